@@ -1,0 +1,1 @@
+"""Programs that fit an instrument's calibration artefact to a recording of it."""

@@ -1,0 +1,1 @@
+"""Tactile optics: from ball presses to the colour a surface slope gives."""

@@ -1,0 +1,1 @@
+"""One plain class per instrument: the near end of each cable."""

@@ -1,0 +1,1 @@
+"""Programs that perform steps on the bench and estimate from the recording."""

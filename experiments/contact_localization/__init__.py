@@ -1,0 +1,1 @@
+"""Which point of the object's surface was touched?"""

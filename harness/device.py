@@ -1,0 +1,108 @@
+"""What an experiment may ask of an instrument. Drivers are plain classes and inherit nothing.
+
+Every method states an intention and may be called twice. Poses are of the flange in the
+robot's base; what the flange carries is the station's business.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from harness.arrays import FloatArray
+from harness.reading import Reading
+
+
+@dataclass(frozen=True, eq=False)
+class ArmState:
+    """One packet of the arm's stream.
+
+    Attributes:
+        time: s on the bench clock, at arrival.
+        joints: ``(6,)`` rad, measured.
+        joint_speeds: ``(6,)`` rad/s, measured.
+        base_from_flange: ``(4, 4)``, the controller's own.
+        wrench: ``(6,)`` N and N m at the flange, in base.
+        safety: ``"normal"``, ``"protective stop"``, ``"emergency stop"`` and so on, in words.
+        moving: whether the arm is executing a motion.
+    """
+
+    time: float
+    joints: FloatArray
+    joint_speeds: FloatArray
+    base_from_flange: FloatArray
+    wrench: FloatArray
+    safety: str
+    moving: bool
+
+
+@dataclass(frozen=True)
+class Health:
+    """How an instrument is doing, for ``touchstone check`` and the report.
+
+    Attributes:
+        name: of the instrument.
+        identity: model and serial number, as the instrument states them.
+        rate: samples a second, measured.
+        drops: samples lost since opening.
+        latency: s, median age of a sample on arrival; None where it cannot be known.
+        detail: anything worth a sentence.
+    """
+
+    name: str
+    identity: str
+    rate: float
+    drops: int
+    latency: float | None
+    detail: str = ""
+
+
+class Arm(Protocol):
+    """A six-joint arm that moves only within the station's limits."""
+
+    def open(self) -> None:
+        """Connect; raises ``BenchFault`` naming the cable or the switch to look at."""
+
+    def close(self) -> None:
+        """Stop, disconnect, release."""
+
+    def state(self) -> ArmState:
+        """The newest state; raises ``BenchFault`` where it is stale."""
+
+    def history(self, seconds: float) -> tuple[Reading, ...]:
+        """Every packet of the last ``seconds``: joints, flange poses, wrenches."""
+
+    def move_joints(self, joints: FloatArray, speed: float, acceleration: float) -> None:
+        """Move to ``(6,)`` rad at rad/s and rad/s^2; returns at rest."""
+
+    def move_line(self, base_from_flange: FloatArray, speed: float, acceleration: float) -> None:
+        """Move the flange in a straight line at m/s and m/s^2; returns at rest."""
+
+    def move_until_contact(self, direction: FloatArray, speed: float, force: float, travel: float) -> bool:
+        """Move along a unit direction in base until ``force`` N resist; False after ``travel`` m without."""
+
+    def zero_force(self) -> None:
+        """Take the present reading of the force sensor as zero; only at rest and out of contact."""
+
+    def set_digital_output(self, index: int, on: bool) -> None:
+        """Switch a tool digital output."""
+
+    def stop(self) -> None:
+        """Stop now, from any thread and in any state."""
+
+    def health(self) -> Health:
+        """Rate, drops and latency since opening."""
+
+
+class TactileCamera(Protocol):
+    """A gel seen from behind, or any camera."""
+
+    def open(self) -> None:
+        """Connect and wait for the first frame."""
+
+    def close(self) -> None:
+        """Release the stream."""
+
+    def read(self, count: int, timeout: float) -> Reading:
+        """The next ``count`` frames that arrive from now on, or ``BenchFault`` after ``timeout`` s."""
+
+    def health(self) -> Health:
+        """Rate, drops and latency since opening."""

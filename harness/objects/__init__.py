@@ -1,0 +1,1 @@
+"""Built-in household objects, modelled procedurally."""

@@ -1,0 +1,1 @@
+"""Reference simulators: one effect or one step of it in each file."""

@@ -1,0 +1,1 @@
+"""A controller that speaks UR's real-time data exchange, dashboard and script ports."""
