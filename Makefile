@@ -1,0 +1,54 @@
+# Everything sets itself up: a machine with Python 3.11, gcc and make needs nothing else.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+RUN := $(VENV)/.installed
+DEV := $(VENV)/.installed-dev
+
+.PHONY: help install demo test lint types contracts bench tables clean
+
+help: ## what can be asked for
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "Touchstone needs Python 3.11 or later; $(PYTHON) is $$($(PYTHON) --version). Say: make PYTHON=python3.11"; exit 2; }
+	@$(PYTHON) -m venv $(VENV) \
+	  || { echo "python3-venv is missing; on Debian: apt-get install python3-venv"; exit 2; }
+
+$(RUN): $(VENV)/bin/python pyproject.toml constraints.txt
+	@echo "installing into $(VENV) (once; a few minutes)"
+	@$(PIP) install --constraint constraints.txt --editable .
+	@touch $@
+
+$(DEV): $(RUN)
+	@$(PIP) install --constraint constraints.txt --editable '.[dev]'
+	@touch $@
+
+install: $(RUN) ## the programs, without the developers' tools
+
+demo: $(RUN) ## localize a contact on the mocked bench, and write the report
+	@$(BIN)/touchstone demo
+
+test: $(DEV) lint types contracts ## everything CI checks
+	@$(BIN)/python -m pytest -m "not benchmark"
+
+lint: $(DEV)
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+
+types: $(DEV)
+	@$(BIN)/mypy
+
+contracts: $(DEV)
+	@$(BIN)/lint-imports
+
+bench: $(DEV) ## timings with their spread, beside the peers
+	@$(BIN)/python -m pytest -m benchmark -s
+
+tables: $(RUN) ## the localization table (long; resumes where it was stopped)
+	@$(BIN)/touchstone tables localization
+
+clean: ## runs, caches and the virtual environment
+	rm -rf $(VENV) runs build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
