@@ -1,0 +1,131 @@
+"""The ``touchstone`` program: a literal table of commands, each imported when it is used.
+
+``--help`` imports none of them; the text beside each name is all it shows.
+"""
+
+import importlib
+import json
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import typer
+from rich.console import Console
+from typer.exceptions import TyperException
+
+from harness.errors import TouchstoneError
+
+
+@dataclass(frozen=True)
+class Command:
+    """Where a command lives, and what it is for."""
+
+    target: str
+    summary: str
+
+
+COMMANDS = {
+    "demo": Command(
+        "experiments.commands.demo:demo",
+        "Localize a contact on the mocked bench from end to end, and write the report.",
+    ),
+    "run": Command(
+        "experiments.commands.run:run",
+        "Run an experiment on a bench; with --resume, go on where one stopped.",
+    ),
+    "replay": Command(
+        "experiments.commands.replay:replay", "Estimate again from a recording alone; no bench is opened."
+    ),
+    "explain": Command(
+        "experiments.commands.explain:explain", "Say which effects a scene calls for, which not, and why."
+    ),
+    "check": Command(
+        "experiments.commands.check:check", "Open every instrument of a station: rate, drops, latency."
+    ),
+    "mock-lab": Command(
+        "experiments.commands.mock_lab:mock_lab", "Keep a mocked bench running, to try drivers on."
+    ),
+    "tables localization": Command(
+        "experiments.commands.tables:localization",
+        "Localization error over objects, seeds and methods; stops and resumes at will.",
+    ),
+}
+
+GROUPS = {"tables": "The tables a paper would print, measured on the mocked bench."}
+
+EPILOG = (
+    "Start with `touchstone demo`. Exit codes: 0 answered; 1 a named failure of the bench or the data; "
+    "2 wrong use; 3 stopped by a safety limit; 130 interrupted."
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit with the code the design promises."""
+    sys.exit(invoke(list(sys.argv[1:] if arguments is None else arguments)))
+
+
+def invoke(arguments: list[str]) -> int:
+    """Run the command line; the exit code instead of an exit."""
+    try:
+        result = _app(_chosen(arguments))(arguments, standalone_mode=False)
+    except TouchstoneError as error:
+        return _report(str(error), error.exit_code, "--json" in arguments)
+    except KeyboardInterrupt:
+        return _report(
+            "interrupted; what is committed is kept, go on with --resume", 130, "--json" in arguments
+        )
+    except TyperException as error:
+        return _report(error.format_message(), error.exit_code, "--json" in arguments)
+    return result if isinstance(result, int) else 0
+
+
+def _chosen(arguments: Sequence[str]) -> str | None:
+    words = [word for word in arguments if not word.startswith("-")][:2]
+    candidates = (" ".join(words), words[0] if words else "")
+    return next((name for name in candidates if name in COMMANDS), None)
+
+
+def _app(chosen: str | None) -> typer.Typer:
+    app = typer.Typer(
+        name="touchstone",
+        help="Touch an object, compare it with its model, estimate, replay.",
+        epilog=EPILOG,
+        no_args_is_help=True,
+        add_completion=False,
+        rich_markup_mode="rich",
+        pretty_exceptions_enable=False,
+    )
+    groups = {name: typer.Typer(help=text, no_args_is_help=True) for name, text in GROUPS.items()}
+    for name, command in COMMANDS.items():
+        *group, last = name.split()
+        parent = groups[group[0]] if group else app
+        body = load(command.target) if name == chosen else _stub
+        parent.command(last, help=None if name == chosen else command.summary, short_help=command.summary)(
+            body
+        )
+    for name, group_app in groups.items():
+        app.add_typer(group_app, name=name)
+    return app
+
+
+def load(target: str) -> Callable[..., Any]:
+    """The object a ``"module:name"`` string names."""
+    module, _, name = target.partition(":")
+    loaded: Callable[..., Any] = vars(importlib.import_module(module))[name]
+    return loaded
+
+
+def _stub() -> None:
+    """Stand in for a command that is listed but not run."""
+
+
+def _report(message: str, code: int, as_json: bool) -> int:
+    Console(stderr=True, highlight=False, soft_wrap=True).print(f"[bold red]error:[/] {_escape(message)}")
+    if as_json:
+        sys.stdout.write(json.dumps({"schema": 1, "error": message, "exit_code": code}) + "\n")
+    return code
+
+
+def _escape(message: str) -> str:
+    return message.replace("[", r"\[")

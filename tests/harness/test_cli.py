@@ -1,0 +1,58 @@
+"""The command line keeps its promises: fast help, exit codes, one JSON object."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from harness.cli import COMMANDS, invoke, load
+
+FORBIDDEN_AT_START = ("torch", "mujoco", "numba", "scipy", "cv2", "matplotlib", "pydantic")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_resolves_and_teaches(name: str) -> None:
+    function = load(COMMANDS[name].target)
+    assert callable(function)
+    assert function.__doc__
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert invoke([*name.split(), "--help"]) == 0
+    assert "Usage" in capsys.readouterr().out
+
+
+def test_help_imports_no_command_and_no_heavy_library() -> None:
+    program = (
+        "import sys; from harness.cli import invoke; invoke(['--help'])\n"
+        f"print([m for m in {FORBIDDEN_AT_START!r} if m in sys.modules], file=sys.stderr)\n"
+        "print([m for m in sys.modules if m.startswith('experiments')], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr.split("\n")[:2] == ["[]", "[]"]
+
+
+def test_wrong_use_exits_with_2() -> None:
+    assert invoke(["no-such-command"]) == 2
+    assert invoke(["run", "--no-such-option"]) == 2
+
+
+def test_json_is_one_object_even_for_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    code = invoke(["explain", "no_such_scene.toml", "--json"])
+    captured = capsys.readouterr()
+    answer = json.loads(captured.out)
+    assert code == answer["exit_code"] == 2
+    assert "no_such_scene.toml" in answer["error"]
+    assert "error" in captured.err
+
+
+def test_nothing_at_the_bench_imports_torch() -> None:
+    targets = [command.target for command in COMMANDS.values()]
+    program = (
+        "import sys; from harness.cli import load\n"
+        f"[load(t) for t in {targets!r}]\n"
+        "assert 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
