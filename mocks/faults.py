@@ -1,0 +1,85 @@
+"""Faults on cue: what goes wrong at the far end of a cable, and until when.
+
+A cue is one JSON object, ``{"instrument": "gel", "kind": "stall", "seconds": 2}``. Without
+``seconds`` the fault lasts until the same instrument is cued ``{"kind": "none"}``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.arrays import ByteArray
+from harness.clock import now
+from harness.errors import WrongUse
+
+CAMERA_KINDS = ("none", "stall", "truncate", "drop", "freeze", "saturate")
+"""stall: nothing is sent. truncate: half of each JPEG is sent. drop: connections are reset and
+refused. freeze: the last frame again and again. saturate: an overexposed picture."""
+
+ARM_KINDS = ("protective_stop", "drop", "freeze")
+"""protective_stop: the controller stops the arm. drop: connections are closed. freeze: the stream halts."""
+
+KINDS = {"gel": CAMERA_KINDS, "camera": CAMERA_KINDS, "arm": ARM_KINDS}
+
+_KEYS = ("instrument", "kind", "seconds")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One cue.
+
+    Attributes:
+        instrument: ``"gel"``, ``"camera"`` or ``"arm"``.
+        kind: of the instrument's ``KINDS``.
+        seconds: how long; None until it is cleared.
+    """
+
+    instrument: str
+    kind: str
+    seconds: float | None = None
+
+
+def parse(cue: Mapping[str, object]) -> Fault:
+    """The fault a cue asks for.
+
+    Raises:
+        WrongUse: an unknown key, instrument or kind, or a duration that is not above zero.
+    """
+    unknown = sorted(set(cue) - set(_KEYS))
+    if unknown:
+        raise WrongUse(f"a fault has the keys {', '.join(_KEYS)}; it has no {', '.join(unknown)}")
+    instrument, kind, seconds = cue.get("instrument"), cue.get("kind"), cue.get("seconds")
+    if not isinstance(instrument, str) or instrument not in KINDS:
+        raise WrongUse(f"no instrument {instrument!r} to put a fault into; there are {', '.join(KINDS)}")
+    if not isinstance(kind, str) or kind not in KINDS[instrument]:
+        raise WrongUse(f"the {instrument} has no fault {kind!r}; it has {', '.join(KINDS[instrument])}")
+    if seconds is None:
+        return Fault(instrument, kind)
+    if not isinstance(seconds, int | float) or isinstance(seconds, bool) or not 0.0 < seconds < np.inf:
+        raise WrongUse(f"a fault of {seconds!r} s; it lasts a finite number of seconds above zero")
+    return Fault(instrument, kind, float(seconds))
+
+
+class ActiveFault:
+    """The fault a camera has at present."""
+
+    def __init__(self) -> None:
+        self._kind = "none"
+        self._until = np.inf
+
+    def set(self, fault: Fault) -> None:
+        """Begin ``fault``, in place of any other."""
+        self._kind = fault.kind
+        self._until = np.inf if fault.seconds is None else now() + fault.seconds
+
+    @property
+    def kind(self) -> str:
+        """Of the fault now, ``"none"`` where all is well."""
+        return self._kind if now() < self._until else "none"
+
+
+def saturated(image: ByteArray) -> ByteArray:
+    """An overexposed ``(rows, columns, 3)`` picture: four times the light, clipped by the sensor."""
+    bright: ByteArray = np.minimum(image.astype(np.uint16) * 4, 255).astype(np.uint8)
+    return bright
