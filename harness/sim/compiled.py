@@ -1,0 +1,22 @@
+"""Machine code for the loops that numpy would run as temporaries."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def compiled(function: _F) -> _F:
+    """The function compiled on first call, kept on disk, holding no lock while it runs."""
+    return cast(_F, numba.njit(cache=True, nogil=True)(function))
+
+
+def compiled_fast(function: _F) -> _F:
+    """As ``compiled``, free to reorder sums and fuse products: for levels that state an error.
+
+    Infinities and NaN keep their meaning; only rounding may differ.
+    """
+    flags = {"contract", "arcp", "nsz", "reassoc"}
+    return cast(_F, numba.njit(cache=True, nogil=True, fastmath=flags)(function))
