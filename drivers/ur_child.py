@@ -1,0 +1,290 @@
+"""The process that owns ur_rtde: ``python -m drivers.ur_child`` with frames on its standard streams.
+
+The parent may kill it at any moment: the controller's watchdog then stops the arm. When the
+parent dies, its end of the pipe closes, and this process stops the arm and ends.
+"""
+
+import argparse
+import contextlib
+import os
+import queue
+import signal
+import sys
+import threading
+from typing import Final
+
+from drivers import dashboard, pipe
+from drivers.safety import require_loopback
+from drivers.ur_link import Link
+from drivers.ur_motion import Motion, Outcome
+from drivers.ur_stream import Stream
+from harness.arrays import FloatArray
+from harness.clock import now
+from harness.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
+
+KICK_PERIOD: Final = 0.02  # s; five kicks in the 0.1 s that the watchdog waits
+TICK: Final = 0.002  # s between looks at a motion
+REST_TICK: Final = 0.01
+STALE: Final = 0.05  # s without a packet: nothing is commanded, the watchdog is not kicked
+LOST_MOVING: Final = 0.5  # s without a packet during a motion: give up
+LOST_AT_REST: Final = 2.0
+BEAT_LATE: Final = 0.15  # s without a heartbeat during a motion: stop
+LAST_WORDS: Final = 1.5  # s that this process may take to stop the arm when its parent is gone
+
+
+class Child:
+    """Serves requests one by one; one motion at a time; a stop request at any moment."""
+
+    def __init__(self, link: Link, requests: int, replies: int) -> None:
+        self._link = link
+        self._requests = requests
+        self._replies = replies
+        self._inbox: queue.SimpleQueue[pipe.Message | None] = queue.SimpleQueue()
+        self._stream = Stream(link, self._send_packet, lambda: self._inbox.put(None))
+        self._motion: Motion | None = None
+        self._latched: TouchstoneError | None = None
+        self._closed = False
+        self._epoch = 0
+        self._beat = now()
+        self._kicked = 0.0
+
+    def run(self, model: str) -> None:
+        """Connect, then serve until the parent closes the pipe or the link is lost."""
+        threading.Thread(target=self._read, name="requests", daemon=True).start()
+        try:
+            controller = self._link.connect(model)
+        except TouchstoneError as error:
+            self._refuse(0, error)
+            return
+        self._stream.start()
+        self._answer(0, [controller.model, controller.serial, controller.version])
+        try:
+            while not self._closed:
+                self._tick()
+        except (TouchstoneError, RuntimeError) as error:
+            self._give_up(error)
+        finally:
+            self._leave()
+
+    def _tick(self) -> None:
+        message = self._next()
+        if message is not None:
+            self._serve(message)
+        self._check_link()
+        self._check_safety()
+        if self._motion is not None:
+            self._watch(self._motion)
+        self._kick()
+
+    def _next(self) -> pipe.Message | None:
+        with contextlib.suppress(queue.Empty):
+            return self._inbox.get(timeout=TICK if self._motion else REST_TICK)
+        return None
+
+    # Requests
+
+    def _serve(self, message: pipe.Message) -> None:
+        try:
+            match message["do"]:
+                case "stop":
+                    self._stop(message)
+                case "move":
+                    self._start(message)
+                case "zero_force":
+                    self._zero_force()
+                    self._answer(message["id"], True)
+                case "tool_output":
+                    self._link.set_tool_output(message["index"], message["on"])
+                    self._answer(message["id"], True)
+                case unknown:
+                    raise BenchFault(f"the arm's process was asked to '{unknown}', which it does not know")
+        except TouchstoneError as error:
+            self._refuse(message["id"], error)
+
+    def _stop(self, message: pipe.Message) -> None:
+        if self._motion is not None:
+            self._motion.stop(
+                self._link, Outcome(error=SafetyStop(f"{self._motion.what} was stopped by request"))
+            )
+        self._answer(message["id"], True)
+
+    def _start(self, message: pipe.Message) -> None:
+        if message["epoch"] < self._epoch:
+            raise SafetyStop("a stop was requested before this motion began; it was not sent")
+        self._require_calm("move")
+        motion = Motion.from_message(message, self._stream.force)
+        if motion.pose is not None and not self._link.reachable(motion.pose, motion.near):
+            raise BenchFault(
+                f"{motion.what}: the controller finds no joints for the target; nothing was moved"
+            )
+        self._beat = now()
+        self._stream.watch(motion.guard)
+        self._stream.moving = True
+        self._motion = motion
+        try:
+            motion.start(self._link)
+        except TouchstoneError:
+            self._end_motion()
+            raise
+
+    def _zero_force(self) -> None:
+        self._require_calm("zero the force sensor")
+        if not self._stream.at_rest:
+            raise BenchFault("the force sensor was not zeroed: the arm is not at rest; wait and ask again")
+        self._link.zero_force()
+
+    def _require_calm(self, what: str) -> None:
+        if self._latched is not None:
+            raise self._latched
+        if self._motion is not None:
+            raise BenchFault(f"the arm was asked to {what} during a motion; wait for it to end")
+        if self._stream.age > STALE:
+            raise BenchFault(
+                f"the arm was asked to {what}, but its state is {1e3 * self._stream.age:.0f} ms old "
+                f"(limit {1e3 * STALE:.0f} ms); check the load of this computer and the network"
+            )
+
+    # What goes on meanwhile
+
+    def _watch(self, motion: Motion) -> None:
+        late = now() - self._beat
+        if late > BEAT_LATE and not motion.stopping:
+            text = (
+                f"{motion.what} was stopped: the program that asked for it fell behind by {1e3 * late:.0f} ms"
+            )
+            motion.stop(self._link, Outcome(error=BenchFault(text)))
+        outcome = motion.look(self._link, self._stream)
+        if outcome is None:
+            return
+        self._end_motion()
+        if outcome.latch:
+            dashboard.stop(self._link.address)
+            self._latched = outcome.error
+        if outcome.error is not None:
+            self._refuse(motion.id, outcome.error)
+        else:
+            self._answer(motion.id, outcome.value)
+
+    def _end_motion(self) -> None:
+        self._motion = None
+        self._stream.moving = False
+        self._stream.watch(None)
+
+    def _check_safety(self) -> None:
+        """Latch a stop of the controller's, and end the program, so that no release resumes the motion."""
+        safety = self._stream.safety
+        if safety in ("normal", "reduced") or isinstance(self._latched, ProtectiveStop):
+            return
+        self._latched = _controller_stop(safety, self._stream.newest, self._motion)
+        if self._motion is not None:
+            self._refuse(self._motion.id, self._latched)
+            self._end_motion()
+        with contextlib.suppress(BenchFault):
+            dashboard.stop(self._link.address)
+
+    def _check_link(self) -> None:
+        if self._stream.failure:
+            raise BenchFault(f"the arm's state stream ended: {self._stream.failure}")
+        limit = LOST_MOVING if self._motion else LOST_AT_REST
+        if self._stream.age > limit:
+            raise BenchFault(
+                f"no state arrived from the arm for {self._stream.age:.1f} s (limit {limit:g} s); "
+                "check the network cable of the control box"
+            )
+        if self._stream.age > STALE and not self._link.connected():
+            raise BenchFault(
+                "the controller closed the connection; check the network cable of the control box"
+            )
+
+    def _kick(self) -> None:
+        if now() - self._kicked < KICK_PERIOD or self._stream.age > STALE:
+            return
+        self._link.kick()
+        self._kicked = now()
+
+    # The pipe
+
+    def _read(self) -> None:
+        with contextlib.suppress(OSError):
+            for _, payload in pipe.read_frames(self._requests):
+                message = pipe.unpack_message(payload)
+                if message["do"] == "beat":
+                    self._beat = now()
+                    continue
+                if message["do"] == "stop":
+                    self._epoch = max(self._epoch, message["epoch"])
+                self._inbox.put(message)
+        self._closed = True
+        self._inbox.put(None)
+        threading.Timer(LAST_WORDS, self._stop_hard).start()
+
+    def _stop_hard(self) -> None:
+        """The main thread is stuck in the library, and nobody is left to kill it."""
+        with contextlib.suppress(BenchFault):
+            dashboard.stop(self._link.address)
+        os._exit(1)
+
+    def _send_packet(self, packet: FloatArray) -> None:
+        pipe.write_now(self._replies, pipe.packet_frame(packet))
+
+    def _answer(self, request: int, value: object) -> None:
+        self._reply({"id": request, "ok": True, "value": value})
+
+    def _refuse(self, request: int, error: TouchstoneError) -> None:
+        self._reply({"id": request, "ok": False, "error": type(error).__name__, "text": str(error)[:2000]})
+
+    def _reply(self, message: pipe.Message) -> None:
+        with contextlib.suppress(pipe.PipeBroken):
+            pipe.write_within(self._replies, pipe.message_frame(message), 0.5)
+
+    # The end
+
+    def _give_up(self, error: Exception) -> None:
+        with contextlib.suppress(BenchFault):
+            dashboard.stop(self._link.address)
+        fault = error if isinstance(error, TouchstoneError) else BenchFault(f"ur_rtde failed: {error}")
+        self._reply({"id": -1, "ok": False, "error": type(fault).__name__, "text": str(fault)[:2000]})
+
+    def _leave(self) -> None:
+        """Stop, end the script. Sockets are closed by the exit: disconnecting takes 0.5 s an interface."""
+        with contextlib.suppress(TouchstoneError, RuntimeError):
+            if self._motion is not None:
+                self._motion.stop(self._link, Outcome(error=SafetyStop("the program ended")))
+                end = now() + 0.5
+                while not self._stream.at_rest and now() < end:
+                    self._kick()
+                    threading.Event().wait(TICK)
+            if self._link.program_running():
+                self._link.end_script()
+
+
+def _controller_stop(safety: str, packet: FloatArray, motion: Motion | None) -> ProtectiveStop:
+    x, y, z = 1e3 * packet[pipe.FIELDS["pose"]][:3]
+    force = packet[pipe.FIELDS["wrench"]][:3]
+    during = f"during {motion.what}" if motion is not None else "at rest"
+    return ProtectiveStop(
+        f"the controller stopped the arm {during}: {safety}; flange at ({x:.1f}, {y:.1f}, {z:.1f}) mm in "
+        f"base, force ({force[0]:.1f}, {force[1]:.1f}, {force[2]:.1f}) N. Look for the cause, free the arm "
+        "and release the stop at the pendant, then start again; nothing resumes by itself"
+    )
+
+
+def main() -> None:
+    """Serve one arm until standard input closes."""
+    parser = argparse.ArgumentParser(description="Owns ur_rtde for one arm; started by the arm driver.")
+    parser.add_argument("--address", required=True)
+    parser.add_argument("--model", required=True)
+    parser.add_argument("--rate", type=float, required=True)
+    arguments = parser.parse_args()
+    require_loopback(arguments.address)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
+    replies = os.dup(sys.stdout.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # ur_rtde prints; that must not enter the frames
+    pipe.prepare_to_write(replies)
+    child = Child(Link(arguments.address, arguments.rate), sys.stdin.fileno(), replies)
+    child.run(arguments.model)
+    os._exit(0)  # the library's destructors race with its threads and crash
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+"""From packets of the arm's stream to states and readings; UR's rotation vectors end here."""
+
+import numpy as np
+
+from drivers import pipe, ur_words
+from harness.arrays import FloatArray
+from harness.device import ArmState
+from harness.geometry import (
+    quaternion_from_rotation,
+    rotation_from_vector,
+    transform,
+    vector_from_rotation,
+)
+from harness.reading import Channel, Reading
+
+
+def pose_vector(base_from_flange: FloatArray) -> list[float]:
+    """UR's (x, y, z, rx, ry, rz) of a ``(4, 4)`` pose: metres and a rotation vector in rad."""
+    return [*base_from_flange[:3, 3].tolist(), *vector_from_rotation(base_from_flange[:3, :3]).tolist()]
+
+
+def pose_quaternion(pose: FloatArray) -> FloatArray:
+    """``(7,)`` x, y, z, qw, qx, qy, qz of UR's ``(6,)`` pose vector."""
+    return np.concatenate([pose[:3], quaternion_from_rotation(rotation_from_vector(pose[3:]))])
+
+
+def arm_state(packet: FloatArray) -> ArmState:
+    """The state that a ``(pipe.WIDTH,)`` packet holds."""
+    fields = pipe.FIELDS
+    pose = packet[fields["pose"]]
+    return ArmState(
+        time=float(packet[0]),
+        joints=packet[fields["joints"]],
+        joint_speeds=packet[fields["joint_speeds"]],
+        base_from_flange=transform(rotation_from_vector(pose[3:]), pose[:3]),
+        wrench=packet[fields["wrench"]],
+        safety=ur_words.safety_words(int(packet[fields["safety_bits"]][0])),
+        moving=bool(packet[fields["moving"]][0]),
+    )
+
+
+def readings(packets: FloatArray, rate: float) -> tuple[Reading, ...]:
+    """Joints, flange poses, wrenches and the controller's clock of ``(n, pipe.WIDTH)`` packets."""
+    poses = np.array([pose_quaternion(row) for row in packets[:, pipe.FIELDS["pose"]]]).reshape(-1, 7)
+    columns = (
+        ("arm.joints", "rad", "", packets[:, pipe.FIELDS["joints"]]),
+        ("arm.base_from_flange", "m, 1", "base", poses),
+        ("arm.wrench", "N, N m", "base", packets[:, pipe.FIELDS["wrench"]]),
+        ("arm.controller_time", "s", "", packets[:, pipe.FIELDS["controller_time"]][:, 0]),
+    )
+    return tuple(
+        Reading(Channel(name, unit, values.shape[1:], "float64", frame, rate), packets[:, 0], values)
+        for name, unit, frame, values in columns
+    )
