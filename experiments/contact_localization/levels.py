@@ -1,0 +1,27 @@
+"""What the estimate's accuracy costs: the dials of its method."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Method = Literal["grid", "particle"]
+
+
+@dataclass(frozen=True)
+class Levels:
+    """One choice of every dial.
+
+    Attributes:
+        method: ``"grid"``, the exact posterior refined; ``"particle"``, the paper's filter.
+        spacing: metres between the surface's samples.
+        particles: of the paper's filter.
+        block: tactile pixels averaged into one of the compared map, each way.
+        rounds: of refinement; 0 answers from the grid.
+        samples: hypotheses drawn in each round where the yaw is known; four times as many where not.
+    """
+
+    method: Method = "grid"
+    spacing: float = 2.0e-3
+    particles: int = 1000
+    block: int = 8
+    rounds: int = 3
+    samples: int = 600

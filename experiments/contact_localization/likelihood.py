@@ -1,0 +1,212 @@
+"""How well a hypothesis agrees with where the contacts were and how the tool stood.
+
+A hypothesis is a surface sample for one contact, the *anchor*, and a yaw of the object. The
+arm's relative translations then say where every other contact was: each must lie on the
+surface, and the tool must have stood near the normal there.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.surface import Surface
+from harness.arrays import AnyArray, FloatArray, IntArray
+from harness.sim.compiled import compiled
+
+
+@dataclass(frozen=True)
+class GeometryNoise:
+    """How far a contact may lie from the surface that the arm puts it on.
+
+    Attributes:
+        gap: metres, one sigma: arm, gel centre, shape.
+        gap_per_metre: metres of sigma for each metre between the contact and the anchor: the
+            object's scale and tilt.
+        free_angle: rad between tool and normal that cost nothing: the planner may tilt so far.
+        angle: rad, one sigma beyond it.
+        cap: the most that one contact may cost, nats; a slipped contact costs no more.
+    """
+
+    gap: float = 0.8e-3
+    gap_per_metre: float = 8.0e-3
+    free_angle: float = np.radians(16.0)
+    angle: float = np.radians(2.0)
+    cap: float = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangement:
+    """The contacts relative to the anchor, for every yaw, in the object's frame.
+
+    Attributes:
+        anchor: index of the contact that hypotheses place on the surface.
+        offsets: ``(yaws, contacts, 3)`` metres from the anchor.
+        axes: ``(yaws, contacts, 3)`` unit: where the tool pointed.
+    """
+
+    anchor: int
+    offsets: FloatArray
+    axes: FloatArray
+
+    def gap_sigmas(self, noise: GeometryNoise) -> FloatArray:
+        """``(contacts,)`` metres."""
+        lengths = np.linalg.norm(self.offsets[0], axis=1)
+        return np.asarray(np.hypot(noise.gap, noise.gap_per_metre * lengths))
+
+
+def arrange(
+    object_from_base: FloatArray, points_in_base: FloatArray, axes_in_base: FloatArray, anchor: int
+) -> Arrangement:
+    """Contacts relative to the anchor.
+
+    Args:
+        object_from_base: ``(yaws, 3, 3)`` rotations.
+        points_in_base: ``(contacts, 3)`` metres; only their differences are used.
+        axes_in_base: ``(contacts, 3)`` unit.
+        anchor: index of a contact.
+    """
+    relative = points_in_base - points_in_base[anchor]
+    offsets = np.einsum("yij,kj->yki", object_from_base, relative)
+    axes = np.einsum("yij,kj->yki", object_from_base, axes_in_base)
+    return Arrangement(anchor, np.ascontiguousarray(offsets), np.ascontiguousarray(axes))
+
+
+def possible_anchors(
+    surface: Surface, arrangement: Arrangement, noise: GeometryNoise, use_axis: bool
+) -> tuple[IntArray, IntArray]:
+    """The (sample, yaw) pairs at which the tool could have stood at the anchor."""
+    pairs = (len(surface.points), len(arrangement.axes))
+    if not use_axis:
+        samples, yaws = np.divmod(np.arange(pairs[0] * pairs[1]), pairs[1])
+        return samples, yaws
+    facing = -surface.normals @ arrangement.axes[:, arrangement.anchor].T
+    limit = noise.free_angle + noise.angle * np.sqrt(2.0 * noise.cap)
+    samples, yaws = np.nonzero(facing > np.cos(limit))
+    return samples.astype(np.int64), yaws.astype(np.int64)
+
+
+def geometry_terms(
+    surface: Surface,
+    arrangement: Arrangement,
+    samples: IntArray,
+    yaws: IntArray,
+    noise: GeometryNoise,
+    use_axis: bool,
+) -> FloatArray:
+    """Log-likelihood of each contact's place (and tool axis) under each hypothesis.
+
+    Args:
+        surface: of the object.
+        arrangement: the contacts.
+        samples: ``(n,)`` sample index of the anchor.
+        yaws: ``(n,)`` yaw index.
+        noise: of the terms.
+        use_axis: whether the tool's attitude counts, or only places.
+
+    Returns:
+        ``(n, contacts)`` nats, between ``-noise.cap`` and 0.
+    """
+    table = surface.table
+    return _geometry_terms(
+        surface.points,
+        surface.normals,
+        surface.neighbours,
+        surface.spacing,
+        table.nearest,
+        table.origin,
+        table.pitch,
+        arrangement.offsets,
+        arrangement.axes,
+        arrangement.anchor,
+        samples,
+        yaws,
+        arrangement.gap_sigmas(noise),
+        noise.free_angle,
+        noise.angle,
+        noise.cap,
+        use_axis,
+    )
+
+
+@compiled
+def _fit(
+    points: FloatArray,
+    normals: FloatArray,
+    spacing: float,
+    sample: int,
+    x: float,
+    y: float,
+    z: float,
+    axis: FloatArray,
+    sigma: float,
+    free_angle: float,
+    angle: float,
+    use_axis: bool,
+) -> float:
+    dx, dy, dz = x - points[sample, 0], y - points[sample, 1], z - points[sample, 2]
+    nx, ny, nz = normals[sample, 0], normals[sample, 1], normals[sample, 2]
+    out = dx * nx + dy * ny + dz * nz
+    # Between samples the surface goes on: only what exceeds their spacing is off the surface.
+    along = max(0.0, np.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - out * out)) - spacing)
+    cost = (out * out + along * along) / (sigma * sigma)
+    if use_axis:
+        facing = -(nx * axis[0] + ny * axis[1] + nz * axis[2])
+        if facing < np.cos(free_angle):
+            cost += ((np.arccos(max(-1.0, facing)) - free_angle) / angle) ** 2
+    return float(-0.5 * cost)
+
+
+@compiled
+def _geometry_terms(
+    points: FloatArray,
+    normals: FloatArray,
+    neighbours: AnyArray,
+    spacing: float,
+    nearest: AnyArray,
+    origin: FloatArray,
+    pitch: float,
+    offsets: FloatArray,
+    axes: FloatArray,
+    anchor: int,
+    samples: IntArray,
+    yaws: IntArray,
+    sigmas: FloatArray,
+    free_angle: float,
+    angle: float,
+    cap: float,
+    use_axis: bool,
+) -> FloatArray:
+    contacts = offsets.shape[1]
+    terms = np.empty((len(samples), contacts))
+    for n in range(len(samples)):
+        i, j = samples[n], yaws[n]
+        for k in range(contacts):
+            x = points[i, 0] + offsets[j, k, 0]
+            y = points[i, 1] + offsets[j, k, 1]
+            z = points[i, 2] + offsets[j, k, 2]
+            a = int(np.floor((x - origin[0]) / pitch))
+            b = int(np.floor((y - origin[1]) / pitch))
+            c = int(np.floor((z - origin[2]) / pitch))
+            inside = 0 <= a < nearest.shape[0] and 0 <= b < nearest.shape[1] and 0 <= c < nearest.shape[2]
+            sample = -1
+            if k == anchor:
+                sample = i
+            elif inside:
+                sample = nearest[a, b, c]
+            if sample < 0:
+                terms[n, k] = -cap
+                continue
+            axis = axes[j, k]
+            best = _fit(
+                points, normals, spacing, sample, x, y, z, axis, sigmas[k], free_angle, angle, use_axis
+            )
+            # Near an edge the nearest sample may lie on the other face.
+            if use_axis and k != anchor and best < -0.5:
+                for m in range(neighbours.shape[1]):
+                    other = neighbours[sample, m]
+                    fit = _fit(
+                        points, normals, spacing, other, x, y, z, axis, sigmas[k], free_angle, angle, use_axis
+                    )
+                    best = max(best, fit)
+            terms[n, k] = max(best, -cap)
+    return terms

@@ -1,0 +1,68 @@
+"""What an estimator is given beside the readings: the object, the sensor and what is believed of the pose."""
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from experiments.contact_localization.surface import Surface, sample_surface
+from harness.arrays import FloatArray, read_only
+from harness.errors import WrongUse
+from harness.geometry import rotation_about
+from harness.mesh import Mesh
+from harness.sensor import TactileSensor
+from harness.sim.height_map import RasterMesh
+
+_VERTICAL = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is believed of the object's orientation. Its position is never given.
+
+    Attributes:
+        base_from_object: ``(3, 3)`` nominal rotation.
+        yaw: ``"known"`` to ``yaw_sigma``, or ``"unknown"``: upright, turned by any angle.
+        yaw_sigma: rad, about the vertical of the base, where the yaw is known.
+    """
+
+    base_from_object: FloatArray
+    yaw: Literal["known", "unknown"] = "known"
+    yaw_sigma: float = np.radians(1.5)
+
+    def __post_init__(self) -> None:
+        rotation = np.asarray(self.base_from_object, dtype=np.float64)
+        if rotation.shape != (3, 3) or not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6):
+            raise WrongUse("the prior's base_from_object must be a (3, 3) rotation; pass pose[:3, :3]")
+        object.__setattr__(self, "base_from_object", read_only(rotation.copy()))
+
+    def object_from_base(self, yaws: FloatArray) -> FloatArray:
+        """``(n, 3, 3)`` rotations for ``(n,)`` yaws in rad away from the nominal one."""
+        turned = [self.base_from_object.T @ rotation_about(_VERTICAL, -float(yaw)) for yaw in yaws]
+        return np.array(turned)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The object and the sensor as the estimator knows them.
+
+    Attributes:
+        mesh: of the object, in metres.
+        sensor: its geometry.
+        calibration: of its colours, fitted to presses of this sensor.
+    """
+
+    mesh: Mesh
+    sensor: TactileSensor
+    calibration: Any
+    raster: RasterMesh = field(init=False, repr=False)
+    _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "raster", RasterMesh(self.mesh))
+
+    def surface(self, spacing: float) -> Surface:
+        """The object's samples ``spacing`` metres apart, made on first use."""
+        if spacing not in self._surfaces:
+            self._surfaces[spacing] = sample_surface(self.mesh, spacing)
+        return self._surfaces[spacing]

@@ -1,0 +1,159 @@
+"""Where a flat sensor can be pressed on an object, and which of these places a run visits."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from experiments.contact_localization.surface import random_points
+from experiments.contact_localization.view import window_depth
+from harness.arrays import FloatArray, read_only
+from harness.errors import WrongUse
+from harness.geometry import apply, frame_facing, rotation_about, transform
+from harness.sensor import TactileSensor
+from harness.sim.height_map import RasterMesh
+
+Steps = Literal["close", "spread"]
+Reachable = Callable[[FloatArray], bool]
+
+LONGEST_CLOSE_STEP = 25.0e-3
+SHORTEST_STEP = 3.0e-3
+MOST_TILT = np.radians(15.0)
+PRESS = (0.5e-3, 2.0e-3)
+MOST_PENETRATION = 2.5e-3
+_LOWEST_TOOL = 0.25
+_PATIENCE = 6000
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """One planned contact.
+
+    Attributes:
+        base_from_gel: ``(4, 4)``: the gel when it is fully pressed, were the object where the
+            plan believes it to be.
+        press: metres to travel from the first touch to there.
+        point_in_object: ``(3,)`` metres: the planned contact.
+        tilt: rad between the tool and the surface's normal.
+    """
+
+    base_from_gel: FloatArray
+    press: float
+    point_in_object: FloatArray
+    tilt: float
+
+
+def from_above_or_aside(base_from_gel: FloatArray) -> bool:
+    """Whether the tool points down, level, or at most 14 degrees up: what an arm beside an object can do."""
+    return bool(base_from_gel[2, 2] < _LOWEST_TOOL)
+
+
+def plan_sites(
+    raster: RasterMesh,
+    sensor: TactileSensor,
+    base_from_object: FloatArray,
+    count: int,
+    steps: Steps,
+    seed: int,
+    reachable: Reachable = from_above_or_aside,
+) -> tuple[Site, ...]:
+    """Contacts to make, drawn at random among those that the sensor's housing allows.
+
+    Args:
+        raster: the object, in metres.
+        sensor: whose flat housing must fit.
+        base_from_object: ``(4, 4)`` nominal pose.
+        count: contacts.
+        steps: ``"close"``: each within 25 mm of the one before; ``"spread"``: anywhere.
+        seed: of the draws; the same seed gives the same sites.
+        reachable: whether the arm can take the gel there without a collision.
+
+    Raises:
+        WrongUse: the object has no such places.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(20):
+        sites = _chain(raster, sensor, base_from_object, count, steps, rng, reachable)
+        if len(sites) == count:
+            return tuple(sites)
+    raise WrongUse(
+        f"no {count} places with {steps} steps were found where a flat housing of "
+        f"{sensor.housing[0] * 1e3:g} x {sensor.housing[1] * 1e3:g} mm fits; "
+        "ask for fewer contacts, spread steps, or another pose of the object"
+    )
+
+
+def _chain(
+    raster: RasterMesh,
+    sensor: TactileSensor,
+    base_from_object: FloatArray,
+    count: int,
+    steps: Steps,
+    rng: np.random.Generator,
+    reachable: Reachable,
+) -> list[Site]:
+    sites: list[Site] = []
+    tries = 0
+    while len(sites) < count and tries < _PATIENCE:
+        points, faces = random_points(raster.mesh, 256, rng)
+        tries += len(points)
+        for point, normal in zip(points, raster.mesh.face_normals[faces], strict=True):
+            if len(sites) == count:
+                break
+            if not _may_follow(point, sites, steps):
+                continue
+            site = try_site(raster, sensor, base_from_object, point, normal, rng)
+            if site is not None and reachable(site.base_from_gel):
+                sites.append(site)
+    return sites
+
+
+def _may_follow(point: FloatArray, sites: list[Site], steps: Steps) -> bool:
+    if not sites:
+        return True
+    gaps = np.array([np.linalg.norm(point - site.point_in_object) for site in sites])
+    if gaps.min() < SHORTEST_STEP:
+        return False
+    return steps == "spread" or bool(gaps[-1] <= LONGEST_CLOSE_STEP)
+
+
+def try_site(
+    raster: RasterMesh,
+    sensor: TactileSensor,
+    base_from_object: FloatArray,
+    point_in_object: FloatArray,
+    normal_in_object: FloatArray,
+    rng: np.random.Generator,
+) -> Site | None:
+    """A press at a point with a random tilt, sensor yaw and depth; None where it does not fit.
+
+    It fits where the tool, coming straight in, meets the point first at its centre line and
+    where no part of the object reaches 2.5 mm behind the gel's plane anywhere under the
+    housing.
+    """
+    tilt = float(np.arccos(rng.uniform(np.cos(MOST_TILT), 1.0)))
+    aside = frame_facing(-normal_in_object, rng.uniform(0.0, 2.0 * np.pi))
+    axis = rotation_about(aside[:, 0], tilt) @ -normal_in_object
+    object_from_gel = frame_facing(axis / np.linalg.norm(axis), rng.uniform(0.0, 2.0 * np.pi))
+    indentation = rng.uniform(*PRESS)
+    heights = -window_depth(raster, object_from_gel, point_in_object, sensor.housing, 0.5e-3)
+    rows, columns = heights.shape
+    centre = heights[rows // 2, columns // 2]
+    if not abs(centre) < 0.3e-3 or heights.max() + indentation > MOST_PENETRATION:
+        return None
+    window_columns, window_rows = (round(side / 0.5e-3 / 2.0) for side in sensor.window)
+    under_gel = heights[
+        rows // 2 - window_rows : rows // 2 + window_rows + 1,
+        columns // 2 - window_columns : columns // 2 + window_columns + 1,
+    ]
+    gel_in_object = point_in_object + indentation * object_from_gel[:, 2]
+    base_from_gel = transform(
+        base_from_object[:3, :3] @ object_from_gel, apply(base_from_object, gel_in_object[None])[0]
+    )
+    return Site(
+        read_only(base_from_gel),
+        float(under_gel.max() + indentation),
+        read_only(np.array(point_in_object)),
+        tilt,
+    )

@@ -1,0 +1,51 @@
+"""Pictures of an object along the tool: for the touch term, and for where a housing fits."""
+
+import numpy as np
+
+from experiments.contact_localization.touch import View
+from harness.arrays import FloatArray, read_only
+from harness.geometry import transform
+from harness.sim.height_map import RasterMesh, depth_image
+
+_MARGIN = 2
+"""Pixels around the object, so that a rounded place never leaves the picture by itself."""
+
+
+def view_along(raster: RasterMesh, object_from_gel: FloatArray, pitch: float) -> View:
+    """The object as the gel would meet it, everywhere at once.
+
+    Args:
+        raster: the object.
+        object_from_gel: ``(3, 3)`` rotation; its third column is the way the tool points.
+        pitch: metres a pixel.
+    """
+    in_view = raster.mesh.vertices[np.unique(raster.mesh.faces)] @ object_from_gel
+    low, high = in_view.min(axis=0)[:2], in_view.max(axis=0)[:2]
+    columns, rows = np.ceil((high - low) / pitch).astype(np.int64) + 2 * _MARGIN
+    centre = 0.5 * (low + high)
+    view_from_object = transform(object_from_gel.T, np.array([-centre[0], -centre[1], 0.0]))
+    depth = depth_image(raster, view_from_object, pitch, int(rows), int(columns)).depth
+    origin = centre - 0.5 * pitch * np.array([columns - 1.0, rows - 1.0])
+    missing = np.full(depth.shape, np.nan)
+    return View(read_only(object_from_gel.copy()), read_only(origin), pitch, depth, missing, missing.copy())
+
+
+def window_depth(
+    raster: RasterMesh,
+    object_from_gel: FloatArray,
+    centre_in_object: FloatArray,
+    size: tuple[float, float],
+    pitch: float,
+) -> FloatArray:
+    """``(rows, columns)`` metres along the tool from a centre to the first surface; inf where none.
+
+    Args:
+        raster: the object.
+        object_from_gel: ``(3, 3)`` rotation; its third column is the way the tool points.
+        centre_in_object: ``(3,)`` metres, under the middle pixel.
+        size: metres (x, y); both sides get an odd number of pixels.
+        pitch: metres a pixel.
+    """
+    columns, rows = (2 * round(0.5 * side / pitch) + 1 for side in size)
+    view_from_object = transform(object_from_gel.T, -object_from_gel.T @ centre_in_object)
+    return depth_image(raster, view_from_object, pitch, rows, columns).depth
