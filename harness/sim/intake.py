@@ -178,7 +178,7 @@ def _cleaned(raw: RawMesh, name: str) -> Surface:
 
 def _check_surface(surface: Surface, name: str) -> None:
     area = float(surface.areas().sum())
-    if len(surface.faces) < 4 or not area > 1e-9 * surface.size**2:
+    if len(surface.faces) < 4 or not area > 1e-13 * surface.size**2:
         raise MeshRefused(
             f"{name}: {len(surface.faces)} faces with a total area of {area:.1e} (size {surface.size:.3g}) "
             "remain after welding; at least 4 faces with an area make an object"
