@@ -179,7 +179,7 @@ def check_workspace(limits: SafetyLimits, path: Path, what: str) -> None:
     bad = np.concatenate([outside[:-1] > allowed, (outside[-1] > allowed_at_end)[None]])
     if not np.any(bad):
         return
-    sample, point, axis = (int(i) for i in np.argwhere(bad)[0])
+    sample, point, axis = (int(i) for i in np.unravel_index(np.argmax(outside * bad), bad.shape))
     value = path.tool_points[sample, point, axis]
     raise LimitExceeded(
         f"{what}: tool point {point + 1} would come to {'xyz'[axis]} = {value:.4f} m in base; the workspace "
