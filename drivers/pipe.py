@@ -44,9 +44,10 @@ FIELDS: Final = {
     "output_bits": slice(30, 31),
     "moving": slice(31, 32),
     "drops": slice(32, 33),
+    "restarts": slice(33, 34),
 }
 """Where each quantity lies in a packet of the arm's state (all float64, SI)."""
-WIDTH: Final = 33
+WIDTH: Final = 34
 
 
 class PipeBroken(Exception):

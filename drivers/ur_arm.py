@@ -111,7 +111,7 @@ class UrArm:
             rate=rate_of(session.process.first, packet, session.process.count),
             drops=int(packet[pipe.FIELDS["drops"]][0]),
             latency=None,
-            detail=f"safety {ur_words.safety_words(int(packet[pipe.FIELDS['safety_bits']][0]))}",
+            detail=ur_state.detail(packet),
         )
 
     def move_joints(self, joints: FloatArray, speed: float, acceleration: float) -> None:
@@ -182,9 +182,9 @@ class UrArm:
             self._require_clear()
             session.ask({"do": "zero_force"}, ANSWER_WITHIN)
             limit = self.limits.force_press / 2
-            if not session.comes_true(lambda packet: _force(packet) < limit, SEEN_WITHIN):
+            if not session.comes_true(lambda packet: ur_state.force(packet) < limit, SEEN_WITHIN):
                 raise BenchFault(
-                    f"the force sensor reads {_force(session.packet()):.1f} N after it was zeroed (limit "
+                    f"the force sensor reads {ur_state.force(session.packet()):.1f} N after it was zeroed (limit "
                     f"{limit:g} N); check that nothing pulls at the tool, and the payload at the pendant"
                 )
 
@@ -307,8 +307,3 @@ class UrArm:
                 f"controller at {self.address} says it is (limit {1e3 * SAME_POSE:g} mm): the station file "
                 "names another model, or the controller keeps a tool offset"
             )
-
-
-def _force(packet: FloatArray) -> float:
-    """N, of a packet."""
-    return float(np.linalg.norm(packet[pipe.FIELDS["wrench"]][:3]))

@@ -13,7 +13,7 @@ import sys
 import threading
 from typing import Final
 
-from drivers import dashboard, pipe
+from drivers import dashboard, pipe, ur_state
 from drivers.safety import require_loopback
 from drivers.ur_link import Link
 from drivers.ur_motion import Motion, Outcome
@@ -23,6 +23,8 @@ from harness.clock import now
 from harness.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
 
 KICK_PERIOD: Final = 0.02  # s; five kicks in the 0.1 s that the watchdog waits
+STARVED: Final = 0.08  # s between two kicks; the watchdog may have ended the script
+STARVED_LATELY: Final = 0.5  # s
 TICK: Final = 0.002  # s between looks at a motion
 REST_TICK: Final = 0.01
 STALE: Final = 0.05  # s without a packet: nothing is commanded, the watchdog is not kicked
@@ -46,7 +48,9 @@ class Child:
         self._closed = False
         self._epoch = 0
         self._beat = now()
-        self._kicked = 0.0
+        self._kicked = now()
+        self._starved = -STARVED_LATELY
+        self._script_ran = True
 
     def run(self, model: str) -> None:
         """Connect, then serve until the parent closes the pipe or the link is lost."""
@@ -72,6 +76,7 @@ class Child:
             self._serve(message)
         self._check_link()
         self._check_safety()
+        self._check_script()
         if self._motion is not None:
             self._watch(self._motion)
         self._kick()
@@ -175,12 +180,34 @@ class Child:
         safety = self._stream.safety
         if safety in ("normal", "reduced") or isinstance(self._latched, ProtectiveStop):
             return
-        self._latched = _controller_stop(safety, self._stream.newest, self._motion)
+        during = f"during {self._motion.what}" if self._motion is not None else "at rest"
+        self._latched = ProtectiveStop(ur_state.stopped_by_controller(self._stream.newest, during))
         if self._motion is not None:
             self._refuse(self._motion.id, self._latched)
             self._end_motion()
         with contextlib.suppress(BenchFault):
             dashboard.stop(self._link.address)
+
+    def _check_script(self) -> None:
+        """Start the script again if this computer's own delay let the watchdog end it, at rest.
+
+        A script that ended for any other reason (the stop button at the pendant) stays ended.
+        """
+        ran, self._script_ran = self._script_ran, self._link.program_running()
+        starved = now() - self._starved < STARVED_LATELY or now() - self._kicked > STARVED
+        if (
+            not ran
+            or self._script_ran
+            or not starved
+            or self._motion is not None
+            or self._latched is not None
+        ):
+            return
+        self._link.revive()
+        self._link.kick()
+        self._kicked = now()
+        self._script_ran = True
+        self._stream.restarts += 1
 
     def _check_link(self) -> None:
         if self._stream.failure:
@@ -199,6 +226,8 @@ class Child:
     def _kick(self) -> None:
         if now() - self._kicked < KICK_PERIOD or self._stream.age > STALE:
             return
+        if now() - self._kicked > STARVED:
+            self._starved = now()
         self._link.kick()
         self._kicked = now()
 
@@ -256,17 +285,6 @@ class Child:
                     threading.Event().wait(TICK)
             if self._link.program_running():
                 self._link.end_script()
-
-
-def _controller_stop(safety: str, packet: FloatArray, motion: Motion | None) -> ProtectiveStop:
-    x, y, z = 1e3 * packet[pipe.FIELDS["pose"]][:3]
-    force = packet[pipe.FIELDS["wrench"]][:3]
-    during = f"during {motion.what}" if motion is not None else "at rest"
-    return ProtectiveStop(
-        f"the controller stopped the arm {during}: {safety}; flange at ({x:.1f}, {y:.1f}, {z:.1f}) mm in "
-        f"base, force ({force[0]:.1f}, {force[1]:.1f}, {force[2]:.1f}) N. Look for the cause, free the arm "
-        "and release the stop at the pendant, then start again; nothing resumes by itself"
-    )
 
 
 def main() -> None:

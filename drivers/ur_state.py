@@ -52,3 +52,28 @@ def readings(packets: FloatArray, rate: float) -> tuple[Reading, ...]:
         Reading(Channel(name, unit, values.shape[1:], "float64", frame, rate), packets[:, 0], values)
         for name, unit, frame, values in columns
     )
+
+
+def force(packet: FloatArray) -> float:
+    """N, the length of a packet's force."""
+    return float(np.linalg.norm(packet[pipe.FIELDS["wrench"]][:3]))
+
+
+def detail(packet: FloatArray) -> str:
+    """Safety state and anything unusual since opening, in words."""
+    words = ur_words.safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))
+    restarts = int(packet[pipe.FIELDS["restarts"]][0])
+    late = f"; the control script was restarted {restarts} times after a delay at rest" if restarts else ""
+    return f"safety {words}{late}"
+
+
+def stopped_by_controller(packet: FloatArray, during: str) -> str:
+    """What an operator must know of a stop that only they may release."""
+    x, y, z = 1e3 * packet[pipe.FIELDS["pose"]][:3]
+    fx, fy, fz = packet[pipe.FIELDS["wrench"]][:3]
+    words = ur_words.safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))
+    return (
+        f"the controller stopped the arm {during}: {words}; flange at ({x:.1f}, {y:.1f}, {z:.1f}) mm in base, "
+        f"force ({fx:.1f}, {fy:.1f}, {fz:.1f}) N. Look for the cause, free the arm and release the stop at the "
+        "pendant, then start again; nothing resumes by itself"
+    )

@@ -71,6 +71,7 @@ class Stream:
         self.drops = 0
         self.still = 0
         self.moving = False
+        self.restarts = 0
         self.failure = ""
         self.guard: Guard | None = None
         self.trip: Trip | None = None
@@ -144,6 +145,7 @@ class Stream:
             self.drops += max(0, round(step / period) - 1)
         packet[fields["moving"]] = self.moving
         packet[fields["drops"]] = self.drops
+        packet[fields["restarts"]] = self.restarts
         turning = float(np.abs(packet[fields["joint_speeds"]]).max())
         self.still = self.still + 1 if turning < AT_REST else 0
         self.newest = packet

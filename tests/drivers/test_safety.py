@@ -173,7 +173,7 @@ def test_a_line_out_of_reach_or_through_another_branch_is_refused() -> None:
     with pytest.raises(LimitExceeded, match="out of the ur5e's reach"):
         line(translation(np.array([-0.9, 0.0, 0.0])))
     x, y = kinematics.forward(MODEL, READY)[:2, 3]
-    with pytest.raises(LimitExceeded, match="reach|branch"):
+    with pytest.raises(LimitExceeded, match=r"reach|branch"):
         line(translation(np.array([-2 * x, -2 * y, 0.0])))
 
 
