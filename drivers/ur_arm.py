@@ -184,8 +184,8 @@ class UrArm:
             limit = self.limits.force_press / 2
             if not session.comes_true(lambda packet: ur_state.force(packet) < limit, SEEN_WITHIN):
                 raise BenchFault(
-                    f"the force sensor reads {ur_state.force(session.packet()):.1f} N after it was zeroed (limit "
-                    f"{limit:g} N); check that nothing pulls at the tool, and the payload at the pendant"
+                    f"the force sensor reads {ur_state.force(session.packet()):.1f} N after it was zeroed "
+                    f"(limit {limit:g} N); check that nothing pulls at the tool, and the payload at the pendant"
                 )
 
     def set_digital_output(self, index: int, on: bool) -> None:

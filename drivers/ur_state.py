@@ -73,7 +73,7 @@ def stopped_by_controller(packet: FloatArray, during: str) -> str:
     fx, fy, fz = packet[pipe.FIELDS["wrench"]][:3]
     words = ur_words.safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))
     return (
-        f"the controller stopped the arm {during}: {words}; flange at ({x:.1f}, {y:.1f}, {z:.1f}) mm in base, "
-        f"force ({fx:.1f}, {fy:.1f}, {fz:.1f}) N. Look for the cause, free the arm and release the stop at the "
-        "pendant, then start again; nothing resumes by itself"
+        f"the controller stopped the arm {during}: {words}; flange at ({x:.1f}, {y:.1f}, {z:.1f}) mm in "
+        f"base, force ({fx:.1f}, {fy:.1f}, {fz:.1f}) N. Look for the cause, free the arm and release the "
+        "stop at the pendant, then start again; nothing resumes by itself"
     )
