@@ -1,0 +1,164 @@
+"""The reality gap: how the bench differs from what is believed of it, as a file of distributions.
+
+The mocked world draws from it, once a run; nothing that estimates reads it. A value is the
+sigma of a normal distribution with mean zero unless its attribute says otherwise.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from harness.errors import WrongUse
+from harness.quantities import Angle, Length, Level, Nonnegative, Ordered, Positive, Ratio, Time
+from harness.toml_file import StrictModel, load_toml, nearest
+
+_FOLDER = Path(__file__).parent / "gaps"
+
+
+class ArmGap(StrictModel):
+    """Where the arm is, against where its controller says.
+
+    Attributes:
+        translation: m, per axis of the base and contact.
+        along_tool: m, along the tool's axis, per contact, in addition.
+    """
+
+    translation: Annotated[Length, Nonnegative]
+    along_tool: Annotated[Length, Nonnegative]
+
+
+class ObjectGap(StrictModel):
+    """How the object stands, against the scene's nominal pose.
+
+    Attributes:
+        position: m, per axis of the base and run; no estimator is told the position.
+        yaw: rad, about the vertical, per run.
+        tilt: rad, about base x and y each, per run.
+    """
+
+    position: Annotated[Length, Nonnegative]
+    yaw: Annotated[Angle, Nonnegative]
+    tilt: Annotated[Angle, Nonnegative]
+
+
+class SensorGap(StrictModel):
+    """How the sensor is mounted, against the station's frame of it.
+
+    Attributes:
+        tilt: rad, about gel x and y each, per run.
+        tilt_per_contact: rad, about gel x and y each, per contact.
+        image_yaw: rad, of the image about the gel's z, per run.
+        gel_centre: m, per axis of the gel's frame, per run.
+    """
+
+    tilt: Annotated[Angle, Nonnegative]
+    tilt_per_contact: Annotated[Angle, Nonnegative]
+    image_yaw: Annotated[Angle, Nonnegative]
+    gel_centre: Annotated[Length, Nonnegative]
+
+
+class GelGap(StrictModel):
+    """How the gel deforms and is seen, against its model.
+
+    Attributes:
+        height_gain: relative, of the indentation, per run.
+        height_offset: m of indentation, per contact.
+        pixel_noise: m of indentation, per pixel.
+        shading: m of indentation, smooth over the image, per run.
+        skirt: m, the blur by which the gel hangs from what it touches: the value itself.
+        calibration: whether the world's colours come from presses other than the estimator's.
+    """
+
+    height_gain: Annotated[Ratio, Nonnegative]
+    height_offset: Annotated[Length, Nonnegative]
+    pixel_noise: Annotated[Length, Nonnegative]
+    shading: Annotated[Length, Nonnegative]
+    skirt: Annotated[Length, Nonnegative]
+    calibration: Literal["other presses", "the estimator's"]
+
+
+class ShapeGap(StrictModel):
+    """The object as it was made, against its model.
+
+    Attributes:
+        scale: relative, per run.
+        deviation: m, per axis, smooth, per run.
+        deviation_length: m over which the deviation varies: the value itself.
+    """
+
+    scale: Annotated[Ratio, Nonnegative]
+    deviation: Annotated[Length, Nonnegative]
+    deviation_length: Annotated[Length, Positive]
+
+
+class SoundGap(StrictModel):
+    """The struck object and what carries its sound, against their models.
+
+    Attributes:
+        wall: relative change of the wall's thickness: uniform between the two.
+        poisson: uniform between minus and plus this.
+        elastic_field: relative, smooth fields of Young's modulus and density.
+        frequency: relative, of all modes together, per run.
+        frequency_per_mode: relative.
+        damping: of the logarithm, of all modes together, per run.
+        damping_per_mode: of the logarithm.
+        microphone_gain: dB, per mode, common to a run, with a random phase.
+        strike_direction: rad, per strike.
+        strike_point: m, per axis and strike.
+        force_gain: relative, per run.
+        pulse: s, the length of the half sine: the value itself.
+        pulse_spread: relative, per strike, uniform between minus and plus this.
+        reverberation_time: s to fall by 60 dB: the value itself; zero without a room.
+        direct_to_reverberant: dB: the value itself.
+        signal_to_noise: dB: the value itself.
+    """
+
+    wall: Annotated[tuple[Ratio, Ratio], Ordered]
+    poisson: float = Field(ge=0.0, lt=0.5)
+    elastic_field: Annotated[Ratio, Nonnegative]
+    frequency: Annotated[Ratio, Nonnegative]
+    frequency_per_mode: Annotated[Ratio, Nonnegative]
+    damping: Annotated[Ratio, Nonnegative]
+    damping_per_mode: Annotated[Ratio, Nonnegative]
+    microphone_gain: Annotated[Level, Nonnegative]
+    strike_direction: Annotated[Angle, Nonnegative]
+    strike_point: Annotated[Length, Nonnegative]
+    force_gain: Annotated[Ratio, Nonnegative]
+    pulse: Annotated[Time, Positive]
+    pulse_spread: Annotated[Ratio, Nonnegative]
+    reverberation_time: Annotated[Time, Nonnegative]
+    direct_to_reverberant: Level
+    signal_to_noise: Level
+
+
+class Gap(StrictModel):
+    """Everything that may differ between the bench and what is believed of it."""
+
+    schema_number: Literal[1] = Field(alias="schema")
+    title: str
+    arm: ArmGap
+    object: ObjectGap
+    sensor: SensorGap
+    gel: GelGap
+    shape: ShapeGap
+    sound: SoundGap
+
+
+def gap_path(name: str) -> Path:
+    """The file of a gap: ``"default"``, ``"none"``, or a path.
+
+    Raises:
+        WrongUse: there is no such file and no such name.
+    """
+    shipped = {path.stem: path for path in _FOLDER.glob("*.toml")}
+    if name in shipped:
+        return shipped[name]
+    if not Path(name).is_file():
+        raise WrongUse(f"no gap file {name!r}; give a path or a shipped name: {nearest(name, shipped)}")
+    return Path(name).resolve()
+
+
+def load_gap(name: str) -> Gap:
+    """A gap by name or path; ``WrongUse`` as ``gap_path`` and ``load_toml``."""
+    return load_toml(gap_path(name), Gap)
