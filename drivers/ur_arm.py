@@ -185,7 +185,7 @@ class UrArm:
             if not session.comes_true(lambda packet: ur_state.force(packet) < limit, SEEN_WITHIN):
                 raise BenchFault(
                     f"the force sensor reads {ur_state.force(session.packet()):.1f} N after it was zeroed "
-                    f"(limit {limit:g} N); check that nothing pulls at the tool, and the payload at the pendant"
+                    f"(limit {limit:g} N); check that nothing pulls at the tool, and the payload set"
                 )
 
     def set_digital_output(self, index: int, on: bool) -> None:
