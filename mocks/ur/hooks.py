@@ -1,0 +1,82 @@
+"""What a mocked controller is told at its start, and what it asks of the bench around it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+Six = tuple[float, float, float, float, float, float]
+Matrix = tuple[tuple[float, float, float, float], ...]
+"""A homogeneous transform, four rows of four."""
+
+HOME: Final[Six] = (
+    0.0,
+    -1.5707963267948966,
+    -1.5707963267948966,
+    -1.5707963267948966,
+    1.5707963267948966,
+    0.0,
+)
+"""rad; the tool points down, in front of the arm."""
+
+
+class ContactModel(Protocol):
+    """What the tool feels."""
+
+    def wrench(self, base_from_flange: Sequence[Sequence[float]], time: float) -> Sequence[float]:
+        """``(6,)`` N and N m that act on the flange, in base; called once a cycle.
+
+        Args:
+            base_from_flange: ``(4, 4)``, nested.
+            time: s on the controller's clock.
+        """
+
+
+class OnCycle(Protocol):
+    """Is told where the arm is, once a cycle of 2 ms; called by keyword-free position."""
+
+    def __call__(self, time: float, joints: Sequence[float], base_from_flange: Matrix, /) -> None:
+        """Time on the controller's clock in s, ``(6,)`` rad, ``(4, 4)`` nested."""
+
+
+class Cue(Protocol):
+    """A fault to begin; ``mocks.ur.faults`` lists the kinds."""
+
+    @property
+    def kind(self) -> str:
+        """What goes wrong."""
+
+    @property
+    def seconds(self) -> float | None:
+        """How long; None until it is cleared."""
+
+
+@dataclass(frozen=True)
+class ControllerConfig:
+    """One mocked controller.
+
+    Attributes:
+        host: the loopback address that its ports are bound to.
+        model: ``"ur3e"``, ``"ur5e"`` or ``"ur10e"``.
+        joints: rad at power-on.
+        serial: of the arm, digits.
+        polyscope: the software version it reports, (major, minor, bugfix, build).
+        seed: of the force sensor's bias and noise.
+        force_noise: N, standard deviation of each force reading.
+        torque_noise: N m, standard deviation of each torque reading.
+        force_bias: N, standard deviation from which each axis' constant offset is drawn; torques have
+            a tenth of it, in N m.
+        contact_force: N against the direction of motion at which ``tool_contact`` says contact.
+        remote: whether the pendant is in remote control.
+    """
+
+    host: str
+    model: str = "ur5e"
+    joints: Six = HOME
+    serial: str = "20225500001"
+    polyscope: tuple[int, int, int, int] = (5, 12, 4, 1101661)
+    seed: int = 0
+    force_noise: float = 0.05
+    torque_noise: float = 0.002
+    force_bias: float = 1.0
+    contact_force: float = 3.0
+    remote: bool = True
