@@ -99,3 +99,34 @@ def _refined(faces: IntArray, long: BoolArray, middles: IntArray) -> IntArray:
 
 def _stacked(chosen: BoolArray, *triangles: tuple[IntArray, IntArray, IntArray]) -> IntArray:
     return np.concatenate([np.stack(corners, axis=1)[chosen] for corners in triangles])
+
+
+def shares_of_corners(mesh: Mesh, face: int, point: FloatArray) -> FloatArray:
+    """``(3,)`` barycentric coordinates of a point in the plane of a face."""
+    a, b, c = mesh.corners[face]
+    (u, v), *_ = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), point - a, rcond=None)
+    return np.array([1.0 - u - v, u, v])
+
+
+def nearest_face(mesh: Mesh, point: FloatArray) -> tuple[int, FloatArray]:
+    """The face nearest to a ``(3,)`` point, and the point of that face that is nearest."""
+    corners, normals = mesh.corners, mesh.face_normals
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    height = np.einsum("ij,ij->i", point - a, normals)
+    foot = point - height[:, None] * normals
+    turns = [np.cross(q - p, foot - p) for p, q in ((a, b), (b, c), (c, a))]
+    inside = np.all([np.einsum("ij,ij->i", turn, normals) >= 0.0 for turn in turns], axis=0)
+    inside &= mesh.face_areas > 0.0
+    candidates = np.stack([foot, *(_on_segment(p, q, point) for p, q in ((a, b), (b, c), (c, a)))])
+    distances = np.linalg.norm(candidates - point, axis=2)
+    distances[0, ~inside] = np.inf
+    kind, face = np.unravel_index(int(np.argmin(distances)), distances.shape)
+    return int(face), candidates[kind, face]
+
+
+def _on_segment(start: FloatArray, end: FloatArray, point: FloatArray) -> FloatArray:
+    along = end - start
+    squares = np.einsum("ij,ij->i", along, along)
+    share = np.einsum("ij,ij->i", point - start, along) / np.where(squares > 0.0, squares, 1.0)
+    nearest: FloatArray = start + np.minimum(np.maximum(share, 0.0), 1.0)[:, None] * along
+    return nearest

@@ -1,0 +1,265 @@
+"""The mocked bench: ``python -m mocks.lab``, one process for each instrument, on an address of its own.
+
+It answers JSON lines on standard output with one for each on standard input:
+
+``{"mark": {"step": 3, "sample": 0}}``
+    The run is at this step and sample. From sample 0 on, the truth of the step is written.
+``{"fault": {"instrument": "gel", "kind": "stall", "seconds": 2}}``
+    Something goes wrong (``mocks.faults``).
+
+The first line out says where the instruments are: ``{"ready": true, "arm": ADDRESS, "gel": URL,
+"camera": URL or null}``, or ``{"ready": false, "error": ...}``. End of file ends everything.
+"""
+
+import argparse
+import json
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from harness.arrays import ByteArray, FloatArray
+from harness.clock import now
+from harness.errors import TouchstoneError, WrongUse
+from harness.gap import load_gap
+from harness.kinematics import forward
+from mocks.faults import parse
+from mocks.gelsight_stream import MjpegServer
+from mocks.lab_processes import CAMERA_PORT, GEL_PORT, Child, Line, free_address
+from mocks.lab_scene import NominalArm, read_lab_scene
+from mocks.shared_pose import Mark, SharedPose
+from mocks.truth import TruthFile
+from mocks.ur.hooks import ControllerConfig
+from mocks.ur.serve import serve
+from mocks.world import World
+
+READY_TIMEOUT = 30.0
+SHOWN_TIMEOUT = 0.5
+_GEL, _CAMERA = 0, 1
+_ORPHAN_CHECK = 0.5
+
+
+class Seen:
+    """A camera's view of the world at the arm's present pose, step and sample."""
+
+    def __init__(
+        self, shared: SharedPose, viewer: int, look: Callable[[FloatArray, int, int], ByteArray]
+    ) -> None:
+        self._shared = shared
+        self._viewer = viewer
+        self._look = look
+        self._pose = shared.base_from_flange
+        self._mark = shared.mark
+
+    def state(self) -> Hashable:
+        """Pose, step and sample."""
+        self._mark = self._shared.mark
+        self._pose = self._shared.base_from_flange
+        return self._pose.tobytes(), self._mark.step, self._mark.sample
+
+    def picture(self) -> ByteArray:
+        """What the world shows there."""
+        return self._look(self._pose, self._mark.step, self._mark.sample)
+
+    def sent(self) -> None:
+        """Tell the lab which mark has been shown."""
+        self._shared.set_shown(self._viewer, self._mark.number)
+
+
+class Lab:
+    """The instruments' processes and what is said to them.
+
+    Args:
+        world: behind all of them.
+        controller: runs the arm's controller at an address until its line says stop.
+        shared: what the processes share.
+        truth: where the truth is written.
+        address: loopback, of all the instruments.
+        camera: whether there is a scene camera.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        controller: Callable[[str, Line], None],
+        shared: SharedPose,
+        truth: TruthFile,
+        address: str,
+        camera: bool,
+    ) -> None:
+        self._shared = shared
+        self._truth = truth
+        self._address = address
+        self._has_camera = camera
+        self._children = {"arm": Child("arm", lambda line: controller(address, line))}
+        gel = Seen(shared, _GEL, world.tactile_image)
+        self._children["gel"] = Child("gel", lambda line: _stream(address, GEL_PORT, gel, line))
+        if camera:
+            seen = Seen(shared, _CAMERA, lambda pose, _step, _sample: world.scene_image(pose))
+            self._children["camera"] = Child("camera", lambda line: _stream(address, CAMERA_PORT, seen, line))
+
+    def wait_ready(self) -> Mapping[str, Any]:
+        """Where the instruments are, once all of them answer; ``BenchFault`` where one does not."""
+        for child in self._children.values():
+            child.wait_ready(READY_TIMEOUT)
+        camera = f"http://{self._address}:{CAMERA_PORT}/?action=stream" if self._has_camera else None
+        gel = f"http://{self._address}:{GEL_PORT}/?action=stream"
+        return {"ready": True, "arm": self._address, "gel": gel, "camera": camera}
+
+    def answer(self, line: str) -> Mapping[str, Any]:
+        """Do what one line of JSON asks; an answer with the key ``error`` where it cannot be done."""
+        try:
+            request = json.loads(line)
+            match request:
+                case {"mark": {"step": int(step), "sample": int(sample)}} if len(request) == 1:
+                    return {"marked": self._mark(step, sample)}
+                case {"fault": dict(cue)} if len(request) == 1:
+                    return {"begun": self._cue(cue)}
+        except json.JSONDecodeError as error:
+            return {"error": f"not a line of JSON: {error}"}
+        except TouchstoneError as error:
+            return {"error": str(error)}
+        return {"error": f"the lab knows mark (step, sample) and fault, not {line.strip()!r}"}
+
+    def close(self) -> None:
+        """End every process."""
+        for child in self._children.values():
+            child.kill()
+
+    def _mark(self, step: int, sample: int) -> Mapping[str, int]:
+        """Set the step and sample, and wait until the gel has shown them."""
+        mark = Mark(self._shared.mark.number + 1, step, sample)
+        self._shared.set_mark(mark)
+        if sample >= 0:
+            self._truth.append(self._shared.base_from_flange, step, sample)
+        end = now() + SHOWN_TIMEOUT
+        while self._shared.shown(_GEL) < mark.number and now() < end:
+            time.sleep(2e-3)
+        return {"step": step, "sample": sample}
+
+    def _cue(self, cue: Mapping[str, object]) -> Mapping[str, object]:
+        fault = parse(cue)
+        if fault.instrument not in self._children:
+            raise WrongUse(f"this bench has no {fault.instrument}")
+        self._children[fault.instrument].cue(fault)
+        return dict(cue)
+
+
+def _stream(address: str, port: int, view: Seen, line: Line) -> None:
+    server = MjpegServer(address, port, view)
+    line.ready()
+
+    def should_stop() -> bool:
+        fault = line.fault()
+        if fault is not None:
+            server.fault.set(fault)
+        return line.should_stop()
+
+    server.serve(should_stop)
+
+
+def _lines(descriptor: int, orphaned: Callable[[], bool]) -> Iterator[str]:
+    """Lines from a pipe, until it ends or whoever started the lab is gone."""
+    waiting = b""
+    while not orphaned():
+        if not select.select([descriptor], [], [], _ORPHAN_CHECK)[0]:
+            continue
+        arrived = os.read(descriptor, 1 << 16)
+        if not arrived:
+            return
+        *lines, waiting = (waiting + arrived).split(b"\n")
+        yield from (line.decode() for line in lines if line.strip())
+
+
+def _say(answer: Mapping[str, Any]) -> None:
+    sys.stdout.write(json.dumps(answer, allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def _controller(world: World, arm: NominalArm, shared: SharedPose, seed: int) -> Callable[[str, Line], None]:
+    """What the arm's process does."""
+
+    class Push:
+        def wrench(self, base_from_flange: Sequence[Sequence[float]], _time: float) -> Sequence[float]:
+            return world.contact_wrench(np.array(base_from_flange), shared.mark.step).tolist()
+
+    def publish(_time: float, _joints: Sequence[float], base_from_flange: Sequence[Sequence[float]]) -> None:
+        shared.set_pose(np.array(base_from_flange))
+
+    def run(address: str, line: Line) -> None:
+        serve(
+            ControllerConfig(host=address, model=arm.model, joints=arm.joints, seed=seed),
+            Push(),
+            publish,
+            line.should_stop,
+            step=lambda: shared.mark.step,
+            cues=line.fault,
+            on_ready=line.ready,
+        )
+
+    return run
+
+
+def _begin(arguments: argparse.Namespace) -> Lab:
+    """Build the world, and begin a process for each instrument."""
+    cv2.setNumThreads(0)  # threads of the parent are lost in a fork
+    scene = read_lab_scene(arguments.scene)
+    world = World(scene.bench, load_gap(arguments.gap), arguments.seed)
+    start = forward(scene.arm.model, np.array(scene.arm.joints))
+    world.contact_wrench(start, 0)  # compile before the fork, once for all
+    world.tactile_image(start, 0, 0)
+    shared = SharedPose(start)
+    return Lab(
+        world,
+        _controller(world, scene.arm, shared, arguments.seed),
+        shared,
+        TruthFile(arguments.truth, world, arguments.seed),
+        free_address(),
+        scene.bench.camera is not None,
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m mocks.lab", description="The mocked bench.")
+    parser.add_argument("--scene", type=Path, required=True, help="the bench, as JSON")
+    parser.add_argument("--seed", type=int, required=True, help="of the run, zero or more")
+    parser.add_argument(
+        "--gap", required=True, help="a gap file, or the name of a shipped one: default, none"
+    )
+    parser.add_argument("--truth", type=Path, required=True, help="where to write what really happened")
+    return parser
+
+
+def main() -> int:
+    """Run the lab until standard input ends; the exit status."""
+    arguments = _parser().parse_args()
+    parent = os.getppid()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the run's to answer; it closes our input
+    try:
+        lab = _begin(arguments)
+    except TouchstoneError as error:
+        _say({"ready": False, "error": str(error)})
+        return error.exit_code
+    try:
+        _say(lab.wait_ready())
+        for line in _lines(sys.stdin.fileno(), lambda: os.getppid() != parent):
+            _say(lab.answer(line))
+    except TouchstoneError as error:
+        _say({"ready": False, "error": str(error)})
+        return error.exit_code
+    except BrokenPipeError:
+        return 0
+    finally:
+        lab.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,183 @@
+"""The one world behind all mocks: it holds the truth, and says what each instrument reads.
+
+Everything is a function of where the controller believes the flange to be, the step and the
+sample; the world keeps no clock and no state, so a rerun reads the same values.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from harness.arrays import ByteArray, FloatArray, read_only
+from harness.gap import Gap
+from harness.geometry import apply, inverse, transform, translation
+from harness.mesh import Mesh
+from harness.sensor import TactileSensor
+from harness.sim.height_map import RasterMesh, depth_image, height_maps, penetration
+from mocks.gap_draw import GapDraw
+from mocks.gel_contact import GelContact
+from mocks.scene_view import Body, SceneView, box
+from mocks.world_mesh import nearest_face, shares_of_corners, split_long_edges
+
+LONGEST_EDGE = 5.0e-3
+"""Metres, in the world's own tessellation: short beside the length over which shape deviates."""
+
+SPRING_SPACING = 0.75e-3
+REACH = 10.0e-3
+"""Metres behind the gel's surface beyond which nothing is felt: deeper than any gel is thick."""
+
+BESIDE = 50.0e-3
+"""Metres behind the gel's surface where the sensor's body ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """The scene camera: ``base_from_camera`` ``(4, 4)``, pixels, and focal length in pixels."""
+
+    base_from_camera: FloatArray
+    rows: int
+    columns: int
+    focal_length: float
+
+
+@dataclass(frozen=True, eq=False)
+class NominalBench:
+    """The bench as the scene and the station state it.
+
+    Attributes:
+        mesh: of the object, on a tessellation that nobody else uses.
+        base_from_object: ``(4, 4)``.
+        flange_from_gel: ``(4, 4)``.
+        sensor: the make of the gel.
+        camera: the scene camera, None where there is none.
+    """
+
+    mesh: Mesh
+    base_from_object: FloatArray
+    flange_from_gel: FloatArray
+    sensor: TactileSensor
+    camera: Camera | None = None
+
+
+class World:
+    """The truth of one run.
+
+    Args:
+        bench: nominal.
+        gap: distributions of what differs from it.
+        seed: of the run.
+
+    Attributes:
+        sensor: the make of the gel.
+        mesh: the true object, in its own frame.
+        base_from_object: ``(4, 4)``, where it truly stands.
+    """
+
+    def __init__(self, bench: NominalBench, gap: Gap, seed: int) -> None:
+        self._bench = bench
+        self._draw = GapDraw(gap, seed)
+        self.sensor = bench.sensor
+        self._nominal = split_long_edges(bench.mesh, LONGEST_EDGE)
+        self._deviation = self._draw.deviation(self._nominal.bounds.mean(axis=0))
+        self.mesh = Mesh(self._deviation.applied(self._nominal.vertices), self._nominal.faces)
+        self.base_from_object = read_only(self._placed())
+        self._object_from_base = inverse(self.base_from_object)
+        self._raster = RasterMesh(self.mesh)
+        self._contact = GelContact(self.mesh, self.sensor.window, SPRING_SPACING, REACH)
+
+    def contact_wrench(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        """``(6,)`` N and N m that the object exerts at the flange, in base."""
+        flange_from_gel = self._true_flange_from_gel(step)
+        base_from_gel = self._true_base_from_flange(base_from_flange, step) @ flange_from_gel
+        in_gel = self._contact.wrench(self._object_from_base @ base_from_gel)
+        rotation = base_from_gel[:3, :3]
+        force = rotation @ in_gel[:3]
+        arm = base_from_flange[:3, :3] @ flange_from_gel[:3, 3]
+        return np.concatenate([force, rotation @ in_gel[3:] + np.cross(arm, force)])
+
+    def penetration(self, base_from_flange: FloatArray, step: int) -> float:
+        """Metres that the object reaches into the gel at the deepest pixel; zero without contact."""
+        return float(self._indentation(base_from_flange, step).max())
+
+    def true_contact(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        """The point touched, ``(3,)`` metres: a material point, given where it is on the nominal surface.
+
+        It is the point first met by the line through the gel's centre along the gel's z axis; where
+        that line meets nothing within the gel's thickness, the surface point nearest to the centre.
+        """
+        gel_from_object = inverse(self._object_from_gel(base_from_flange, step))
+        met = depth_image(
+            self._raster, gel_from_object, 1e-6, 1, 1, near=-BESIDE, far=self.sensor.gel_thickness
+        )
+        face = int(met.face[0, 0])
+        in_gel = np.array([0.0, 0.0, met.depth[0, 0]]) if face >= 0 else np.zeros(3)
+        in_object = apply(inverse(gel_from_object), in_gel[None])[0]
+        if face < 0:
+            face, in_object = nearest_face(self.mesh, in_object)
+        point: FloatArray = shares_of_corners(self.mesh, face, in_object) @ self._nominal.corners[face]
+        return point
+
+    def differences(self) -> Mapping[str, Any]:
+        """What the world does differently from the nominal bench, for the report."""
+        surface = {"vertices": len(self.mesh.vertices), "faces": len(self.mesh.faces)}
+        return {**self._draw.summary(), "tessellation": surface, "optics_level": "exact"}
+
+    def scene_image(self, base_from_flange: FloatArray) -> ByteArray:
+        """What the scene camera sees, ``(rows, columns, 3)`` uint8, RGB."""
+        if self._view is None:
+            raise ValueError("this scene has no camera; ask for none of its pictures")
+        width, height = self.sensor.housing
+        length = float(self._bench.flange_from_gel[2, 3])
+        tool = box((width, height, length), (0.0, 0.0, -length / 2))
+        return self._view.picture([Body(tool, base_from_flange @ self._bench.flange_from_gel, (70, 90, 200))])
+
+    @cached_property
+    def _view(self) -> SceneView | None:
+        camera = self._bench.camera
+        if camera is None:
+            return None
+        lowest = float(apply(self.base_from_object, self.mesh.vertices)[:, 2].min())
+        middle = apply(self.base_from_object, self.mesh.bounds.mean(axis=0)[None])[0]
+        fixed = [Body(self.mesh, self.base_from_object, (225, 205, 170))]
+        table = split_long_edges(box((1.6, 1.6, 0.02), (0.0, 0.0, -0.01)), 0.1)
+        fixed.append(Body(table, np.eye(4), (120, 110, 100)))
+        if lowest > 0.0:
+            foam = box((0.06, 0.06, lowest), (0.0, 0.0, lowest / 2))
+            fixed.append(Body(foam, translation(np.array([middle[0], middle[1], 0.0])), (90, 90, 95)))
+        return SceneView(camera.base_from_camera, camera.rows, camera.columns, camera.focal_length, fixed)
+
+    def _placed(self) -> FloatArray:
+        """``base_from_object``: turned and moved about the middle of the object."""
+        middle = apply(self._bench.base_from_object, self._nominal.bounds.mean(axis=0)[None])[0]
+        run = self._draw.run
+        moved = translation(middle + run.position) @ transform(run.object_rotation, np.zeros(3))
+        placed: FloatArray = moved @ translation(-middle) @ self._bench.base_from_object
+        return placed
+
+    def _true_flange_from_gel(self, step: int) -> FloatArray:
+        tilt = transform(self._draw.contact(step).gel_rotation, np.zeros(3))
+        true: FloatArray = self._bench.flange_from_gel @ self._draw.run.gel_from_true_gel @ tilt
+        return true
+
+    def _true_base_from_flange(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        """Where the flange is; the controller believes it to be at ``base_from_flange``."""
+        contact = self._draw.contact(step)
+        along_tool = base_from_flange[:3, :3] @ self._bench.flange_from_gel[:3, 2]
+        true = base_from_flange.copy()
+        true[:3, 3] += contact.arm_error + contact.along_tool * along_tool
+        return true
+
+    def _object_from_gel(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        base_from_gel = self._true_base_from_flange(base_from_flange, step) @ self._true_flange_from_gel(step)
+        object_from_gel: FloatArray = self._object_from_base @ base_from_gel
+        return object_from_gel
+
+    def _indentation(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        gel_from_object = inverse(self._object_from_gel(base_from_flange, step))
+        indentation: FloatArray = penetration(
+            height_maps(self._raster, gel_from_object[None], self.sensor), self.sensor
+        )[0]
+        return indentation
