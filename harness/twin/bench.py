@@ -1,0 +1,278 @@
+"""The bench as bodies in space: arm, tactile sensor, table, pedestal, object. Nothing moves by itself.
+
+MuJoCo places the bodies and measures the gaps between their convex hulls; where the object's
+hull is too near, its triangles decide. Time is never stepped.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from harness.arrays import FloatArray, IntArray, read_only
+from harness.errors import WrongUse
+from harness.geometry import apply, inverse
+from harness.mesh import Mesh
+from harness.sensor import TactileSensor
+from harness.twin.arm import Part, add_arm, arm_parts, reaches
+from harness.twin.triangles import ConvexBody, Solid
+from harness.ur_tables import arm_table
+
+PAD_RIM: Final = 1e-3  # m of gel around the window that the camera sees
+HOUSING_LENGTH: Final = 0.06  # m along the sensor's axis
+MOUNT_RADIUS: Final = 0.022  # m, of what carries the housing on the flange
+NO_GAP: Final = 1e-3  # m; an object this near the table stands on it
+
+_GREY, _BLACK, _WOOD = (0.55, 0.57, 0.6, 1.0), (0.12, 0.12, 0.14, 1.0), (0.72, 0.6, 0.45, 1.0)
+_GEL, _FOAM, _OBJECT = (0.9, 0.75, 0.3, 1.0), (0.3, 0.33, 0.4, 1.0), (0.8, 0.35, 0.25, 1.0)
+
+
+@dataclass(frozen=True)
+class Hit:
+    """Two bodies nearer than they may be.
+
+    Attributes:
+        first: name of the body that moves more.
+        second: name of the other.
+        gap: m between them; negative where they overlap. Of convex hulls, so for the object
+            a lower bound.
+    """
+
+    first: str
+    second: str
+    gap: float
+
+    def __str__(self) -> str:
+        """In words, with the gap in millimetres."""
+        if self.gap < 0:
+            return f"the {self.first} would run into the {self.second}".replace("_", " ")
+        return f"the {self.first} would come within {1e3 * self.gap:.1f} mm of the {self.second}".replace(
+            "_", " "
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """Pairs of bodies within sight of each other in one posture.
+
+    Attributes:
+        pairs: ``(n, 2)`` indices of parts, the one nearer the arm's root first.
+        gaps: ``(n,)`` m.
+    """
+
+    pairs: IntArray
+    gaps: FloatArray
+
+
+class TwinBench:
+    """Everything that could be hit, and the question whether it is.
+
+    Args:
+        model: of the arm: ``"ur3e"``, ``"ur5e"`` or ``"ur10e"``.
+        flange_from_gel: ``(4, 4)``, where the flange carries the gel.
+        sensor: the tactile camera; its housing is a box behind the gel.
+        mesh: the object, m.
+        base_from_object: ``(4, 4)``, its nominal pose.
+        table_height: m in base.
+        pedestal_radius: m, of the foam pedestal between table and object.
+        clearance: m that everything keeps from everything, outside a press; at least 1 mm,
+            because motions are sampled every 2 mm of surface motion.
+        joint_range: ``(2, 6)`` rad; the maker's where it is None.
+
+    Raises:
+        WrongUse: an unknown arm, or an object that reaches below the table.
+    """
+
+    def __init__(
+        self,
+        model: str,
+        flange_from_gel: FloatArray,
+        sensor: TactileSensor,
+        mesh: Mesh,
+        base_from_object: FloatArray,
+        table_height: float = 0.0,
+        pedestal_radius: float = 0.03,
+        clearance: float = 2e-3,
+        joint_range: FloatArray | None = None,
+    ) -> None:
+        if clearance < 1e-3:
+            raise WrongUse(f"twin: a clearance of {1e3 * clearance:g} mm; it must be at least 1 mm")
+        self.model = model
+        self.flange_from_gel = read_only(np.array(flange_from_gel, dtype=np.float64))
+        self.gel_from_flange = read_only(inverse(self.flange_from_gel))
+        self.base_from_object = read_only(np.array(base_from_object, dtype=np.float64))
+        self.object_from_base = read_only(inverse(self.base_from_object))
+        self.sensor = sensor
+        self.solid = Solid(mesh)
+        self.clearance = clearance
+        self.joint_range = arm_table(model).joint_range if joint_range is None else joint_range
+        self._object_in_base = apply(self.base_from_object, self.solid.hull)
+        self.object_top = float(self._object_in_base[:, 2].max())
+        self.pad = _pad(sensor, depth=HOUSING_LENGTH)
+        tool = _tool(sensor, self.flange_from_gel)
+        standing = [Part(name, 0, np.zeros((1, 3))) for name in ("table", "pedestal", "object")]
+        self.parts = [*arm_parts(model), *tool, *standing]
+        self.reach = reaches(model, self.parts)
+        self._spec = self._make_spec(tool, table_height, pedestal_radius)
+        self.mujoco_model = self._spec.compile()
+        # The middle phase's boxes keep the margins they were compiled with.
+        self.mujoco_model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+        self.data = mujoco.MjData(self.mujoco_model)
+        self.links = np.array([part.link for part in self.parts])
+        self._bodies = [ConvexBody.of_points(part.vertices) for part in self.parts[: -len(standing)]]
+        names = [part.name for part in self.parts]
+        geoms = [self.mujoco_model.geom(i).name for i in range(self.mujoco_model.ngeom)]
+        self._part_of_geom = np.array([names.index(name) for name in geoms])
+        self._gel, self._object = names.index("gel"), names.index("object")
+        self._within = -1.0
+
+    def place(self, joints: FloatArray) -> None:
+        """Put the bodies where ``(6,)`` rad put them."""
+        self.data.qpos[:] = joints
+        mujoco.mj_kinematics(self.mujoco_model, self.data)
+
+    def base_from_gel(self, joints: FloatArray) -> FloatArray:
+        """``(4, 4)``: the gel's frame in a posture of ``(6,)`` rad."""
+        self.place(joints)
+        gel: FloatArray = self._base_from_link(6) @ self.flange_from_gel
+        return gel
+
+    def near(self, joints: FloatArray, within: float) -> Near:
+        """All pairs of bodies that are closer than ``within`` m."""
+        if within != self._within:
+            # MuJoCo adds the margins of the two; the bodies' own decide in the broad phase.
+            self.mujoco_model.geom_margin[:] = 0.5 * within
+            self.mujoco_model.body_margin[:] = 0.5 * within
+            self._within = within
+        self.place(joints)
+        mujoco.mj_collision(self.mujoco_model, self.data)
+        contact = self.data.contact
+        pairs = self._part_of_geom[contact.geom]
+        swap = self.links[pairs[:, 0]] > self.links[pairs[:, 1]]
+        pairs[swap] = pairs[swap][:, ::-1]
+        return Near(pairs, contact.dist.copy())
+
+    def hits(self, joints: FloatArray, press: bool = False) -> tuple[Hit, ...]:
+        """What a posture of ``(6,)`` rad hits.
+
+        Args:
+            joints: rad.
+            press: whether the gel may touch the object, and the rest of the tool come as close
+                to it as it likes without touching.
+        """
+        return self.judge(self.near(joints, self.clearance), press)
+
+    def judge(self, near: Near, press: bool) -> tuple[Hit, ...]:
+        """What of the pairs is too near, with the bodies where :meth:`place` last put them."""
+        close = near.gaps < self.clearance
+        if not close.any():
+            return ()
+        hits = []
+        for first, second in np.unique(near.pairs[close], axis=0).tolist():
+            gap = float(near.gaps[(near.pairs == (first, second)).all(axis=1)].min())
+            if self._object in (first, second) and not self._object_hit(first + second - self._object, press):
+                continue
+            hits.append(Hit(self.parts[second].name, self.parts[first].name, gap))
+        return tuple(hits)
+
+    def pad_depth(self, base_from_gel: FloatArray) -> float:
+        """How deep, in m, the object reaches into the pad; negative: still to go; -inf: nothing ahead."""
+        object_from_gel = self.object_from_base @ base_from_gel
+        return -self.solid.least_along(self.pad, object_from_gel)
+
+    def tool_hits(self, base_from_gel: FloatArray, press: bool) -> bool:
+        """Whether the mount, the housing or the gel is too near the object, whatever the arm does."""
+        object_from_flange = self.object_from_base @ base_from_gel @ self.gel_from_flange
+        clearance = 0.0 if press else self.clearance
+        tool = [p for p, link in enumerate(self.links) if link == 6 and self.parts[p].name != "wrist_3"]
+        return any(
+            self.solid.meets(self._bodies[part], object_from_flange, clearance)
+            for part in tool
+            if not (press and part == self._gel)
+        )
+
+    def _object_hit(self, part: int, press: bool) -> bool:
+        """Whether a moving part really is too near the object, by its triangles."""
+        if press and part == self._gel:
+            return False
+        object_from_link = self.object_from_base @ self._base_from_link(self.parts[part].link)
+        return self.solid.meets(self._bodies[part], object_from_link, 0.0 if press else self.clearance)
+
+    def _base_from_link(self, link: int) -> FloatArray:
+        pose = np.eye(4)
+        body = link + 1  # body 0 is MuJoCo's world
+        pose[:3, :3] = self.data.xmat[body].reshape(3, 3)
+        pose[:3, 3] = self.data.xpos[body]
+        return pose
+
+    def _make_spec(self, tool: Sequence[Part], table_height: float, pedestal_radius: float) -> Any:
+        spec = mujoco.MjSpec()
+        spec.compiler.degree = False
+        flange = add_arm(spec, self.model)
+        for part, colour in zip(tool, (_GREY, _BLACK, _GEL), strict=True):
+            _add_hull(spec, flange, part.name, part.vertices, colour)
+        _add_hull(spec, spec.worldbody, "object", self._object_in_base, _OBJECT)
+        low = self._object_in_base[:, 2].min()
+        if low < table_height - NO_GAP:
+            raise WrongUse(
+                f"twin: the object reaches {1e3 * (table_height - low):.1f} mm below the table at z = "
+                f"{table_height:g} m in base; raise it in the scene, or lower the table in the station"
+            )
+        spec.worldbody.add_geom(
+            name="table",
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[1.0, 1.0, 0.05],
+            pos=[0.0, 0.0, table_height],
+            rgba=_WOOD,
+        )
+        if low > table_height + NO_GAP:
+            self._add_pedestal(spec, table_height, float(low), pedestal_radius)
+        return spec
+
+    def _add_pedestal(self, spec: Any, table_height: float, low: float, radius: float) -> None:
+        """Under the middle of what the object stands on."""
+        feet = self._object_in_base[self._object_in_base[:, 2] < low + 0.01, :2]
+        middle = 0.5 * (feet.min(axis=0) + feet.max(axis=0))
+        spec.worldbody.add_geom(
+            name="pedestal",
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            size=[radius, 0.5 * (low - table_height), 0.0],
+            pos=[*middle, 0.5 * (low + table_height)],
+            rgba=_FOAM,
+        )
+
+
+def _pad(sensor: TactileSensor, depth: float) -> ConvexBody:
+    """The space before and behind the gel's surface that the object may dent, in the gel's frame."""
+    half = _half_pad(sensor)
+    return ConvexBody.box(np.array([*-half, -depth]), np.array([*half, depth]))
+
+
+def _half_pad(sensor: TactileSensor) -> FloatArray:
+    half: FloatArray = np.minimum(0.5 * np.array(sensor.window) + PAD_RIM, 0.5 * np.array(sensor.housing))
+    return half
+
+
+def _tool(sensor: TactileSensor, flange_from_gel: FloatArray) -> tuple[Part, Part, Part]:
+    """Mount, housing and gel in the flange's frame; the housing's face lies a gel's thickness back."""
+    half, gel_half = 0.5 * np.array(sensor.housing), _half_pad(sensor)
+    face = -sensor.gel_thickness
+    back = max(face - HOUSING_LENGTH, 0.5 * (face - float(np.linalg.norm(flange_from_gel[:3, 3]))))
+    housing = ConvexBody.box(np.array([*-half, back]), np.array([*half, face]))
+    gel = ConvexBody.box(np.array([*-gel_half, face]), np.array([*gel_half, 0.0]))
+    angles = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
+    ring = MOUNT_RADIUS * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(16)])
+    mount = np.concatenate([ring, apply(flange_from_gel, ring * 0.6 + np.array([0.0, 0.0, back]))])
+    return (
+        Part("mount", 6, mount[ConvexHull(mount).vertices]),
+        Part("housing", 6, apply(flange_from_gel, housing.vertices)),
+        Part("gel", 6, apply(flange_from_gel, gel.vertices)),
+    )
+
+
+def _add_hull(spec: Any, body: Any, name: str, vertices: FloatArray, colour: tuple[float, ...]) -> None:
+    spec.add_mesh(name=name, uservert=vertices.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, mass=0.0, rgba=colour)

@@ -1,0 +1,168 @@
+"""From a wanted contact to motions the arm can make: reach, approach, press, retreat."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from harness import kinematics
+from harness.arrays import FloatArray
+from harness.geometry import translation
+from harness.twin.bench import TwinBench
+from harness.twin.rehearsal import NEARLY_SINGULAR, Segment
+from harness.twin.sweep import line_poses, line_postures, sweep_postures
+from harness.twin.ways import connect
+
+STAND_OFF: Final = 0.03  # m between the gel and the place where it is fully pressed
+GREATEST_TURN: Final = 0.6  # rad of a joint from the stand-off to the press
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """One branch that reaches a contact.
+
+    Attributes:
+        base_from_gel: ``(4, 4)``, fully pressed.
+        stand_off_joints: ``(6,)`` rad, before the approach.
+        pressed_joints: ``(6,)`` rad.
+    """
+
+    base_from_gel: FloatArray
+    stand_off_joints: FloatArray
+    pressed_joints: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedContact:
+    """A contact with every motion to and from it.
+
+    Attributes:
+        start: ``(6,)`` rad, where the travel starts.
+        travel: ``(n, 6)`` rad, joint motions; the last is the stand-off. Empty if it starts there.
+        base_from_stand_off: ``(4, 4)`` of the flange.
+        base_from_pressed: ``(4, 4)`` of the flange.
+        pressed_joints: ``(6,)`` rad.
+        stand_off: m from there to the press.
+    """
+
+    start: FloatArray
+    travel: FloatArray
+    base_from_stand_off: FloatArray
+    base_from_pressed: FloatArray
+    pressed_joints: FloatArray
+    stand_off: float
+
+    @property
+    def stand_off_joints(self) -> FloatArray:
+        """``(6,)`` rad: where the contact begins and ends."""
+        return self.travel[-1] if len(self.travel) else self.start
+
+    def segments(self, step: int) -> tuple[Segment, ...]:
+        """What the arm does for this contact, to be rehearsed."""
+        stations = [self.start, *self.travel]
+        there = self.stand_off_joints
+        return (
+            *(Segment(step, "travel", "joint", a, b) for a, b in itertools.pairwise(stations)),
+            Segment(step, "press", "line", there, self.base_from_pressed, touches=True, press=True),
+            Segment(step, "retreat", "line", self.pressed_joints, self.base_from_stand_off, touches=True),
+        )
+
+
+def reachable(bench: TwinBench, base_from_gel: FloatArray, stand_off: float = STAND_OFF) -> bool:
+    """Whether some branch puts the gel there and at the stand-off before it, hitting nothing.
+
+    Quick, for choosing among hundreds of places; the way there is not looked at.
+
+    Args:
+        bench: the twin.
+        base_from_gel: ``(4, 4)``, fully pressed.
+        stand_off: m back along the gel's axis.
+    """
+    return next(_approaches(bench, base_from_gel, stand_off), None) is not None
+
+
+def approaches(bench: TwinBench, base_from_gel: FloatArray, stand_off: float = STAND_OFF) -> list[Approach]:
+    """Every branch that :func:`reachable` would accept."""
+    return list(_approaches(bench, base_from_gel, stand_off))
+
+
+def plan_contact(
+    bench: TwinBench,
+    base_from_gel: FloatArray,
+    seed_joints: FloatArray,
+    stand_off: float = STAND_OFF,
+    seed: int = 0,
+) -> PlannedContact | None:
+    """Travel, approach and retreat for one contact; None where no branch has a free way.
+
+    Args:
+        bench: the twin.
+        base_from_gel: ``(4, 4)``, fully pressed.
+        seed_joints: ``(6,)`` rad, where the arm is.
+        stand_off: m back along the gel's axis.
+        seed: of the search, should one be needed.
+    """
+    candidates = [
+        approach
+        for found in _approaches(bench, base_from_gel, stand_off)
+        if (approach := _turned_to(bench, found, seed_joints)) is not None and _line_free(bench, approach)
+    ]
+    candidates.sort(key=lambda approach: float(np.abs(approach.stand_off_joints - seed_joints).max()))
+    for search in (False, True):
+        for approach in candidates:
+            travel = connect(bench, seed_joints, approach.stand_off_joints, seed, search)
+            if travel is not None:
+                return _planned(bench, approach, seed_joints, travel, stand_off)
+    return None
+
+
+def _planned(
+    bench: TwinBench, approach: Approach, start: FloatArray, travel: FloatArray, stand_off: float
+) -> PlannedContact:
+    pressed = approach.base_from_gel @ bench.gel_from_flange
+    before = approach.base_from_gel @ translation(np.array([0.0, 0.0, -stand_off])) @ bench.gel_from_flange
+    return PlannedContact(start, travel, before, pressed, approach.pressed_joints, stand_off)
+
+
+def _approaches(bench: TwinBench, base_from_gel: FloatArray, stand_off: float) -> Iterator[Approach]:
+    """The cheap questions first: the pad, the tool, the reach, the branch's posture, the whole arm."""
+    if not 0.0 < bench.pad_depth(base_from_gel) <= bench.sensor.gel_thickness:
+        return
+    before = base_from_gel @ translation(np.array([0.0, 0.0, -stand_off]))
+    if bench.tool_hits(base_from_gel, press=True) or bench.tool_hits(before, press=False):
+        return
+    pressed = kinematics.inverse(bench.model, base_from_gel @ bench.gel_from_flange)
+    if len(pressed) == 0:
+        return
+    good = kinematics.singularity(bench.model, pressed) >= NEARLY_SINGULAR
+    for joints in pressed[good]:
+        back = kinematics.nearest_branch(
+            bench.model, before @ bench.gel_from_flange, joints, bench.joint_range
+        )
+        if back is None or np.abs(back - joints).max() > GREATEST_TURN:
+            continue
+        if bench.hits(joints, press=True) or bench.hits(back):
+            continue
+        if float(kinematics.singularity(bench.model, back)) >= NEARLY_SINGULAR:
+            yield Approach(base_from_gel, back, joints)
+
+
+def _turned_to(bench: TwinBench, approach: Approach, seed_joints: FloatArray) -> Approach | None:
+    """The same branch, whole turns nearer to where the arm is."""
+    back = kinematics.within_range(approach.stand_off_joints[None], seed_joints, bench.joint_range)
+    if len(back) == 0:
+        return None
+    pressed = approach.pressed_joints + (back[0] - approach.stand_off_joints)
+    low, high = bench.joint_range
+    if np.any(pressed < low) or np.any(pressed > high):
+        return None
+    return Approach(approach.base_from_gel, back[0], pressed)
+
+
+def _line_free(bench: TwinBench, approach: Approach) -> bool:
+    start = kinematics.forward(bench.model, approach.stand_off_joints)
+    poses = line_poses(start, approach.base_from_gel @ bench.gel_from_flange)
+    postures = line_postures(bench, approach.stand_off_joints, poses)
+    return len(postures) == len(poses) and sweep_postures(bench, postures, press=True) is None
