@@ -149,7 +149,7 @@ def _edge(p: FloatArray, c: int, d: int) -> Edge:
 def _nearer(part: FloatArray, z_first: float, slope: float, z_low: float, z_high: float) -> None:
     # In this form the compiler takes eight pixels at a time (a 32-bit count, no jump).
     for j in range(len(part)):
-        z = z_first + slope * np.float64(np.int32(j))
+        z: float = z_first + slope * np.float64(np.int32(j))
         # Rounding on a steep triangle must not leave the triangle.
         z = z if z > z_low else z_low
         z = z if z < z_high else z_high

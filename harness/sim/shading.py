@@ -1,0 +1,110 @@
+"""The smooth model of a gel's colour: a polynomial in the surface normal and the position.
+
+``dI = sum_ab sum_cd k_abcd nx^a ny^b u^c v^d`` with 1 <= a + b <= 5 and c + d <= 2: no constant
+in the normal, so a flat gel changes no colour. (nx, ny) is the part in the image plane of
+the unit normal towards the camera, (u, v) the position scaled to -1..1 on the image. Beyond
+the slopes that presses supported the normal is bent smoothly towards the limit.
+"""
+
+import numpy as np
+
+from harness.arrays import FloatArray
+from harness.sim.compiled import compiled
+from harness.sim.tactile_calibration import NORMAL_DEGREE, POSITION_DEGREE
+
+KNEE = 0.9
+"""Share of the slope limit up to which a slope is taken as it is."""
+
+NORMAL_TERMS = (NORMAL_DEGREE + 1) * (NORMAL_DEGREE + 2) // 2 - 1
+POSITION_TERMS = (POSITION_DEGREE + 1) * (POSITION_DEGREE + 2) // 2
+
+
+def design(normal: FloatArray, position: FloatArray) -> FloatArray:
+    """``(n, 120)`` the terms at ``(n, 2)`` normals and ``(n, 2)`` scaled positions."""
+    powers = [(a, b) for a in range(NORMAL_DEGREE + 1) for b in range(NORMAL_DEGREE + 1 - a) if a + b]
+    places = [(c, d) for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)]
+    slopes = np.stack([normal[:, 0] ** a * normal[:, 1] ** b for a, b in powers], axis=1)
+    where = np.stack([position[:, 0] ** c * position[:, 1] ** d for c, d in places], axis=1)
+    terms: FloatArray = (slopes[:, :, None] * where[:, None, :]).reshape(len(normal), -1)
+    return terms
+
+
+def scaled_position(x: FloatArray, y: FloatArray, rows: int, columns: int) -> FloatArray:
+    """``(n, 2)`` in -1..1 of pixel coordinates: column ``x`` and row ``y``, from 0."""
+    return np.stack([2.0 * (x + 0.5) / columns - 1.0, 2.0 * (y + 0.5) / rows - 1.0], axis=-1)
+
+
+@compiled
+def position_terms(i: int, j: int, rows: int, columns: int, out: FloatArray) -> None:
+    """Write the powers of the scaled position of pixel (row i, column j) in ``design``'s order."""
+    u = 2.0 * (j + 0.5) / columns - 1.0
+    v = 2.0 * (i + 0.5) / rows - 1.0
+    out[0], out[1], out[2] = 1.0, v, v * v
+    out[3], out[4], out[5] = u, u * v, u * u
+
+
+@compiled
+def at_pixel(smooth: FloatArray, place: FloatArray, out: FloatArray) -> None:
+    """Contract the coefficients with a pixel's position: ``out`` becomes ``(20, 3)``."""
+    for k in range(NORMAL_TERMS):
+        for c in range(3):
+            total = 0.0
+            for p in range(POSITION_TERMS):
+                total += smooth[k * POSITION_TERMS + p, c] * place[p]
+            out[k, c] = total
+
+
+@compiled
+def colour(here: FloatArray, nx: float, ny: float, out: FloatArray) -> None:
+    """Write the change of colour ``(3,)`` of a normal, by Horner's rule over ``at_pixel``'s terms."""
+    for c in range(3):
+        k = NORMAL_TERMS
+        total = 0.0
+        for a in range(NORMAL_DEGREE, -1, -1):
+            inner = 0.0
+            for _ in range(NORMAL_DEGREE + 1 - a):
+                k -= 1
+                inner = inner * ny + (here[k, c] if k >= 0 else 0.0)
+            total = total * nx + inner
+        out[c] = total
+
+
+@compiled
+def colour_and_slope(here: FloatArray, nx: float, ny: float, out: FloatArray, by: FloatArray) -> None:
+    """As ``colour``, and the derivatives by nx and ny into ``by``, ``(3, 2)``."""
+    for c in range(3):
+        k = NORMAL_TERMS
+        total, total_x, total_y = 0.0, 0.0, 0.0
+        for a in range(NORMAL_DEGREE, -1, -1):
+            inner, inner_y = 0.0, 0.0
+            for _ in range(NORMAL_DEGREE + 1 - a):
+                k -= 1
+                inner_y = inner_y * ny + inner
+                inner = inner * ny + (here[k, c] if k >= 0 else 0.0)
+            total_x = total_x * nx + total
+            total_y = total_y * nx + inner_y
+            total = total * nx + inner
+        out[c], by[c, 0], by[c, 1] = total, total_x, total_y
+
+
+@compiled
+def softly_limited(sine: float, limit: float) -> float:
+    """The sine of a slope, bent towards ``limit`` beyond the knee; once differentiable, increasing."""
+    knee = KNEE * limit
+    if sine <= knee:
+        return sine
+    room = limit - knee
+    bent: float = knee + room * (1.0 - np.exp(-(sine - knee) / room))
+    return bent
+
+
+@compiled
+def unlimited(sine: float, limit: float) -> float:
+    """The inverse of ``softly_limited`` on 0 <= sine < limit, at most 0.99."""
+    knee = KNEE * limit
+    if sine <= knee:
+        return sine
+    room = limit - knee
+    left = max(1.0 - (sine - knee) / room, 1e-6)
+    straight: float = min(knee - room * np.log(left), 0.99)
+    return straight
