@@ -45,16 +45,13 @@ class Dimension:
         Raises:
             ValueError: no number, no unit, a unit of something else, or a number too large.
         """
-        if isinstance(text, bool) or not isinstance(text, str | int | float):
-            raise ValueError(f"{text!r} is not {self.name}; write a number and its unit, {self._write()}")
-        if isinstance(text, int | float):
+        match = _TEXT.fullmatch(text) if isinstance(text, str) else None
+        bare = isinstance(text, int | float) and not isinstance(text, bool)
+        if bare or (match is not None and match.group(2) is None):
             raise ValueError(f"{text!r} has no unit; write {self.name} as {self._write()}")
-        match = _TEXT.fullmatch(text)
         if match is None:
             raise ValueError(f"{text!r} is not a number and a unit; write {self.name} as {self._write()}")
         number, unit = match.groups()
-        if unit is None:
-            raise ValueError(f"{text!r} has no unit; write {self.name} as {self._write()}")
         if unit not in self.factors:
             raise ValueError(f"{text!r} is not {self.name}: the unit {unit!r} is none of {self._units()}")
         value = float(Decimal(number) * Decimal(self.factors[unit]))

@@ -1,0 +1,229 @@
+"""The station's end of the pipe to a mocked lab: start it, tell it the step, cue faults, end it.
+
+The lab is a program of its own (``python -m mocks.lab``) that answers JSON lines. It ends with
+the end of file on its standard input, so it cannot outlive the process that started it.
+"""
+
+import json
+import os
+import selectors
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from harness.clock import now
+from harness.errors import BenchFault, DataRefused
+from harness.scene import SceneFile
+from harness.station_file import Station
+from harness.toml_file import StrictModel, validate
+
+READY_WITHIN = 60.0
+"""s for the lab to be ready: on a cold machine its kernels are compiled first."""
+
+ANSWER_WITHIN = 15.0
+END_WITHIN = 3.0
+_TAIL = 2000
+
+
+class LabFile(StrictModel):
+    """What a lab is a mock of: ``--scene FILE.json``.
+
+    Attributes:
+        schema_number: ``schema`` in the file.
+        scene: with the mesh's path absolute.
+        station: whose far ends the lab stands for.
+    """
+
+    schema_number: Literal[1] = Field(alias="schema")
+    scene: SceneFile
+    station: Station
+
+    def write(self, path: Path) -> None:
+        """Write the file, quantities with their units."""
+        path.write_text(self.model_dump_json(indent=1), encoding="utf-8")
+
+
+def read_lab_file(path: Path) -> LabFile:
+    """What ``LabFile.write`` wrote; ``WrongUse`` or ``DataRefused`` where it is something else."""
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DataRefused(f"{path} is not a file for a mocked lab: {error}") from error
+    return validate(tree, LabFile, str(path))
+
+
+@dataclass(frozen=True)
+class LabAddresses:
+    """Where the mocked instruments are.
+
+    Attributes:
+        arm: address of the controller.
+        gel: URL of the stream.
+        camera: URL of the stream, None without.
+    """
+
+    arm: str
+    gel: str
+    camera: str | None
+
+
+class MockLab:
+    """A mocked lab in a process of its own; a context manager that ends it.
+
+    Args:
+        scene: that the world shows.
+        station: whose instruments are mocked.
+        seed: of the world's draws.
+        gap: path of the reality gap.
+        truth: where the lab writes what is true.
+        command: the program; None for ``python -m mocks.lab``.
+    """
+
+    def __init__(
+        self,
+        scene: SceneFile,
+        station: Station,
+        seed: int,
+        gap: Path,
+        truth: Path,
+        command: Sequence[str] | None = None,
+    ) -> None:
+        self._file = LabFile(schema=1, scene=scene, station=station)
+        self._options = ["--seed", str(seed), "--gap", str(gap), "--truth", str(truth)]
+        self._command = [*(command or (sys.executable, "-m", "mocks.lab"))]
+        self._process: subprocess.Popen[bytes] | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._waiting = b""
+        self._busy = threading.Lock()
+
+    def start(self) -> LabAddresses:
+        """Start the lab and wait until every instrument answers.
+
+        Raises:
+            BenchFault: it ended, or was not ready in time; what it said last is in the message.
+        """
+        if self._process is not None:
+            raise ValueError("this lab is running already; make another")
+        self._folder = tempfile.TemporaryDirectory(prefix="touchstone-lab-")
+        scene = Path(self._folder.name) / "scene.json"
+        self._file.write(scene)
+        arguments = ["--scene", str(scene), *self._options]
+        with self._log.open("wb") as log:
+            self._process = subprocess.Popen(
+                [*self._command, *arguments],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                process_group=0,  # Ctrl-C at the terminal is for the session; the lab goes on
+            )
+        try:
+            return _addresses(self._line(READY_WITHIN))
+        except BaseException:
+            self.close()
+            raise
+
+    def mark(self, step: int, sample: int) -> None:
+        """Tell the world the step and the sample, and wait until it shows them."""
+        self.ask({"mark": {"step": step, "sample": sample}})
+
+    def fault(self, instrument: str, kind: str, seconds: float | None = None) -> None:
+        """Make something go wrong at the far end of a cable; for tests and demonstrations."""
+        cue: dict[str, Any] = {"instrument": instrument, "kind": kind}
+        self.ask({"fault": cue if seconds is None else {**cue, "seconds": seconds}})
+
+    def ask(self, request: Mapping[str, Any]) -> Mapping[str, Any]:
+        """One line to the lab, and its answer.
+
+        Raises:
+            BenchFault: the lab is gone, silent, or cannot do what is asked.
+        """
+        with self._busy:
+            stream = None if self._process is None else self._process.stdin
+            if stream is None or stream.closed:
+                raise BenchFault("the mocked lab is not running; open the station first")
+            try:
+                stream.write(json.dumps(request, allow_nan=False).encode() + b"\n")
+                stream.flush()
+            except OSError as error:
+                raise BenchFault(f"the mocked lab is gone ({error}); {self._said()}") from error
+            answer = self._line(ANSWER_WITHIN)
+        if "error" in answer:
+            raise BenchFault(f"the mocked lab refused {json.dumps(request)}: {answer['error']}")
+        return answer
+
+    def close(self) -> None:
+        """End the lab and all its processes; may be called twice."""
+        process, self._process = self._process, None
+        if process is not None:
+            _end(process)
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
+    def __enter__(self) -> "MockLab":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def process_id(self) -> int:
+        """Of the lab's own process; ``BenchFault`` where it is not running."""
+        if self._process is None:
+            raise BenchFault("the mocked lab is not running; open the station first")
+        return self._process.pid
+
+    @property
+    def _log(self) -> Path:
+        assert self._folder is not None
+        return Path(self._folder.name) / "lab.log"
+
+    def _line(self, seconds: float) -> Mapping[str, Any]:
+        """The next line the lab says within ``seconds``."""
+        assert self._process is not None
+        assert self._process.stdout is not None
+        descriptor = self._process.stdout.fileno()
+        end = now() + seconds
+        with selectors.DefaultSelector() as selector:
+            selector.register(descriptor, selectors.EVENT_READ)
+            while b"\n" not in self._waiting:
+                if not selector.select(max(0.0, end - now())):
+                    raise BenchFault(f"the mocked lab said nothing for {seconds:g} s; {self._said()}")
+                arrived = os.read(descriptor, 1 << 16)
+                if not arrived:
+                    raise BenchFault(f"the mocked lab ended; {self._said()}")
+                self._waiting += arrived
+        line, _, self._waiting = self._waiting.partition(b"\n")
+        answer: Mapping[str, Any] = json.loads(line)
+        return answer
+
+    def _said(self) -> str:
+        text = self._log.read_text(encoding="utf-8", errors="replace").strip()
+        return f"its last words were: {text[-_TAIL:]}" if text else "it said nothing on standard error"
+
+
+def _addresses(ready: Mapping[str, Any]) -> LabAddresses:
+    if ready.get("ready") is not True:
+        raise BenchFault(f"the mocked lab did not start: {ready.get('error', ready)}")
+    return LabAddresses(ready["arm"], ready["gel"], ready["camera"])
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            try:
+                stream.close()
+            except OSError:  # what was not yet sent no longer matters
+                continue
+    try:
+        process.wait(END_WITHIN)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

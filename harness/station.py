@@ -1,0 +1,207 @@
+"""The bench, opened: the station's instruments by their kind, all of them or none.
+
+The table of kinds is literal and names its drivers by import strings, loaded on use: nothing
+in the core imports what lies above it.
+"""
+
+import importlib
+import logging
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol
+
+import numpy as np
+
+from harness.device import Arm, TactileCamera
+from harness.errors import BenchFault, SafetyStop, TouchstoneError
+from harness.gap import gap_path
+from harness.geometry import apply
+from harness.mock_lab import LabAddresses, MockLab
+from harness.scene import SceneFile
+from harness.station_file import Station
+
+INSTRUMENTS = {
+    "ur": "drivers.ur_arm:UrArm",
+    "gelsight-http": "drivers.gelsight:GelSight",
+    "camera-http": "drivers.camera:SceneCamera",
+}
+"""Instrument kind to driver."""
+
+LIMITS = {"ur": "drivers.safety:SafetyLimits"}
+"""Arm kind to the form in which its driver takes the station's limits."""
+
+_LOG = logging.getLogger(__name__)
+
+
+class Mark(Protocol):
+    """Says at which step and sample the run is; -1 before the first sample of a step."""
+
+    def __call__(self, step: int, sample: int) -> None:
+        """A mocked world draws its errors for that step and sample; a real bench ignores it."""
+
+
+def _ignore_mark(step: int, sample: int) -> None:
+    """What a real bench does with a mark."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Instruments, open, and what is known of how they are mounted.
+
+    Attributes:
+        arm: that moves.
+        gel: on its flange.
+        camera: that looks on; None without.
+        station: they belong to.
+        mark: see ``Mark``.
+        pause: waits for so many seconds of the bench's own time.
+        lab: behind a mocked bench, for cueing faults; None at a real one.
+    """
+
+    arm: Arm
+    gel: TactileCamera
+    camera: TactileCamera | None
+    station: Station
+    mark: Mark = _ignore_mark
+    pause: Callable[[float], None] = time.sleep
+    lab: MockLab | None = None
+
+
+@dataclass(frozen=True)
+class RunContext:
+    """What a mocked bench must know of the run it is opened for.
+
+    Attributes:
+        truth: where the world writes what is true.
+        seed: of the world.
+        gap: reality gap by name or path; None for the station's own.
+    """
+
+    truth: Path
+    seed: int = 0
+    gap: str | None = None
+
+
+@contextmanager
+def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterator[Bench]:
+    """Open every instrument; on exit stop the arm first, close the rest, end the mocked lab.
+
+    Args:
+        station: to open.
+        scene: says whether the camera is needed, and what a mocked world shows.
+        run: the run this is for.
+
+    Raises:
+        BenchFault: one or more instruments did not open: each is named, with the cable to check.
+        SafetyStop: one of them refused for safety's sake.
+    """
+    with ExitStack() as stack:
+        lab = None
+        if station.mock is not None:
+            gap = gap_path(run.gap or station.mock.gap)
+            lab = MockLab(scene, station, run.seed, gap, run.truth)
+            stack.callback(lab.close)
+            where = addressed(station, lab.start())
+        else:
+            where = station
+        arm = make_arm(where)
+        gel = make_gel(where)
+        camera = make_camera(where) if scene.sensors.camera else None
+        _open_all(stack, {"arm": arm, "gel": gel, "camera": camera})
+        stack.push(_Closing("arm, stopping", arm.stop))
+        mark = _ignore_mark if lab is None else lab.mark
+        yield Bench(arm, gel, camera, station, mark, lab=lab)
+
+
+def addressed(station: Station, where: LabAddresses) -> Station:
+    """A mocked station with the addresses that its lab took."""
+    camera = station.camera
+    if camera is not None:
+        camera = camera.model_copy(update={"url": where.camera})
+    arm = station.arm.model_copy(update={"address": where.arm})
+    gel = station.gel.model_copy(update={"url": where.gel})
+    return station.model_copy(update={"arm": arm, "gel": gel, "camera": camera})
+
+
+def make_arm(station: Station) -> Arm:
+    """The arm's driver, not yet open; its limits hold for the flange and the gel's housing."""
+    section = station.arm
+    width, height = (0.5 * side for side in station.gel.sensor.housing)
+    corners = [(x, y, 0.0) for x in (-width, width) for y in (-height, height)]
+    on_tool = apply(station.flange_from_gel, np.array(corners))
+    made: Arm = _load(INSTRUMENTS[section.kind])(
+        address=section.address,
+        model=section.model,
+        limits=_load(LIMITS[section.kind])(**section.safety.model_dump()),
+        rate=section.rate,
+        tool_points=[(0.0, 0.0, 0.0), *on_tool.tolist()],
+    )
+    return made
+
+
+def make_gel(station: Station) -> TactileCamera:
+    """The gel's driver, not yet open."""
+    section = station.gel
+    made: TactileCamera = _load(INSTRUMENTS[section.kind])(
+        url=section.url, sensor=section.sensor, serial=section.serial, nominal_rate=section.rate
+    )
+    return made
+
+
+def make_camera(station: Station) -> TactileCamera | None:
+    """The scene camera's driver, not yet open; None for a bench without."""
+    section = station.camera
+    if section is None:
+        return None
+    made: TactileCamera = _load(INSTRUMENTS[section.kind])(
+        url=section.url, rows=section.rows, columns=section.columns, serial=section.serial
+    )
+    return made
+
+
+def _open_all(stack: ExitStack, instruments: dict[str, Arm | TactileCamera | None]) -> None:
+    failures: dict[str, TouchstoneError] = {}
+    for name, instrument in instruments.items():
+        if instrument is None:
+            continue
+        try:
+            instrument.open()
+        except TouchstoneError as error:
+            failures[name] = error
+        else:
+            stack.push(_Closing(f"{name}, closing", instrument.close))
+    if len(failures) == 1:
+        raise next(iter(failures.values()))
+    if failures:
+        listed = "".join(f"\n  - {name}: {error}" for name, error in failures.items())
+        unsafe = any(isinstance(error, SafetyStop) for error in failures.values())
+        kind = SafetyStop if unsafe else BenchFault
+        raise kind(f"{len(failures)} instruments did not open:{listed}")
+
+
+@dataclass(frozen=True)
+class _Closing:
+    """One thing to do on the way out, which hides no earlier failure."""
+
+    what: str
+    action: Callable[[], None]
+
+    def __call__(
+        self, _kind: type[BaseException] | None, error: BaseException | None, _trace: TracebackType | None
+    ) -> bool:
+        try:
+            self.action()
+        except TouchstoneError as failure:
+            if error is None:
+                raise
+            _LOG.warning("%s: %s", self.what, failure)
+        return False
+
+
+def _load(target: str) -> Any:
+    module, _, name = target.partition(":")
+    return vars(importlib.import_module(module))[name]
