@@ -14,15 +14,15 @@ import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import Field
+import numpy as np
 
 from harness.clock import now
-from harness.errors import BenchFault, DataRefused
+from harness.errors import BenchFault
+from harness.mesh import Mesh
 from harness.scene import SceneFile
 from harness.station_file import Station
-from harness.toml_file import StrictModel, validate
 
 READY_WITHIN = 60.0
 """s for the lab to be ready: on a cold machine its kernels are compiled first."""
@@ -30,33 +30,7 @@ READY_WITHIN = 60.0
 ANSWER_WITHIN = 15.0
 END_WITHIN = 3.0
 _TAIL = 2000
-
-
-class LabFile(StrictModel):
-    """What a lab is a mock of: ``--scene FILE.json``.
-
-    Attributes:
-        schema_number: ``schema`` in the file.
-        scene: with the mesh's path absolute.
-        station: whose far ends the lab stands for.
-    """
-
-    schema_number: Literal[1] = Field(alias="schema")
-    scene: SceneFile
-    station: Station
-
-    def write(self, path: Path) -> None:
-        """Write the file, quantities with their units."""
-        path.write_text(self.model_dump_json(indent=1), encoding="utf-8")
-
-
-def read_lab_file(path: Path) -> LabFile:
-    """What ``LabFile.write`` wrote; ``WrongUse`` or ``DataRefused`` where it is something else."""
-    try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DataRefused(f"{path} is not a file for a mocked lab: {error}") from error
-    return validate(tree, LabFile, str(path))
+_SCHEMA = 1
 
 
 @dataclass(frozen=True)
@@ -80,6 +54,7 @@ class MockLab:
     Args:
         scene: that the world shows.
         station: whose instruments are mocked.
+        mesh: of the object, in metres, as planned with; a built-in object the lab tessellates anew.
         seed: of the world's draws.
         gap: path of the reality gap.
         truth: where the lab writes what is true.
@@ -90,12 +65,13 @@ class MockLab:
         self,
         scene: SceneFile,
         station: Station,
+        mesh: Mesh,
         seed: int,
         gap: Path,
         truth: Path,
         command: Sequence[str] | None = None,
     ) -> None:
-        self._file = LabFile(schema=1, scene=scene, station=station)
+        self._scene, self._station, self._mesh = scene, station, mesh
         self._options = ["--seed", str(seed), "--gap", str(gap), "--truth", str(truth)]
         self._command = [*(command or (sys.executable, "-m", "mocks.lab"))]
         self._process: subprocess.Popen[bytes] | None = None
@@ -112,9 +88,7 @@ class MockLab:
         if self._process is not None:
             raise ValueError("this lab is running already; make another")
         self._folder = tempfile.TemporaryDirectory(prefix="touchstone-lab-")
-        scene = Path(self._folder.name) / "scene.json"
-        self._file.write(scene)
-        arguments = ["--scene", str(scene), *self._options]
+        arguments = ["--scene", str(self._described(Path(self._folder.name))), *self._options]
         with self._log.open("wb") as log:
             self._process = subprocess.Popen(
                 [*self._command, *arguments],
@@ -184,6 +158,22 @@ class MockLab:
     def _log(self) -> Path:
         assert self._folder is not None
         return Path(self._folder.name) / "lab.log"
+
+    def _described(self, folder: Path) -> Path:
+        """The file that tells the lab what it is a mock of."""
+        mesh = None if self._scene.object.builtin is not None else folder / "mesh.npz"
+        if mesh is not None:
+            np.savez(mesh, vertices=self._mesh.vertices, faces=self._mesh.faces)
+        told = {
+            "schema": _SCHEMA,
+            "scene": self._scene.model_dump(mode="json"),
+            "station": self._station.model_dump(mode="json"),
+            "mesh": None if mesh is None else str(mesh),
+            "base_from_object": self._scene.base_from_object(self._mesh).tolist(),
+        }
+        path = folder / "scene.json"
+        path.write_text(json.dumps(told, allow_nan=False), encoding="utf-8")
+        return path
 
     def _line(self, seconds: float) -> Mapping[str, Any]:
         """The next line the lab says within ``seconds``."""

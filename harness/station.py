@@ -20,6 +20,7 @@ from harness.device import Arm, TactileCamera
 from harness.errors import BenchFault, SafetyStop, TouchstoneError
 from harness.gap import gap_path
 from harness.geometry import apply
+from harness.mesh import Mesh
 from harness.mock_lab import LabAddresses, MockLab
 from harness.scene import SceneFile
 from harness.station_file import Station
@@ -77,11 +78,13 @@ class RunContext:
 
     Attributes:
         truth: where the world writes what is true.
+        mesh: of the object, in metres, as the run is planned with.
         seed: of the world.
         gap: reality gap by name or path; None for the station's own.
     """
 
     truth: Path
+    mesh: Mesh
     seed: int = 0
     gap: str | None = None
 
@@ -103,7 +106,7 @@ def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterato
         lab = None
         if station.mock is not None:
             gap = gap_path(run.gap or station.mock.gap)
-            lab = MockLab(scene, station, run.seed, gap, run.truth)
+            lab = MockLab(scene, station, run.mesh, run.seed, gap, run.truth)
             stack.callback(lab.close)
             where = addressed(station, lab.start())
         else:
