@@ -1,0 +1,118 @@
+"""The loops of the optics: slope to colour for every pixel of one image."""
+
+import numpy as np
+
+from harness.arrays import ByteArray, FloatArray
+from harness.sim.compiled import compiled
+from harness.sim.shading import at_pixel, colour, position_terms, softly_limited
+
+
+@compiled
+def _slopes(z: FloatArray, i: int, j: int) -> tuple[float, float]:
+    # Central differences down and right; the border repeats its inner neighbour (Taxim).
+    rows, columns = z.shape
+    i = min(max(i, 1), rows - 2)
+    j = min(max(j, 1), columns - 2)
+    return (z[i + 1, j] - z[i - 1, j]) / 2.0, (z[i, j + 1] - z[i, j - 1]) / 2.0
+
+
+@compiled
+def _exact_pixel(z: FloatArray, i: int, j: int, table: FloatArray, out: FloatArray) -> float:
+    a, b = _slopes(z, i, j)
+    steep: float = np.hypot(a, b)
+    bins = table.shape[0]
+    magnitude = np.arctan(steep)
+    # Adding zero turns -0.0 to 0.0, or the sign of nothing would choose the side of the seam.
+    direction = np.arctan2(a + 0.0, b + 0.0) if steep > 0.0 else 0.0
+    row = int(np.floor(magnitude / (0.5 * np.pi / (bins - 1))))
+    column = int(np.floor((direction + np.pi) / (2.0 * np.pi / (bins - 1))))
+    x, y = float(j), float(i)
+    for c in range(3):
+        p = table[row, column]
+        value = x * x * p[0, c] + y * y * p[1, c] + x * y * p[2, c]
+        out[c] = value + x * p[3, c] + y * p[4, c] + p[5, c]
+    return steep
+
+
+@compiled
+def change_exactly(z: FloatArray, table: FloatArray, change: FloatArray) -> None:
+    """Write the table's grey levels ``(rows, columns, 3)`` for a surface ``z`` in pixels."""
+    for i in range(z.shape[0]):
+        for j in range(z.shape[1]):
+            _exact_pixel(z, i, j, table, change[i, j])
+
+
+@compiled
+def draw_exactly(
+    z: FloatArray, table: FloatArray, base: FloatArray, steepest: float, image: ByteArray
+) -> tuple[int, int]:
+    """Add the table's grey levels to ``base``, round and clip to ``image``; count clipped and too steep."""
+    clipped, beyond = 0, 0
+    out = np.empty(3)
+    for i in range(z.shape[0]):
+        for j in range(z.shape[1]):
+            if _exact_pixel(z, i, j, table, out) > steepest:
+                beyond += 1
+            clipped += _to_bytes(base[i, j], out, image[i, j])
+    return clipped, beyond
+
+
+@compiled
+def _smooth_pixel(
+    z: FloatArray,
+    i: int,
+    j: int,
+    smooth: FloatArray,
+    limit: float,
+    place: FloatArray,
+    here: FloatArray,
+    out: FloatArray,
+) -> float:
+    a, b = _slopes(z, i, j)
+    steep: float = np.hypot(a, b)
+    if steep == 0.0:
+        out[:] = 0.0
+        return steep
+    sine = steep / np.sqrt(1.0 + steep * steep)
+    scale = softly_limited(sine, limit) / steep
+    position_terms(i, j, z.shape[0], z.shape[1], place)
+    at_pixel(smooth, place, here)
+    colour(here, -b * scale, -a * scale, out)
+    return steep
+
+
+@compiled
+def change_smoothly(z: FloatArray, smooth: FloatArray, limit: float, change: FloatArray) -> None:
+    """Write the polynomial's grey levels ``(rows, columns, 3)`` for a surface ``z`` in pixels."""
+    place, here = np.empty(6), np.empty((20, 3))
+    for i in range(z.shape[0]):
+        for j in range(z.shape[1]):
+            _smooth_pixel(z, i, j, smooth, limit, place, here, change[i, j])
+
+
+@compiled
+def draw_smoothly(
+    z: FloatArray, smooth: FloatArray, base: FloatArray, limit: float, image: ByteArray
+) -> tuple[int, int]:
+    """As ``draw_exactly`` with the polynomial."""
+    steepest = limit / np.sqrt(1.0 - limit * limit) if limit < 1.0 else np.inf
+    clipped, beyond = 0, 0
+    place, here, out = np.empty(6), np.empty((20, 3)), np.empty(3)
+    for i in range(z.shape[0]):
+        for j in range(z.shape[1]):
+            if _smooth_pixel(z, i, j, smooth, limit, place, here, out) > steepest:
+                beyond += 1
+            clipped += _to_bytes(base[i, j], out, image[i, j])
+    return clipped, beyond
+
+
+@compiled
+def _to_bytes(base: FloatArray, change: FloatArray, pixel: ByteArray) -> int:
+    clipped = 0
+    for c in range(3):
+        value = np.rint(base[c] + change[c])
+        if value < 0.0 or value > 255.0:
+            clipped += 1
+            value = min(max(value, 0.0), 255.0)
+        pixel[c] = np.uint8(value)
+    return clipped
