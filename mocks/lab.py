@@ -33,10 +33,10 @@ from harness.kinematics import forward
 from mocks.faults import parse
 from mocks.gelsight_stream import MjpegServer
 from mocks.lab_processes import CAMERA_PORT, GEL_PORT, Child, Line, free_address
-from mocks.lab_scene import NominalArm, read_lab_scene
+from mocks.lab_scene import read_lab_scene
 from mocks.shared_pose import Mark, SharedPose
 from mocks.truth import TruthFile
-from mocks.ur.hooks import ControllerConfig
+from mocks.ur.hooks import HOME, ControllerConfig
 from mocks.ur.serve import serve
 from mocks.world import World
 
@@ -183,19 +183,20 @@ def _say(answer: Mapping[str, Any]) -> None:
     sys.stdout.flush()
 
 
-def _controller(world: World, arm: NominalArm, shared: SharedPose, seed: int) -> Callable[[str, Line], None]:
+def _controller(world: World, model: str, shared: SharedPose, seed: int) -> Callable[[str, Line], None]:
     """What the arm's process does."""
 
     class Push:
         def wrench(self, base_from_flange: Sequence[Sequence[float]], _time: float) -> Sequence[float]:
-            return world.contact_wrench(np.array(base_from_flange), shared.mark.step).tolist()
+            wrench = world.contact_wrench(np.array(base_from_flange), shared.mark.step)
+            return [float(component) for component in wrench]
 
     def publish(_time: float, _joints: Sequence[float], base_from_flange: Sequence[Sequence[float]]) -> None:
         shared.set_pose(np.array(base_from_flange))
 
     def run(address: str, line: Line) -> None:
         serve(
-            ControllerConfig(host=address, model=arm.model, joints=arm.joints, seed=seed),
+            ControllerConfig(host=address, model=model, seed=seed),
             Push(),
             publish,
             line.should_stop,
@@ -210,19 +211,19 @@ def _controller(world: World, arm: NominalArm, shared: SharedPose, seed: int) ->
 def _begin(arguments: argparse.Namespace) -> Lab:
     """Build the world, and begin a process for each instrument."""
     cv2.setNumThreads(0)  # threads of the parent are lost in a fork
-    scene = read_lab_scene(arguments.scene)
-    world = World(scene.bench, load_gap(arguments.gap), arguments.seed)
-    start = forward(scene.arm.model, np.array(scene.arm.joints))
+    bench, model = read_lab_scene(arguments.scene)
+    world = World(bench, load_gap(arguments.gap), arguments.seed)
+    start = forward(model, np.array(HOME))
     world.contact_wrench(start, 0)  # compile before the fork, once for all
     world.tactile_image(start, 0, 0)
     shared = SharedPose(start)
     return Lab(
         world,
-        _controller(world, scene.arm, shared, arguments.seed),
+        _controller(world, model, shared, arguments.seed),
         shared,
         TruthFile(arguments.truth, world, arguments.seed),
         free_address(),
-        scene.bench.camera is not None,
+        bench.camera is not None,
     )
 
 

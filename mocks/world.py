@@ -20,10 +20,14 @@ from harness.sim.height_map import RasterMesh, depth_image, height_maps, penetra
 from mocks.gap_draw import GapDraw
 from mocks.gel_contact import GelContact
 from mocks.scene_view import Body, SceneView, box
+from mocks.world_gel import WorldGel
 from mocks.world_mesh import nearest_face, shares_of_corners, split_long_edges
 
 LONGEST_EDGE = 5.0e-3
 """Metres, in the world's own tessellation: short beside the length over which shape deviates."""
+
+CUT = 0.9
+"""Of the longest edge of a mesh with shorter ones: some are cut always, so that no tessellation is shared."""
 
 SPRING_SPACING = 0.75e-3
 REACH = 10.0e-3
@@ -43,6 +47,15 @@ class Camera:
     focal_length: float
 
 
+@dataclass(frozen=True)
+class Furniture:
+    """What the scene camera sees beside the object: metres, in base."""
+
+    table_height: float = 0.0
+    table_size: tuple[float, float] = (1.6, 1.6)
+    pedestal_width: float = 0.06
+
+
 @dataclass(frozen=True, eq=False)
 class NominalBench:
     """The bench as the scene and the station state it.
@@ -52,14 +65,18 @@ class NominalBench:
         base_from_object: ``(4, 4)``.
         flange_from_gel: ``(4, 4)``.
         sensor: the make of the gel.
+        calibration: of the gel that estimators believe in: the name of a shipped one, or a path.
         camera: the scene camera, None where there is none.
+        furniture: around the object.
     """
 
     mesh: Mesh
     base_from_object: FloatArray
     flange_from_gel: FloatArray
     sensor: TactileSensor
+    calibration: str
     camera: Camera | None = None
+    furniture: Furniture = Furniture()
 
 
 class World:
@@ -74,19 +91,32 @@ class World:
         sensor: the make of the gel.
         mesh: the true object, in its own frame.
         base_from_object: ``(4, 4)``, where it truly stands.
+        background: ``(rows, columns, 3)``, the picture of the untouched gel.
     """
 
     def __init__(self, bench: NominalBench, gap: Gap, seed: int) -> None:
         self._bench = bench
         self._draw = GapDraw(gap, seed)
         self.sensor = bench.sensor
-        self._nominal = split_long_edges(bench.mesh, LONGEST_EDGE)
+        edges = bench.mesh.corners - np.roll(bench.mesh.corners, 1, axis=1)
+        longest = float(np.linalg.norm(edges, axis=-1).max())
+        self._nominal = split_long_edges(bench.mesh, min(LONGEST_EDGE, CUT * longest))
         self._deviation = self._draw.deviation(self._nominal.bounds.mean(axis=0))
         self.mesh = Mesh(self._deviation.applied(self._nominal.vertices), self._nominal.faces)
         self.base_from_object = read_only(self._placed())
         self._object_from_base = inverse(self.base_from_object)
         self._raster = RasterMesh(self.mesh)
+        self._gel = WorldGel(self.sensor, gap.gel, bench.calibration)
+        self.background = self._gel.background
+        self._shading = self._draw.shading(self.sensor.rows, self.sensor.columns)
         self._contact = GelContact(self.mesh, self.sensor.window, SPRING_SPACING, REACH)
+
+    def tactile_image(self, base_from_flange: FloatArray, step: int, sample: int) -> ByteArray:
+        """What the gel's camera sees, ``(rows, columns, 3)`` uint8, RGB; without contact, the background."""
+        penetration = self._indentation(base_from_flange, step)
+        offset = self._draw.contact(step).height_offset
+        noise = self._draw.pixel_noise(self.sensor.rows, self.sensor.columns, step, sample)
+        return self._gel.picture(penetration, self._draw.run.height_gain, offset + self._shading + noise)
 
     def contact_wrench(self, base_from_flange: FloatArray, step: int) -> FloatArray:
         """``(6,)`` N and N m that the object exerts at the flange, in base."""
@@ -122,8 +152,13 @@ class World:
 
     def differences(self) -> Mapping[str, Any]:
         """What the world does differently from the nominal bench, for the report."""
-        surface = {"vertices": len(self.mesh.vertices), "faces": len(self.mesh.faces)}
-        return {**self._draw.summary(), "tessellation": surface, "optics_level": "exact"}
+        return {
+            **self._draw.summary(),
+            "mesh_vertices": len(self.mesh.vertices),
+            "mesh_faces": len(self.mesh.faces),
+            "optics_level": "exact",
+            "calibration_sha256": self._gel.calibration.sha256,
+        }
 
     def scene_image(self, base_from_flange: FloatArray) -> ByteArray:
         """What the scene camera sees, ``(rows, columns, 3)`` uint8, RGB."""
@@ -139,14 +174,17 @@ class World:
         camera = self._bench.camera
         if camera is None:
             return None
-        lowest = float(apply(self.base_from_object, self.mesh.vertices)[:, 2].min())
-        middle = apply(self.base_from_object, self.mesh.bounds.mean(axis=0)[None])[0]
+        furniture = self._bench.furniture
+        vertices = apply(self.base_from_object, self.mesh.vertices)
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        (x, y, _), lowest, top = 0.5 * (low + high), float(low[2]), furniture.table_height
         fixed = [Body(self.mesh, self.base_from_object, (225, 205, 170))]
-        table = split_long_edges(box((1.6, 1.6, 0.02), (0.0, 0.0, -0.01)), 0.1)
-        fixed.append(Body(table, np.eye(4), (120, 110, 100)))
-        if lowest > 0.0:
-            foam = box((0.06, 0.06, lowest), (0.0, 0.0, lowest / 2))
-            fixed.append(Body(foam, translation(np.array([middle[0], middle[1], 0.0])), (90, 90, 95)))
+        table = box((*furniture.table_size, 0.02), (0.0, 0.0, top - 0.01))
+        fixed.append(Body(split_long_edges(table, 0.1), np.eye(4), (120, 110, 100)))
+        if lowest > top:
+            width = furniture.pedestal_width
+            foam = box((width, width, lowest - top), (x, y, 0.5 * (lowest + top)))
+            fixed.append(Body(foam, np.eye(4), (90, 90, 95)))
         return SceneView(camera.base_from_camera, camera.rows, camera.columns, camera.focal_length, fixed)
 
     def _placed(self) -> FloatArray:

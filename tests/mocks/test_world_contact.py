@@ -68,7 +68,7 @@ def test_deeper_pushes_harder(ball: Mesh) -> None:
         for depth in np.linspace(0.0, 3e-3, 40)
     ]
     assert np.all(np.diff(pushes) >= 0.0)
-    assert pushes[-1] > 10.0
+    assert pushes[-1] > 3.0
 
 
 def test_the_springs_feel_what_the_camera_sees() -> None:

@@ -1,0 +1,96 @@
+"""The nominal bench that the world departs from, out of a scene and a station.
+
+The lab is told of it in a file of JSON, ``{"schema": 1, "scene": ..., "station": ...,
+"mesh": PATH or null, "base_from_object": 4 x 4}``: scene and station as their models write them,
+and for an object that is not built in, the ``.npz`` (``vertices`` in metres, ``faces``) of its
+repaired mesh.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from harness.arrays import FloatArray
+from harness.errors import WrongUse
+from harness.mesh import Mesh
+from harness.objects.household import build
+from harness.scene import SceneFile, scene_from_json
+from harness.station_file import Station, station_from_json
+from mocks.world import Camera, Furniture, NominalBench
+
+SCHEMA = 1
+
+EDGE = 2.2e-3
+"""Metres between the vertices of built-in objects: no other part of the program uses this one."""
+
+_KEYS = {"schema", "scene", "station", "mesh", "base_from_object"}
+
+
+def read_lab_scene(path: Path) -> tuple[NominalBench, str]:
+    """The bench of a file, and the model of its arm.
+
+    Raises:
+        WrongUse: it cannot be read, or is not what a lab is told.
+    """
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise WrongUse(f"the lab cannot read its scene {path}: {error}") from error
+    if not isinstance(told, dict) or set(told) != _KEYS or told["schema"] != SCHEMA:
+        raise WrongUse(
+            f"{path} is not what a lab is told: the keys {', '.join(sorted(_KEYS))}, schema {SCHEMA}"
+        )
+    scene = scene_from_json(told["scene"], str(path))
+    station = station_from_json(told["station"], str(path))
+    mesh = None if told["mesh"] is None else _read_mesh(Path(told["mesh"]))
+    return nominal_bench(scene, station, mesh, np.array(told["base_from_object"])), station.arm.model
+
+
+def nominal_bench(
+    scene: SceneFile, station: Station, mesh: Mesh | None, base_from_object: FloatArray
+) -> NominalBench:
+    """The bench as scene and station state it.
+
+    Args:
+        scene: what is on the table.
+        station: the instruments.
+        mesh: of the object in metres, scaled; None for a built-in object, which the world
+            tessellates anew.
+        base_from_object: ``(4, 4)``, nominal.
+
+    Raises:
+        WrongUse: no mesh for an object that is not built in.
+    """
+    return NominalBench(
+        mesh=_own_tessellation(scene) if mesh is None else mesh,
+        base_from_object=base_from_object,
+        flange_from_gel=station.flange_from_gel,
+        sensor=station.gel.sensor,
+        calibration=station.gel.calibration,
+        camera=_camera(scene, station),
+        furniture=Furniture(scene.table.height, scene.table.size, scene.support.width),
+    )
+
+
+def _own_tessellation(scene: SceneFile) -> Mesh:
+    name = scene.object.builtin
+    if name is None:
+        raise WrongUse(f"the world needs the mesh of {scene.object.name}: it is not built in")
+    mesh = build(name, edge=EDGE)
+    return Mesh(mesh.vertices * scene.object.scale, mesh.faces)
+
+
+def _camera(scene: SceneFile, station: Station) -> Camera | None:
+    camera = station.camera
+    if camera is None or not scene.sensors.camera:
+        return None
+    return Camera(camera.base_from_camera.matrix, camera.rows, camera.columns, camera.focal_length)
+
+
+def _read_mesh(path: Path) -> Mesh:
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return Mesh(archive["vertices"], archive["faces"])
+    except (OSError, ValueError, KeyError) as error:
+        raise WrongUse(f"the lab cannot read the object's mesh {path}: {error}") from error
