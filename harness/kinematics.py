@@ -19,6 +19,9 @@ LENGTH: Final = 0.5
 ROUND_OFF: Final = 1e-12
 """How far past its bound a sine or a cosine may come by rounding alone."""
 
+STRETCH: Final = 1e-9
+"""The same for the elbow's cosine, which inherits what a nearly singular wrist leaves undetermined."""
+
 Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
 
@@ -174,7 +177,7 @@ def _elbows(
     u, v = c1 * wrist[0] + s1 * wrist[1], wrist[2] - table.d[0]
     a2, a3 = table.a[1], table.a[2]
     cosine = (u * u + v * v - a2 * a2 - a3 * a3) / (2 * a2 * a3)
-    if abs(cosine) > 1 + ROUND_OFF:
+    if abs(cosine) > 1 + STRETCH:
         return []
     fold = math.acos(max(-1.0, min(1.0, cosine)))
     postures: list[Six] = []

@@ -81,7 +81,7 @@ class Solid:
         return float(_least_along(self._corners, lows, highs, planes, low, high, axis))
 
     def first_hit(self, start: FloatArray, direction: FloatArray) -> float:
-        """Way in m along a unit direction from a ``(3,)`` start to the first triangle; inf where it misses."""
+        """How far, in m, along a unit direction from ``(3,)`` the first triangle is; inf where it misses."""
         return float(_first_hit(self._corners, np.ascontiguousarray(start), np.ascontiguousarray(direction)))
 
     def nearest(self, point: FloatArray) -> FloatArray:
