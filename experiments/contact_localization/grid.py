@@ -126,7 +126,9 @@ class Search:
             object_from_base = self.prior.object_from_base(np.array([nominal]))[0]
             object_from_gel = object_from_base @ self.contacts[contact].base_from_gel[:3, :3]
             pitch = 0.5 * self.touch_pitch
-            self._views[contact, picture] = view_along(self.model.raster, object_from_gel, pitch)
+            self._views[contact, picture] = view_along(
+                self.model.raster, object_from_gel, pitch, self.model.sensor
+            )
         return self._views[contact, picture]
 
     def grid(self, members: IntArray, anchor: int, use_axis: bool = True) -> Hypotheses:
@@ -300,10 +302,13 @@ def refine(
 
 
 def _best(log_weights: FloatArray, within: float, most: int) -> IntArray:
+    """Indices within so many nats of the best; where they are too many, evenly thinned.
+
+    Hypotheses come in the samples' random order, so every n-th of them covers the surface.
+    """
     kept = np.nonzero(log_weights > log_weights.max() - within)[0]
-    if len(kept) > most:
-        kept = kept[np.argsort(-log_weights[kept], kind="stable")[:most]]
-    return kept.astype(np.int64)
+    stride = -(-len(kept) // most)
+    return kept[::stride].astype(np.int64)
 
 
 def _systematic(weights: FloatArray, count: int, rng: np.random.Generator) -> IntArray:

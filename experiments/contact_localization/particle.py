@@ -16,7 +16,7 @@ from harness.arrays import FloatArray, IntArray
 
 CANDIDATES = 10
 TEMPERATURE = 0.05
-"""Of the weight ``exp(cosine / temperature)``. The paper states none; with 1 the filter fails twice as often."""
+"""Of the weight ``exp(cosine / temperature)``; the paper states none, with 1 it hardly converges."""
 
 
 @dataclass(frozen=True, eq=False)

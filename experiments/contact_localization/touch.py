@@ -13,7 +13,7 @@ from harness.arrays import AnyArray, FloatArray, IntArray, read_only
 from harness.sim.compiled import compiled
 
 _SUNKEN = -6.0e-3
-"""Where the object is farther than this below the contact, or absent, the gel reads nothing."""
+"""Where the object is farther than this below its highest place, or absent, the gel reads nothing."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,10 @@ class View:
         origin: ``(2,)`` metres, view x and y of the centre of pixel (0, 0).
         pitch: metres a pixel, half of the touch map's.
         depth: ``(rows, columns)`` metres along z of the first surface, inf where there is none.
+        nearest: ``(rows, columns)`` metres along z: the gel's centre cannot be nearer to the arm,
+            or nothing would touch it.
+        farthest: ``(rows, columns)`` metres along z: it cannot be farther, or the object would
+            reach through the gel.
         score: ``(rows, columns)`` nats, NaN where not asked for yet.
         gel_depth: ``(rows, columns)`` metres along z of the gel's centre, from the fit.
     """
@@ -73,6 +77,8 @@ class View:
     origin: FloatArray
     pitch: float
     depth: FloatArray
+    nearest: FloatArray
+    farthest: FloatArray
     score: FloatArray
     gel_depth: FloatArray
 
@@ -151,6 +157,8 @@ def touch_terms(
         view.origin,
         view.pitch,
         view.depth,
+        view.nearest,
+        view.farthest,
         view.score,
         view.gel_depth,
         touch.heights,
@@ -244,21 +252,26 @@ def _similarities(
 
 
 @compiled
-def _crop(depth: FloatArray, row: int, column: int, crop: FloatArray) -> None:
-    """Heights over the surface at a pixel, towards the gel, at every second pixel around it.
+def _crop(depth: FloatArray, row: int, column: int, crop: FloatArray) -> float:
+    """Heights at every second pixel around a pixel, over the greatest of them; its depth is returned.
 
     Two view pixels make one of the map, so every map pixel's centre is a view pixel whether
     the map's sides are even or odd.
     """
     rows, columns = crop.shape
     top, left = row - (rows - 1), column - (columns - 1)
+    reference = np.inf
     for i in range(rows):
         for j in range(columns):
             r, c = top + 2 * i, left + 2 * j
-            rise = _SUNKEN
+            crop[i, j] = np.inf
             if 0 <= r < depth.shape[0] and 0 <= c < depth.shape[1]:
-                rise = max(_SUNKEN, depth[row, column] - depth[r, c])
-            crop[i, j] = rise
+                crop[i, j] = depth[r, c]
+                reference = min(reference, depth[r, c])
+    for i in range(rows):
+        for j in range(columns):
+            crop[i, j] = max(_SUNKEN, reference - crop[i, j])
+    return float(reference)
 
 
 @compiled
@@ -295,10 +308,9 @@ def _score(
 ) -> tuple[float, float]:
     """The term at one pixel, and the depth of the gel's centre above it, along the view."""
     rows, columns = heights.shape
-    reference = depth[row, column]
+    reference = _crop(depth, row, column, crop)
     if not np.isfinite(reference):
         return -np.inf, np.nan
-    _crop(depth, row, column, crop)
     a = np.zeros((3, 3))
     b = np.zeros(3)
     for n in range(len(touched)):
@@ -379,6 +391,8 @@ def _terms(
     origin: FloatArray,
     view_pitch: float,
     depth: FloatArray,
+    nearest: FloatArray,
+    farthest: FloatArray,
     score: FloatArray,
     gel_depth: FloatArray,
     heights: FloatArray,
@@ -413,13 +427,14 @@ def _terms(
                 r, c = middle_r + u * step, middle_c + v * step
                 if r < 0 or c < 0 or r >= depth.shape[0] or c >= depth.shape[1]:
                     continue
-                # The gel's centre is never far from the surface it was pressed on.
-                if not np.abs(places[n, 2] - depth[r, c]) < 12.0e-3:
+                if not nearest[r, c] < places[n, 2] < farthest[r, c]:
                     continue
                 if np.isnan(score[r, c]):
                     score[r, c], gel_depth[r, c] = _score(
                         depth, r, c, heights, pitch, touched, blur, rms, tilt, crop, work
                     )
+                if score[r, c] == -np.inf:
+                    continue
                 dx, dy = (c - column) * view_pitch, (r - row) * view_pitch
                 dz = (places[n, 2] - gel_depth[r, c]) / depth_sigma
                 value = temperature * score[r, c] - 0.5 * ((dx * dx + dy * dy) / (shift * shift) + dz * dz)

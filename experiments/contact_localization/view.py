@@ -1,23 +1,29 @@
 """Pictures of an object along the tool: for the touch term, and for where a housing fits."""
 
 import numpy as np
+from scipy.ndimage import minimum_filter
 
 from experiments.contact_localization.touch import View
 from harness.arrays import FloatArray, read_only
 from harness.geometry import transform
+from harness.sensor import TactileSensor
 from harness.sim.height_map import RasterMesh, depth_image
+
+_SLACK = 3.0e-3
+"""Metres by which place and picture may disagree: arm, shape, attitude over the window's width."""
 
 _MARGIN = 2
 """Pixels around the object, so that a rounded place never leaves the picture by itself."""
 
 
-def view_along(raster: RasterMesh, object_from_gel: FloatArray, pitch: float) -> View:
+def view_along(raster: RasterMesh, object_from_gel: FloatArray, pitch: float, sensor: TactileSensor) -> View:
     """The object as the gel would meet it, everywhere at once.
 
     Args:
         raster: the object.
         object_from_gel: ``(3, 3)`` rotation; its third column is the way the tool points.
         pitch: metres a pixel.
+        sensor: gives the gel's window and thickness.
     """
     in_view = raster.mesh.vertices[np.unique(raster.mesh.faces)] @ object_from_gel
     low, high = in_view.min(axis=0)[:2], in_view.max(axis=0)[:2]
@@ -26,8 +32,25 @@ def view_along(raster: RasterMesh, object_from_gel: FloatArray, pitch: float) ->
     view_from_object = transform(object_from_gel.T, np.array([-centre[0], -centre[1], 0.0]))
     depth = depth_image(raster, view_from_object, pitch, int(rows), int(columns)).depth
     origin = centre - 0.5 * pitch * np.array([columns - 1.0, rows - 1.0])
+    nearest = _front(depth, pitch, sensor.window, _SLACK) - _SLACK
+    farthest = _front(depth, pitch, sensor.window, -_SLACK) + sensor.gel_thickness + _SLACK
     missing = np.full(depth.shape, np.nan)
-    return View(read_only(object_from_gel.copy()), read_only(origin), pitch, depth, missing, missing.copy())
+    return View(
+        read_only(object_from_gel.copy()),
+        read_only(origin),
+        pitch,
+        depth,
+        nearest,
+        farthest,
+        missing,
+        missing.copy(),
+    )
+
+
+def _front(depth: FloatArray, pitch: float, window: tuple[float, float], wider: float) -> FloatArray:
+    """The first surface under a window, widened on every side, centred on each pixel."""
+    columns, rows = (2 * round((0.5 * side + wider) / pitch) + 1 for side in window)
+    return np.asarray(minimum_filter(depth, size=(rows, columns), mode="constant", cval=np.inf))
 
 
 def window_depth(
