@@ -96,15 +96,3 @@ def softly_limited(sine: float, limit: float) -> float:
     room = limit - knee
     bent: float = knee + room * (1.0 - np.exp(-(sine - knee) / room))
     return bent
-
-
-@compiled
-def unlimited(sine: float, limit: float) -> float:
-    """The inverse of ``softly_limited`` on 0 <= sine < limit, at most 0.99."""
-    knee = KNEE * limit
-    if sine <= knee:
-        return sine
-    room = limit - knee
-    left = max(1.0 - (sine - knee) / room, 1e-6)
-    straight: float = min(knee - room * np.log(left), 0.99)
-    return straight

@@ -1,0 +1,175 @@
+"""From tactile images back to the shape of the gel: colour to slope, slope to height.
+
+The answer is the gel's surface as the camera sees it, its skirt around the contact included:
+compare it with ``gel.deform`` of a prediction, not with the prediction itself.
+"""
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from scipy import ndimage
+
+from harness.arrays import BoolArray, ByteArray, FloatArray, read_only
+from harness.errors import CalibrationRefused, DataRefused
+from harness.sim.poisson import anchored_heights, free_heights
+from harness.sim.slope_kernels import normals_from_colour
+from harness.sim.tactile_calibration import TactileCalibration
+
+QUIET = 4.0
+"""Grey levels (length over the channels, mean of 5 x 5 pixels) below which the gel may be at rest."""
+
+STRONG = 12.0
+"""Grey levels that some part of an imprint must reach: three times the drift between real presses."""
+
+_WINDOW = 5
+_RIDGE = 16.0
+_DISTRUST = 0.1
+_LEAST_REST = 60
+"""Pixels of a quiet region that can be told from a chance calm."""
+
+_FLOOR = 0.05
+"""Pixels of height, one sigma, where the gel is at rest."""
+
+_CORRELATED = 1.0
+
+_SAME_LEVEL = 1.5
+"""Pixels of height within which quiet regions are taken to lie at the same level, the rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inversion:
+    """What the pictures say the gel did.
+
+    Attributes:
+        height: ``(n, rows, columns)`` metres of indentation, 0 or more, zero outside the imprint.
+        contact: ``(n, rows, columns)`` where the object surely shapes the gel (deeper than the
+            skirt's core share of the deepest point).
+        imprint: ``(n, rows, columns)`` where the gel moved at all.
+        trusted: ``(n, rows, columns)`` where the colour was explained by a slope within the
+            calibration's range; elsewhere the slope was held or doubtful.
+        error: ``(n, rows, columns)`` metres, one sigma estimated from colour noise and the
+            calibration's own residual.
+        anchored: ``(n,)`` whether some of the gel was at rest in view; if not, heights are
+            counted from their least.
+        seconds: for all of them.
+    """
+
+    height: FloatArray
+    contact: BoolArray
+    imprint: BoolArray
+    trusted: BoolArray
+    error: FloatArray
+    anchored: BoolArray
+    seconds: float
+
+
+def invert(images: ByteArray, calibration: TactileCalibration) -> Inversion:
+    """Recover the surface of a flat gel from pictures of it.
+
+    Args:
+        images: ``(n, rows, columns, 3)`` RGB.
+        calibration: with a smooth model.
+
+    Raises:
+        DataRefused: images of another shape or type than the calibration's.
+        CalibrationRefused: the calibration has only a table.
+    """
+    shape = calibration.background.shape
+    if images.ndim != 4 or images.shape[1:] != shape or images.dtype != np.uint8:
+        raise DataRefused(
+            f"images are {images.dtype} {images.shape}; this calibration reads uint8 (n, *{shape})"
+        )
+    if len(calibration.smooth) == 0:
+        raise CalibrationRefused(
+            "this calibration has no smooth model to invert; fit it again from its presses"
+        )
+    began = perf_counter()
+    answers = [_invert_one(image, calibration) for image in images]
+    height, contact, imprint, trusted, error, anchored = (
+        np.array([answer[k] for answer in answers]).reshape(len(images), *([] if k == 5 else shape[:2]))
+        for k in range(6)
+    )
+    return Inversion(
+        read_only(height),
+        read_only(contact.astype(np.bool_)),
+        read_only(imprint.astype(np.bool_)),
+        read_only(trusted.astype(np.bool_)),
+        read_only(error),
+        read_only(anchored.astype(np.bool_)),
+        perf_counter() - began,
+    )
+
+
+_Answer = tuple[FloatArray, BoolArray, BoolArray, BoolArray, FloatArray, bool]
+
+
+def _invert_one(image: ByteArray, calibration: TactileCalibration) -> _Answer:
+    header = calibration.header
+    change = _without_drift(image.astype(np.float64) - calibration.background)
+    strength = _strength(change)
+    quiet = strength < QUIET
+    if strength.max() < STRONG:
+        nothing = np.zeros(quiet.shape)
+        nowhere = np.zeros(quiet.shape, np.bool_)
+        return nothing, nowhere, nowhere, ~nowhere, nothing + _rest_error(header.pitch), True
+    noise = header.residual_rms
+    normal, fit = np.empty((*quiet.shape, 2)), np.empty((*quiet.shape, 2))
+    normals_from_colour(change, calibration.smooth, header.slope_limit, noise, _RIDGE, normal, fit)
+    flatness = np.sqrt(1.0 - normal[..., 0] ** 2 - normal[..., 1] ** 2)
+    right, down = -normal[..., 0] / flatness, -normal[..., 1] / flatness
+    trusted = (fit[..., 0] < 3.0 * noise) & (flatness > np.sqrt(1.0 - (0.98 * header.slope_limit) ** 2))
+    heights = free_heights(down, right)
+    rest = _resting(heights, quiet)
+    level = float(heights[rest].mean()) if rest.any() else float(heights.min())
+    heights -= level
+    if rest.any():
+        anchored_heights(heights, down, right, np.where(trusted, 1.0, _DISTRUST), rest)
+    height = np.maximum(heights, 0.0) * header.pitch
+    contact = height > header.skirt.core * height.max()
+    spread = fit[..., 1] / flatness**3 * np.hypot(1.0, np.maximum(fit[..., 0], 0.2 * noise))
+    return height, contact, ~rest, trusted, _error(spread, rest, header.pitch), bool(rest.any())
+
+
+def _without_drift(change: FloatArray) -> FloatArray:
+    # Lamps warm up: where much of the picture hardly changed, what it changed by is the light.
+    hardly = np.sqrt((change**2).sum(axis=2)) < STRONG
+    if hardly.mean() < 0.2:
+        return change
+    return change - np.median(change[hardly], axis=0)
+
+
+def _strength(change: FloatArray) -> FloatArray:
+    smooth = ndimage.uniform_filter(change, size=(_WINDOW, _WINDOW, 1), mode="nearest")
+    strength: FloatArray = np.sqrt((smooth**2).sum(axis=2))
+    return strength
+
+
+def _resting(heights: FloatArray, quiet: BoolArray) -> BoolArray:
+    """The quiet regions at the lowest level; quiet regions above it are flat parts of the contact."""
+    inner = ndimage.binary_erosion(quiet, iterations=2, border_value=1)
+    labels, count = ndimage.label(inner)
+    if count == 0:
+        return np.zeros(quiet.shape, np.bool_)
+    names = np.arange(1, count + 1)
+    sizes = ndimage.sum_labels(inner, labels, names)
+    levels = ndimage.mean(heights, labels, names)
+    large = sizes >= _LEAST_REST
+    if not large.any():
+        return np.zeros(quiet.shape, np.bool_)
+    lowest = levels[large].min()
+    at_rest = np.concatenate([[False], levels < lowest + _SAME_LEVEL])
+    resting: BoolArray = at_rest[labels]
+    return resting
+
+
+def _rest_error(pitch: float) -> float:
+    return _FLOOR * pitch
+
+
+def _error(spread: FloatArray, rest: BoolArray, pitch: float) -> FloatArray:
+    # Independent slope errors add up along the way from where the height is known.
+    way = ndimage.distance_transform_edt(~rest) if rest.any() else np.full(rest.shape, float(max(rest.shape)))
+    variance: FloatArray = ndimage.uniform_filter(spread**2, size=2 * _WINDOW + 1, mode="nearest")
+    error: FloatArray = pitch * np.hypot(_FLOOR, np.where(rest, 0.0, np.sqrt(variance * way) * _CORRELATED))
+    return error
