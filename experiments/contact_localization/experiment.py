@@ -5,61 +5,88 @@ Everything a step needs is in its parameters, planned and rehearsed before the f
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from harness.arrays import FloatArray
-from harness.clock import now
 from harness.device import Arm
 from harness.errors import NotTouched
-from harness.geometry import transform, translation
+from harness.geometry import transform
 from harness.reading import Reading
 from harness.recording import Recording
 from harness.station import Bench
 from harness.step_file import Step
+from harness.twin.motion import PlannedContact
 
 FRAMES_PER_CONTACT = 3
 """Frames kept of each press: enough to see whether the gel was still."""
+
+WHERE_PLANNED = 1e-3
+"""rad: an arm this near to where a travel was planned from is there."""
 
 SETTLE = 0.3
 """s between the end of the press and the first frame: the gel creeps for about that long."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ContactMotion:
     """One contact, ready to be performed.
 
     Attributes:
-        travel: ``(n, 6)`` rad, joint way points from the step before to the stand-off.
-        base_from_flange: ``(4, 4)`` at the stand-off.
-        stand_off: m between the gel and the nominal surface at the stand-off.
-        depth: m to press on after the first touch.
+        start: ``(6,)`` rad, where the travel was planned to start.
+        travel: ``(n, 6)`` rad, joint way points from there to the stand-off.
+        base_from_stand_off: ``(4, 4)`` of the flange.
+        axis: ``(3,)`` unit in base: the way the gel is pressed.
+        search: m from the stand-off to where the gel would first touch the nominal surface.
+        press: m to press on after the first touch.
     """
 
+    start: FloatArray
     travel: FloatArray
-    base_from_flange: FloatArray
-    stand_off: float
-    depth: float
+    base_from_stand_off: FloatArray
+    axis: FloatArray
+    search: float
+    press: float
+
+    @classmethod
+    def planned(cls, contact: PlannedContact, flange_from_gel: FloatArray, press: float) -> "ContactMotion":
+        """The motion of a planned contact whose last ``press`` metres are in the gel."""
+        axis = (contact.base_from_stand_off @ flange_from_gel)[:3, 2]
+        search = contact.stand_off - press
+        return cls(contact.start, contact.travel, contact.base_from_stand_off, axis, search, press)
+
+    @property
+    def end(self) -> FloatArray:
+        """``(6,)`` rad at the stand-off."""
+        return self.travel[-1] if len(self.travel) else self.start
 
     def to_parameters(self) -> dict[str, Any]:
         """As JSON values, with the unit in each key."""
         return {
+            "start_rad": self.start.tolist(),
             "travel_rad": self.travel.tolist(),
-            "base_from_flange": self.base_from_flange.tolist(),
-            "stand_off_m": self.stand_off,
-            "depth_m": self.depth,
+            "base_from_stand_off": self.base_from_stand_off.tolist(),
+            "axis_in_base": self.axis.tolist(),
+            "search_m": self.search,
+            "press_m": self.press,
         }
 
     @classmethod
     def from_parameters(cls, parameters: Mapping[str, Any]) -> "ContactMotion":
         """The motion that ``to_parameters`` wrote."""
+        arrays = {name: np.asarray(parameters[name], dtype=np.float64) for name in _ARRAYS}
         return cls(
-            np.asarray(parameters["travel_rad"], dtype=np.float64).reshape(-1, 6),
-            np.asarray(parameters["base_from_flange"], dtype=np.float64),
-            float(parameters["stand_off_m"]),
-            float(parameters["depth_m"]),
+            arrays["start_rad"],
+            arrays["travel_rad"].reshape(-1, 6),
+            arrays["base_from_stand_off"],
+            arrays["axis_in_base"],
+            float(parameters["search_m"]),
+            float(parameters["press_m"]),
         )
+
+
+_ARRAYS = ("start_rad", "travel_rad", "base_from_stand_off", "axis_in_base")
 
 
 @dataclass(frozen=True)
@@ -87,10 +114,24 @@ class Speeds:
     overtravel: float = 0.008
 
 
-class ContactLocalization:
-    """Presses the gel where the plan says, and hands on what was read there."""
+class Way(Protocol):
+    """Finds joint way points that hit nothing."""
 
-    def __init__(self, speeds: Speeds | None = None) -> None:
+    def __call__(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """``(n, 6)`` rad, from ``(6,)`` to ``(6,)``."""
+
+
+class ContactLocalization:
+    """Presses the gel where the plan says, and hands on what was read there.
+
+    Args:
+        way: used where the arm is not where a step's travel was planned from: at the start of a
+            session, and when a run is resumed.
+        speeds: of the motions.
+    """
+
+    def __init__(self, way: Way, speeds: Speeds | None = None) -> None:
+        self.way = way
         self.speeds = speeds or Speeds()
 
     def steps(self, recording: Recording) -> Iterator[Step]:
@@ -102,37 +143,44 @@ class ContactLocalization:
     def perform(self, step: Step, bench: Bench) -> Sequence[Reading]:
         """One contact; the arm ends at the stand-off it approached from."""
         motion = ContactMotion.from_parameters(step.parameters)
+        arm = bench.arm
         bench.mark(step.index, -1)
-        for joints in motion.travel:
-            bench.arm.move_joints(joints, self.speeds.travel, self.speeds.travel_acceleration)
-        began = now()
-        self._touch(step, motion, bench.arm)
-        self._press(motion, bench.arm)
+        for joints in self._travel(motion, arm):
+            arm.move_joints(joints, self.speeds.travel, self.speeds.travel_acceleration)
+        arm.zero_force()
+        began = arm.state().time
+        self._touch(step, motion, arm)
+        touched = arm.state().base_from_flange
+        self._line(arm, _moved(motion.base_from_stand_off, touched, motion.press * motion.axis), "press")
         bench.pause(SETTLE)
         bench.mark(step.index, 0)
         image = bench.gel.read(FRAMES_PER_CONTACT, timeout=3.0)
-        arm = bench.arm.history(now() - began)
-        self._line(bench.arm, motion.base_from_flange, self.speeds.retreat)
-        return (image, *arm)
+        history = arm.history(arm.state().time - began)
+        self._line(arm, motion.base_from_stand_off, "retreat")
+        return (image, *history)
+
+    def _travel(self, motion: ContactMotion, arm: Arm) -> FloatArray:
+        here = arm.state().joints
+        if np.abs(here - motion.start).max() < WHERE_PLANNED:
+            return motion.travel
+        return self.way(here, motion.end)
 
     def _touch(self, step: Step, motion: ContactMotion, arm: Arm) -> None:
-        travel = motion.stand_off + self.speeds.overtravel
-        arm.zero_force()
-        axis = motion.base_from_flange[:3, 2]
-        if arm.move_until_contact(axis, self.speeds.approach, self.speeds.touch_force, travel):
+        travel = motion.search + self.speeds.overtravel
+        if arm.move_until_contact(motion.axis, self.speeds.approach, self.speeds.touch_force, travel):
             return
-        self._line(arm, motion.base_from_flange, self.speeds.retreat)
+        self._line(arm, motion.base_from_stand_off, "retreat")
         raise NotTouched(
             f"contact {step.index + 1}: the gel travelled {travel * 1e3:.0f} mm and met nothing "
             f"({self.speeds.touch_force} N would have been a touch); check that the object stands where the "
             "scene's [object.pose] says, then resume the run"
         )
 
-    def _press(self, motion: ContactMotion, arm: Arm) -> None:
-        touched = arm.state().base_from_flange
-        # The attitude is the planned one: a measured attitude would carry its noise into the press.
-        target = transform(motion.base_from_flange[:3, :3], touched[:3, 3])
-        self._line(arm, target @ translation(np.array([0.0, 0.0, motion.depth])), self.speeds.press)
-
-    def _line(self, arm: Arm, base_from_flange: FloatArray, speed: float) -> None:
+    def _line(self, arm: Arm, base_from_flange: FloatArray, phase: Literal["press", "retreat"]) -> None:
+        speed = self.speeds.press if phase == "press" else self.speeds.retreat
         arm.move_line(base_from_flange, speed, self.speeds.acceleration)
+
+
+def _moved(attitude: FloatArray, position: FloatArray, by: FloatArray) -> FloatArray:
+    """The planned attitude (a measured one would carry its noise into the press) at a measured place."""
+    return transform(attitude[:3, :3], position[:3, 3] + by)
