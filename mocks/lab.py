@@ -41,6 +41,8 @@ from mocks.ur.serve import serve
 from mocks.world import World
 
 READY_TIMEOUT = 30.0
+GEL_RATE = 25.0
+CAMERA_RATE = 10.0
 SHOWN_TIMEOUT = 0.5
 _GEL, _CAMERA = 0, 1
 _ORPHAN_CHECK = 0.5
@@ -100,10 +102,12 @@ class Lab:
         self._has_camera = camera
         self._children = {"arm": Child("arm", lambda line: controller(address, line))}
         gel = Seen(shared, _GEL, world.tactile_image)
-        self._children["gel"] = Child("gel", lambda line: _stream(address, GEL_PORT, gel, line))
+        self._children["gel"] = Child("gel", lambda line: _stream(address, GEL_PORT, gel, GEL_RATE, line))
         if camera:
             seen = Seen(shared, _CAMERA, lambda pose, _step, _sample: world.scene_image(pose))
-            self._children["camera"] = Child("camera", lambda line: _stream(address, CAMERA_PORT, seen, line))
+            self._children["camera"] = Child(
+                "camera", lambda line: _stream(address, CAMERA_PORT, seen, CAMERA_RATE, line)
+            )
 
     def wait_ready(self) -> Mapping[str, Any]:
         """Where the instruments are, once all of them answer; ``BenchFault`` where one does not."""
@@ -152,8 +156,8 @@ class Lab:
         return dict(cue)
 
 
-def _stream(address: str, port: int, view: Seen, line: Line) -> None:
-    server = MjpegServer(address, port, view)
+def _stream(address: str, port: int, view: Seen, rate: float, line: Line) -> None:
+    server = MjpegServer(address, port, view, rate)
     line.ready()
 
     def should_stop() -> bool:

@@ -1,4 +1,4 @@
-"""How far along its way a simulated motion is: the trapezoid of speed that UR's planner follows."""
+"""Simulated time, and how far along its way a motion is: the trapezoid of speed of UR's planner."""
 
 from dataclasses import dataclass
 
@@ -6,6 +6,25 @@ import numpy as np
 
 from harness.arrays import FloatArray
 from harness.geometry import rotation_from_vector
+
+
+@dataclass
+class Stage:
+    """Where a run is in time and in its plan.
+
+    Attributes:
+        time: s on the simulated bench clock.
+        step: of the run; -1 before the first.
+        sample: of the step; -1 before the first.
+    """
+
+    time: float = 0.0
+    step: int = -1
+    sample: int = -1
+
+    def pause(self, seconds: float) -> None:
+        """Let simulated time pass."""
+        self.time += seconds
 
 
 @dataclass(frozen=True)
