@@ -129,11 +129,19 @@ class Table(StrictModel):
 
 
 class Sensors(StrictModel):
-    """Which senses the scene calls for."""
+    """Which senses the scene calls for.
+
+    Attributes:
+        touch: the gel.
+        sound: hammer and microphones.
+        camera: the scene camera.
+        noise: whether simulated readings carry the instruments' own noise.
+    """
 
     touch: bool = True
     sound: bool = False
     camera: bool = False
+    noise: bool = False
 
 
 class Room(StrictModel):

@@ -1,0 +1,93 @@
+"""An effect: a quantity of the simulation, what it needs, and when a scene calls for it."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from harness.accuracy import Knob, Level
+from harness.scene import SceneFile
+from harness.sensor import TactileSensor
+
+Compute = Callable[[Mapping[str, Any], Mapping[str, Level]], Any]
+"""From the needed quantities by name, and the levels of the effect's knobs by name."""
+
+Omission = Callable[[Mapping[str, Any]], float]
+"""From the sources: how much leaving the effect out would change the result, relative."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What decides which effects a scene calls for.
+
+    Attributes:
+        scene: on the table.
+        sensor: on the flange.
+    """
+
+    scene: SceneFile
+    sensor: TactileSensor
+
+
+@dataclass(frozen=True)
+class Condition:
+    """When an effect is called for, in code and in words.
+
+    Attributes:
+        holds: the test.
+        because: what is the case where it holds.
+        otherwise: what is the case where it does not.
+    """
+
+    holds: Callable[[Facts], bool]
+    because: str
+    otherwise: str
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One quantity that can be computed from others.
+
+    Attributes:
+        provides: the quantity's name.
+        needs: quantities it is computed from: other effects' or sources.
+        compute: pure; every array it takes and gives has a leading batch axis.
+        when: the scene calls for it; None for always.
+        bypass: the quantity that takes its place where the scene does not call for it; None if
+            asking for it is then an error.
+        knobs: that its levels are chosen by.
+        version: raised with every change of what it computes, so that stored results are dropped.
+        stored: whether a result is worth keeping on disk.
+        omission: an estimate of what leaving it out would change, where there is a cheap one.
+    """
+
+    provides: str
+    needs: tuple[str, ...]
+    compute: Compute
+    when: Condition | None = None
+    bypass: str | None = None
+    knobs: tuple[Knob, ...] = ()
+    version: int = 1
+    stored: bool = False
+    omission: Omission | None = None
+
+
+def by_name(effects: Iterable[Effect]) -> dict[str, Effect]:
+    """The effects by what they provide.
+
+    Raises:
+        ValueError: two provide the same, or a bypass is nothing that the effect needs.
+    """
+    known: dict[str, Effect] = {}
+    for effect in effects:
+        if effect.provides in known:
+            raise ValueError(f"two effects provide {effect.provides}; a quantity has one home")
+        if effect.bypass is not None and effect.bypass not in effect.needs:
+            raise ValueError(f"{effect.provides} is bypassed by {effect.bypass}, which it does not need")
+        known[effect.provides] = effect
+    return known
+
+
+def knobs_of(effects: Iterable[Effect]) -> tuple[Knob, ...]:
+    """Every knob of the effects, once, in order."""
+    found = {knob.name: knob for effect in effects for knob in effect.knobs}
+    return tuple(found.values())

@@ -1,0 +1,50 @@
+"""A plan in words: which effects run and which not, and why."""
+
+from typing import Any
+
+from rich.table import Table
+
+from harness.accuracy import Accuracy
+from harness.effects import Facts
+from harness.plan import Plan, default_accuracy, plan
+from harness.scene import SceneFile
+from harness.sensor import TactileSensor
+from harness.sim.catalogue import EFFECTS
+
+
+def scene_plan(scene: SceneFile, sensor: TactileSensor, accuracy: Accuracy | None = None) -> Plan:
+    """What would be simulated to compare a bench with this scene.
+
+    Args:
+        scene: says what is observed.
+        sensor: on the flange.
+        accuracy: levels; None for the default ones.
+
+    Raises:
+        WrongUse: ``observe`` names something that nothing computes or that the scene rules out.
+    """
+    return plan(EFFECTS, Facts(scene, sensor), scene.observe, accuracy or default_accuracy(EFFECTS))
+
+
+def as_json(chosen: Plan) -> dict[str, Any]:
+    """``{"ran": [{effect, reason, levels}], "skipped": [{effect, reason}]}``."""
+    ran = [
+        {"effect": step.effect.provides, "reason": step.reason, "levels": dict(step.levels)}
+        for step in chosen.ran
+    ]
+    skipped = [{"effect": step.effect.provides, "reason": step.reason} for step in chosen.skipped]
+    return {"ran": ran, "skipped": skipped}
+
+
+def as_table(chosen: Plan) -> Table:
+    """The same for a terminal."""
+    table = Table(title=f"to compute {', '.join(chosen.wanted)}")
+    for heading in ("effect", "runs", "why", "levels"):
+        table.add_column(heading)
+    for step in chosen.ran:
+        levels = ", ".join(f"{name} = {level}" for name, level in step.levels.items())
+        table.add_row(step.effect.provides, "[green]yes[/]", step.reason, levels)
+    for skipped in chosen.skipped:
+        reason = skipped.reason.replace("[", r"\[")
+        table.add_row(skipped.effect.provides, "no", reason, "", style="dim")
+    return table

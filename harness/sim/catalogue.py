@@ -1,0 +1,158 @@
+"""Every effect of the simulation, in one list: what there is, what it needs, when it runs.
+
+The functions here only take apart what the kernels take; the mathematics is theirs. Sources,
+which the caller gives: ``object.mesh`` (``Mesh``), ``object.material`` (``Material``),
+``contact.gel_from_object`` (``(n, 4, 4)``), ``sensor`` (``TactileSensor``),
+``sensor.calibration`` (``TactileCalibration``), ``sensor.noise`` (grey levels), ``seed``.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from harness.accuracy import Knob, Level
+from harness.arrays import ByteArray, FloatArray
+from harness.effects import Condition, Effect
+from harness.sensor import TactileSensor
+from harness.sim.gel import deform, over_range
+from harness.sim.height_map import RasterMesh, height_maps, penetration, rest_surface
+from harness.sim.noise import with_camera_noise
+from harness.sim.optics import Optics
+from harness.sim.tactile_calibration import TactileCalibration
+
+Given = Mapping[str, Any]
+Levels = Mapping[str, Level]
+
+SUPERSAMPLING = Knob("touch.supersampling", (1, 2, 3), "rays a side", "number", 1, "rays a pixel, each way")
+GEL = Knob("touch.gel", ("fast", "exact"), "", "method", "exact", "how wide blurs of the gel are done")
+OPTICS = Knob("touch.optics", ("smooth", "fast", "exact"), "", "method", "fast", "slope to colour")
+
+
+def _prepare(given: Given, _levels: Levels) -> RasterMesh:
+    return RasterMesh(given["object.mesh"])
+
+
+def _height_map(given: Given, levels: Levels) -> FloatArray:
+    sensor, rays = given["sensor"], int(levels[SUPERSAMPLING.name])
+    fine = replace(sensor, rows=sensor.rows * rays, columns=sensor.columns * rays, pitch=sensor.pitch / rays)
+    gap = height_maps(given["object.raster"], given["contact.gel_from_object"], fine)
+    deep = penetration(gap, fine)
+    blocks = deep.reshape(len(deep), sensor.rows, rays, sensor.columns, rays)
+    mean: FloatArray = deep if rays == 1 else blocks.mean(axis=(2, 4))
+    return mean
+
+
+def _over_range(given: Given, _levels: Levels) -> FloatArray:
+    return over_range(given["touch.height_map"], given["sensor"])[1]
+
+
+def _gel(given: Given, levels: Levels) -> FloatArray:
+    held, _ = over_range(given["touch.height_map"], given["sensor"])
+    skirt = given["sensor.calibration"].header.skirt
+    return deform(held, skirt, "fast" if levels[GEL.name] == "fast" else "exact")
+
+
+def _colour(given: Given, levels: Levels) -> ByteArray:
+    optics = _optics(given["sensor.calibration"], str(levels[OPTICS.name]), given["sensor"])
+    return optics.render(given["touch.gel"]).images
+
+
+@lru_cache(maxsize=4)
+def _optics(calibration: TactileCalibration, level: str, sensor: TactileSensor) -> Optics:
+    rest = None if sensor.gel_radius is None else -rest_surface(sensor)
+    match level:
+        case "exact" | "fast" | "smooth":
+            return Optics(calibration, level, rest)
+    raise ValueError(f"no optics level {level!r}")
+
+
+def _noise(given: Given, _levels: Levels) -> FloatArray:
+    return with_camera_noise(given["touch.markers"], given["sensor.noise"], given["seed"])
+
+
+def _image(given: Given, _levels: Levels) -> ByteArray:
+    seen: ByteArray = given["touch.noise"]
+    if seen.dtype == np.uint8:
+        return seen
+    return np.clip(np.rint(seen), 0.0, 255.0).astype(np.uint8)
+
+
+def _later(name: str) -> Callable[[Given, Levels], Any]:
+    """An effect that is declared, so that plans can say why it is not needed, and not built."""
+
+    def compute(_given: Given, _levels: Levels) -> Any:
+        raise NotImplementedError(f"{name} is declared and not built yet; do not ask for it")
+
+    return compute
+
+
+TOUCH = Condition(lambda f: f.scene.sensors.touch, "sensors.touch is true", "sensors.touch is false")
+SHADOW = Condition(
+    lambda f: f.sensor.casts_shadow, "the sensor's light casts shadows", "the sensor casts no shadows"
+)
+MARKERS = Condition(lambda f: f.sensor.markers is not None, "the gel has markers", "the gel has no markers")
+NOISE = Condition(lambda f: f.scene.sensors.noise, "sensors.noise is true", "sensors.noise is false")
+SOUND = Condition(lambda f: f.scene.sensors.sound, "sensors.sound is true", "sensors.sound is false")
+ROOM = Condition(lambda f: f.scene.room is not None, "the scene has a [room]", "the scene has no [room]")
+CAMERA = Condition(lambda f: f.scene.sensors.camera, "sensors.camera is true", "sensors.camera is false")
+LIGHTS = Condition(lambda f: bool(f.scene.lights), "the scene has [[lights]]", "the scene has no [[lights]]")
+
+EFFECTS = (
+    Effect("object.raster", ("object.mesh",), _prepare),
+    Effect(
+        "touch.height_map",
+        ("object.raster", "contact.gel_from_object", "sensor"),
+        _height_map,
+        knobs=(SUPERSAMPLING,),
+    ),
+    Effect("touch.over_range", ("touch.height_map", "sensor"), _over_range),
+    Effect("touch.gel", ("touch.height_map", "sensor", "sensor.calibration"), _gel, knobs=(GEL,)),
+    Effect("touch.colour", ("touch.gel", "sensor", "sensor.calibration"), _colour, knobs=(OPTICS,)),
+    Effect(
+        "touch.shadow",
+        ("touch.colour", "touch.gel", "sensor"),
+        _later("touch.shadow"),
+        when=SHADOW,
+        bypass="touch.colour",
+    ),
+    Effect(
+        "touch.markers",
+        ("touch.shadow", "touch.gel", "sensor"),
+        _later("touch.markers"),
+        when=MARKERS,
+        bypass="touch.shadow",
+    ),
+    Effect(
+        "touch.noise", ("touch.markers", "sensor.noise", "seed"), _noise, when=NOISE, bypass="touch.markers"
+    ),
+    Effect("touch.image", ("touch.noise",), _image, when=TOUCH),
+    Effect(
+        "object.modes", ("object.mesh", "object.material"), _later("object.modes"), when=SOUND, stored=True
+    ),
+    Effect("object.sound", ("object.modes", "strike"), _later("object.sound"), when=SOUND),
+    Effect(
+        "room.reverberation",
+        ("object.sound", "room"),
+        _later("room.reverberation"),
+        when=ROOM,
+        bypass="object.sound",
+    ),
+    Effect(
+        "microphone.pressure",
+        ("room.reverberation", "microphone"),
+        _later("microphone.pressure"),
+        when=SOUND,
+    ),
+    Effect("camera.radiance", ("object.raster", "camera"), _later("camera.radiance"), when=CAMERA),
+    Effect(
+        "camera.shadow",
+        ("camera.radiance", "object.raster", "lights"),
+        _later("camera.shadow"),
+        when=LIGHTS,
+        bypass="camera.radiance",
+    ),
+    Effect("arm.dynamics", ("arm.joints", "arm.model"), _later("arm.dynamics")),
+)
