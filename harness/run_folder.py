@@ -1,0 +1,135 @@
+"""The files that a run carries so that it can be estimated again from the folder alone."""
+
+import datetime as dt
+import importlib.metadata
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.clock import ClockOffset
+from harness.errors import RecordingDamaged
+from harness.mesh import Mesh
+from harness.recording import Recording, RunHeader
+from harness.scene import SceneFile, scene_from_json
+from harness.sim.tactile_calibration import (
+    TactileCalibration,
+    load_calibration,
+    save_calibration,
+    shipped_calibration,
+)
+from harness.station_file import Station, station_from_json
+
+OBJECT, CALIBRATION = "object.npz", "calibration.npz"
+
+_NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-python-headless", "mujoco", "touchstone-lab")
+
+
+def station_calibration(station: Station) -> TactileCalibration:
+    """The calibration of a station's gel: a file, or one that comes with the package."""
+    named = station.gel.calibration
+    return load_calibration(Path(named)) if named.endswith(".npz") else shipped_calibration(named)
+
+
+def create_run(
+    folder: Path,
+    experiment: str,
+    scene: SceneFile,
+    station: Station,
+    mesh: Mesh,
+    calibration: TactileCalibration,
+    plan: Mapping[str, Any],
+    seed: int,
+    mock: Mapping[str, Any] | None,
+) -> Recording:
+    """Make a run folder with everything an estimate will need; refuses one that holds a run.
+
+    Args:
+        folder: of the run.
+        experiment: its name on the command line.
+        scene: resolved.
+        station: resolved.
+        mesh: of the object as the estimator is to know it, in metres.
+        calibration: of the gel, as the estimator is to know it.
+        plan: of the experiment, JSON values.
+        seed: of everything random.
+        mock: how the mocked bench is started; None at a real one.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    np.savez(folder / OBJECT, vertices=mesh.vertices, faces=mesh.faces)
+    save_calibration(calibration, folder / CALIBRATION)
+    header = RunHeader(
+        experiment=experiment,
+        scene=scene.model_dump(mode="json", by_alias=True),
+        station=station.model_dump(mode="json", by_alias=True),
+        plan=plan,
+        files={name: _hash(folder / name) for name in (OBJECT, CALIBRATION)},
+        versions=versions(),
+        seed=seed,
+        mock=mock,
+        clock_offset_ns=round(ClockOffset.measure().seconds * 1e9),
+        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+    )
+    return Recording.create(folder, header)
+
+
+@dataclass(frozen=True, eq=False)
+class RunFiles:
+    """A recording with what it carries, read on first use and checked against the hashes in ``run.json``."""
+
+    recording: Recording
+
+    @cached_property
+    def scene(self) -> SceneFile:
+        """As it was resolved when the run was made."""
+        return scene_from_json(self.recording.header.scene, f"{self.recording.folder}/run.json")
+
+    @cached_property
+    def station(self) -> Station:
+        """As it was resolved when the run was made."""
+        return station_from_json(self.recording.header.station, f"{self.recording.folder}/run.json")
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The object as the estimator knows it."""
+        with np.load(self._checked(OBJECT), allow_pickle=False) as archive:
+            return Mesh(archive["vertices"], archive["faces"])
+
+    @cached_property
+    def calibration(self) -> TactileCalibration:
+        """The gel's colours as the estimator knows them."""
+        return load_calibration(self._checked(CALIBRATION))
+
+    def _checked(self, name: str) -> Path:
+        path = self.recording.folder / name
+        wanted = self.recording.header.files.get(name)
+        if not path.exists() or _hash(path) != wanted:
+            raise RecordingDamaged(f"{path} is missing or is not the file this run was recorded with")
+        return path
+
+
+def versions() -> dict[str, str]:
+    """Of what shapes the numbers, and the commit of the checkout with + where it was changed."""
+    found = {name: importlib.metadata.version(name) for name in _NUMBERS_COME_FROM}
+    return {**found, "git": git_commit()}
+
+
+def git_commit() -> str:
+    """Short hash of the checkout, + where it was changed; "unknown" where there is none."""
+    described = subprocess.run(
+        ["git", "describe", "--always", "--dirty=+", "--abbrev=12"],  # noqa: S607 - whichever git is installed
+        cwd=Path(__file__).parent,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return described.stdout.strip() or "unknown"
+
+
+def _hash(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()
