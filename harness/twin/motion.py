@@ -110,9 +110,9 @@ def plan_contact(
         if (approach := _turned_to(bench, found, seed_joints)) is not None and _line_free(bench, approach)
     ]
     candidates.sort(key=lambda approach: float(np.abs(approach.stand_off_joints - seed_joints).max()))
-    for search in (False, True):
+    for thorough in (False, True):
         for approach in candidates:
-            travel = connect(bench, seed_joints, approach.stand_off_joints, seed, search)
+            travel = connect(bench, seed_joints, approach.stand_off_joints, seed, thorough)
             if travel is not None:
                 return _planned(bench, approach, seed_joints, travel, stand_off)
     return None

@@ -23,13 +23,13 @@ SHORTCUTS: Final = 40
 
 
 def connect(
-    bench: TwinBench, start: FloatArray, end: FloatArray, seed: int = 0, search: bool = True
+    bench: TwinBench, start: FloatArray, end: FloatArray, seed: int = 0, thorough: bool = True
 ) -> FloatArray | None:
     """Joint motions from ``(6,)`` to ``(6,)`` rad that hit nothing.
 
     First the shortest chain of a few natural stations (pulled back from the object, lifted
-    over it, above it), then, if ``search``, a rapidly exploring random tree (RRT-Connect,
-    Kuffner and LaValle, ICRA 2000). The same question always gets the same answer.
+    over it, above it), then, if ``thorough``, a search from both ends. The same question always
+    gets the same answer.
 
     Returns:
         ``(n, 6)`` rad, the stations after ``start``, the last of them ``end``; None where no way
@@ -37,8 +37,8 @@ def connect(
     """
     stations = _stations(bench, start, end)
     way = _shortest(bench, stations)
-    if way is None and search and not bench.hits(start) and not bench.hits(end):
-        way = _grow(bench, start, end, np.random.default_rng(seed))
+    if way is None and thorough and not bench.hits(start) and not bench.hits(end):
+        way = search(bench, start, end, np.random.default_rng(seed))
     return None if way is None else _divided(way)[1:]
 
 
@@ -143,9 +143,15 @@ class _Tree:
         return branch[::-1]
 
 
-def _grow(
+def search(
     bench: TwinBench, start: FloatArray, end: FloatArray, rng: np.random.Generator
 ) -> FloatArray | None:
+    """Random trees grown from both ends until they meet (RRT-Connect, Kuffner and LaValle, ICRA 2000).
+
+    Returns:
+        ``(n, 6)`` rad from start to end, shortened where that stays free; None where the trees have
+        not met after 300 attempts.
+    """
     low = np.maximum(np.minimum(start, end) - 1.5, bench.joint_range[0])
     high = np.minimum(np.maximum(start, end) + 1.5, bench.joint_range[1])
     near, far = _Tree([start], [-1]), _Tree([end], [-1])

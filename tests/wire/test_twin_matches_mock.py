@@ -38,7 +38,7 @@ def test_both_know_the_same_branches(model: str) -> None:
         pose = kinematics.forward(model, joints)
         ours = kinematics.inverse(model, pose)
         matrix = tuple(tuple(row) for row in pose.tolist())
-        theirs = np.array(controller.postures(table, matrix, joints.tolist()))  # type: ignore[arg-type]
+        theirs = np.array(controller.postures(table, matrix, joints.tolist()))
         apart = np.abs((ours[:, None] - theirs[None, :] + np.pi) % (2 * np.pi) - np.pi).max(axis=-1)
         assert len(ours) == len(theirs)
         assert apart.min(axis=1).max() < 1e-6

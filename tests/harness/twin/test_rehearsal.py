@@ -1,6 +1,8 @@
 """A plan that must not be performed is refused, and the refusal names the step and the bodies."""
 
+import csv
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +10,14 @@ import pytest
 from harness import kinematics
 from harness.arrays import FloatArray
 from harness.errors import MotionRefused
-from harness.geometry import apply, frame_facing, rotation_about, transform, translation
+from harness.geometry import (
+    apply,
+    frame_facing,
+    rotation_about,
+    rotation_from_vector,
+    transform,
+    translation,
+)
 from harness.mesh import Mesh
 from harness.objects.household import build
 from harness.sensor import GELSIGHT_R15
@@ -17,7 +26,7 @@ from harness.twin.compare import compare_arm, compare_contact
 from harness.twin.motion import PlannedContact, approaches, plan_contact, reachable
 from harness.twin.rehearsal import Segment, contact_point, rehearse
 from harness.twin.sweep import sweep
-from harness.twin.ways import LONGEST_MOVE, connect
+from harness.twin.ways import LONGEST_MOVE, connect, search
 
 TOOL = translation(np.array([0.0, 0.0, 0.12]))
 BASE_FROM_OBJECT = translation(np.array([-0.42, 0.0, 0.25]))
@@ -232,6 +241,16 @@ def test_where_the_object_is_in_the_way_the_way_leads_around_it(bench: TwinBench
     assert all(sweep(bench, a, b) is None for a, b in itertools.pairwise(stations))
 
 
+def test_the_search_finds_a_way_where_the_straight_one_is_blocked(bench: TwinBench) -> None:
+    one = planned(bench, HOME, on_the_wall(bench, 1.8, 0.05, 5e-4)).stand_off_joints
+    other = planned(bench, one, on_the_wall(bench, -0.9, 0.05, 5e-4)).stand_off_joints
+    way = search(bench, one, other, np.random.default_rng(3))
+    assert way is not None
+    assert np.array_equal(way[[0, -1]], [one, other])
+    assert all(sweep(bench, a, b) is None for a, b in itertools.pairwise(way))
+    assert np.array_equal(way, search(bench, one, other, np.random.default_rng(3)))  # type: ignore[arg-type]
+
+
 def test_a_contact_performed_elsewhere_is_reported_as_far_as_it_was(
     bench: TwinBench, seven: list[PlannedContact]
 ) -> None:
@@ -251,6 +270,19 @@ def test_where_the_line_misses_the_contact_is_the_nearest_surface(bench: TwinBen
     point = contact_point(bench, beside)
     assert np.linalg.norm(bench.solid.nearest(point) - point) < 1e-12
     assert np.linalg.norm(apply(BASE_FROM_OBJECT, point[None])[0] - beside[:3, 3]) > 0.1
+
+
+def test_a_real_arm_differs_from_its_table_by_one_constant(shared_data: Path) -> None:
+    with (shared_data / "robot" / "rtde_recording" / "ur5e_real_robot_data.csv").open() as file:
+        rows = list(csv.DictReader(file, delimiter=" "))
+    joints = np.array([[float(row[f"target_q_{i}"]) for i in range(6)] for row in rows])
+    tcp = np.array([[float(row[f"target_TCP_pose_{i}"]) for i in range(6)] for row in rows])
+    poses = np.stack([transform(rotation_from_vector(row[3:]), row[:3]) for row in tcp])
+    deviation = compare_arm("ur5e", joints, poses)
+    # Factory calibration: the maker's tables are the nominal arm's.
+    assert np.median(deviation.distances) == pytest.approx(1.57e-3, abs=2e-5)
+    assert np.degrees(np.median(deviation.angles)) == pytest.approx(0.27, abs=0.01)
+    assert np.ptp(deviation.distances) < 1e-5
 
 
 def test_a_controllers_kinematics_are_compared_pose_by_pose() -> None:
