@@ -12,7 +12,8 @@ import numpy as np
 from calibration.taxim.pack import PressPack
 from harness.arrays import BoolArray, FloatArray, read_only
 from harness.errors import CalibrationRefused
-from harness.sim.shading import design, scaled_position
+from harness.sim.shading import POSITION_TERMS, design, scaled_position
+from harness.sim.tactile_calibration import POSITION_DEGREE
 
 _ROUNDS = 12
 _HUBER = 10.0
@@ -20,6 +21,15 @@ _HUBER = 10.0
 
 _RIDGE = 1e-6
 """Of the normalised normal equations."""
+
+_PLACE_RIDGE = 1e-3
+"""Pulls the colours towards being the same everywhere, in units of the constant terms' own weight.
+
+Presses seldom cover the whole gel; where none was made, two halves of the published set differ
+by 16 grey levels without this and by 6 with it, for 0.1 dB on presses held out.
+"""
+
+_PLACE_DEGREES = np.array([c + d for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)])
 
 _STEP = 0.25
 """Pixels, for the derivative by the centre; the model is smooth over several."""
@@ -146,13 +156,17 @@ def _coefficients(
     for _ in range(2):
         weighted = terms * weight[:, None]
         gram, right = terms.T @ weighted, weighted.T @ wanted
-        scale = np.sqrt(np.diag(gram))
-        normal = gram / np.outer(scale, scale)
-        smooth = (
-            np.linalg.solve(normal + _RIDGE * np.eye(len(normal)), right / scale[:, None]) / scale[:, None]
-        )
+        normal = gram + np.diag(_ridge(np.diag(gram)))
+        smooth = np.linalg.solve(normal, right)
         weight = _huber(terms @ smooth - wanted)
-    return smooth, float(np.linalg.cond(normal))
+    scale = np.sqrt(np.diag(normal))
+    return smooth, float(np.linalg.cond(normal / np.outer(scale, scale)))
+
+
+def _ridge(diagonal: FloatArray) -> FloatArray:
+    constants = diagonal.reshape(-1, POSITION_TERMS)[:, :1]
+    ridge: FloatArray = _RIDGE * diagonal + (_PLACE_RIDGE * constants * _PLACE_DEGREES**2).ravel()
+    return ridge
 
 
 def _terms(centre: FloatArray, inside: BoolArray, ball: float) -> FloatArray:
