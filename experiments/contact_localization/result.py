@@ -1,0 +1,156 @@
+"""The answer as JSON: what a script reads, and what ``result.json`` holds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.comparison import Comparison
+from experiments.contact_localization.estimate import Estimate
+from experiments.contact_localization.gate import Gate
+from experiments.contact_localization.posterior import Mode
+from experiments.contact_localization.surface import random_points
+from experiments.contact_localization.truth import Truth
+from harness.arrays import FloatArray
+from harness.explain import as_json
+from harness.mesh import Mesh
+from harness.run_folder import RunFiles
+from harness.symmetry import SymmetryGroup
+
+SCHEMA = 1
+_RANDOM_POINTS = 4000
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """Everything that a result and a report are made from.
+
+    Attributes:
+        run: the folder.
+        found: its answer.
+        geometry: the answer from places and tool axes alone, without one image.
+        comparison: live against simulated.
+        truth: of a mocked run.
+        symmetry: of the object.
+        accuracy: the chosen levels by knob.
+        warnings: what the operator should know.
+    """
+
+    run: RunFiles
+    found: Answer
+    geometry: Estimate
+    comparison: Comparison
+    truth: Truth | None
+    symmetry: SymmetryGroup
+    accuracy: Mapping[str, Any]
+    warnings: tuple[str, ...]
+
+    @property
+    def true_points(self) -> FloatArray | None:
+        """``(contacts, 3)`` metres, None where any is unknown."""
+        count = len(self.found.observations)
+        if self.truth is None or not all(k in self.truth.points for k in range(count)):
+            return None
+        return np.array([self.truth.points[k] for k in range(count)])
+
+
+def result_of(scored: Scored, report: str | None) -> dict[str, Any]:
+    """The result as JSON values; keys carry their unit."""
+    run, found = scored.run, scored.found
+    true = scored.true_points
+    last_true = None if true is None else true[-1]
+    return {
+        "schema": SCHEMA,
+        "experiment": run.recording.header.experiment,
+        "object": run.scene.object.name,
+        "mock": run.recording.header.mock is not None,
+        "seed": run.recording.header.seed,
+        "contacts": len(found.observations),
+        "estimates": {"touch": touch_estimate(scored)},
+        "random_baseline_m": _random_error(run.mesh, last_true),
+        "geometry_baseline_m": _distance(scored.geometry.position_in_object, last_true),
+        "symmetry": scored.symmetry.name,
+        "plan": _plan(scored.comparison),
+        "accuracy": dict(scored.accuracy),
+        "warnings": list(scored.warnings),
+        "world": None if scored.truth is None else dict(scored.truth.differences),
+        "recording": str(run.recording.folder),
+        "report": report,
+    }
+
+
+def touch_estimate(scored: Scored) -> dict[str, Any]:
+    """The estimate by touch, scored where the truth is known."""
+    found, true = scored.found, scored.true_points
+    last = found.last
+    errors = None if true is None else np.linalg.norm(last.contacts - true, axis=1)
+    end = None if true is None else true[-1]
+    return {
+        "position_m": last.position_in_object.tolist(),
+        "error_m": None if errors is None else float(errors[-1]),
+        "error_symmetric_m": None if end is None else scored.symmetry.distance(last.position_in_object, end),
+        "error_mean_m": None if errors is None else float(errors.mean()),
+        "error_top10_m": None if end is None else float(np.linalg.norm(last.candidates - end, axis=1).mean()),
+        "credible90_m": last.credible90,
+        "region90_area_m2": last.region.area,
+        "in_region90": None if end is None else last.region.contains(end),
+        "modes": [_mode(mode) for mode in last.modes],
+        "yaw_rad": last.yaw,
+        "yaw_sigma_rad": last.yaw_sigma,
+        "contacts": [
+            _contact(k, point, gate, None if errors is None else float(errors[k]))
+            for k, (point, gate) in enumerate(zip(last.contacts, last.gates, strict=True))
+        ],
+        "seconds": found.seconds,
+        "seconds_by_stage": dict(last.seconds),
+    }
+
+
+def flags_of(gate: Gate) -> list[str]:
+    """What is wrong with a contact, in words."""
+    said = []
+    if gate.missed:
+        said.append("missed: the image shows no contact; it was not used")
+    if gate.slipped:
+        said.append("slipped: it fits much worse than the others; its weight is limited")
+    if gate.repeats is not None:
+        said.append(f"repeated: the same place as contact {gate.repeats + 1}; together they count once")
+    return said
+
+
+def _contact(index: int, point: FloatArray, gate: Gate, error: float | None) -> dict[str, Any]:
+    return {
+        "contact": index + 1,
+        "position_m": point.tolist(),
+        "error_m": error,
+        "fit_nats": gate.fit,
+        "flags": flags_of(gate),
+    }
+
+
+def _mode(mode: Mode) -> dict[str, Any]:
+    spread = float(np.sqrt(np.trace(mode.covariance)))
+    return {"position_m": mode.position.tolist(), "weight": mode.weight, "spread_m": spread}
+
+
+def _plan(comparison: Comparison) -> dict[str, Any]:
+    described = as_json(comparison.plan)
+    evaluation = comparison.evaluation
+    for step in described["ran"]:
+        step["seconds"] = evaluation.seconds.get(step["effect"])
+        step["calls"] = evaluation.calls.get(step["effect"], 0)
+    return described
+
+
+def _random_error(mesh: Mesh, true: FloatArray | None) -> float | None:
+    """Expected error of a point drawn evenly from the surface."""
+    if true is None:
+        return None
+    points, _ = random_points(mesh, _RANDOM_POINTS, np.random.default_rng(0))
+    return float(np.linalg.norm(points - true, axis=1).mean())
+
+
+def _distance(point: FloatArray, true: FloatArray | None) -> float | None:
+    return None if true is None else float(np.linalg.norm(point - true))
