@@ -145,7 +145,7 @@ class MjpegServer:
             if "action=stream" in request:
                 self._stream(client)
             elif "action=snapshot" in request:
-                frame, _ = self._next(0)
+                frame, _ = self._next(self._number)
                 client.sendall(_HEAD + b"Content-type: image/jpeg\r\n\r\n" + frame)
             else:
                 client.sendall(_NOT_FOUND)
@@ -154,7 +154,7 @@ class MjpegServer:
     def _stream(self, client: socket.socket) -> None:
         client.sendall(_HEAD + b"Content-Type: multipart/x-mixed-replace;boundary=" + BOUNDARY)
         client.sendall(b"\r\n\r\n--" + BOUNDARY + b"\r\n")
-        number = 0
+        number = self._number  # a new client waits for a new frame, as mjpg-streamer's do
         while not self._stopped:
             frame, number = self._next(number)
             head = b"Content-Type: image/jpeg\r\nContent-Length: %d\r\nX-Timestamp: %.6f\r\n\r\n"

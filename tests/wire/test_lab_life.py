@@ -1,0 +1,192 @@
+"""The mocked lab as a program: it starts, is told things, and leaves nothing behind."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.gelsight import GelSight
+from harness.errors import BenchFault
+from harness.gap import gap_path
+from harness.mock_lab import LabAddresses, MockLab
+from harness.objects.household import build
+from harness.scene import SceneFile, load_scene
+from harness.sensor import GELSIGHT_R15
+from harness.station_file import Station, load_station
+
+ROOT = Path(__file__).parents[2]
+PORTS = (29999, 30001, 30002, 30003, 30004, 8080, 8081)
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux")
+
+
+@pytest.fixture(scope="module")
+def scene() -> SceneFile:
+    return load_scene(ROOT / "scenes" / "mug_touch.toml")
+
+
+@pytest.fixture(scope="module")
+def station() -> Station:
+    return load_station(ROOT / "stations" / "mock.toml")
+
+
+def make_lab(scene: SceneFile, station: Station, truth: Path, seed: int = 3) -> MockLab:
+    return MockLab(scene, station, build("mug"), seed, gap_path("default"), truth)
+
+
+@pytest.fixture(scope="module")
+def truth(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("truth") / "truth.json"
+
+
+@pytest.fixture(scope="module")
+def lab(scene: SceneFile, station: Station, truth: Path) -> Iterator[tuple[MockLab, LabAddresses]]:
+    with make_lab(scene, station, truth) as lab:
+        yield lab, lab.start()
+
+
+def answers(address: str, port: int) -> bool:
+    try:
+        socket.create_connection((address, port), 1.0).close()
+    except OSError:
+        return False
+    return True
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def children(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def ended(pids: list[int], seconds: float) -> bool:
+    end = time.monotonic() + seconds
+    while any(alive(pid) for pid in pids):
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def test_every_instrument_answers_on_an_address_of_its_own(lab: tuple[MockLab, LabAddresses]) -> None:
+    _, where = lab
+    assert where.arm.startswith("127.")
+    assert where.camera is None
+    assert all(answers(where.arm, port) for port in (29999, 30003, 30004, 8080))
+
+
+def test_a_mark_is_shown_before_it_is_answered(lab: tuple[MockLab, LabAddresses], truth: Path) -> None:
+    program, _ = lab
+    assert program.ask({"mark": {"step": 2, "sample": -1}}) == {"marked": {"step": 2, "sample": -1}}
+    program.mark(2, 0)
+    written = json.loads(truth.read_text())
+    assert [contact["step"] for contact in written["contacts"]] == [2]
+    assert np.array(written["base_from_object"]).shape == (4, 4)
+    assert written["contacts"][0]["penetration_m"] == 0.0  # the arm is at home
+    assert "object_yaw_rad" in written["differences"]
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        {"mark": {"step": 1}},
+        {"marc": {}},
+        {"mark": {"step": 1.5, "sample": 0}},
+        {"fault": {"instrument": "gel"}},
+    ],
+    ids=str,
+)
+def test_a_request_it_does_not_know_is_refused(
+    lab: tuple[MockLab, LabAddresses], request_: dict[str, object]
+) -> None:
+    with pytest.raises(BenchFault, match="refused"):
+        lab[0].ask(request_)
+
+
+def test_a_fault_reaches_the_instrument(lab: tuple[MockLab, LabAddresses]) -> None:
+    program, where = lab
+    gel = GelSight(where.gel, GELSIGHT_R15)
+    gel.open()
+    program.fault("gel", "stall", 0.8)
+    with pytest.raises(BenchFault, match="stalled"):
+        gel.read(6, 0.4)
+    assert gel.read(2, 5.0).values.shape == (2, 120, 160, 3)
+    gel.close()
+
+
+def test_the_gel_shows_the_untouched_gel_at_home(lab: tuple[MockLab, LabAddresses]) -> None:
+    gel = GelSight(lab[1].gel, GELSIGHT_R15)
+    gel.open()
+    first, second = gel.read(2, 2.0).encoded
+    gel.close()
+    assert first == second
+
+
+def test_end_of_file_ends_every_process(scene: SceneFile, station: Station, tmp_path: Path) -> None:
+    lab = make_lab(scene, station, tmp_path / "truth.json")
+    where = lab.start()
+    pids = [lab.process_id, *children(lab.process_id)]
+    assert len(pids) == 3
+    lab.close()
+    assert ended(pids, 5.0)
+    assert not any(answers(where.arm, port) for port in PORTS)
+
+
+_RUN = """
+import sys, time
+sys.path.insert(0, {tests!r})
+from pathlib import Path
+import test_lab_life as t
+lab = t.make_lab(
+    t.load_scene(t.ROOT / "scenes" / "mug_touch.toml"), t.load_station(t.ROOT / "stations" / "mock.toml"),
+    Path({truth!r}))
+where = lab.start()
+print(lab.process_id, where.arm, lab._folder.name, flush=True)
+time.sleep(60.0)
+"""
+
+
+@pytest.mark.parametrize("victim", ["run", "lab"])
+def test_kill_leaves_no_process_and_no_port(tmp_path: Path, victim: str) -> None:
+    code = _RUN.format(tests=str(Path(__file__).parent), truth=str(tmp_path / "truth.json"))
+    run = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    assert run.stdout is not None
+    lab_pid, address, folder = run.stdout.readline().split()
+    pids = [int(lab_pid), *children(int(lab_pid))]
+    assert len(pids) == 3
+    try:
+        os.kill(run.pid if victim == "run" else int(lab_pid), signal.SIGKILL)
+        assert ended(pids, 5.0)
+        assert not any(answers(address, port) for port in PORTS)
+    finally:
+        run.kill()
+        run.wait()
+        run.stdout.close()
+        for left in Path(folder).glob("*"):
+            left.unlink()
+        Path(folder).rmdir()
+
+
+def test_two_labs_live_side_by_side(
+    lab: tuple[MockLab, LabAddresses], scene: SceneFile, station: Station, tmp_path: Path
+) -> None:
+    with make_lab(scene, station, tmp_path / "truth.json", seed=4) as other:
+        where = other.start()
+        assert where.arm != lab[1].arm
+        assert answers(where.arm, 30004)
+        assert answers(lab[1].arm, 30004)
+    assert threading.active_count() < 10
