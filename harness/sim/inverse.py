@@ -22,6 +22,7 @@ QUIET = 4.0
 STRONG = 12.0
 """Grey levels that some part of an imprint must reach: three times the drift between real presses."""
 
+_MOSTLY = 0.5
 _WINDOW = 5
 _RIDGE = 16.0
 _DISTRUST = 0.1
@@ -132,11 +133,13 @@ def _invert_one(image: ByteArray, calibration: TactileCalibration) -> _Answer:
 
 
 def _without_drift(change: FloatArray) -> FloatArray:
-    # Lamps warm up: where much of the picture hardly changed, what it changed by is the light.
+    # Lamps warm up: where most of the picture hardly changed, what it changed by is the light.
+    # Where less of it is still, a tilted face pressed into the gel would pass for light.
     hardly = np.sqrt((change**2).sum(axis=2)) < STRONG
-    if hardly.mean() < 0.2:
+    if hardly.mean() < _MOSTLY:
         return change
-    return change - np.median(change[hardly], axis=0)
+    still: FloatArray = change - np.median(change[hardly], axis=0)
+    return still
 
 
 def _strength(change: FloatArray) -> FloatArray:
@@ -170,6 +173,6 @@ def _rest_error(pitch: float) -> float:
 def _error(spread: FloatArray, rest: BoolArray, pitch: float) -> FloatArray:
     # Independent slope errors add up along the way from where the height is known.
     way = ndimage.distance_transform_edt(~rest) if rest.any() else np.full(rest.shape, float(max(rest.shape)))
-    variance: FloatArray = ndimage.uniform_filter(spread**2, size=2 * _WINDOW + 1, mode="nearest")
+    variance = ndimage.uniform_filter(spread**2, size=2 * _WINDOW + 1, mode="nearest")
     error: FloatArray = pitch * np.hypot(_FLOOR, np.where(rest, 0.0, np.sqrt(variance * way) * _CORRELATED))
     return error

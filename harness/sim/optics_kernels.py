@@ -4,7 +4,7 @@ import numpy as np
 
 from harness.arrays import ByteArray, FloatArray
 from harness.sim.compiled import compiled
-from harness.sim.shading import at_pixel, colour, position_terms, softly_limited
+from harness.sim.shading import at_pixel, at_row, colour, softly_limited
 
 
 @compiled
@@ -62,9 +62,8 @@ def _smooth_pixel(
     z: FloatArray,
     i: int,
     j: int,
-    smooth: FloatArray,
+    row: FloatArray,
     limit: float,
-    place: FloatArray,
     here: FloatArray,
     out: FloatArray,
 ) -> float:
@@ -75,8 +74,7 @@ def _smooth_pixel(
         return steep
     sine = steep / np.sqrt(1.0 + steep * steep)
     scale = softly_limited(sine, limit) / steep
-    position_terms(i, j, z.shape[0], z.shape[1], place)
-    at_pixel(smooth, place, here)
+    at_pixel(row, j, z.shape[1], here)
     colour(here, -b * scale, -a * scale, out)
     return steep
 
@@ -84,10 +82,11 @@ def _smooth_pixel(
 @compiled
 def change_smoothly(z: FloatArray, smooth: FloatArray, limit: float, change: FloatArray) -> None:
     """Write the polynomial's grey levels ``(rows, columns, 3)`` for a surface ``z`` in pixels."""
-    place, here = np.empty(6), np.empty((20, 3))
+    row, here = np.empty((3, 60)), np.empty(60)
     for i in range(z.shape[0]):
+        at_row(smooth, i, z.shape[0], row)
         for j in range(z.shape[1]):
-            _smooth_pixel(z, i, j, smooth, limit, place, here, change[i, j])
+            _smooth_pixel(z, i, j, row, limit, here, change[i, j])
 
 
 @compiled
@@ -97,10 +96,11 @@ def draw_smoothly(
     """As ``draw_exactly`` with the polynomial."""
     steepest = limit / np.sqrt(1.0 - limit * limit) if limit < 1.0 else np.inf
     clipped, beyond = 0, 0
-    place, here, out = np.empty(6), np.empty((20, 3)), np.empty(3)
+    row, here, out = np.empty((3, 60)), np.empty(60), np.empty(3)
     for i in range(z.shape[0]):
+        at_row(smooth, i, z.shape[0], row)
         for j in range(z.shape[1]):
-            if _smooth_pixel(z, i, j, smooth, limit, place, here, out) > steepest:
+            if _smooth_pixel(z, i, j, row, limit, here, out) > steepest:
                 beyond += 1
             clipped += _to_bytes(base[i, j], out, image[i, j])
     return clipped, beyond

@@ -35,23 +35,23 @@ def scaled_position(x: FloatArray, y: FloatArray, rows: int, columns: int) -> Fl
 
 
 @compiled
-def position_terms(i: int, j: int, rows: int, columns: int, out: FloatArray) -> None:
-    """Write the powers of the scaled position of pixel (row i, column j) in ``design``'s order."""
-    u = 2.0 * (j + 0.5) / columns - 1.0
+def at_row(smooth: FloatArray, i: int, rows: int, out: FloatArray) -> None:
+    """Contract the coefficients with row ``i``: ``out`` becomes ``(3, 60)``, powers of the scaled column."""
     v = 2.0 * (i + 0.5) / rows - 1.0
-    out[0], out[1], out[2] = 1.0, v, v * v
-    out[3], out[4], out[5] = u, u * v, u * u
+    for k in range(NORMAL_TERMS):
+        at = k * POSITION_TERMS
+        for c in range(3):
+            out[0, k * 3 + c] = smooth[at, c] + v * (smooth[at + 1, c] + v * smooth[at + 2, c])
+            out[1, k * 3 + c] = smooth[at + 3, c] + v * smooth[at + 4, c]
+            out[2, k * 3 + c] = smooth[at + 5, c]
 
 
 @compiled
-def at_pixel(smooth: FloatArray, place: FloatArray, out: FloatArray) -> None:
-    """Contract the coefficients with a pixel's position: ``out`` becomes ``(20, 3)``."""
-    for k in range(NORMAL_TERMS):
-        for c in range(3):
-            total = 0.0
-            for p in range(POSITION_TERMS):
-                total += smooth[k * POSITION_TERMS + p, c] * place[p]
-            out[k, c] = total
+def at_pixel(row: FloatArray, j: int, columns: int, out: FloatArray) -> None:
+    """Contract ``at_row``'s result with column ``j``: ``out`` becomes ``(60,)``, term by channel."""
+    u = 2.0 * (j + 0.5) / columns - 1.0
+    for k in range(NORMAL_TERMS * 3):
+        out[k] = row[0, k] + u * (row[1, k] + u * row[2, k])
 
 
 @compiled
@@ -64,7 +64,7 @@ def colour(here: FloatArray, nx: float, ny: float, out: FloatArray) -> None:
             inner = 0.0
             for _ in range(NORMAL_DEGREE + 1 - a):
                 k -= 1
-                inner = inner * ny + (here[k, c] if k >= 0 else 0.0)
+                inner = inner * ny + (here[k * 3 + c] if k >= 0 else 0.0)
             total = total * nx + inner
         out[c] = total
 
@@ -80,7 +80,7 @@ def colour_and_slope(here: FloatArray, nx: float, ny: float, out: FloatArray, by
             for _ in range(NORMAL_DEGREE + 1 - a):
                 k -= 1
                 inner_y = inner_y * ny + inner
-                inner = inner * ny + (here[k, c] if k >= 0 else 0.0)
+                inner = inner * ny + (here[k * 3 + c] if k >= 0 else 0.0)
             total_x = total_x * nx + total
             total_y = total_y * nx + inner_y
             total = total * nx + inner

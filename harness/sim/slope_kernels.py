@@ -4,7 +4,7 @@ import numpy as np
 
 from harness.arrays import FloatArray
 from harness.sim.compiled import compiled
-from harness.sim.shading import at_pixel, colour_and_slope, position_terms
+from harness.sim.shading import at_pixel, at_row, colour_and_slope
 
 _STEPS = 8
 _SETTLED = 1e-4
@@ -39,12 +39,12 @@ def normals_from_colour(
             deviation of the slope's sine for noise of one grey level.
     """
     rows, columns = change.shape[:2]
-    place, here = np.empty(6), np.empty((20, 3))
+    row, here = np.empty((3, 60)), np.empty(60)
     shade, by = np.empty(3), np.empty((3, 2))
     for i in range(rows):
+        at_row(smooth, i, rows, row)
         for j in range(columns):
-            position_terms(i, j, rows, columns, place)
-            at_pixel(smooth, place, here)
+            at_pixel(row, j, columns, here)
             seen = change[i, j]
             size = np.sqrt(seen[0] ** 2 + seen[1] ** 2 + seen[2] ** 2)
             x, y, left, spread = _descend(here, seen, 0.0, 0.0, limit, ridge, shade, by)
