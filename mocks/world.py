@@ -106,6 +106,9 @@ class World:
         self.base_from_object = read_only(self._placed())
         self._object_from_base = inverse(self.base_from_object)
         self._raster = RasterMesh(self.mesh)
+        self._middle = apply(self.base_from_object, self.mesh.bounds.mean(axis=0)[None])[0]
+        tool = float(np.linalg.norm(bench.flange_from_gel[:3, 3]))
+        self._touching_distance = self.mesh.diagonal / 2 + tool + float(np.hypot(*self.sensor.window)) + REACH
         self._gel = WorldGel(self.sensor, gap.gel, bench.calibration)
         self.background = self._gel.background
         self._shading = self._draw.shading(self.sensor.rows, self.sensor.columns)
@@ -114,12 +117,17 @@ class World:
     def tactile_image(self, base_from_flange: FloatArray, step: int, sample: int) -> ByteArray:
         """What the gel's camera sees, ``(rows, columns, 3)`` uint8, RGB; without contact, the background."""
         penetration = self._indentation(base_from_flange, step)
+        if not penetration.any():
+            return self.background.copy()
         offset = self._draw.contact(step).height_offset
         noise = self._draw.pixel_noise(self.sensor.rows, self.sensor.columns, step, sample)
         return self._gel.picture(penetration, self._draw.run.height_gain, offset + self._shading + noise)
 
     def contact_wrench(self, base_from_flange: FloatArray, step: int) -> FloatArray:
         """``(6,)`` N and N m that the object exerts at the flange, in base."""
+        offset = base_from_flange[:3, 3] - self._middle
+        if float(offset @ offset) > self._touching_distance**2:
+            return np.zeros(6)
         flange_from_gel = self._true_flange_from_gel(step)
         base_from_gel = self._true_base_from_flange(base_from_flange, step) @ flange_from_gel
         in_gel = self._contact.wrench(self._object_from_base @ base_from_gel)

@@ -53,8 +53,6 @@ class WorldGel:
             noise: ``(rows, columns)`` metres, added where the gel is touched.
         """
         touched = penetration > 0.0
-        if not touched.any():
-            return self.background.copy()
         shown = np.where(touched, np.maximum(gain * penetration + noise, 0.0), 0.0)
         held, _ = over_range(shown[None], self._sensor)
         image: ByteArray = self._optics.render(deform(held, self._skirt)).images[0]
