@@ -141,11 +141,16 @@ def _curve(points: list[tuple[float, float]]) -> FloatArray:
 
 
 def _handle(points: list[tuple[float, float]], halves: list[tuple[float, float]], edge: float) -> Mesh:
-    """A handle through (x, z) points in mm, with half axes (in its plane, across) at each."""
+    """A handle through (x, z) points in mm, with half axes (in its plane, across) at each.
+
+    It leaves and meets the wall level, so that its flat ends lie within the wall's thickness.
+    """
     both = np.column_stack([np.array(points), np.array(halves)])
     at = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(both[:, :2], axis=0), axis=1))]
     count = int(np.ceil(at[-1] / edge)) + 1
-    smooth = CubicSpline(at, both)(np.linspace(0.0, at[-1], count))
+    level = np.array([1.0, 0.0, 0.0, 0.0])
+    path = CubicSpline(at, both, bc_type=((1, level), (1, -level)))
+    smooth = path(np.linspace(0.0, at[-1], count))
     return tube(smooth[:, :2], smooth[:, 2:], edge)
 
 

@@ -53,7 +53,7 @@ def tube(centres: FloatArray, halves: FloatArray, edge: float) -> Mesh:
     Returns:
         A watertight mesh with flat ends, outward.
     """
-    along = np.gradient(centres, axis=0)
+    along = np.gradient(centres, axis=0, edge_order=2)
     along /= np.linalg.norm(along, axis=1)[:, None]
     count = max(12, int(np.ceil(2.0 * np.pi * float(halves.max()) / edge)))
     vertices = []
