@@ -1,0 +1,257 @@
+"""All that a report shows, as plain values: the page is a pure function of these."""
+
+from dataclasses import dataclass, field
+
+from harness.arrays import AnyArray, FloatArray
+from harness.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Missing:
+    """Something the report would show and cannot, and why."""
+
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The answer of a run, for its last contact. Lengths in metres; None where unknown.
+
+    Attributes:
+        position: ``(3,)`` in the object's frame.
+        seconds: the estimate took, from recorded readings to this answer.
+        credible90: radius about the answer that holds 90 % of the posterior.
+        error: straight-line distance to the true contact.
+        error_symmetric: the same, the least over the object's rotations.
+        error_mean: mean error over all contacts of the run.
+        random_baseline: expected error of a random point of the surface.
+        geometry_baseline: error of the relative translations alone.
+        modes: how many separate places stay likely; more than 1 is an ambiguous answer.
+    """
+
+    position: FloatArray
+    seconds: float
+    credible90: float | None = None
+    error: float | None = None
+    error_symmetric: float | None = None
+    error_mean: float | None = None
+    random_baseline: float | None = None
+    geometry_baseline: float | None = None
+    modes: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Where a contact may have been, as weighted places on the object.
+
+    Attributes:
+        points: ``(n, 3)`` metres, object frame.
+        weights: ``(n,)``, not negative, any sum but zero.
+        estimate: ``(3,)`` metres.
+        modes: ``(k, 3)`` metres, separate likely places, best first.
+        mode_weights: ``(k,)`` share of the posterior each holds.
+        credible90: metres.
+    """
+
+    points: FloatArray
+    weights: FloatArray
+    estimate: FloatArray
+    modes: FloatArray
+    mode_weights: FloatArray
+    credible90: float
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """One press.
+
+    Attributes:
+        number: from 1.
+        step: name of the step in the recording.
+        live: ``(rows, columns, 3)`` uint8 RGB, what the sensor saw.
+        simulated: the same shape and type at the estimated contact.
+        live_height: ``(rows, columns)`` metres of indentation, from the live image.
+        simulated_height: ``(rows, columns)`` metres at the estimated contact.
+        object_from_gel: ``(4, 4)``, where the estimate puts the sensor.
+        posterior: after this contact and all before it.
+        truth: ``(3,)`` metres, or None.
+        error: metres of this contact's answer, or None.
+        flags: "slipped", "missed", "repeated" and the like, with what was done about it.
+        notes: other facts, as (name, value with unit).
+    """
+
+    number: int
+    step: str
+    live: AnyArray | Missing
+    simulated: AnyArray | Missing
+    live_height: FloatArray | Missing
+    simulated_height: FloatArray | Missing
+    object_from_gel: FloatArray | Missing
+    posterior: Posterior | Missing
+    truth: FloatArray | None = None
+    error: float | None = None
+    flags: tuple[str, ...] = ()
+    notes: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A body in the picture of the bench.
+
+    Attributes:
+        mesh: metres, in its own frame.
+        base_from_part: ``(4, 4)``.
+        colour: red, green, blue from 0 to 1.
+        smooth: shade over edges of less than 35 degrees.
+    """
+
+    mesh: Mesh
+    base_from_part: FloatArray
+    colour: tuple[float, float, float]
+    smooth: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """What the picture of the bench shows: its bodies and, in base, the contact frames.
+
+    Attributes:
+        parts: bodies; the object among them.
+        base_from_gels: ``(n, 4, 4)`` of the contacts, drawn as tool axes.
+        focus: ``(3,)`` metres, the point looked at.
+        width: metres across the picture at the focus.
+    """
+
+    parts: tuple[Part, ...]
+    base_from_gels: FloatArray
+    focus: FloatArray
+    width: float = 1.1
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Errors in metres against contacts, or against seconds; the first curve is ours.
+
+    Attributes:
+        name: in the legend.
+        x: contacts, or seconds.
+        error: metres, as many.
+        labels: beside each point, or empty.
+    """
+
+    name: str
+    x: tuple[float, ...]
+    error: tuple[float, ...]
+    labels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """How one instrument did during the run. Rates in Hz, times in seconds."""
+
+    name: str
+    address: str
+    rate: float | None
+    nominal_rate: float | None
+    readings: int
+    drops: int | None
+    latency_median: float | None
+    latency_99: float | None
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Artefact:
+    """A calibration artefact the run relied on."""
+
+    name: str
+    serial: str
+    made: str
+    age_days: float
+    residual: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class EffectRun:
+    """An effect of the simulation that ran, or did not, and why.
+
+    Attributes:
+        name: what it provides.
+        ran: whether it was computed.
+        reason: in words.
+        calls: how often, None if not counted.
+        seconds: total, None if not timed.
+    """
+
+    name: str
+    ran: bool
+    reason: str
+    calls: int | None = None
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class TwinDeviation:
+    """Recorded against rehearsed poses of one step: metres and radians."""
+
+    step: str
+    position_mean: float
+    position_max: float
+    angle_max: float
+    contact_point: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ReportData:
+    """A run's report.
+
+    Attributes:
+        title: what was asked.
+        object_name: as the operator calls it.
+        material: of the object.
+        mesh: the estimator's mesh, metres, object frame.
+        mock: whether the far end of every cable was a mock.
+        made: date and time of the run, as text.
+        command: what was typed.
+        recording: where it lies, as text.
+        answer: of the last contact.
+        contacts: in order.
+        bench: for the picture.
+        error_by_contact: errors after 1, 2, ... contacts.
+        error_by_seconds: errors at levels of accuracy against the seconds they took.
+        instruments: one row each.
+        calibrations: one row each.
+        effects: one row each.
+        world: what the mocked world did differently from the estimator's model, by name.
+        twin: recorded poses against the rehearsal.
+        versions: of packages, by name.
+        git: hash of the checkout, with "+" if it was changed.
+        symmetry: the object's, in words.
+        accuracy: the chosen levels by knob.
+        warnings: what the operator should know.
+    """
+
+    title: str
+    object_name: str
+    material: str
+    mesh: Mesh
+    mock: bool
+    made: str
+    command: str
+    recording: str
+    answer: Answer | Missing
+    contacts: tuple[Contact, ...]
+    bench: Bench | Missing
+    error_by_contact: tuple[Curve, ...] | Missing
+    error_by_seconds: tuple[Curve, ...] | Missing
+    instruments: tuple[Instrument, ...] | Missing
+    calibrations: tuple[Artefact, ...] | Missing
+    effects: tuple[EffectRun, ...] | Missing
+    world: dict[str, str] | Missing
+    twin: tuple[TwinDeviation, ...] | Missing
+    versions: dict[str, str]
+    git: str
+    symmetry: str = "not looked for"
+    accuracy: dict[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()

@@ -1,0 +1,155 @@
+"""The report's one page: everything inlined, PNGs of the same beside it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from harness.arrays import FloatArray
+from harness.report import wording
+from harness.report.charts import error_chart
+from harness.report.data import Answer, Contact, Curve, Missing, Posterior, ReportData
+from harness.report.figures import Album, Picture
+from harness.report.pictures import (
+    Sides,
+    bench_figure,
+    contacts_figure,
+    object_sides,
+    posterior_figure,
+    posterior_strip,
+)
+from harness.report.tiles import DIFFERENCE_GAIN, difference, height_picture, png, root_mean_square
+
+PAGE = "report.html"
+"""Name of the page in a report's folder."""
+
+_SIDE_PIXELS = 460
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A small picture under its title, or the reason why there is none."""
+
+    title: str
+    picture: Picture | Missing
+
+
+def write_report(data: ReportData, folder: Path) -> Path:
+    """Write the page and its pictures.
+
+    Args:
+        data: everything shown; what is ``Missing`` is said to be, with its reason.
+        folder: made if it does not exist; files of the same names are replaced.
+
+    Returns:
+        Path of the page, which refers to nothing outside itself.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    environment = Environment(
+        loader=PackageLoader("harness.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    style = environment.get_template("report.css").render()
+    page = environment.get_template(PAGE).render(style=style, **_content(data, Album(folder)))
+    (folder / PAGE).write_text(page, encoding="utf-8")
+    return folder / PAGE
+
+
+def _content(data: ReportData, album: Album) -> dict[str, Any]:
+    sides = object_sides(data.mesh, _towards(data), _SIDE_PIXELS)
+    located = [contact for contact in data.contacts if isinstance(contact.posterior, Posterior)]
+    return {
+        "data": data,
+        "say": wording,
+        "is_missing": lambda value: isinstance(value, Missing),
+        "headline": wording.headline(data),
+        "cards": wording.cards(data.answer) if isinstance(data.answer, Answer) else [],
+        "bench": data.bench
+        if isinstance(data.bench, Missing)
+        else album.photograph("bench", bench_figure(data.bench)),
+        "contacts_picture": _contacts_picture(data, sides, album),
+        "tiles": {contact.number: _tiles(contact, album) for contact in data.contacts},
+        "fits": {contact.number: _fit(contact) for contact in data.contacts},
+        "gain": f"{DIFFERENCE_GAIN:g}",
+        "strip": album.photograph("posterior_by_contact", posterior_strip(sides, data.contacts))
+        if located
+        else Missing("no contact has a posterior"),
+        "last": album.photograph("posterior", posterior_figure(sides, located[-1]))
+        if located
+        else Missing("no contact has a posterior"),
+        "last_contact": located[-1] if located else None,
+        "by_contact": _chart(data.error_by_contact, "error_by_contact", "contacts used", False, album),
+        "by_seconds": _chart(data.error_by_seconds, "error_by_seconds", "seconds a contact", True, album),
+    }
+
+
+def _towards(data: ReportData) -> FloatArray:
+    """The point of the object to look at: the answer, else its front."""
+    if isinstance(data.answer, Answer):
+        return data.answer.position
+    return np.asarray(data.mesh.bounds.mean(axis=0))
+
+
+def _contacts_picture(data: ReportData, sides: Sides, album: Album) -> Picture | Missing:
+    if all(isinstance(contact.object_from_gel, Missing) for contact in data.contacts):
+        return Missing("no contact was located")
+    return album.photograph("contacts", contacts_figure(sides, data.contacts))
+
+
+def _tiles(contact: Contact, album: Album) -> list[Tile]:
+    """Live, simulated and difference; then the two height maps on one scale."""
+    prefix = f"contact_{contact.number}"
+    live, simulated = contact.live, contact.simulated
+    heights = [contact.live_height, contact.simulated_height]
+    highest = max([float(h.max()) for h in heights if not isinstance(h, Missing)], default=0.0)
+    apart: Picture | Missing
+    if isinstance(live, Missing) or isinstance(simulated, Missing):
+        apart = live if isinstance(live, Missing) else Missing("there is no simulated image")
+    else:
+        apart = album.pixels(f"{prefix}_difference", png(difference(live, simulated)))
+    tiles = [
+        Tile("live", live if isinstance(live, Missing) else album.pixels(f"{prefix}_live", png(live))),
+        Tile(
+            "simulated",
+            simulated
+            if isinstance(simulated, Missing)
+            else album.pixels(f"{prefix}_simulated", png(simulated)),
+        ),
+        Tile("difference", apart),
+    ]
+    for name, height in zip(("live", "simulated"), heights, strict=True):
+        title = f"height, {name}: 0 to {highest * 1e3:.2f} mm"
+        if isinstance(height, Missing):
+            tiles.append(Tile(f"height, {name}", height))
+        else:
+            picture = png(height_picture(height, highest))
+            tiles.append(Tile(title, album.pixels(f"{prefix}_height_{name}", picture)))
+    return tiles
+
+
+def _fit(contact: Contact) -> str:
+    """How far live and simulated readings lie apart, in words."""
+    said = []
+    if not isinstance(contact.live, Missing) and not isinstance(contact.simulated, Missing):
+        said.append(
+            f"images differ by {root_mean_square(contact.live, contact.simulated):.1f} grey levels rms"
+        )
+    if not isinstance(contact.live_height, Missing) and not isinstance(contact.simulated_height, Missing):
+        apart = float(np.sqrt(np.mean((contact.live_height - contact.simulated_height) ** 2)))
+        said.append(f"height maps by {apart * 1e3:.3f} mm rms")
+    return ", ".join(said)
+
+
+def _chart(
+    curves: tuple[Curve, ...] | Missing, name: str, x_label: str, logarithmic_x: bool, album: Album
+) -> Picture | Missing:
+    if isinstance(curves, Missing):
+        return curves
+    if not any(curve.x for curve in curves):
+        return Missing("no errors were given")
+    return album.drawing(name, error_chart(curves, x_label, logarithmic_x))

@@ -1,0 +1,216 @@
+"""A run that never was: the built-in mug, six contacts, images drawn from its height maps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.arrays import ByteArray, FloatArray
+from harness.geometry import frame_facing, inverse, transform, translation
+from harness.kinematics import inverse as joints_for
+from harness.mesh import Mesh
+from harness.objects.household import build
+from harness.report.data import (
+    Answer,
+    Artefact,
+    Bench,
+    Contact,
+    Curve,
+    EffectRun,
+    Instrument,
+    Missing,
+    Posterior,
+    ReportData,
+    TwinDeviation,
+)
+from harness.report.props import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.sensor import GELSIGHT_R15
+from harness.sim.height_map import RasterMesh, height_maps, penetration
+
+BASE_FROM_OBJECT = translation(np.array([-0.5, 0.0, 0.25]))
+GEL_FROM_FLANGE = translation(np.array([0.0, 0.0, -0.12]))
+DEPTH = 1.2e-3
+FLAGS = {3: ("slipped: down-weighted",), 5: ("repeated contact 4",)}
+
+
+def contact_points(mesh: Mesh) -> list[int]:
+    """Faces of the outer wall and of the handle within reach from the arm's side."""
+    centres = mesh.corners.mean(axis=1)
+    wanted = np.array([[0.04 * np.cos(a), 0.04 * np.sin(a), z] for a, z in zip(ANGLES, HEIGHTS, strict=True)])
+    wanted[-1] = [0.073, 0.0, 0.055]
+    return [int(np.argmin(np.linalg.norm(centres - place, axis=1))) for place in wanted]
+
+
+ANGLES = np.radians([-50.0, -35.0, -28.0, 30.0, 30.0, 0.0])
+HEIGHTS = np.array([0.03, 0.05, 0.07, 0.08, 0.06, 0.055])
+
+
+def looks(height: FloatArray, tint: float) -> ByteArray:
+    """A gel lit from three sides in three colours."""
+    down, across = np.gradient(height / GELSIGHT_R15.pitch)
+    lights = [(0.9, 0.2), (-0.6, 0.8), (-0.4, -0.9)]
+    channels = [118.0 + tint + 210.0 * (a * across + b * down) for a, b in lights]
+    image: ByteArray = np.clip(np.stack(channels, axis=-1), 0, 255).astype(np.uint8)
+    return image
+
+
+def posterior(mesh: Mesh, truth: FloatArray, number: int) -> Posterior:
+    rng = np.random.default_rng(number)
+    points = mesh.vertices[rng.integers(len(mesh.vertices), size=6000)]
+    points = points + rng.normal(0.0, 2e-4, points.shape)
+    width = 0.03 / number**1.4 + 1.2e-3
+    weights = np.exp(-0.5 * (np.linalg.norm(points - truth, axis=1) / width) ** 2)
+    mirrored = truth * np.array([-1.0, 1.0, 1.0])
+    weights += 0.3 / number * np.exp(-0.5 * (np.linalg.norm(points - mirrored, axis=1) / width) ** 2)
+    best = points[int(np.argmax(weights))]
+    share = 1.0 / (1.0 + 0.3 / number)
+    return Posterior(
+        points, weights, best, np.array([best, mirrored]), np.array([share, 1.0 - share]), 2.1 * width
+    )
+
+
+def contact(mesh: Mesh, raster: RasterMesh, face: int, number: int) -> Contact:
+    truth = mesh.corners[face].mean(axis=0)
+    object_from_gel = transform(frame_facing(-mesh.face_normals[face], 0.4 * number), truth)
+    pressed = object_from_gel @ translation(np.array([0.0, 0.0, DEPTH]))
+    height = penetration(height_maps(raster, inverse(pressed)[None], GELSIGHT_R15), GELSIGHT_R15)[0]
+    noise = np.random.default_rng(number).normal(0.0, 2e-5, height.shape)
+    found = posterior(mesh, truth, number)
+    return Contact(
+        number=number,
+        step=f"touch-{number:02d}",
+        live=looks(height + noise, 3.0),
+        simulated=looks(height, 0.0),
+        live_height=height + np.abs(noise),
+        simulated_height=height,
+        object_from_gel=object_from_gel,
+        posterior=found,
+        truth=truth,
+        error=float(np.linalg.norm(found.estimate - truth)),
+        flags=FLAGS.get(number, ()),
+        notes=(("press depth", "1.20 mm"), ("force", "6.4 N")),
+    )
+
+
+def gel_pose(shown: Contact) -> FloatArray:
+    assert not isinstance(shown.object_from_gel, Missing)
+    return shown.object_from_gel
+
+
+@pytest.fixture(scope="session")
+def report_data() -> ReportData:
+    return sample()
+
+
+def sample() -> ReportData:
+    mesh = build("mug")
+    raster = RasterMesh(mesh)
+    contacts = tuple(contact(mesh, raster, f, n) for n, f in enumerate(contact_points(mesh), 1))
+    gels = np.array([BASE_FROM_OBJECT @ gel_pose(c) for c in contacts])
+    joints = joints_for("ur5e", gels[-1] @ GEL_FROM_FLANGE)[4]
+    bench = Bench(
+        (
+            object_part(mesh, BASE_FROM_OBJECT),
+            *table_and_pedestal(BASE_FROM_OBJECT, 0.25),
+            *sensor_parts(GELSIGHT_R15, gels[-1], GEL_FROM_FLANGE),
+            *arm_parts("ur5e", joints),
+        ),
+        gels,
+        np.array([-0.3, 0.0, 0.28]),
+        1.3,
+    )
+    last = contacts[-1].posterior
+    assert isinstance(last, Posterior)
+    numbers = tuple(float(c.number) for c in contacts)
+    return ReportData(
+        title="Contact localization on the mug",
+        object_name="mug",
+        material="ceramic",
+        mesh=mesh,
+        mock=True,
+        made="2026-03-02 14:05",
+        command="touchstone run contact-localization --station mock --scene scenes/mug_touch.toml",
+        recording="runs/20260302-140512-mug",
+        answer=Answer(
+            last.estimate,
+            0.231,
+            last.credible90,
+            contacts[-1].error,
+            contacts[-1].error,
+            2.4e-3,
+            0.082,
+            0.0252,
+            2,
+        ),
+        contacts=contacts,
+        bench=bench,
+        error_by_contact=(
+            Curve("touch", numbers, tuple(c.error or 0.0 for c in contacts)),
+            Curve("geometry + tool axis", numbers, (0.071, 0.052, 0.041, 0.033, 0.028, 0.021)),
+            Curve("geometry only", numbers, (0.082, 0.061, 0.05, 0.041, 0.033, 0.025)),
+            Curve("random point", numbers, (0.082,) * 6),
+        ),
+        error_by_seconds=(
+            Curve(
+                "ours",
+                (0.004, 0.012, 0.041, 0.19),
+                (0.011, 0.0042, 0.0019, 0.0015),
+                ("4", "3", "2", "1.5 mm"),
+            ),
+            Curve("particle filter", (0.03, 0.09, 0.29, 0.84), (0.019, 0.0045, 0.0025, 0.0017)),
+        ),
+        instruments=(
+            Instrument("arm", "127.0.0.1:30004", 124.98, 125.0, 4812, 0, 0.0021, 0.0068),
+            Instrument(
+                "gelsight", "http://127.0.0.1:8090/stream", 29.7, 30.0, 1120, 3, 0.019, 0.041, "reopened once"
+            ),
+            Instrument("camera", "http://127.0.0.1:8091/stream", None, 10.0, 0, None, None, None, "not used"),
+        ),
+        calibrations=(
+            Artefact("taxim-r15", "mock-0001", "2026-02-20", 10.0, "1.9 grey levels rms", "3f" * 32),
+        ),
+        effects=(
+            EffectRun("gel.height_map", True, "the estimator needs it", 18220, 3.9),
+            EffectRun("gel.deformation", True, "a gel is touched", 18220, 1.2),
+            EffectRun("gel.shadow", False, "the sensor casts none (GelSight R1.5 has no grazing light)"),
+            EffectRun("room.reverberation", False, "nothing listens: the scene has no microphone"),
+        ),
+        world={"object yaw": "1.3 deg", "gel centre offset": "(0.4, -0.2) mm", "height gain": "1.04"},
+        twin=tuple(TwinDeviation(c.step, 2.1e-4, 4.4e-4, 8e-4, 6.1e-4) for c in contacts),
+        versions={"touchstone": "0.1.0", "numpy": "2.3.1", "ur_rtde": "1.6.1"},
+        git="054b11f+",
+        symmetry="no rotation",
+        accuracy={"samples": "2 mm", "kernel": "0.064 mm"},
+        warnings=("The calibration was fitted at 22 degrees; the gel was at 27.",),
+    )
+
+
+def without_everything(data: ReportData) -> ReportData:
+    gone = Missing("this recording is older than that")
+    bare = tuple(
+        replace(
+            c,
+            live=gone,
+            simulated=gone,
+            live_height=gone,
+            simulated_height=gone,
+            object_from_gel=gone,
+            posterior=gone,
+            truth=None,
+            error=None,
+        )
+        for c in data.contacts
+    )
+    return replace(
+        data,
+        answer=gone,
+        contacts=bare,
+        bench=gone,
+        error_by_contact=gone,
+        error_by_seconds=gone,
+        instruments=gone,
+        calibrations=gone,
+        effects=gone,
+        world=gone,
+        twin=gone,
+    )
