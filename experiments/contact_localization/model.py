@@ -1,7 +1,7 @@
 """What an estimator is given beside the readings: the object, the sensor and what is believed of the pose."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from harness.geometry import rotation_about
 from harness.mesh import Mesh
 from harness.sensor import TactileSensor
 from harness.sim.height_map import RasterMesh
+from harness.sim.tactile_calibration import TactileCalibration
 
 _VERTICAL = np.array([0.0, 0.0, 1.0])
 
@@ -54,7 +55,7 @@ class Model:
 
     mesh: Mesh
     sensor: TactileSensor
-    calibration: Any
+    calibration: TactileCalibration
     raster: RasterMesh = field(init=False, repr=False)
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
 

@@ -22,6 +22,11 @@ SHORTEST_STEP = 3.0e-3
 MOST_TILT = np.radians(15.0)
 PRESS = (0.5e-3, 2.0e-3)
 MOST_PENETRATION = 2.5e-3
+TOUCH_VOLUME = 8.0e-9
+"""Cubic metres of gel displaced when the arm notices a touch: 0.4 N on a bed of 50 N/cm^3."""
+
+_LEAST_PRESS = 0.1e-3
+_PITCH = 0.5e-3
 _LOWEST_TOOL = 0.25
 _PATIENCE = 6000
 
@@ -33,13 +38,15 @@ class Site:
     Attributes:
         base_from_gel: ``(4, 4)``: the gel when it is fully pressed, were the object where the
             plan believes it to be.
-        press: metres to travel from the first touch to there.
+        press: metres to travel on to there from where the arm notices the touch.
+        penetration: metres that the object then reaches into the gel at most.
         point_in_object: ``(3,)`` metres: the planned contact.
         tilt: rad between the tool and the surface's normal.
     """
 
     base_from_gel: FloatArray
     press: float
+    penetration: float
     point_in_object: FloatArray
     tilt: float
 
@@ -137,12 +144,12 @@ def try_site(
     axis = rotation_about(aside[:, 0], tilt) @ -normal_in_object
     object_from_gel = frame_facing(axis / np.linalg.norm(axis), rng.uniform(0.0, 2.0 * np.pi))
     indentation = rng.uniform(*PRESS)
-    heights = -window_depth(raster, object_from_gel, point_in_object, sensor.housing, 0.5e-3)
+    heights = -window_depth(raster, object_from_gel, point_in_object, sensor.housing, _PITCH)
     rows, columns = heights.shape
     centre = heights[rows // 2, columns // 2]
     if not abs(centre) < 0.3e-3 or heights.max() + indentation > MOST_PENETRATION:
         return None
-    window_columns, window_rows = (round(side / 0.5e-3 / 2.0) for side in sensor.window)
+    window_columns, window_rows = (round(0.5 * side / _PITCH) for side in sensor.window)
     under_gel = heights[
         rows // 2 - window_rows : rows // 2 + window_rows + 1,
         columns // 2 - window_columns : columns // 2 + window_columns + 1,
@@ -153,7 +160,19 @@ def try_site(
     )
     return Site(
         read_only(base_from_gel),
+        max(_LEAST_PRESS, indentation - _noticed_at(under_gel)),
         float(under_gel.max() + indentation),
         read_only(np.array(point_in_object)),
         tilt,
     )
+
+
+def _noticed_at(heights: FloatArray) -> float:
+    """Metres of indentation at the centre when the displaced volume is enough to be felt."""
+    levels = -np.sort(-heights[np.isfinite(heights)].ravel())
+    wanted = TOUCH_VOLUME / _PITCH**2
+    # Pressed to the k-th highest place, the gel is displaced by all higher ones down to it.
+    displaced = np.cumsum(levels) - levels * np.arange(1, len(levels) + 1)
+    k = int(np.searchsorted(displaced, wanted))
+    higher = float(levels[:k].sum())
+    return (wanted - higher) / k
