@@ -1,0 +1,247 @@
+"""Fill the report of a run from its folder, its answer and, for a mocked run, its truth."""
+
+import datetime as dt
+import sys
+from collections.abc import Mapping
+
+import numpy as np
+
+from experiments.contact_localization.answer import Answer as Found
+from experiments.contact_localization.levels import Levels
+from experiments.contact_localization.result import Scored, flags_of, result_of
+from experiments.contact_localization.trade import Point
+from experiments.contact_localization.twin_check import deviations
+from harness.device import Health
+from harness.geometry import inverse
+from harness.report.data import (
+    Answer,
+    Artefact,
+    Bench,
+    Contact,
+    Curve,
+    EffectRun,
+    Instrument,
+    Missing,
+    Posterior,
+    ReportData,
+)
+from harness.report.props import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.run_folder import RunFiles
+
+NO_TRUTH = Missing("the truth is not known: this is not a mocked run, or its truth was taken away")
+
+
+def report_of(
+    scored: Scored,
+    geometry_errors: tuple[float, ...] | None,
+    trade: tuple[Point, ...],
+    health: Mapping[str, Health] | None,
+) -> ReportData:
+    """Everything the page shows.
+
+    Args:
+        scored: the run, its answer, what it was compared with.
+        geometry_errors: m after each contact, of the answer without images; None where unknown.
+        trade: errors and seconds at several levels of accuracy.
+        health: of the instruments at the end of the session; None for a replay.
+    """
+    run, found = scored.run, scored.found
+    header = run.recording.header
+    return ReportData(
+        title=f"Contact localization: {run.scene.title or run.scene.object.name}",
+        object_name=run.scene.object.name,
+        material=run.scene.object.material,
+        mesh=run.mesh,
+        mock=header.mock is not None,
+        made=header.created,
+        command=" ".join(["touchstone", *sys.argv[1:]]),
+        recording=str(run.recording.folder),
+        answer=_answer(scored),
+        contacts=tuple(_contact(scored, k) for k in range(len(found.observations))),
+        bench=_bench(run, found),
+        error_by_contact=_by_contact(scored, geometry_errors),
+        error_by_seconds=_by_seconds(trade),
+        instruments=_instruments(run, health),
+        calibrations=(_artefact(run),),
+        effects=_effects(scored),
+        world=_world(scored),
+        twin=deviations(run, found),
+        versions={name: text for name, text in header.versions.items() if name != "git"},
+        git=header.versions["git"],
+        symmetry=scored.symmetry.name,
+        accuracy={name: str(level) for name, level in scored.accuracy.items()},
+        warnings=scored.warnings,
+    )
+
+
+def _answer(scored: Scored) -> Answer:
+    result = result_of(scored, None)
+    touch = result["estimates"]["touch"]
+    return Answer(
+        position=scored.found.last.position_in_object,
+        seconds=touch["seconds"],
+        credible90=touch["credible90_m"],
+        error=touch["error_m"],
+        error_symmetric=touch["error_symmetric_m"],
+        error_mean=touch["error_mean_m"],
+        random_baseline=result["random_baseline_m"],
+        geometry_baseline=result["geometry_baseline_m"],
+        modes=len(touch["modes"]),
+    )
+
+
+def _contact(scored: Scored, index: int) -> Contact:
+    found, comparison, true = scored.found, scored.comparison, scored.true_points
+    after, gate = found.estimates[index], found.last.gates[index]
+    fit = "no contact in the image" if gate.fit is None else f"{gate.fit:.1f} nats"
+    return Contact(
+        number=index + 1,
+        step=f"step {index + 1}",
+        live=comparison.live[index],
+        simulated=comparison.simulated[index],
+        live_height=comparison.live_height[index],
+        simulated_height=comparison.simulated_height[index],
+        object_from_gel=comparison.object_from_gel[index],
+        posterior=Posterior(
+            after.points,
+            after.weights,
+            after.position_in_object,
+            np.array([mode.position for mode in after.modes]).reshape(-1, 3),
+            np.array([mode.weight for mode in after.modes]),
+            after.credible90,
+        ),
+        truth=None if true is None else true[index],
+        error=None if true is None else float(np.linalg.norm(after.position_in_object - true[index])),
+        flags=tuple(flags_of(gate)),
+        notes=(("fit", fit),),
+    )
+
+
+def _bench(run: RunFiles, found: Found) -> Bench:
+    station, scene = run.station, run.scene
+    base_from_object = scene.base_from_object(run.mesh)
+    base_from_gels = np.array([observation.base_from_gel for observation in found.observations])
+    joints = run.recording.step(len(found.observations) - 1).readings["arm.joints"].values[-1]
+    corners = run.mesh.bounds
+    in_base = base_from_object[:3, :3] @ corners.T + base_from_object[:3, 3:]
+    parts = (
+        object_part(run.mesh, base_from_object),
+        *table_and_pedestal(
+            base_from_object, float(in_base[2].min()), 0.5 * scene.support.width, scene.table.height
+        ),
+        *sensor_parts(station.gel.sensor, base_from_gels[-1], inverse(station.flange_from_gel)),
+        *arm_parts(station.arm.model, joints),
+    )
+    return Bench(parts, base_from_gels, in_base.mean(axis=1))
+
+
+def _by_contact(scored: Scored, geometry: tuple[float, ...] | None) -> tuple[Curve, ...] | Missing:
+    true = scored.true_points
+    if true is None:
+        return NO_TRUTH
+    counts = tuple(float(k + 1) for k in range(len(true)))
+    ours = tuple(
+        float(np.linalg.norm(estimate.position_in_object - point))
+        for estimate, point in zip(scored.found.estimates, true, strict=True)
+    )
+    curves = [Curve("touch", counts, ours)]
+    if geometry is not None:
+        curves.append(Curve("places and tool axes alone", counts, geometry))
+    return tuple(curves)
+
+
+def _by_seconds(trade: tuple[Point, ...]) -> tuple[Curve, ...] | Missing:
+    if not trade:
+        return NO_TRUTH
+    methods: dict[str, list[Point]] = {}
+    for point in trade:
+        methods.setdefault(_method(point.levels), []).append(point)
+    return tuple(
+        Curve(
+            name,
+            tuple(point.seconds_a_contact for point in points),
+            tuple(point.error for point in points),
+            tuple(point.name for point in points),
+        )
+        for name, points in methods.items()
+    )
+
+
+def _method(levels: Levels) -> str:
+    return "grid" if levels.method == "grid" else "the paper's particle filter"
+
+
+def _instruments(run: RunFiles, health: Mapping[str, Health] | None) -> tuple[Instrument, ...] | Missing:
+    if health is None:
+        return Missing("estimated again from the recording: no instrument was open")
+    nominal = {"arm": run.station.arm.rate, "gel": run.station.gel.rate}
+    steps = run.recording.steps()
+    return tuple(
+        Instrument(
+            name=name,
+            address=said.identity,
+            rate=said.rate,
+            nominal_rate=nominal.get(name),
+            readings=sum(
+                len(reading.times)
+                for step in steps
+                for reading in step.readings.values()
+                if reading.channel.name.startswith(f"{name}.")
+            ),
+            drops=said.drops,
+            latency_median=said.latency,
+            latency_99=None,
+            remark=said.detail,
+        )
+        for name, said in health.items()
+    )
+
+
+def _artefact(run: RunFiles) -> Artefact:
+    header = run.calibration.header
+    made = dt.datetime.fromisoformat(header.date)
+    made = made if made.tzinfo is not None else made.replace(tzinfo=dt.UTC)
+    age = dt.datetime.fromisoformat(run.recording.header.created) - made
+    return Artefact(
+        name=f"tactile optics of {header.sensor}",
+        serial=header.serial,
+        made=header.date,
+        age_days=age.total_seconds() / 86400.0,
+        residual=f"{header.held_out_db:.1f} dB on presses held out, {header.residual_rms:.1f} counts rms",
+        sha256=run.calibration.sha256,
+    )
+
+
+def _effects(scored: Scored) -> tuple[EffectRun, ...]:
+    plan, evaluation = scored.comparison.plan, scored.comparison.evaluation
+    ran = [
+        EffectRun(
+            step.effect.provides,
+            True,
+            step.reason,
+            evaluation.calls.get(step.effect.provides, 0),
+            evaluation.seconds.get(step.effect.provides),
+        )
+        for step in plan.ran
+    ]
+    return (*ran, *(EffectRun(step.effect.provides, False, step.reason) for step in plan.skipped))
+
+
+def _world(scored: Scored) -> dict[str, str] | Missing:
+    if scored.truth is None:
+        return NO_TRUTH
+    ours = {
+        "mesh_vertices, the estimator's": str(len(scored.run.mesh.vertices)),
+        "mesh_faces, the estimator's": str(len(scored.run.mesh.faces)),
+        "optics_level, the comparison's": str(scored.accuracy.get("touch.optics", "")),
+        "calibration_sha256, the estimator's": scored.run.calibration.sha256,
+    }
+    return {name: _said(value) for name, value in (*scored.truth.differences.items(), *ours.items())}
+
+
+def _said(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return ", ".join(_said(item) for item in value)
+    return str(value)
