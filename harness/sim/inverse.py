@@ -16,26 +16,54 @@ from harness.sim.poisson import anchored_heights, free_heights
 from harness.sim.slope_kernels import normals_from_colour
 from harness.sim.tactile_calibration import TactileCalibration
 
-QUIET = 4.0
-"""Grey levels (length over the channels, mean of 5 x 5 pixels) below which the gel may be at rest."""
-
-STRONG = 12.0
-"""Grey levels that some part of an imprint must reach: three times the drift between real presses."""
-
-_MOSTLY = 0.5
-_WINDOW = 5
+_NARROW, _WIDE = 5, 25
 _RIDGE = 16.0
 _DISTRUST = 0.1
-_LEAST_REST = 60
+_MOSTLY = 0.5
+_LEAST_REST = 20
 """Pixels of a quiet region that can be told from a chance calm."""
 
 _FLOOR = 0.05
 """Pixels of height, one sigma, where the gel is at rest."""
 
-_CORRELATED = 1.0
+_CORRELATED = 2.0
+"""Slope errors of neighbours are alike: the calibration's, not the camera's. Chosen so that two
+thirds of the pixels of rendered presses lie within one sigma under another calibration."""
+
+_SUNKEN = 3.0
+"""Pixels of height: nothing of a pressed gel lies lower than its rest, but for the slopes' errors."""
 
 _SAME_LEVEL = 1.5
 """Pixels of height within which quiet regions are taken to lie at the same level, the rest."""
+
+
+@dataclass(frozen=True)
+class Detection:
+    """From how many grey levels on a change of colour is the gel's; lengths over the channels.
+
+    A face tilted by one degree changes the colour by about one grey level, and so does the
+    camera's noise: the mean over a window is what is compared.
+
+    Attributes:
+        quiet: mean of 5 x 5 pixels below which the gel may be at rest.
+        strong: mean of 5 x 5 pixels that shows a contact.
+        wide: mean of 25 x 25 pixels that shows one too, for flat faces hardly tilted.
+        drifting: whether the light may have changed since the calibration's background was
+            taken; the change that most of the picture shares is then taken out, and with it
+            the tilt of a face that fills most of it. Better: a fresh background.
+    """
+
+    quiet: float = 2.5
+    strong: float = 8.0
+    wide: float = 2.5
+    drifting: bool = False
+
+
+STEADY = Detection()
+"""For a background taken just before the contact, by the light of the contact."""
+
+DRIFTING = Detection(quiet=6.0, strong=20.0, wide=12.0, drifting=True)
+"""For a background of another day: the published presses differ from theirs by so much far from the ball."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +93,13 @@ class Inversion:
     seconds: float
 
 
-def invert(images: ByteArray, calibration: TactileCalibration) -> Inversion:
+def invert(images: ByteArray, calibration: TactileCalibration, detection: Detection = STEADY) -> Inversion:
     """Recover the surface of a flat gel from pictures of it.
 
     Args:
         images: ``(n, rows, columns, 3)`` RGB.
         calibration: with a smooth model.
+        detection: what counts as a change.
 
     Raises:
         DataRefused: images of another shape or type than the calibration's.
@@ -86,7 +115,7 @@ def invert(images: ByteArray, calibration: TactileCalibration) -> Inversion:
             "this calibration has no smooth model to invert; fit it again from its presses"
         )
     began = perf_counter()
-    answers = [_invert_one(image, calibration) for image in images]
+    answers = [_invert_one(image, calibration, detection) for image in images]
     height, contact, imprint, trusted, error, anchored = (
         np.array([answer[k] for answer in answers]).reshape(len(images), *([] if k == 5 else shape[:2]))
         for k in range(6)
@@ -105,12 +134,14 @@ def invert(images: ByteArray, calibration: TactileCalibration) -> Inversion:
 _Answer = tuple[FloatArray, BoolArray, BoolArray, BoolArray, FloatArray, bool]
 
 
-def _invert_one(image: ByteArray, calibration: TactileCalibration) -> _Answer:
+def _invert_one(image: ByteArray, calibration: TactileCalibration, detection: Detection) -> _Answer:
     header = calibration.header
-    change = _without_drift(image.astype(np.float64) - calibration.background)
-    strength = _strength(change)
-    quiet = strength < QUIET
-    if strength.max() < STRONG:
+    change = image.astype(np.float64) - calibration.background
+    if detection.drifting:
+        change = _without_drift(change, detection)
+    strength = _strength(change, _NARROW)
+    quiet = strength < detection.quiet
+    if strength.max() < detection.strong and _strength(change, _WIDE).max() < detection.wide:
         nothing = np.zeros(quiet.shape)
         nowhere = np.zeros(quiet.shape, np.bool_)
         return nothing, nowhere, nowhere, ~nowhere, nothing + _rest_error(header.pitch), True
@@ -132,18 +163,16 @@ def _invert_one(image: ByteArray, calibration: TactileCalibration) -> _Answer:
     return height, contact, ~rest, trusted, _error(spread, rest, header.pitch), bool(rest.any())
 
 
-def _without_drift(change: FloatArray) -> FloatArray:
-    # Lamps warm up: where most of the picture hardly changed, what it changed by is the light.
-    # Where less of it is still, a tilted face pressed into the gel would pass for light.
-    hardly = np.sqrt((change**2).sum(axis=2)) < STRONG
+def _without_drift(change: FloatArray, detection: Detection) -> FloatArray:
+    hardly = np.sqrt((change**2).sum(axis=2)) < detection.wide
     if hardly.mean() < _MOSTLY:
         return change
     still: FloatArray = change - np.median(change[hardly], axis=0)
     return still
 
 
-def _strength(change: FloatArray) -> FloatArray:
-    smooth = ndimage.uniform_filter(change, size=(_WINDOW, _WINDOW, 1), mode="nearest")
+def _strength(change: FloatArray, window: int) -> FloatArray:
+    smooth = ndimage.uniform_filter(change, size=(window, window, 1), mode="nearest")
     strength: FloatArray = np.sqrt((smooth**2).sum(axis=2))
     return strength
 
@@ -161,6 +190,8 @@ def _resting(heights: FloatArray, quiet: BoolArray) -> BoolArray:
     if not large.any():
         return np.zeros(quiet.shape, np.bool_)
     lowest = levels[large].min()
+    if lowest > np.percentile(heights, 2) + _SUNKEN:
+        return np.zeros(quiet.shape, np.bool_)
     at_rest = np.concatenate([[False], levels < lowest + _SAME_LEVEL])
     resting: BoolArray = at_rest[labels]
     return resting
@@ -173,6 +204,6 @@ def _rest_error(pitch: float) -> float:
 def _error(spread: FloatArray, rest: BoolArray, pitch: float) -> FloatArray:
     # Independent slope errors add up along the way from where the height is known.
     way = ndimage.distance_transform_edt(~rest) if rest.any() else np.full(rest.shape, float(max(rest.shape)))
-    variance = ndimage.uniform_filter(spread**2, size=2 * _WINDOW + 1, mode="nearest")
+    variance = ndimage.uniform_filter(spread**2, size=2 * _NARROW + 1, mode="nearest")
     error: FloatArray = pitch * np.hypot(_FLOOR, np.where(rest, 0.0, np.sqrt(variance * way) * _CORRELATED))
     return error
