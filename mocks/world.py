@@ -95,6 +95,8 @@ class World:
     """
 
     def __init__(self, bench: NominalBench, gap: Gap, seed: int) -> None:
+        if bench.sensor.markers is not None or bench.sensor.casts_shadow:
+            raise NotImplementedError("mocks.world: printed markers and shadows in the gel")
         self._bench = bench
         self._draw = GapDraw(gap, seed)
         self.sensor = bench.sensor
