@@ -1,0 +1,1 @@
+"""The commands of the ``touchstone`` program, one in each file."""

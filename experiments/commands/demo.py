@@ -1,0 +1,36 @@
+"""``touchstone demo``: the whole path once, on the mocked bench."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.commands import options
+from experiments.commands.output import CONSOLE
+from experiments.commands.run import Experiment, Spacing, run
+
+
+def demo(
+    object_: Annotated[
+        str, typer.Option("--object", help="A built-in object: mug, bowl, plate, pitcher, tray, wrench.")
+    ] = "mug",
+    seed: options.Seed = 1,
+    out: Annotated[Path | None, typer.Option(help="The run's folder.")] = None,
+    json: options.Json = False,
+) -> int:
+    """Localize a contact on the mocked bench from end to end, and write the report.
+
+    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object six times; the drivers are
+    those of a real bench. The estimate is made from the recording alone.
+    """
+    CONSOLE.print(
+        "mock bench: a UR5e's controller and a GelSight's stream on loopback, with a reality gap of their own"
+    )
+    return run(
+        Experiment.CONTACT_LOCALIZATION,
+        object_=f"builtin:{object_}",
+        spacing=Spacing.SPREAD,
+        seed=seed,
+        out=out,
+        json=json,
+    )

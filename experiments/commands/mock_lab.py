@@ -1,0 +1,53 @@
+"""``touchstone mock-lab``: the far ends of the cables, to try drivers on."""
+
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from experiments.commands import options
+from experiments.commands.output import ANSWERS, CONSOLE, emit
+
+
+def mock_lab(
+    station: options.Station = "mock",
+    scene: options.SceneOption = None,
+    object_: options.Object = None,
+    material: options.Material = None,
+    units: options.Units = None,
+    seed: options.Seed = None,
+    gap: options.GapOption = None,
+    json: options.Json = False,
+) -> int:
+    """Keep a mocked bench running, to try drivers on; Ctrl-C ends it.
+
+    Prints where the instruments are: a controller that UR's own clients connect to, and an MJPEG stream
+    that any browser shows.
+
+    Try: touchstone mock-lab --object builtin:mug
+    """
+    from experiments.commands.scenes import resolve
+    from harness.gap import gap_path
+    from harness.mock_lab import MockLab
+    from harness.sim.scene_object import known_object
+    from harness.station_file import load_station, station_path
+
+    default = "builtin:mug" if scene is None and object_ is None else object_
+    wanted = resolve(scene, default, material, units)
+    bench = load_station(station_path(station))
+    gap_file = gap_path(gap or (bench.mock.gap if bench.mock is not None else "default"))
+    with TemporaryDirectory(prefix="touchstone-truth-") as folder:
+        truth = Path(folder) / "truth.json"
+        lab = MockLab(wanted, bench, known_object(wanted).mesh, seed or 0, gap_file, truth)
+        try:
+            where = lab.start()
+            if json:
+                emit({"schema": 1, "arm": where.arm, "gel": where.gel, "camera": where.camera})
+            else:
+                ANSWERS.print(f"arm: {where.arm} (ports 29999, 30003, 30004)\ngel: {where.gel}", markup=False)
+            CONSOLE.print("Ctrl-C ends it")
+            while True:
+                time.sleep(3600)
+        except KeyboardInterrupt:
+            return 0
+        finally:
+            lab.close()

@@ -1,0 +1,49 @@
+"""Options that several commands take, each described once."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Station = Annotated[
+    str, typer.Option("--station", help="A bench: a name under stations/, or a station file.", metavar="NAME")
+]
+SceneOption = Annotated[
+    Path | None, typer.Option("--scene", help="A scene file; examples are under scenes/.", metavar="FILE")
+]
+Object = Annotated[
+    str | None,
+    typer.Option(
+        "--object", help="A mesh file, or builtin:mug and so on: a scene without a file.", metavar="FILE"
+    ),
+]
+Material = Annotated[
+    str | None, typer.Option("--material", help="What the object is made of (with --object).", metavar="M")
+]
+Units = Annotated[
+    str | None,
+    typer.Option("--units", help="Of the mesh file's numbers: m, cm, mm or in (with --object).", metavar="U"),
+]
+Wall = Annotated[
+    str | None,
+    typer.Option("--wall", help="Wall of a hollow thing scanned as a solid, as 2mm.", metavar="LENGTH"),
+]
+Seed = Annotated[
+    int | None,
+    typer.Option("--seed", help="Of everything random; the scene's own where none is given.", min=0),
+]
+GapOption = Annotated[
+    str | None,
+    typer.Option(
+        "--gap", help="Reality gap of a mocked bench: default, none, or a gap file.", metavar="NAME"
+    ),
+]
+LevelOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--level", help="Turn one dial, as localization.rounds=1; may be given again.", metavar="D=L"
+    ),
+]
+Json = Annotated[
+    bool, typer.Option("--json", help="One JSON object on standard output; the rest on standard error.")
+]

@@ -1,0 +1,55 @@
+"""What commands say: prose and progress on standard error, one JSON object on standard output."""
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from harness.step_file import Step
+
+CONSOLE = Console(stderr=True, highlight=False, soft_wrap=True)
+ANSWERS = Console(highlight=False, soft_wrap=True)
+
+
+def emit(result: Mapping[str, Any]) -> None:
+    """Print the one JSON object of a command."""
+    sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
+
+
+def warn(sentence: str) -> None:
+    """Something the operator should know."""
+    CONSOLE.print(f"[yellow]note:[/] {sentence}")
+
+
+class StepProgress:
+    """A bar over the steps of a run."""
+
+    def __init__(self, bar: Progress, done: int, total: int) -> None:
+        self._bar = bar
+        self._task = bar.add_task("contacts", completed=done, total=total)
+
+    def began(self, step: Step) -> None:
+        """Say which step is performed."""
+        self._bar.update(self._task, description=f"contact {step.index + 1}: {step.kind}")
+
+    def ended(self, step: Step, seconds: float) -> None:
+        """Count it, and say how long it took."""
+        self._bar.console.print(f"  contact {step.index + 1} recorded in {seconds:.1f} s")
+        self._bar.advance(self._task)
+
+
+@contextmanager
+def step_progress(done: int, total: int) -> Iterator[StepProgress]:
+    """A progress bar for the length of a session."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=CONSOLE, transient=True) as bar:
+        yield StepProgress(bar, done, total)
+
+
+def millimetres(metres: float | None) -> str:
+    """For people; "unknown" where there is nothing to say."""
+    return "unknown" if metres is None else f"{metres * 1e3:.1f} mm"

@@ -1,0 +1,173 @@
+"""``touchstone run``: an experiment on a bench, from the plan to the report."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from experiments.commands import options
+from experiments.commands.output import ANSWERS, CONSOLE, emit, millimetres, step_progress, warn
+from harness.errors import WrongUse
+
+
+class Experiment(StrEnum):
+    """What can be run."""
+
+    CONTACT_LOCALIZATION = "contact-localization"
+
+
+class Spacing(StrEnum):
+    """How far apart contacts are."""
+
+    CLOSE = "close"
+    SPREAD = "spread"
+
+
+class Yaw(StrEnum):
+    """Whether the estimator is told the object's yaw."""
+
+    KNOWN = "known"
+    UNKNOWN = "unknown"
+
+
+def run(
+    experiment: Annotated[Experiment, typer.Argument(help="What to run.")] = Experiment.CONTACT_LOCALIZATION,
+    station: options.Station = "mock",
+    scene: options.SceneOption = None,
+    object_: options.Object = None,
+    material: options.Material = None,
+    units: options.Units = None,
+    wall: options.Wall = None,
+    seed: options.Seed = None,
+    gap: options.GapOption = None,
+    contacts: Annotated[int | None, typer.Option(help="How many contacts.", min=1, max=100)] = None,
+    spacing: Annotated[
+        Spacing | None, typer.Option(help="close: within 25 mm of the last; spread: over the object.")
+    ] = None,
+    yaw: Annotated[Yaw | None, typer.Option(help="Whether the estimator is told the object's yaw.")] = None,
+    level: options.LevelOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The run's folder; a dated one under runs/ if left out.")
+    ] = None,
+    resume: Annotated[
+        Path | None, typer.Option(help="Go on with this run folder at its first missing contact.")
+    ] = None,
+    json: options.Json = False,
+) -> int:
+    """Run an experiment on a bench; with --resume, go on where one stopped.
+
+    The motion is rehearsed in the twin before anything moves. Each contact is on the disk before the
+    next begins. Ctrl-C once ends after the contact; twice stops the arm.
+
+    Try: touchstone run contact-localization --station mock --scene scenes/mug_touch.toml
+    """
+    from experiments.commands.scenes import resolve
+    from experiments.contact_localization import session_of
+    from experiments.contact_localization.dials import chosen
+    from harness.recording import Recording
+    from harness.station_file import load_station, station_path
+
+    assert experiment is Experiment.CONTACT_LOCALIZATION
+    accuracy = chosen(level or [])
+    if resume is not None:
+        _refuse_with_resume(
+            scene=scene,
+            object=object_,
+            seed=seed,
+            gap=gap,
+            out=out,
+            contacts=contacts,
+            spacing=spacing,
+            yaw=yaw,
+        )
+        recording = Recording(resume)
+    else:
+        wanted = resolve(scene, object_, material, units, wall, contacts, spacing, yaw)
+        bench = load_station(station_path(station))
+        begun = session_of.start(wanted, bench, wanted.localization.seed if seed is None else seed, gap, out)
+        recording = begun.recording
+        _describe(begun)
+    complete, health = _perform(recording)
+    if not complete:
+        CONSOLE.print(
+            f"stopped after contact {recording.committed}; go on with "
+            f"`touchstone run {experiment} --resume {recording.folder}`"
+        )
+        return 130
+    with CONSOLE.status("estimating, comparing, drawing the report"):
+        result = session_of.finish(recording, accuracy, health)
+    show(result, json)
+    return 0
+
+
+def show(result: dict[str, Any], as_json: bool) -> None:
+    """The answer in a line, what to mind, where the report is."""
+    for warning in result["warnings"]:
+        warn(warning)
+    if as_json:
+        emit(result)
+        return
+    ANSWERS.print(answer_line(result), markup=False)
+    ANSWERS.print(f"report: {result['report']}", markup=False)
+
+
+def answer_line(result: dict[str, Any]) -> str:
+    """The answer, its error where the truth is known, how sure it is, what it took, the baselines."""
+    touch = result["estimates"]["touch"]
+    x, y, z = (1e3 * value for value in touch["position_m"])
+    said = [
+        f"touch: contact {result['contacts']} at ({x:.1f}, {y:.1f}, {z:.1f}) mm on the {result['object']}"
+    ]
+    if touch["error_m"] is not None:
+        symmetric = touch["error_symmetric_m"]
+        modulo = f" ({millimetres(symmetric)} modulo symmetry)" if symmetric < 0.9 * touch["error_m"] else ""
+        said.append(f"error {millimetres(touch['error_m'])}{modulo}")
+    if len(touch["modes"]) > 1:
+        said.append(f"{len(touch['modes'])} likely places")
+    said.append(f"90 % within {millimetres(touch['credible90_m'])}")
+    said.append(f"{touch['seconds']:.2f} s")
+    if result["geometry_baseline_m"] is not None:
+        said.append(
+            f"baselines: geometry alone {millimetres(result['geometry_baseline_m'])}, "
+            f"random {millimetres(result['random_baseline_m'])}"
+        )
+    mock = "mock bench, " if result["mock"] else ""
+    return mock + "; ".join(said)
+
+
+def _perform(recording: Any) -> tuple[bool, Any]:
+    from experiments.contact_localization import session_of
+
+    total = len(recording.header.plan["contacts"])
+    CONSOLE.print(f"recording to {recording.folder}")
+    with step_progress(recording.committed, total) as progress:
+        return session_of.perform_on_bench(recording, progress)
+
+
+def _describe(begun: Any) -> None:
+    """What is about to happen, before anything moves."""
+    from harness.explain import as_table, scene_plan
+    from harness.run_folder import RunFiles
+
+    run = RunFiles(begun.recording)
+    wanted = run.scene.localization
+    CONSOLE.print(
+        f"{run.scene.object.name}: {len(run.mesh.faces)} faces, "
+        f"longest side {1e3 * (run.mesh.bounds[1] - run.mesh.bounds[0]).max():.0f} mm; "
+        f"{wanted.contacts} contacts, {wanted.spacing}; station {run.station.title}"
+    )
+    CONSOLE.print(
+        f"rehearsed in the twin: {begun.plan.rehearsal.segments} motions, none refused; "
+        f"{len(begun.plan.rehearsal.warnings)} warnings"
+    )
+    CONSOLE.print(as_table(scene_plan(run.scene, run.station.gel.sensor)))
+
+
+def _refuse_with_resume(**given: object) -> None:
+    named = [f"--{name}" for name, value in given.items() if value is not None]
+    if named:
+        raise WrongUse(
+            f"--resume goes on with the run as it was planned; {', '.join(named)} cannot change it now: "
+            "leave them out, or start another run"
+        )

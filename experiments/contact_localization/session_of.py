@@ -1,0 +1,164 @@
+"""Start a localization run, perform it on a bench, and finish it: what the commands are made of."""
+
+import datetime as dt
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.contact_localization.answer import Answer, answer
+from experiments.contact_localization.baselines import geometry_estimates
+from experiments.contact_localization.comparison import compare
+from experiments.contact_localization.dials import levels_of
+from experiments.contact_localization.experiment import ContactLocalization
+from experiments.contact_localization.planning import RunPlan, plan_run, twin_of, way_between
+from experiments.contact_localization.report_of import report_of
+from experiments.contact_localization.result import Scored, result_of
+from experiments.contact_localization.trade import trade
+from experiments.contact_localization.truth import read_truth
+from harness.accuracy import Accuracy
+from harness.device import Health
+from harness.recording import Recording, write_text_whole
+from harness.report.page import write_report
+from harness.run_folder import RunFiles, create_run, station_calibration
+from harness.scene import SceneFile
+from harness.session import Progress, perform
+from harness.sim.scene_object import KnownObject, known_object
+from harness.station import Bench, RunContext, open_station
+from harness.station_file import Station
+from harness.symmetry import find_symmetries
+
+NAME = "contact-localization"
+
+
+@dataclass(frozen=True, eq=False)
+class Started:
+    """A run that is planned, rehearsed and on the disk, and has not moved yet."""
+
+    recording: Recording
+    plan: RunPlan
+    known: KnownObject
+
+
+def start(
+    scene: SceneFile, station: Station, seed: int, gap: str | None, folder: Path | None = None
+) -> Started:
+    """Take in the object, plan and rehearse the contacts, make the run's folder.
+
+    Raises:
+        MeshRefused, WrongUse: of the object or the scene.
+        MotionRefused: the rehearsal found a motion that must not be made; nothing was created.
+    """
+    known = known_object(scene)
+    calibration = station_calibration(station)
+    plan = plan_run(scene, station, known.mesh, seed)
+    mock = None if station.mock is None else {"gap": gap or station.mock.gap}
+    described = {
+        "contacts": plan.parameters(),
+        "pressed": [site.base_from_gel.tolist() for site in plan.sites],
+        "warnings": [*known.warnings, *plan.rehearsal.warnings],
+    }
+    recording = create_run(
+        folder or _new_folder(scene), NAME, scene, station, known.mesh, calibration, described, seed, mock
+    )
+    return Started(recording, plan, known)
+
+
+def perform_on_bench(recording: Recording, progress: Progress) -> tuple[bool, dict[str, Health]]:
+    """Open the run's bench and perform what is left; False where Ctrl-C ended it early."""
+    run = RunFiles(recording)
+    mock = recording.header.mock
+    context = RunContext(
+        truth=recording.truth_path,
+        mesh=run.mesh,
+        seed=recording.header.seed,
+        gap=None if mock is None else mock["gap"],
+    )
+    with open_station(run.station, run.scene, context) as bench:
+        return perform_on(bench, recording, progress)
+
+
+def perform_on(bench: Bench, recording: Recording, progress: Progress) -> tuple[bool, dict[str, Health]]:
+    """Perform what is left of a run on an open bench; how its instruments did."""
+    run = RunFiles(recording)
+    twin = twin_of(run.scene, run.station, run.mesh)
+    experiment = ContactLocalization(partial(way_between, twin))
+    complete = perform(experiment, bench, recording, bench.arm.stop, progress)
+    return complete, {"arm": bench.arm.health(), "gel": bench.gel.health()}
+
+
+def score(recording: Recording, accuracy: Accuracy) -> Scored:
+    """Estimate, compare, and look at the truth where there is one."""
+    run = RunFiles(recording)
+    found = answer(run, levels_of(accuracy))
+    warnings = tuple(recording.header.plan.get("warnings", ())) + _doubts(found)
+    return Scored(
+        run=run,
+        found=found,
+        geometry=geometry_estimates(found.observations, found.model, found.prior)[-1],
+        comparison=compare(found, run, accuracy),
+        truth=read_truth(recording),
+        symmetry=find_symmetries(run.mesh),
+        accuracy=accuracy,
+        warnings=warnings,
+    )
+
+
+def finish(
+    recording: Recording, accuracy: Accuracy, health: Mapping[str, Health] | None, folder: Path | None = None
+) -> dict[str, Any]:
+    """The result of a run, with its report and ``result.json`` written.
+
+    Args:
+        recording: of the run.
+        accuracy: of the estimate and of what is simulated.
+        health: of the instruments; None for a replay.
+        folder: for the report; the run's own where None.
+    """
+    folder = folder or recording.folder
+    scored = score(recording, accuracy)
+    page = write_report(
+        report_of(scored, _geometry_errors(scored), _trade(scored), health), folder / "report"
+    )
+    result = result_of(scored, str(page))
+    write_text_whole(folder / "result.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    return result
+
+
+def _geometry_errors(scored: Scored) -> tuple[float, ...] | None:
+    true, found = scored.true_points, scored.found
+    if true is None:
+        return None
+    alone = geometry_estimates(found.observations, found.model, found.prior, first=1)
+    return tuple(
+        float(np.linalg.norm(estimate.position_in_object - point))
+        for estimate, point in zip(alone, true, strict=True)
+    )
+
+
+def _trade(scored: Scored) -> Any:
+    true = scored.true_points
+    if true is None:
+        return ()
+    return trade(scored.found, true[-1], scored.run.recording.header.seed)
+
+
+def _doubts(found: Answer) -> tuple[str, ...]:
+    if len(found.last.modes) < 2:
+        return ()
+    shares = ", ".join(f"{100 * mode.weight:.0f} %" for mode in found.last.modes)
+    return (
+        f"the answer is ambiguous: {len(found.last.modes)} places stay likely ({shares}); "
+        "one more contact elsewhere on the object would tell them apart",
+    )
+
+
+def _new_folder(scene: SceneFile) -> Path:
+    stamp = dt.datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
+    base = Path("runs") / f"{stamp}-{NAME}-{scene.object.name}"
+    candidates = (base, *(base.with_name(f"{base.name}-{k}") for k in range(2, 1000)))
+    return next(path for path in candidates if not path.exists())
