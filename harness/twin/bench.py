@@ -80,7 +80,7 @@ class TwinBench:
         pedestal_radius: m, of the foam pedestal between table and object.
         clearance: m that everything keeps from everything, outside a press; at least 1 mm,
             because motions are sampled every 2 mm of surface motion.
-        joint_range: ``(2, 6)`` rad; the maker's where it is None.
+        joint_range: ``(2, 6)`` rad, within the maker's, which holds alone where it is None.
 
     Raises:
         WrongUse: an unknown arm, or an object that reaches below the table.
@@ -108,7 +108,7 @@ class TwinBench:
         self.sensor = sensor
         self.solid = Solid(mesh)
         self.clearance = clearance
-        self.joint_range = arm_table(model).joint_range if joint_range is None else joint_range
+        self.joint_range = _common_range(arm_table(model).joint_range, joint_range)
         self._object_in_base = apply(self.base_from_object, self.solid.hull)
         self.object_top = float(self._object_in_base[:, 2].max())
         self.pad = _pad(sensor, depth=HOUSING_LENGTH)
@@ -116,8 +116,8 @@ class TwinBench:
         standing = [Part(name, 0, np.zeros((1, 3))) for name in ("table", "pedestal", "object")]
         self.parts = [*arm_parts(model), *tool, *standing]
         self.reach = reaches(model, self.parts)
-        self._spec = self._make_spec(tool, table_height, pedestal_radius)
-        self.mujoco_model = self._spec.compile()
+        self.spec = self._make_spec(tool, table_height, pedestal_radius)
+        self.mujoco_model = self.spec.compile()
         # The middle phase's boxes keep the margins they were compiled with.
         self.mujoco_model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
         self.data = mujoco.MjData(self.mujoco_model)
@@ -243,6 +243,12 @@ class TwinBench:
             pos=[*middle, 0.5 * (low + table_height)],
             rgba=_FOAM,
         )
+
+
+def _common_range(makers: FloatArray, station: FloatArray | None) -> FloatArray:
+    if station is None:
+        return makers
+    return read_only(np.stack([np.maximum(makers[0], station[0]), np.minimum(makers[1], station[1])]))
 
 
 def _pad(sensor: TactileSensor, depth: float) -> ConvexBody:

@@ -16,6 +16,7 @@ from harness.twin.sweep import line_poses, line_postures, sweep_postures
 from harness.twin.ways import connect
 
 STAND_OFF: Final = 0.03  # m between the gel and the place where it is fully pressed
+SEARCHED: Final = 2  # branches for which a way is searched where no natural one is free
 GREATEST_TURN: Final = 0.6  # rad of a joint from the stand-off to the press
 
 
@@ -111,7 +112,7 @@ def plan_contact(
     ]
     candidates.sort(key=lambda approach: float(np.abs(approach.stand_off_joints - seed_joints).max()))
     for thorough in (False, True):
-        for approach in candidates:
+        for approach in candidates[: SEARCHED if thorough else None]:
             travel = connect(bench, seed_joints, approach.stand_off_joints, seed, thorough)
             if travel is not None:
                 return _planned(bench, approach, seed_joints, travel, stand_off)

@@ -192,3 +192,13 @@ def test_a_bench_keeps_its_inputs_from_being_changed() -> None:
     bench = TwinBench("ur5e", TOOL, GELSIGHT_R15, MUG, pose)
     pose[0, 3] = 5.0
     assert bench.base_from_object[0, 3] == -0.42
+
+
+def test_a_station_narrows_the_makers_joint_range_and_never_widens_it() -> None:
+    wide = np.array([[-7.0] * 6, [1.0, 7.0, 7.0, 7.0, 7.0, 7.0]])
+    bench = TwinBench(
+        "ur5e", TOOL, GELSIGHT_R15, MUG, translation(np.array([-0.42, 0, 0.25])), joint_range=wide
+    )
+    makers = arm_table("ur5e").joint_range
+    assert np.array_equal(bench.joint_range[0], makers[0])
+    assert np.array_equal(bench.joint_range[1], [1.0, *makers[1, 1:]])
