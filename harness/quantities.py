@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import AfterValidator, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-_TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
+_TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zµ%]\S*|1(?:/\S+)?)?\s*")
 
 _DEGREE = "0.017453292519943295769236907684886"
 
@@ -61,7 +61,7 @@ class Dimension:
 
     def text(self, value: float) -> str:
         """A value as text that reads back to the same bits."""
-        return f"{value!r} {self.si}"
+        return f"{float(value)!r} {self.si}"
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: GetCoreSchemaHandler) -> CoreSchema:
         written = core_schema.plain_serializer_function_ser_schema(self.text, when_used="json")

@@ -1,5 +1,6 @@
 """What is on the table: ``scene.toml``, or the options of the command line, as one model."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -187,7 +188,7 @@ class Localization(StrictModel):
     spacing: Literal["close", "spread"] = "close"
     step: Annotated[Length, Positive] = 0.025
     depth: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] = (0.5e-3, 2e-3)
-    tilt: Annotated[Angle, Nonnegative] = np.radians(15.0)
+    tilt: Annotated[Angle, Nonnegative] = math.radians(15.0)
     yaw: Literal["known", "unknown"] = "known"
     seed: int = Field(default=0, ge=0)
 
