@@ -22,6 +22,9 @@ from mocks.truth import TruthFile
 from mocks.ur.hooks import HOME
 from mocks.world import World
 
+PACKET_RATE = 25.0
+"""Hz of the arm's history: one packet for each frame of the gel is all that an estimate reads."""
+
 
 class InProcessGel:
     """A ``TactileCamera`` that sees the world where the arm is.
@@ -87,7 +90,7 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
     world = World(nominal, load_gap(run.gap or station.mock.gap), run.seed)
     truth = TruthFile(run.truth, world, run.seed)
     stage = Stage()
-    arm = InProcessArm(station.arm.model, np.array(HOME), world, stage)
+    arm = InProcessArm(station.arm.model, np.array(HOME), world, stage, PACKET_RATE)
 
     def mark(step: int, sample: int) -> None:
         stage.step, stage.sample = step, sample
