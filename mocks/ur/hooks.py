@@ -8,15 +8,12 @@ Six = tuple[float, float, float, float, float, float]
 Matrix = tuple[tuple[float, float, float, float], ...]
 """A homogeneous transform, four rows of four."""
 
-HOME: Final[Six] = (
-    0.0,
-    -1.5707963267948966,
-    -1.5707963267948966,
-    -1.5707963267948966,
-    1.5707963267948966,
-    0.0,
-)
-"""rad; the tool points down, in front of the arm."""
+CYCLE: Final = 0.002
+"""s, of an e-Series controller."""
+
+_QUARTER: Final = 1.5707963267948966
+HOME: Final[Six] = (0.0, -_QUARTER, _QUARTER, -_QUARTER, -_QUARTER, 0.0)
+"""rad; the arm reaches along -x of its base, the tool points down."""
 
 
 class ContactModel(Protocol):

@@ -12,11 +12,39 @@ give it a process of its own. ::
         cues=line.fault,                      # the next fault, or None; asked every 10 ms
         on_ready=line.ready,                  # once, when all ports listen
     )
+
+The controller's cycles keep an absolute schedule of 2 ms; those that are late are made up for one
+by one, so the stream of time stamps has no gaps.
 """
 
+import asyncio
+import contextlib
+import selectors
+import sys
 from collections.abc import Callable
+from typing import Final
 
-from mocks.ur.hooks import ContactModel, ControllerConfig, Cue, OnCycle
+from mocks.ur.controller import Controller
+from mocks.ur.dashboard import Dashboard, DashboardConnection
+from mocks.ur.faults import Faults
+from mocks.ur.hooks import CYCLE, ContactModel, ControllerConfig, Cue, OnCycle
+from mocks.ur.rtde_server import RtdeConnection, RtdeServer
+from mocks.ur.script_server import ScriptConnection, ScriptServer
+
+DASHBOARD_PORT: Final = 29999
+SCRIPT_PORTS: Final = (30001, 30002, 30003)
+RTDE_PORT: Final = 30004
+
+_CUES_EVERY: Final = 5
+_STOP_EVERY: Final = 25
+_BURST: Final = 4
+"""Late cycles made up for before the ports are served again."""
+
+_LATEST: Final = 1.0
+"""s; where the machine slept for longer, its lost time is not made up for."""
+
+_SWITCH_INTERVAL: Final = 5e-4
+"""s that the translating thread may hold the interpreter while a cycle is due."""
 
 
 def serve(
@@ -28,11 +56,86 @@ def serve(
     step: Callable[[], int] = lambda: 0,
     cues: Callable[[], Cue | None] = lambda: None,
     on_ready: Callable[[], None] = lambda: None,
+    answer: Callable[[str], None] = lambda _: None,
 ) -> None:
     """Serve until ``should_stop``; every port is closed on return.
+
+    Args:
+        config: of the controller.
+        contact: what the tool feels; nothing where None.
+        on_cycle: is told where the arm is.
+        should_stop: ends it.
+        step: of the run.
+        cues: faults to begin (``mocks.ur.faults``).
+        on_ready: is called once, when all ports listen.
+        answer: is told what became of each cue.
 
     Raises:
         OSError: an address or port that cannot be bound.
         harness.errors.WrongUse: a model that is not known.
     """
-    raise NotImplementedError("mocks.ur.serve.serve")
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    controller = Controller(config, contact, on_cycle, step)
+    # The default selector's timers are a millisecond coarse, half a cycle.
+    loop = asyncio.SelectorEventLoop(selectors.SelectSelector())
+    try:
+        loop.run_until_complete(_serve(controller, should_stop, cues, on_ready, answer))
+    finally:
+        loop.close()
+
+
+async def _serve(
+    controller: Controller,
+    should_stop: Callable[[], bool],
+    cues: Callable[[], Cue | None],
+    on_ready: Callable[[], None],
+    answer: Callable[[str], None],
+) -> None:
+    rtde, scripts = RtdeServer(controller), ScriptServer(controller)
+    dashboard, dashboards = Dashboard(controller), set[DashboardConnection]()
+    faults = Faults(controller, rtde, scripts, dashboards)
+    async with contextlib.AsyncExitStack() as stack:
+        stack.callback(scripts.close)
+        await _listen(stack, controller, DASHBOARD_PORT, lambda: DashboardConnection(dashboard, dashboards))
+        for port in SCRIPT_PORTS:
+            await _listen(stack, controller, port, lambda: ScriptConnection(scripts))
+        await _listen(stack, controller, RTDE_PORT, lambda: RtdeConnection(rtde))
+        on_ready()
+        schedule = _Schedule()
+        while schedule.count % _STOP_EVERY or not should_stop():
+            await schedule.next_cycle()
+            controller.cycle()
+            faults.tick()
+            rtde.publish()
+            if schedule.count % _CUES_EVERY == 0 and (cue := cues()) is not None:
+                answer(faults.begin(cue))
+
+
+async def _listen(
+    stack: contextlib.AsyncExitStack,
+    controller: Controller,
+    port: int,
+    protocol: Callable[[], asyncio.Protocol],
+) -> None:
+    loop = asyncio.get_running_loop()
+    server = await loop.create_server(protocol, controller.robot.config.host, port)
+    stack.callback(server.close)
+
+
+class _Schedule:
+    """When each cycle is due, from now on."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._due = self._loop.time()
+        self.count = 0
+
+    async def next_cycle(self) -> None:
+        """Return when the next cycle is due; the ports are served meanwhile."""
+        self._due += CYCLE
+        self.count += 1
+        wait = self._due - self._loop.time()
+        if wait > 0.0 or self.count % _BURST == 0:
+            await asyncio.sleep(max(wait, 0.0))
+        if wait < -_LATEST:
+            self._due = self._loop.time()

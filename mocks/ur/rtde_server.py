@@ -1,0 +1,255 @@
+"""Port 30004: recipes, claims on inputs, and one packet for each due cycle to each client.
+
+Recipe numbers are handed out in order for each connection, as ur_rtde takes for granted.
+"""
+
+import asyncio
+import struct
+from typing import Any, Final
+
+from mocks.ur import wire
+from mocks.ur.controller import Controller
+from mocks.ur.variables import INPUTS, OUTPUTS, Input, Read
+from mocks.ur.wire import BadPacket, Kind, packet
+
+CYCLES_PER_SECOND: Final = 500
+PROTOCOL: Final = 2
+SLOWEST: Final = 1 << 22
+"""Bytes that a client may leave unread before it is dropped: some ten seconds of everything."""
+
+_FIRST_RECIPE: Final = b"\x01"
+_FREQUENCY: Final = struct.Struct(">d")
+_VERSION: Final = struct.Struct(">H")
+
+
+class OutputRecipe:
+    """What one client is sent, and how often."""
+
+    def __init__(self, names: list[str], frequency: float) -> None:
+        self.types = [OUTPUTS[name].type if name in OUTPUTS else wire.NOT_FOUND for name in names]
+        self.frequency = frequency
+        self.valid = bool(names) and wire.NOT_FOUND not in self.types
+        self._reads: list[tuple[Read, bool]] = [
+            (OUTPUTS[name].read, OUTPUTS[name].type in wire.SCALARS) for name in names if name in OUTPUTS
+        ]
+        self._layout = wire.layout([name for name in self.types if name != wire.NOT_FOUND])
+
+    def due(self, cycle: int) -> bool:
+        """Whether a packet belongs to this cycle."""
+        return int(cycle * self.frequency / CYCLES_PER_SECOND) > int(
+            (cycle - 1) * self.frequency / CYCLES_PER_SECOND
+        )
+
+    def packed(self, controller: Controller) -> bytes:
+        """One packet."""
+        values: list[Any] = []
+        for read, scalar in self._reads:
+            value = read(controller)
+            if scalar:
+                values.append(value)
+            else:
+                values.extend(value)
+        return packet(Kind.DATA, _FIRST_RECIPE + self._layout.pack(*values))
+
+
+class InputRecipe:
+    """What one client writes."""
+
+    def __init__(self, names: list[str], inputs: list[Input]) -> None:
+        self._fields = list(zip(names, inputs, strict=True))
+        self._layout = wire.layout([field.type for field in inputs])
+
+    def apply(self, controller: Controller, payload: bytes) -> None:
+        """Write the values of one packet; ``BadPacket`` where it has another length."""
+        if len(payload) != self._layout.size:
+            raise BadPacket(f"{len(payload)} bytes of data, where its recipe has {self._layout.size}")
+        values = iter(self._layout.unpack(payload))
+        robot = controller.robot
+        masked: dict[str, Any] = {}
+        for name, field in self._fields:
+            value = next(values) if field.type in wire.SCALARS else [next(values) for _ in range(6)]
+            if field.write is None:
+                masked[name] = value
+            else:
+                field.write(controller, value)
+            robot.written[name] = robot.cycles
+        if masked:
+            robot.outputs.apply(masked)
+
+
+class RtdeServer:
+    """All clients of the port.
+
+    Attributes:
+        frozen: whether nothing is sent or read, as where a cable hangs loose.
+        refusing: whether new connections are dropped at once.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        self.controller = controller
+        self.claims: dict[str, RtdeConnection] = {}
+        self.refusing = False
+        self._connections: list[RtdeConnection] = []
+        self._frozen = False
+
+    @property
+    def frozen(self) -> bool:
+        """Whether nothing is sent or read."""
+        return self._frozen
+
+    @frozen.setter
+    def frozen(self, value: bool) -> None:
+        if value != self._frozen:
+            self._frozen = value
+            for connection in self._connections:
+                connection.set_reading(not value)
+
+    def publish(self) -> None:
+        """Send what this cycle owes."""
+        if not self._frozen:
+            for connection in self._connections:
+                connection.publish()
+
+    def drop(self) -> None:
+        """Close every connection."""
+        for connection in list(self._connections):
+            connection.abort()
+
+    def add(self, connection: "RtdeConnection") -> None:
+        """A client has come."""
+        self._connections.append(connection)
+
+    def remove(self, connection: "RtdeConnection") -> None:
+        """A client has gone; its inputs keep their values and are free again."""
+        self._connections.remove(connection)
+        self.claims = {name: owner for name, owner in self.claims.items() if owner is not connection}
+
+
+class RtdeConnection(asyncio.Protocol):
+    """One client."""
+
+    def __init__(self, server: RtdeServer) -> None:
+        self._server = server
+        self._packets = wire.Packets()
+        self._output: OutputRecipe | None = None
+        self._inputs: dict[int, InputRecipe] = {}
+        self._next_input = 1
+        self._protocol = 1
+        self._started = False
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """A client has come."""
+        assert isinstance(transport, asyncio.Transport), "a stream server makes stream transports"
+        self._transport = transport
+        self._server.add(self)
+        if self._server.refusing:
+            transport.abort()
+        elif self._server.frozen:
+            transport.pause_reading()
+
+    def connection_lost(self, _error: Exception | None) -> None:
+        """It has gone."""
+        self._transport = None
+        self._server.remove(self)
+
+    def abort(self) -> None:
+        """Reset the connection."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def set_reading(self, reading: bool) -> None:
+        """Take in what the client sends, or leave it in the cable."""
+        if self._transport is not None and self._transport.is_reading() != reading:
+            (self._transport.resume_reading if reading else self._transport.pause_reading)()
+
+    def data_received(self, data: bytes) -> None:
+        """Answer every whole packet; bytes that cannot be packets end the connection."""
+        try:
+            for kind, payload in self._packets.feed(data):
+                self._answer(kind, payload)
+        except BadPacket as error:
+            self._send(wire.text_message(f"{error}; the connection is closed"))
+            if self._transport is not None:
+                self._transport.close()
+
+    def publish(self) -> None:
+        """Send this cycle's packet, if one is due; drop a client that does not read."""
+        recipe, transport = self._output, self._transport
+        if not self._started or recipe is None or transport is None:
+            return
+        if recipe.due(self._server.controller.robot.cycles):
+            transport.write(recipe.packed(self._server.controller))
+            if transport.get_write_buffer_size() > SLOWEST:
+                transport.abort()
+
+    def _send(self, data: bytes) -> None:
+        if self._transport is not None:
+            self._transport.write(data)
+
+    def _answer(self, kind: int, payload: bytes) -> None:
+        match kind:
+            case Kind.PROTOCOL_VERSION:
+                accepted = payload == _VERSION.pack(PROTOCOL)
+                self._protocol = PROTOCOL if accepted else self._protocol
+                self._send(packet(Kind.PROTOCOL_VERSION, bytes((accepted,))))
+            case Kind.CONTROL_VERSION:
+                version = struct.pack(">4I", *self._server.controller.robot.config.polyscope)
+                self._send(packet(Kind.CONTROL_VERSION, version))
+            case Kind.SETUP_OUTPUTS:
+                self._set_up_outputs(payload)
+            case Kind.SETUP_INPUTS:
+                self._set_up_inputs(payload)
+            case Kind.START:
+                self._started = self._output is not None and self._output.valid
+                self._send(packet(Kind.START, bytes((self._started,))))
+            case Kind.PAUSE:
+                self._started = False
+                self._send(packet(Kind.PAUSE, b"\x01"))
+            case Kind.DATA:
+                self._take(payload)
+            case Kind.TEXT:
+                pass
+            case _:
+                self._send(wire.text_message(f"packet type {kind} is not known"))
+
+    def _set_up_outputs(self, payload: bytes) -> None:
+        if self._protocol != PROTOCOL or len(payload) < _FREQUENCY.size:
+            raise BadPacket("outputs are set up in protocol version 2 only, with a frequency")
+        (frequency,) = _FREQUENCY.unpack_from(payload)
+        names = wire.names_in(payload[_FREQUENCY.size :])
+        if not 1.0 <= frequency <= CYCLES_PER_SECOND:
+            self._send(
+                wire.text_message(f"frequency {frequency} Hz is not between 1 and {CYCLES_PER_SECOND}")
+            )
+            frequency = 0.0
+        recipe = OutputRecipe(names, frequency)
+        recipe.valid = recipe.valid and frequency > 0.0
+        if recipe.valid:
+            self._output = recipe
+        self._send(packet(Kind.SETUP_OUTPUTS, bytes((recipe.valid,)) + ",".join(recipe.types).encode()))
+
+    def _set_up_inputs(self, payload: bytes) -> None:
+        names = wire.names_in(payload)
+        claims = self._server.claims
+        types = []
+        for name in names:
+            if name not in INPUTS:
+                types.append(wire.NOT_FOUND)
+            elif claims.get(name, self) is not self:
+                types.append(wire.IN_USE)
+            else:
+                types.append(INPUTS[name].type)
+        number = 0
+        if names and wire.NOT_FOUND not in types and wire.IN_USE not in types and self._next_input < 256:
+            number, self._next_input = self._next_input, self._next_input + 1
+            claims.update(dict.fromkeys(names, self))
+            self._inputs[number] = InputRecipe(names, [INPUTS[name] for name in names])
+        self._send(packet(Kind.SETUP_INPUTS, bytes((number,)) + ",".join(types).encode()))
+
+    def _take(self, payload: bytes) -> None:
+        number = payload[0] if payload else 0
+        if number not in self._inputs:
+            self._send(wire.text_message(f"there is no input recipe {number}"))
+            return
+        self._inputs[number].apply(self._server.controller, payload[1:])

@@ -1,0 +1,89 @@
+"""Ports 30001 to 30003: programs arrive as text and run once they are whole.
+
+Translation takes some tens of milliseconds and happens in a worker thread, so that the cycle
+goes on. The state that these ports also send on a real controller is not sent: clients that want
+it use the real-time data exchange.
+"""
+
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final
+
+from mocks.ur.controller import Controller
+from mocks.ur.urscript.errors import ScriptError
+from mocks.ur.urscript.tokens import whole_length
+
+LONGEST_PROGRAM: Final = 1 << 20
+
+
+class ScriptServer:
+    """Runs what arrives, in order of arrival.
+
+    Attributes:
+        connections: open ones.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        self.connections: set[ScriptConnection] = set()
+        self._controller = controller
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="translate")
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def submit(self, text: str) -> None:
+        """Translate a program, then start it."""
+        task = asyncio.get_running_loop().create_task(self._run(text))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def close(self) -> None:
+        """End the worker."""
+        self._worker.shutdown(wait=False, cancel_futures=True)
+
+    async def _run(self, text: str) -> None:
+        controller = self._controller
+        try:
+            program = await asyncio.get_running_loop().run_in_executor(
+                self._worker, controller.player.translate, text
+            )
+        except ScriptError as error:
+            controller.complain(f"a program was refused: {error}")
+            return
+        if controller.robot.remote:
+            controller.player.start(program)
+        else:
+            controller.complain("a program was refused: the pendant is in local control")
+
+
+class ScriptConnection(asyncio.Protocol):
+    """One client."""
+
+    def __init__(self, server: ScriptServer) -> None:
+        self._server = server
+        self._waiting = ""
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """A client has come."""
+        assert isinstance(transport, asyncio.Transport), "a stream server makes stream transports"
+        self._transport = transport
+        self._server.connections.add(self)
+
+    def connection_lost(self, _error: Exception | None) -> None:
+        """It has gone; what it left unfinished is not run."""
+        self._transport = None
+        self._server.connections.discard(self)
+
+    def abort(self) -> None:
+        """Reset the connection."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def data_received(self, data: bytes) -> None:
+        """Run every whole program."""
+        self._waiting += data.decode("utf-8", "replace")
+        while length := whole_length(self._waiting):
+            text, self._waiting = self._waiting[:length], self._waiting[length:]
+            if text.strip():
+                self._server.submit(text)
+        if len(self._waiting) > LONGEST_PROGRAM:
+            self.abort()

@@ -1,0 +1,230 @@
+"""The variables of the real-time data exchange: type, and where each is read or written.
+
+Names and types: Universal Robots, RTDE guide. Currents, voltages, temperatures and moments are
+not modelled and read as constants.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from mocks.ur import poses
+from mocks.ur.controller import Controller
+from mocks.ur.player import RuntimeState
+from mocks.ur.registers import BITS, NUMERIC
+from mocks.ur.safety import RobotMode
+
+Read = Callable[[Controller], Any]
+Write = Callable[[Controller, Any], None]
+
+_ZEROS: Final = (0.0,) * 6
+_JOINT_RUNNING, _JOINT_POWER_OFF = 253, 239
+_LAST_WORD: Final = BITS - 64
+
+
+@dataclass(frozen=True)
+class Output:
+    """A variable that clients may ask for."""
+
+    type: str
+    read: Read
+
+
+@dataclass(frozen=True)
+class Input:
+    """A variable that one client may write; ``write`` is None where the outputs take it by its mask."""
+
+    type: str
+    write: Write | None
+
+
+def _constant(kind: str, value: Any) -> Output:
+    return Output(kind, lambda _: value)
+
+
+def _tcp_force(c: Controller) -> Any:
+    mover = c.robot.mover
+    return c.robot.force.at_tcp(mover.base_from_flange, mover.flange_from_tcp)
+
+
+def _elbow(c: Controller) -> Any:
+    """Position of the elbow, m in base: the end of the upper arm."""
+    mover, arm = c.robot.mover, c.robot.arm
+    turned = poses.matrix_from_pose((0.0, 0.0, arm.d1, 0.0, 0.0, mover.joints[0]))
+    lifted = poses.matrix_from_pose((0.0, 0.0, 0.0, 0.0, -mover.joints[1], 0.0))
+    return poses.translation(
+        poses.compose(poses.compose(turned, lifted), poses.matrix_from_pose((arm.a2, 0, 0, 0, 0, 0)))
+    )
+
+
+def _joint_modes(c: Controller) -> Any:
+    mode = _JOINT_RUNNING if c.robot.safety.power is RobotMode.RUNNING else _JOINT_POWER_OFF
+    return (mode,) * 6
+
+
+def _state() -> dict[str, Output]:
+    """What moves and what is felt."""
+    joints = Output("VECTOR6D", lambda c: c.robot.mover.joints)
+    speeds = Output("VECTOR6D", lambda c: c.robot.mover.speeds)
+    pose = Output("VECTOR6D", lambda c: poses.pose_from_matrix(c.robot.mover.base_from_tcp))
+    twist = Output("VECTOR6D", lambda c: (*c.robot.mover.twist[0], *c.robot.mover.twist[1]))
+    return {
+        "timestamp": Output("DOUBLE", lambda c: c.robot.time),
+        "target_q": joints,
+        "actual_q": joints,
+        "target_qd": speeds,
+        "actual_qd": speeds,
+        "target_qdd": Output("VECTOR6D", lambda c: c.robot.mover.accelerations),
+        "actual_TCP_pose": pose,
+        "target_TCP_pose": pose,
+        "actual_TCP_speed": twist,
+        "target_TCP_speed": twist,
+        "actual_TCP_force": Output("VECTOR6D", _tcp_force),
+        "ft_raw_wrench": Output("VECTOR6D", lambda c: c.robot.force.raw),
+        "tcp_force_scalar": Output("DOUBLE", lambda c: sum(f * f for f in _tcp_force(c)[:3]) ** 0.5),
+        "tcp_offset": Output("VECTOR6D", lambda c: poses.pose_from_matrix(c.robot.mover.flange_from_tcp)),
+        "elbow_position": Output("VECTOR3D", _elbow),
+        "payload": Output("DOUBLE", lambda c: c.robot.payload.mass),
+        "payload_cog": Output("VECTOR3D", lambda c: c.robot.payload.centre),
+        "payload_inertia": Output("VECTOR6D", lambda c: c.robot.payload.inertia),
+    }
+
+
+def _modes() -> dict[str, Output]:
+    """What the controller says of itself."""
+    return {
+        "robot_mode": Output("INT32", lambda c: int(c.robot.safety.power)),
+        "joint_mode": Output("VECTOR6INT32", _joint_modes),
+        "safety_mode": Output("INT32", lambda c: int(c.robot.safety.mode)),
+        "safety_status": Output("INT32", lambda c: int(c.robot.safety.mode)),
+        "runtime_state": Output("UINT32", lambda c: int(c.player.state)),
+        "robot_status_bits": Output("UINT32", lambda c: c.status_bits),
+        "safety_status_bits": Output("UINT32", lambda c: c.robot.safety.bits),
+        "speed_scaling": Output("DOUBLE", lambda c: float(c.player.state is RuntimeState.PLAYING)),
+        "target_speed_fraction": Output("DOUBLE", lambda c: c.robot.outputs.slider),
+        "actual_digital_input_bits": _constant("UINT64", 0),
+        "actual_digital_output_bits": Output("UINT64", lambda c: c.robot.outputs.digital),
+        "standard_analog_output0": Output("DOUBLE", lambda c: c.robot.outputs.analog[0]),
+        "standard_analog_output1": Output("DOUBLE", lambda c: c.robot.outputs.analog[1]),
+        "output_bit_registers0_to_31": Output("UINT32", lambda c: c.robot.results.word(0)),
+        "output_bit_registers32_to_63": Output("UINT32", lambda c: c.robot.results.word(32)),
+        "input_bit_registers0_to_31": Output("UINT32", lambda c: c.robot.inputs.word(0)),
+        "input_bit_registers32_to_63": Output("UINT32", lambda c: c.robot.inputs.word(32)),
+    }
+
+
+def _constants() -> dict[str, Output]:
+    """What is not modelled."""
+    six = (
+        "target_current",
+        "target_moment",
+        "actual_current",
+        "joint_control_output",
+        "actual_current_window",
+    )
+    scalars = {
+        "actual_execution_time": 0.0,
+        "actual_momentum": 0.0,
+        "actual_main_voltage": 48.0,
+        "actual_robot_voltage": 48.0,
+        "actual_robot_current": 0.5,
+        "standard_analog_input0": 0.0,
+        "standard_analog_input1": 0.0,
+        "io_current": 0.0,
+        "tool_analog_input0": 0.0,
+        "tool_analog_input1": 0.0,
+        "tool_output_current": 0.0,
+        "tool_temperature": 30.0,
+        "collision_detection_ratio": 0.0,
+        "time_scale_source": 0.0,
+    }
+    numbers = {
+        "tool_mode": ("UINT32", 253),
+        "tool_output_voltage": ("INT32", 0),
+        "tool_analog_input_types": ("UINT32", 0),
+        "analog_io_types": ("UINT32", 0),
+        "euromap67_input_bits": ("UINT32", 0),
+        "euromap67_output_bits": ("UINT32", 0),
+        "euromap67_24V_voltage": ("DOUBLE", 0.0),
+        "euromap67_24V_current": ("DOUBLE", 0.0),
+        "tool_output_mode": ("UINT8", 0),
+        "tool_digital_output0_mode": ("UINT8", 0),
+        "tool_digital_output1_mode": ("UINT8", 0),
+        "script_control_line": ("UINT32", 0),
+    }
+    return {
+        **{name: _constant("VECTOR6D", _ZEROS) for name in six},
+        **{name: _constant("DOUBLE", value) for name, value in scalars.items()},
+        **{name: _constant(kind, value) for name, (kind, value) in numbers.items()},
+        "joint_temperatures": _constant("VECTOR6D", (30.0,) * 6),
+        "actual_joint_voltage": _constant("VECTOR6D", (48.0,) * 6),
+        "actual_tool_accelerometer": _constant("VECTOR3D", (0.0, 0.0, 9.82)),
+    }
+
+
+def _output_registers() -> dict[str, Output]:
+    found: dict[str, Output] = {}
+    for i in range(NUMERIC):
+        found[f"output_int_register_{i}"] = Output("INT32", _item(lambda c: c.robot.results.ints, i))
+        found[f"output_double_register_{i}"] = Output("DOUBLE", _item(lambda c: c.robot.results.doubles, i))
+        found[f"input_int_register_{i}"] = Output("INT32", _item(lambda c: c.robot.inputs.ints, i))
+        found[f"input_double_register_{i}"] = Output("DOUBLE", _item(lambda c: c.robot.inputs.doubles, i))
+    for i in range(_LAST_WORD, BITS):
+        found[f"output_bit_register_{i}"] = Output("BOOL", _item(lambda c: c.robot.results.bits, i))
+        found[f"input_bit_register_{i}"] = Output("BOOL", _item(lambda c: c.robot.inputs.bits, i))
+    return found
+
+
+def _item(registers: Callable[[Controller], list[Any]], index: int) -> Read:
+    return lambda controller: registers(controller)[index]
+
+
+def _set_int(index: int) -> Write:
+    def write(controller: Controller, value: Any) -> None:
+        controller.robot.inputs.ints[index] = value
+
+    return write
+
+
+def _set_double(index: int) -> Write:
+    def write(controller: Controller, value: Any) -> None:
+        controller.robot.inputs.doubles[index] = value
+
+    return write
+
+
+def _set_bit(index: int) -> Write:
+    def write(controller: Controller, value: Any) -> None:
+        controller.robot.inputs.bits[index] = value
+
+    return write
+
+
+def _inputs() -> dict[str, Input]:
+    masked = {
+        "speed_slider_mask": "UINT32",
+        "speed_slider_fraction": "DOUBLE",
+        "standard_digital_output_mask": "UINT8",
+        "standard_digital_output": "UINT8",
+        "configurable_digital_output_mask": "UINT8",
+        "configurable_digital_output": "UINT8",
+        "tool_digital_output_mask": "UINT8",
+        "tool_digital_output": "UINT8",
+        "standard_analog_output_mask": "UINT8",
+        "standard_analog_output_type": "UINT8",
+        "standard_analog_output_0": "DOUBLE",
+        "standard_analog_output_1": "DOUBLE",
+    }
+    return {
+        **{name: Input(kind, None) for name, kind in masked.items()},
+        **{f"input_int_register_{i}": Input("INT32", _set_int(i)) for i in range(NUMERIC)},
+        **{f"input_double_register_{i}": Input("DOUBLE", _set_double(i)) for i in range(NUMERIC)},
+        **{f"input_bit_register_{i}": Input("BOOL", _set_bit(i)) for i in range(_LAST_WORD, BITS)},
+        "input_bit_registers0_to_31": Input("UINT32", lambda c, value: c.robot.inputs.set_word(0, value)),
+        "input_bit_registers32_to_63": Input("UINT32", lambda c, value: c.robot.inputs.set_word(32, value)),
+        "external_force_torque": Input("VECTOR6D", lambda _c, _value: None),
+    }
+
+
+OUTPUTS: Final = {**_state(), **_modes(), **_constants(), **_output_registers()}
+INPUTS: Final = _inputs()
