@@ -51,7 +51,7 @@ def _phase(edge: float) -> float:
 
 def _mug(edge: float) -> Mesh:
     wall = stroke(np.array([[38.4, 5.0], [38.0, 93.0]]), np.array([4.4, 3.6]))
-    base = polygon([(0.0, 3.5), (30.0, 3.5), (30.0, 0.0), (34.0, 0.0), (40.6, 4.0), (40.6, 8.5), (0.0, 8.5)])
+    base = polygon([(0.0, 3.5), (30.0, 3.5), (30.0, 0.0), (34.0, 0.0), (40.2, 4.0), (40.2, 8.5), (0.0, 8.5)])
     body = _turned(wall + base, 1.4, 3.5, edge)
     handle = _handle(
         points=[

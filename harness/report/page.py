@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from harness.arrays import FloatArray
+from harness.arrays import AnyArray, FloatArray
 from harness.report import wording
 from harness.report.charts import error_chart
 from harness.report.data import Answer, Contact, Curve, Missing, Posterior, ReportData
 from harness.report.figures import Album, Picture
 from harness.report.pictures import (
-    Sides,
     bench_figure,
     contacts_figure,
     object_sides,
@@ -61,31 +60,42 @@ def write_report(data: ReportData, folder: Path) -> Path:
 
 
 def _content(data: ReportData, album: Album) -> dict[str, Any]:
-    sides = object_sides(data.mesh, _towards(data), _SIDE_PIXELS)
-    located = [contact for contact in data.contacts if isinstance(contact.posterior, Posterior)]
+    bench = data.bench
     return {
         "data": data,
         "say": wording,
         "is_missing": lambda value: isinstance(value, Missing),
         "headline": wording.headline(data),
         "cards": wording.cards(data.answer) if isinstance(data.answer, Answer) else [],
-        "bench": data.bench
-        if isinstance(data.bench, Missing)
-        else album.photograph("bench", bench_figure(data.bench)),
-        "contacts_picture": _contacts_picture(data, sides, album),
+        "bench": bench if isinstance(bench, Missing) else album.photograph("bench", bench_figure(bench)),
+        **_on_the_object(data, album),
         "tiles": {contact.number: _tiles(contact, album) for contact in data.contacts},
         "fits": {contact.number: _fit(contact) for contact in data.contacts},
         "gain": f"{DIFFERENCE_GAIN:g}",
-        "strip": album.photograph("posterior_by_contact", posterior_strip(sides, data.contacts))
-        if located
-        else Missing("no contact has a posterior"),
-        "last": album.photograph("posterior", posterior_figure(sides, located[-1]))
-        if located
-        else Missing("no contact has a posterior"),
-        "last_contact": located[-1] if located else None,
         "by_contact": _chart(data.error_by_contact, "error_by_contact", "contacts used", False, album),
         "by_seconds": _chart(data.error_by_seconds, "error_by_seconds", "seconds a contact", True, album),
     }
+
+
+def _on_the_object(data: ReportData, album: Album) -> dict[str, Any]:
+    """Contacts and posteriors on the object; it is only drawn if there is one of them."""
+    located = [contact for contact in data.contacts if isinstance(contact.posterior, Posterior)]
+    posed = any(not isinstance(contact.object_from_gel, Missing) for contact in data.contacts)
+    shown: dict[str, Any] = {
+        "contacts_picture": Missing("no contact was located"),
+        "strip": Missing("no contact has a posterior"),
+        "last": Missing("no contact has a posterior"),
+        "last_contact": located[-1] if located else None,
+    }
+    if not (located or posed):
+        return shown
+    sides = object_sides(data.mesh, _towards(data), _SIDE_PIXELS)
+    if posed:
+        shown["contacts_picture"] = album.photograph("contacts", contacts_figure(sides, data.contacts))
+    if located:
+        shown["strip"] = album.photograph("posterior_by_contact", posterior_strip(sides, data.contacts))
+        shown["last"] = album.photograph("posterior", posterior_figure(sides, located[-1]))
+    return shown
 
 
 def _towards(data: ReportData) -> FloatArray:
@@ -93,12 +103,6 @@ def _towards(data: ReportData) -> FloatArray:
     if isinstance(data.answer, Answer):
         return data.answer.position
     return np.asarray(data.mesh.bounds.mean(axis=0))
-
-
-def _contacts_picture(data: ReportData, sides: Sides, album: Album) -> Picture | Missing:
-    if all(isinstance(contact.object_from_gel, Missing) for contact in data.contacts):
-        return Missing("no contact was located")
-    return album.photograph("contacts", contacts_figure(sides, data.contacts))
 
 
 def _tiles(contact: Contact, album: Album) -> list[Tile]:
@@ -113,13 +117,8 @@ def _tiles(contact: Contact, album: Album) -> list[Tile]:
     else:
         apart = album.pixels(f"{prefix}_difference", png(difference(live, simulated)))
     tiles = [
-        Tile("live", live if isinstance(live, Missing) else album.pixels(f"{prefix}_live", png(live))),
-        Tile(
-            "simulated",
-            simulated
-            if isinstance(simulated, Missing)
-            else album.pixels(f"{prefix}_simulated", png(simulated)),
-        ),
+        Tile("live", _image(live, f"{prefix}_live", album)),
+        Tile("simulated", _image(simulated, f"{prefix}_simulated", album)),
         Tile("difference", apart),
     ]
     for name, height in zip(("live", "simulated"), heights, strict=True):
@@ -130,6 +129,10 @@ def _tiles(contact: Contact, album: Album) -> list[Tile]:
             picture = png(height_picture(height, highest))
             tiles.append(Tile(title, album.pixels(f"{prefix}_height_{name}", picture)))
     return tiles
+
+
+def _image(image: AnyArray | Missing, name: str, album: Album) -> Picture | Missing:
+    return image if isinstance(image, Missing) else album.pixels(name, png(image))
 
 
 def _fit(contact: Contact) -> str:

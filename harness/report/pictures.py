@@ -93,7 +93,7 @@ class Heat:
 
 def bench_figure(bench: Bench) -> Figure:
     """Bench and object, the tool axis of every contact drawn into it."""
-    camera = look_at(bench.focus, np.radians(-118.0), np.radians(22.0), bench.width, 760, 1180)
+    camera = look_at(bench.focus, np.radians(-118.0), np.radians(22.0), bench.width, 680, 1040)
     shot = Shot(bench.parts, camera)
     figure, axes = _canvas(camera)
     picture = shot.picture()
@@ -127,7 +127,7 @@ def posterior_strip(sides: Sides, contacts: tuple[Contact, ...]) -> Figure:
         grid[0, column].set_title(f"after contact {contact.number}", fontsize=10)
         heat = Heat(_of(contact))
         for row, shot in enumerate(sides.shots):
-            _posterior_on(grid[row, column], shot, contact, heat, 60.0)
+            _posterior_on(grid[row, column], shot, contact, heat, 34.0)
     return figure
 
 

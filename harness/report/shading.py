@@ -18,7 +18,7 @@ Paint = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 _CREASE = np.cos(np.radians(38.0))
 _SLIVER = 0.01
 _OVERSAMPLING = 2
-_SHADOW_PIXELS = 900
+_SHADOW_PIXELS = 800
 _KEY, _FILL, _SKY, _BASE, _SHINE = 0.58, 0.22, 0.22, 0.20, 0.07
 
 
@@ -171,7 +171,7 @@ def _lit(parts: tuple[Part, ...], points: FloatArray, normals: FloatArray, camer
         nearest = np.minimum(nearest, image.depth)
     local = apply(light_from_world, points + 2.0 * pitch * normals)
     lit = np.zeros(len(points))
-    offsets = [(i, j) for i in (-2.5, -0.8, 0.8, 2.5) for j in (-2.5, -0.8, 0.8, 2.5)]
+    offsets = [(i, j) for i in (-2.0, 0.0, 2.0) for j in (-2.0, 0.0, 2.0)]
     for i, j in offsets:
         column = np.clip((local[:, 0] / pitch + 0.5 * _SHADOW_PIXELS + j).astype(int), 0, _SHADOW_PIXELS - 1)
         row = np.clip((local[:, 1] / pitch + 0.5 * _SHADOW_PIXELS + i).astype(int), 0, _SHADOW_PIXELS - 1)
