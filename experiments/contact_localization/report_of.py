@@ -146,7 +146,7 @@ def _by_contact(scored: Scored, geometry: tuple[float, ...] | None) -> tuple[Cur
     )
     curves = [Curve("touch", counts, ours)]
     if geometry is not None:
-        curves.append(Curve("places and tool axes alone", counts, geometry))
+        curves.append(Curve("translations alone, no image", counts, geometry))
     return tuple(curves)
 
 

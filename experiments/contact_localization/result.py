@@ -7,20 +7,17 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.baselines import random_error
 from experiments.contact_localization.comparison import Comparison
-from experiments.contact_localization.estimate import Estimate
 from experiments.contact_localization.gate import Gate
 from experiments.contact_localization.posterior import Mode
-from experiments.contact_localization.surface import random_points
 from experiments.contact_localization.truth import Truth
 from harness.arrays import FloatArray
 from harness.explain import as_json
-from harness.mesh import Mesh
 from harness.run_folder import RunFiles
 from harness.symmetry import SymmetryGroup
 
 SCHEMA = 1
-_RANDOM_POINTS = 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +27,7 @@ class Scored:
     Attributes:
         run: the folder.
         found: its answer.
-        geometry: the answer from places and tool axes alone, without one image.
+        geometry: ``(3,)`` metres, the answer from the arm's translations alone, without one image.
         comparison: live against simulated.
         truth: of a mocked run.
         symmetry: of the object.
@@ -40,7 +37,7 @@ class Scored:
 
     run: RunFiles
     found: Answer
-    geometry: Estimate
+    geometry: FloatArray
     comparison: Comparison
     truth: Truth | None
     symmetry: SymmetryGroup
@@ -69,8 +66,8 @@ def result_of(scored: Scored, report: str | None) -> dict[str, Any]:
         "seed": run.recording.header.seed,
         "contacts": len(found.observations),
         "estimates": {"touch": touch_estimate(scored)},
-        "random_baseline_m": _random_error(run.mesh, last_true),
-        "geometry_baseline_m": _distance(scored.geometry.position_in_object, last_true),
+        "random_baseline_m": None if last_true is None else random_error(run.mesh, last_true),
+        "geometry_baseline_m": _distance(scored.geometry, last_true),
         "symmetry": scored.symmetry.name,
         "plan": _plan(scored.comparison),
         "accuracy": dict(scored.accuracy),
@@ -142,14 +139,6 @@ def _plan(comparison: Comparison) -> dict[str, Any]:
         step["seconds"] = evaluation.seconds.get(step["effect"])
         step["calls"] = evaluation.calls.get(step["effect"], 0)
     return described
-
-
-def _random_error(mesh: Mesh, true: FloatArray | None) -> float | None:
-    """Expected error of a point drawn evenly from the surface."""
-    if true is None:
-        return None
-    points, _ = random_points(mesh, _RANDOM_POINTS, np.random.default_rng(0))
-    return float(np.linalg.norm(points - true, axis=1).mean())
 
 
 def _distance(point: FloatArray, true: FloatArray | None) -> float | None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.answer import Answer, answer
-from experiments.contact_localization.baselines import geometry_estimates
+from experiments.contact_localization.baselines import geometry_answer
 from experiments.contact_localization.comparison import compare
 from experiments.contact_localization.dials import levels_of
 from experiments.contact_localization.experiment import ContactLocalization
@@ -99,7 +99,7 @@ def score(recording: Recording, accuracy: Accuracy) -> Scored:
     return Scored(
         run=run,
         found=found,
-        geometry=geometry_estimates(found.observations, found.model, found.prior)[-1],
+        geometry=geometry_answer(found.observations, found.model, found.prior),
         comparison=compare(found, run, accuracy),
         truth=read_truth(recording),
         symmetry=find_symmetries(run.mesh),
@@ -133,11 +133,8 @@ def _geometry_errors(scored: Scored) -> tuple[float, ...] | None:
     true, found = scored.true_points, scored.found
     if true is None:
         return None
-    alone = geometry_estimates(found.observations, found.model, found.prior, first=1)
-    return tuple(
-        float(np.linalg.norm(estimate.position_in_object - point))
-        for estimate, point in zip(alone, true, strict=True)
-    )
+    alone = [geometry_answer(found.observations[: k + 1], found.model, found.prior) for k in range(len(true))]
+    return tuple(float(np.linalg.norm(a - b)) for a, b in zip(alone, true, strict=True))
 
 
 def _trade(scored: Scored) -> Any:
