@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from mocks.ur import poses
 from mocks.ur.hooks import Matrix
-from mocks.ur.urscript.compiler import Builtin
+from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import Pose, number, show, six
 

@@ -22,7 +22,7 @@ from mocks.ur.motions import (
 )
 from mocks.ur.mover import PROGRAM_STOP
 from mocks.ur.robot import Robot
-from mocks.ur.urscript.compiler import Builtin
+from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import Pose, number, six
 

@@ -6,7 +6,8 @@ from typing import Final
 
 from mocks.ur.mover import PROGRAM_STOP
 from mocks.ur.robot import Robot
-from mocks.ur.urscript.compiler import Builtin, Compiled, compile_program
+from mocks.ur.urscript.code import Builtin
+from mocks.ur.urscript.compiler import Compiled, compile_program
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.parser import parse
 from mocks.ur.urscript.process import Process

@@ -10,7 +10,7 @@ from mocks.ur.motions import as_six
 from mocks.ur.move_functions import solved
 from mocks.ur.mover import HISTORY
 from mocks.ur.robot import Robot
-from mocks.ur.urscript.compiler import Builtin
+from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import Pose, number, six
 

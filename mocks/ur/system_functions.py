@@ -7,7 +7,7 @@ from typing import Any, Final
 from mocks.ur.geometry_functions import matrix
 from mocks.ur.registers import BITS, INT32, NUMERIC, Watchdog
 from mocks.ur.robot import Robot
-from mocks.ur.urscript.compiler import Builtin
+from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import number, show, truth
 
