@@ -259,12 +259,14 @@ class UrArm:
             **details,
         }
         try:
-            return bool(session.ask(message, allowed + KILL_SPARE, beat=True))
+            arrived = bool(session.ask(message, allowed + KILL_SPARE, beat=True))
+            session.comes_true(lambda packet: not packet[pipe.FIELDS["moving"]][0], SEEN_WITHIN)
         except TouchstoneError:
             raise
         except BaseException:
             session.stop()
             raise
+        return arrived
 
     @contextlib.contextmanager
     def _motion(self) -> Iterator[tuple[UrSession, int]]:

@@ -11,6 +11,7 @@ import queue
 import signal
 import sys
 import threading
+import time
 from typing import Final
 
 from drivers import dashboard, pipe, ur_state
@@ -134,7 +135,7 @@ class Child:
 
     def _zero_force(self) -> None:
         self._require_calm("zero the force sensor")
-        if not self._stream.at_rest:
+        if not self._comes_to_rest(0.2):
             raise BenchFault("the force sensor was not zeroed: the arm is not at rest; wait and ask again")
         self._link.zero_force()
 
@@ -148,6 +149,14 @@ class Child:
                 f"the arm was asked to {what}, but its state is {1e3 * self._stream.age:.0f} ms old "
                 f"(limit {1e3 * STALE:.0f} ms); check the load of this computer and the network"
             )
+
+    def _comes_to_rest(self, seconds: float) -> bool:
+        """Whether the arm is at rest within some seconds; the watchdog is kicked meanwhile."""
+        end = now() + seconds
+        while not self._stream.at_rest and now() < end:
+            self._kick()
+            time.sleep(TICK)
+        return self._stream.at_rest
 
     # What goes on meanwhile
 
@@ -279,10 +288,7 @@ class Child:
         with contextlib.suppress(TouchstoneError, RuntimeError):
             if self._motion is not None:
                 self._motion.stop(self._link, Outcome(error=SafetyStop("the program ended")))
-                end = now() + 0.5
-                while not self._stream.at_rest and now() < end:
-                    self._kick()
-                    threading.Event().wait(TICK)
+                self._comes_to_rest(0.5)
             if self._link.program_running():
                 self._link.end_script()
 

@@ -1,0 +1,219 @@
+"""What an operator sees when the arm, its controller, its process or its program fails."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arm_bench import DOWN, FLOOR, READY, FarEnd, child_pid, make_arm
+
+from drivers import dashboard
+from drivers.ur_arm import UrArm
+from harness.arrays import FloatArray
+from harness.errors import BenchFault, ProtectiveStop, SafetyStop
+from harness.geometry import translation
+
+FAR: FloatArray = READY + np.array([0.6, 0, 0, 0, 0, 0])
+
+
+@pytest.fixture
+def far_end() -> Iterator[FarEnd]:
+    end = FarEnd()
+    yield end
+    end.close()
+
+
+@pytest.fixture
+def arm(far_end: FarEnd, tmp_path: Path) -> Iterator[UrArm]:
+    arm = make_arm(far_end.address, tmp_path)
+    arm.open()
+    yield arm
+    arm.close()
+
+
+class InFlight:
+    """A long joint motion in a thread, and how it ended."""
+
+    def __init__(self, arm: UrArm) -> None:
+        self.error: Exception | None = None
+        self._thread = threading.Thread(target=self._move, args=(arm,))
+        self._thread.start()
+        while np.abs(arm.state().joint_speeds).max() < 0.1:
+            time.sleep(0.005)
+
+    def _move(self, arm: UrArm) -> None:
+        try:
+            arm.move_joints(FAR, 0.3, 1.5)
+        except Exception as error:  # noqa: BLE001 - it is looked at by the test
+            self.error = error
+
+    def join(self) -> Exception | None:
+        self._thread.join()
+        return self.error
+
+
+def comes_to_rest(far_end: FarEnd, within: float) -> bool:
+    """Whether the controller's own joints stop changing within some seconds, short of the target."""
+    end = time.monotonic() + within
+    before = far_end.joints()
+    while time.monotonic() < end:
+        time.sleep(0.05)
+        after = far_end.joints()
+        if np.array_equal(before, after):
+            return bool(np.abs(after - FAR).max() > 0.05)
+        before = after
+    return False
+
+
+def gone(pid: int, within: float = 3.0) -> bool:
+    end = time.monotonic() + within
+    while Path(f"/proc/{pid}").exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    return not Path(f"/proc/{pid}").exists()
+
+
+def test_a_protective_stop_is_seen_latched_and_never_resumed(arm: UrArm, far_end: FarEnd) -> None:
+    motion = InFlight(arm)
+    far_end.cue("protective_stop")
+    error = motion.join()
+    assert isinstance(error, ProtectiveStop)
+    assert "during the joint motion: protective stop; flange at (" in str(error)
+    assert arm.state().safety == "protective stop"
+    assert comes_to_rest(far_end, 1.0)
+    with pytest.raises(ProtectiveStop):
+        arm.move_joints(READY, 0.1, 1.0)
+    with pytest.raises(ProtectiveStop):
+        arm.zero_force()
+    arm.close()
+    with pytest.raises(ProtectiveStop, match="release the stop"):
+        arm.open()
+
+
+def test_a_protective_stop_at_rest_is_latched_too(arm: UrArm, far_end: FarEnd) -> None:
+    far_end.cue("protective_stop")
+    while arm.state().safety == "normal":
+        time.sleep(0.01)
+    time.sleep(0.1)
+    with pytest.raises(ProtectiveStop, match="at rest"):
+        arm.move_joints(FAR, 0.1, 1.0)
+
+
+def test_killing_the_child_in_flight_stops_the_arm(arm: UrArm, far_end: FarEnd) -> None:
+    pid = child_pid(arm)
+    motion = InFlight(arm)
+    os.kill(pid, signal.SIGKILL)
+    error = motion.join()
+    assert isinstance(error, BenchFault)
+    assert "open it again" in str(error)
+    assert comes_to_rest(far_end, 1.0)
+    assert gone(pid)
+    arm.close()
+    arm.open()
+    arm.move_joints(READY, 0.3, 1.5)
+
+
+def test_the_watchdog_alone_stops_the_arm_of_a_frozen_child(
+    arm: UrArm, far_end: FarEnd, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dashboard, "stop", lambda _: True)
+    pid = child_pid(arm)
+    motion = InFlight(arm)
+    os.kill(pid, signal.SIGSTOP)
+    assert comes_to_rest(far_end, 1.0)
+    os.kill(pid, signal.SIGKILL)
+    assert isinstance(motion.join(), BenchFault)
+
+
+def test_a_stop_while_the_child_is_frozen_goes_through_the_dashboard(arm: UrArm, far_end: FarEnd) -> None:
+    pid = child_pid(arm)
+    motion = InFlight(arm)
+    os.kill(pid, signal.SIGSTOP)
+    began = time.monotonic()
+    arm.stop()
+    assert time.monotonic() - began < 0.5
+    assert comes_to_rest(far_end, 0.5)
+    os.kill(pid, signal.SIGKILL)
+    assert isinstance(motion.join(), BenchFault)
+    with pytest.raises(BenchFault, match="open it again"):
+        arm.move_joints(READY, 0.1, 1.0)
+
+
+def test_killing_the_program_in_flight_stops_the_arm_and_leaves_no_process(
+    far_end: FarEnd, tmp_path: Path
+) -> None:
+    program = (
+        "import sys; from pathlib import Path; from arm_bench import make_arm, child_pid; "
+        "from test_arm_faults import FAR\n"
+        "arm = make_arm(sys.argv[1], Path(sys.argv[2])); arm.open()\n"
+        "sys.stdout.write(f'{child_pid(arm)}\\n'); sys.stdout.flush()\n"
+        "arm.move_joints(FAR, 0.3, 1.5)"
+    )
+    tests = Path(__file__).resolve().parents[1]
+    path = os.pathsep.join(str(folder) for folder in (tests.parent, tests, tests / "wire"))
+    with subprocess.Popen(
+        [sys.executable, "-c", program, far_end.address, str(tmp_path)],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": path},
+    ) as running:
+        assert running.stdout is not None
+        pid = int(running.stdout.readline())
+        before = far_end.joints()
+        while np.abs(far_end.joints() - before).max() < 0.02:
+            time.sleep(0.01)
+        running.kill()
+    assert comes_to_rest(far_end, 1.0)
+    assert gone(pid)
+    arm = make_arm(far_end.address, tmp_path)
+    arm.open()
+    arm.close()
+
+
+def test_a_dropped_connection_in_flight_is_a_fault(arm: UrArm, far_end: FarEnd) -> None:
+    pid = child_pid(arm)
+    motion = InFlight(arm)
+    far_end.cue("drop", 1.0)
+    error = motion.join()
+    assert isinstance(error, BenchFault)
+    assert "cable" in str(error)
+    assert comes_to_rest(far_end, 1.0)
+    assert gone(pid)
+
+
+def test_a_frozen_stream_in_flight_is_a_fault(arm: UrArm, far_end: FarEnd) -> None:
+    motion = InFlight(arm)
+    far_end.cue("freeze", 3.0)
+    error = motion.join()
+    assert isinstance(error, BenchFault)
+    assert "network cable" in str(error)
+
+
+def test_beyond_the_hard_limit_the_arm_stays_stopped(far_end: FarEnd, tmp_path: Path) -> None:
+    arm = make_arm(far_end.address, tmp_path, force_press=4.0, force_any=5.0)
+    arm.open()
+    here = arm.state().base_from_flange
+    arm.move_line(translation(np.array([0, 0, FLOOR + 0.005 - here[2, 3]])) @ here, 0.2, 1.2)
+    arm.zero_force()
+    with pytest.raises(SafetyStop, match="N; the limit is"):
+        arm.move_line(translation(0.02 * DOWN) @ arm.state().base_from_flange, 0.2, 1.5)
+    with pytest.raises(SafetyStop, match="opened again"):
+        arm.move_line(translation(-0.01 * DOWN) @ arm.state().base_from_flange, 0.05, 1.0)
+    arm.close()
+
+
+def test_a_program_stopped_at_the_pendant_is_not_started_again(arm: UrArm, far_end: FarEnd) -> None:
+    dashboard.stop(far_end.address)
+    time.sleep(0.3)
+    with pytest.raises(BenchFault, match="program stopped"):
+        arm.move_joints(FAR, 0.1, 1.0)
+
+
+def test_no_process_is_left_after_closing(arm: UrArm) -> None:
+    pid = child_pid(arm)
+    arm.close()
+    assert gone(pid, 0.5)
