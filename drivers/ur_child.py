@@ -25,7 +25,7 @@ from harness.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneErr
 
 KICK_PERIOD: Final = 0.02  # s; five kicks in the 0.1 s that the watchdog waits
 STARVED: Final = 0.08  # s between two kicks; the watchdog may have ended the script
-STARVED_LATELY: Final = 0.5  # s
+STARVED_LATELY: Final = 0.2  # s
 TICK: Final = 0.002  # s between looks at a motion
 REST_TICK: Final = 0.01
 STALE: Final = 0.05  # s without a packet: nothing is commanded, the watchdog is not kicked
@@ -61,6 +61,7 @@ class Child:
         except TouchstoneError as error:
             self._refuse(0, error)
             return
+        self._kicked = now()
         self._stream.start()
         self._answer(0, [controller.model, controller.serial, controller.version])
         try:
@@ -68,7 +69,7 @@ class Child:
                 self._tick()
         except (TouchstoneError, RuntimeError) as error:
             self._give_up(error)
-        finally:
+        else:
             self._leave()
 
     def _tick(self) -> None:
@@ -280,7 +281,11 @@ class Child:
     def _give_up(self, error: Exception) -> None:
         with contextlib.suppress(BenchFault):
             dashboard.stop(self._link.address)
-        fault = error if isinstance(error, TouchstoneError) else BenchFault(f"ur_rtde failed: {error}")
+        fault = (
+            error
+            if isinstance(error, TouchstoneError)
+            else BenchFault(f"ur_rtde failed ({error}); check the network cable of the control box")
+        )
         self._reply({"id": -1, "ok": False, "error": type(fault).__name__, "text": str(fault)[:2000]})
 
     def _leave(self) -> None:
