@@ -12,13 +12,11 @@ import numpy as np
 from harness.arrays import ByteArray
 from harness.clock import now
 from harness.errors import WrongUse
+from mocks.ur.faults import KINDS as ARM_KINDS
 
 CAMERA_KINDS = ("none", "stall", "truncate", "drop", "freeze", "saturate")
 """stall: nothing is sent. truncate: half of each JPEG is sent. drop: connections are reset and
 refused. freeze: the last frame again and again. saturate: an overexposed picture."""
-
-ARM_KINDS = ("protective_stop", "drop", "freeze")
-"""protective_stop: the controller stops the arm. drop: connections are closed. freeze: the stream halts."""
 
 KINDS = {"gel": CAMERA_KINDS, "camera": CAMERA_KINDS, "arm": ARM_KINDS}
 
