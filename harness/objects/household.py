@@ -84,9 +84,8 @@ def _plate(edge: float) -> Mesh:
 
 
 def _pitcher(edge: float) -> Mesh:
-    side = _curve(
-        [(53, 4), (59, 20), (62.5, 55), (61, 100), (55, 150), (49.5, 190), (49.5, 215), (54.5, 236)]
-    )
+    outline = [(53.0, 4.0), (59, 20), (62.5, 55), (61, 100), (55, 150), (49.5, 190), (49.5, 215), (54, 236)]
+    side = _curve(outline, rounder=True)
     wall = stroke(side, np.full(len(side), 3.2))
     base = polygon([(0.0, 3.0), (47.0, 3.0), (48.0, 0.0), (52.0, 0.0), (55.0, 4.0), (54.5, 6.5), (0.0, 6.5)])
     body = _turned(wall + base, 1.0, 4.0, edge)
@@ -132,11 +131,12 @@ def _turned(area: CrossSection, outer: float, inner: float, edge: float) -> Mesh
     return lathe(walked(half_profile(area, outer, inner), edge), edge, _phase(edge))
 
 
-def _curve(points: list[tuple[float, float]]) -> FloatArray:
-    """``(n, 2)`` places on a smooth line through a few points in mm that does not overshoot them."""
+def _curve(points: list[tuple[float, float]], rounder: bool = False) -> FloatArray:
+    """``(n, 2)`` places on a line through a few points in mm: without overshoot, or rounder and with."""
     through = np.array(points, dtype=np.float64)
     at = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(through, axis=0), axis=1))]
-    smooth: FloatArray = PchipInterpolator(at, through)(np.linspace(0.0, at[-1], 61))
+    line = CubicSpline(at, through) if rounder else PchipInterpolator(at, through)
+    smooth: FloatArray = line(np.linspace(0.0, at[-1], 61))
     return smooth
 
 
