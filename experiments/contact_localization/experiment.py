@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from experiments.contact_localization.pace import joint_speed
 from harness.arrays import FloatArray
 from harness.device import Arm
 from harness.errors import NotTouched
@@ -145,8 +146,7 @@ class ContactLocalization:
         motion = ContactMotion.from_parameters(step.parameters)
         arm = bench.arm
         bench.mark(step.index, -1)
-        for joints in self._travel(motion, arm):
-            arm.move_joints(joints, self.speeds.travel, self.speeds.travel_acceleration)
+        self._travel(motion, bench)
         arm.zero_force()
         began = arm.state().time
         self._touch(step, motion, arm)
@@ -159,11 +159,13 @@ class ContactLocalization:
         self._line(arm, motion.base_from_stand_off, "retreat")
         return (image, *history)
 
-    def _travel(self, motion: ContactMotion, arm: Arm) -> FloatArray:
-        here = arm.state().joints
-        if np.abs(here - motion.start).max() < WHERE_PLANNED:
-            return motion.travel
-        return self.way(here, motion.end)
+    def _travel(self, motion: ContactMotion, bench: Bench) -> None:
+        here = bench.arm.state().joints
+        planned = np.abs(here - motion.start).max() < WHERE_PLANNED
+        for joints in motion.travel if planned else self.way(here, motion.end):
+            speed = joint_speed(bench.station, here, joints, self.speeds.travel)
+            bench.arm.move_joints(joints, speed, self.speeds.travel_acceleration)
+            here = joints
 
     def _touch(self, step: Step, motion: ContactMotion, arm: Arm) -> None:
         travel = motion.search + self.speeds.overtravel
