@@ -76,10 +76,15 @@ def prior_of(run: RunFiles) -> Prior:
 def observe(run: RunFiles) -> tuple[Observation, ...]:
     """The contacts of a run, from its images and arm poses."""
     flange_from_gel = run.station.flange_from_gel
-    return tuple(_observation(record, flange_from_gel) for record in run.recording.steps())
+    return tuple(observe_step(record, flange_from_gel) for record in run.recording.steps())
 
 
-def _observation(record: StepRecord, flange_from_gel: FloatArray) -> Observation:
+def observe_step(record: StepRecord, flange_from_gel: FloatArray) -> Observation:
+    """One contact: its images, and where the arm was at rest while they were taken.
+
+    Raises:
+        RecordingDamaged: the step has no images, or no pose of the arm with them.
+    """
     images = _needed(record, "gel.image")
     poses = _needed(record, "arm.base_from_flange")
     first, last = images.times[0] - AROUND_IMAGES, images.times[-1]

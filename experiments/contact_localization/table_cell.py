@@ -1,0 +1,185 @@
+"""One cell's run of the localization table: a mocked run in process, answered by every method.
+
+The bench is the mocked one without sockets (``mocks.in_process``), planned and rehearsed as any
+run is; at least one run per object goes over the wires elsewhere and must read the same.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from experiments.contact_localization.answer import observe_step
+from experiments.contact_localization.baselines import geometry_answer, random_error
+from experiments.contact_localization.estimate import Estimate, estimate
+from experiments.contact_localization.experiment import ContactLocalization
+from experiments.contact_localization.levels import Levels
+from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.planning import plan_run, way_between
+from harness.arrays import FloatArray
+from harness.clock import now
+from harness.errors import FitRefused
+from harness.geometry import rotation_about
+from harness.mesh import Mesh
+from harness.run_folder import station_calibration
+from harness.scene import SceneFile, scene_from_json
+from harness.sim.scene_object import known_object
+from harness.station import RunContext
+from harness.station_file import Station
+from harness.step_file import Step, StepRecord
+from harness.symmetry import SymmetryGroup, find_symmetries
+from mocks.in_process import in_process_bench
+
+METHODS = ("random", "geometry", "geometry + axis", "paper's filter", "ours")
+YAWS = ("known", "unknown")
+PAPER = Levels(method="particle", particles=1000)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Which run.
+
+    Attributes:
+        object: name of a built-in object, or of a mesh file.
+        spacing: ``"close"`` or ``"spread"``.
+        gap: ``"default"`` or ``"none"``.
+        seed: of the sites, the world and the draws.
+    """
+
+    object: str
+    spacing: str
+    gap: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Of the cell's file."""
+        return f"{Path(self.object).stem.removeprefix('builtin:')}-{self.spacing}-{self.gap}-{self.seed}"
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A performed run, as an estimator may see it, and its truth."""
+
+    observations: tuple[Observation, ...]
+    model: Model
+    base_from_object: FloatArray
+    true: FloatArray
+    seed: int
+
+
+def scene_of(cell: Cell, scene: SceneFile) -> SceneFile:
+    """The scene of a run: the object turned by an angle of the run's own."""
+    turned = np.random.default_rng((cell.seed, 7)).uniform(0.0, 360.0)
+    tree = scene.model_dump(mode="json", by_alias=True)
+    tree["localization"].update({"spacing": cell.spacing})
+    tree["object"]["pose"]["yaw"] = f"{turned:.3f} deg"
+    return scene_from_json(tree, "the table")
+
+
+def run_cell(cell: Cell, scene: SceneFile, station: Station) -> dict[str, Any]:
+    """Perform and answer one run; the result as JSON values."""
+    scene = scene_of(cell, scene)
+    mesh = known_object(scene).mesh
+    run = _perform(cell, scene, station, mesh)
+    symmetry = find_symmetries(mesh)
+    rows: dict[str, Any] = {}
+    for yaw in YAWS:
+        prior = _prior(run, yaw)
+        rows[yaw] = {method: _scored(method, run, prior, symmetry) for method in METHODS}
+    return {"schema": 1, "cell": asdict(cell), "contacts": len(run.observations), "rows": rows}
+
+
+def _perform(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> _Run:
+    plan = plan_run(scene, station, mesh, cell.seed)
+    experiment = ContactLocalization(lambda start, end: way_between(plan.bench, start, end))
+    with TemporaryDirectory(prefix="touchstone-table-") as folder:
+        context = RunContext(Path(folder) / "truth.json", mesh, cell.seed, cell.gap)
+        bench = in_process_bench(scene, station, context)
+        observations = []
+        for index, parameters in enumerate(plan.parameters()):
+            step = Step(index, "press", parameters)
+            readings = {r.channel.name: r for r in experiment.perform(step, bench)}
+            observations.append(observe_step(StepRecord(step, readings, 0.0), station.flange_from_gel))
+        true = _last_truth(context.truth)
+    model = Model(mesh, station.gel.sensor, station_calibration(station))
+    return _Run(tuple(observations), model, scene.base_from_object(mesh), true, cell.seed)
+
+
+def _last_truth(path: Path) -> FloatArray:
+    contacts = json.loads(path.read_text(encoding="utf-8"))["contacts"]
+    return np.array(contacts[-1]["point_in_object_m"])
+
+
+def _prior(run: _Run, yaw: str) -> Prior:
+    rotation = run.base_from_object[:3, :3]
+    if yaw == "known":
+        return Prior(rotation, "known")
+    # Turned by chance, so that the unknown yaw falls between the grid's yaws, not on one of them.
+    angle = float(np.random.default_rng((run.seed, 11)).uniform(0.0, 2.0 * np.pi))
+    return Prior(rotation_about(np.array([0.0, 0.0, 1.0]), angle) @ rotation, "unknown")
+
+
+def _scored(method: str, run: _Run, prior: Prior, symmetry: SymmetryGroup) -> dict[str, Any]:
+    start = now()
+    if method == "random":
+        error = random_error(run.model.mesh, run.true)
+        return {"error_m": error, "error_symmetric_m": None, "seconds": 0.0}
+    if method.startswith("geometry"):
+        use_axis = method.endswith("axis")
+        point = geometry_answer(run.observations, run.model, prior, use_axis=use_axis)
+        return _errors(point, run.true, symmetry, now() - start)
+    levels = PAPER if method == "paper's filter" else Levels()
+    return _estimated(run, prior, levels, symmetry, start)
+
+
+def _estimated(
+    run: _Run, prior: Prior, levels: Levels, symmetry: SymmetryGroup, start: float
+) -> dict[str, Any]:
+    try:
+        found = estimate(run.observations, run.model, prior, levels, seed=run.seed)
+    except FitRefused as refusal:
+        # A refused fit of the right object is a failure, counted at the value of a random answer.
+        error = random_error(run.model.mesh, run.true)
+        seconds = now() - start
+        return {
+            "error_m": error,
+            "error_symmetric_m": error,
+            "seconds": seconds,
+            "refused": str(refusal),
+            "in_region90": False,
+        }
+    scored = _errors(found.position_in_object, run.true, symmetry, now() - start)
+    return {**scored, **_sureness(found, run.true)}
+
+
+def _sureness(found: Estimate, true: FloatArray) -> dict[str, Any]:
+    return {
+        "in_region90": found.region.contains(true),
+        "region90_area_m2": found.region.area,
+        "credible90_m": found.credible90,
+        "modes": len(found.modes),
+        "error_top10_m": float(np.linalg.norm(found.candidates - true, axis=1).mean()),
+        "fits_nats": [gate.fit for gate in found.gates],
+    }
+
+
+def _errors(point: FloatArray, true: FloatArray, symmetry: SymmetryGroup, seconds: float) -> dict[str, Any]:
+    return {
+        "error_m": float(np.linalg.norm(point - true)),
+        "error_symmetric_m": symmetry.distance(point, true),
+        "seconds": seconds,
+    }
+
+
+def cells(
+    objects: Sequence[str], seeds: Sequence[int], spacings: Sequence[str], gaps: Sequence[str]
+) -> list[Cell]:
+    """Every run of a table, one seed of every object before the next: a table that is stopped is even."""
+    first = [Cell(o, s, g, 0) for g in gaps for s in spacings for o in objects]
+    return [replace(cell, seed=seed) for seed in seeds for cell in first]
