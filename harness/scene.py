@@ -48,7 +48,7 @@ class Pose(StrictModel):
             its bounding box), or the mesh file's origin.
     """
 
-    position: tuple[Length, Length, Length] = (-0.5, 0.0, 0.25)
+    position: tuple[Length, Length, Length] = (-0.42, 0.0, 0.25)
     yaw: Angle = 0.0
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     anchor: Literal["bottom", "origin"] = "bottom"
