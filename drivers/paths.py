@@ -27,7 +27,7 @@ class Path:
         joints: ``(n, 6)`` rad.
         flange_positions: ``(n, 3)`` m in base.
         tool_points: ``(n, points, 3)`` m in base.
-        seconds: ``(n - 1,)`` s from each sample to the next at the motion's cruising speed.
+        seconds: ``(n - 1,)`` s from each sample to the next at the motion's greatest speed.
     """
 
     joints: FloatArray
@@ -47,8 +47,18 @@ class Path:
         return float(np.max(np.abs(np.diff(self.joints, axis=0)) / self.seconds[:, None], initial=0.0))
 
 
+def peak_speed(distance: float, speed: float, acceleration: float) -> float:
+    """The greatest speed on a way from rest to rest: ``speed``, or less where the way is too short."""
+    return min(speed, math.sqrt(distance * acceleration))
+
+
 def joint_path(
-    model: str, points_in_flange: FloatArray, start: FloatArray, end: FloatArray, speed: float
+    model: str,
+    points_in_flange: FloatArray,
+    start: FloatArray,
+    end: FloatArray,
+    speed: float,
+    acceleration: float,
 ) -> Path:
     """A straight line in joint space, the leading joint at ``speed`` rad/s.
 
@@ -58,13 +68,14 @@ def joint_path(
         start: ``(6,)`` rad.
         end: ``(6,)`` rad.
         speed: rad/s, above zero.
+        acceleration: rad/s^2, above zero.
     """
-    largest = float(np.abs(end - start).max())
+    largest = max(float(np.abs(end - start).max()), NO_LENGTH)
     count = 1 + max(1, math.ceil(largest / STEP_ANGLE))
     joints = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
     poses = kinematics.forward(model, joints)
-    seconds = np.full(count - 1, max(largest, 1e-12) / speed / (count - 1))
-    return _path(joints, poses, points_in_flange, seconds)
+    seconds = largest / peak_speed(largest, speed, acceleration) / (count - 1)
+    return _path(joints, poses, points_in_flange, np.full(count - 1, seconds))
 
 
 def line_poses(start: FloatArray, end: FloatArray) -> FloatArray:
@@ -87,6 +98,7 @@ def line_path(
     base_from_start: FloatArray,
     base_from_end: FloatArray,
     speed: float,
+    acceleration: float,
 ) -> Path:
     """A straight line of the flange at ``speed`` m/s, in the branch the arm is in.
 
@@ -99,6 +111,7 @@ def line_path(
         base_from_start: ``(4, 4)``, the flange now.
         base_from_end: ``(4, 4)``, the flange wanted.
         speed: m/s, above zero.
+        acceleration: m/s^2, above zero.
 
     Raises:
         LimitExceeded: a pose on the way is out of reach, or needs another branch.
@@ -108,8 +121,8 @@ def line_path(
     length = float(np.linalg.norm(base_from_end[:3, 3] - base_from_start[:3, 3]))
     turn = float(np.linalg.norm(vector_from_rotation(base_from_start[:3, :3].T @ base_from_end[:3, :3])))
     distance = max(length if length > NO_LENGTH else turn, NO_LENGTH)
-    seconds = np.full(len(poses) - 1, distance / speed / (len(poses) - 1))
-    return _path(joints, poses, points_in_flange, seconds)
+    seconds = distance / peak_speed(distance, speed, acceleration) / (len(poses) - 1)
+    return _path(joints, poses, points_in_flange, np.full(len(poses) - 1, seconds))
 
 
 def _follow(model: str, start_joints: FloatArray, poses: FloatArray) -> FloatArray:

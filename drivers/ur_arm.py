@@ -130,7 +130,7 @@ class UrArm:
         safety.within(f"{what}, acceleration", acceleration, cap, "rad/s^2", "ask for less")
         with self._motion() as (session, epoch):
             present = self.state().joints
-            path = paths.joint_path(self.model, self._points, present, target, speed)
+            path = paths.joint_path(self.model, self._points, present, target, speed, acceleration)
             safety.check_path(self.limits, path, self._contact, what)
             distance = float(np.abs(target - present).max())
             if distance > SETTLED:
@@ -233,7 +233,7 @@ class UrArm:
         safety.within(f"{what}, acceleration", acceleration, cap, "m/s^2", "ask for less")
         state = self.state()
         start = state.base_from_flange
-        path = paths.line_path(self.model, self._points, state.joints, start, target, speed)
+        path = paths.line_path(self.model, self._points, state.joints, start, target, speed, acceleration)
         safety.check_path(self.limits, path, self._contact, what)
         length = float(np.linalg.norm(target[:3, 3] - start[:3, 3]))
         turn = float(np.linalg.norm(vector_from_rotation(start[:3, :3].T @ target[:3, :3])))

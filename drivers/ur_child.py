@@ -58,11 +58,12 @@ class Child:
         threading.Thread(target=self._read, name="requests", daemon=True).start()
         try:
             controller = self._link.connect(model)
+            self._stream.start()
+            self._link.arm()
         except TouchstoneError as error:
             self._refuse(0, error)
             return
         self._kicked = now()
-        self._stream.start()
         self._answer(0, [controller.model, controller.serial, controller.version])
         try:
             while not self._closed:
@@ -221,16 +222,12 @@ class Child:
 
     def _check_link(self) -> None:
         if self._stream.failure:
-            raise BenchFault(f"the arm's state stream ended: {self._stream.failure}")
+            raise BenchFault(self._stream.failure)
         limit = LOST_MOVING if self._motion else LOST_AT_REST
         if self._stream.age > limit:
             raise BenchFault(
                 f"no state arrived from the arm for {self._stream.age:.1f} s (limit {limit:g} s); "
                 "check the network cable of the control box"
-            )
-        if self._stream.age > STALE and not self._link.connected():
-            raise BenchFault(
-                "the controller closed the connection; check the network cable of the control box"
             )
 
     def _kick(self) -> None:

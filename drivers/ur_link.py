@@ -4,29 +4,16 @@ Each call's result is checked: where ur_rtde says False, the controller's own st
 """
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numpy as np
-
 from drivers import pipe, ur_words
+from drivers.rtde_stream import RtdeStream
 from harness.arrays import FloatArray
 from harness.clock import now
 from harness.errors import BenchFault, ProtectiveStop, TouchstoneError
 
-VARIABLES: Final = (
-    "timestamp",
-    "actual_q",
-    "actual_qd",
-    "actual_TCP_pose",
-    "actual_TCP_force",
-    "robot_mode",
-    "safety_mode",
-    "runtime_state",
-    "robot_status_bits",
-    "safety_status_bits",
-    "actual_digital_output_bits",
-)
 WATCHDOG_HZ: Final = 10.0
 DECELERATION: Final = 10.0  # m/s^2; 25 ms from the free speed of 0.25 m/s
 NO_OFFSET: Final = [0.0] * 6
@@ -47,27 +34,27 @@ class Link:
     def __init__(self, address: str, rate: float) -> None:
         self.address = address
         self.rate = rate
-        self._receive: Any = None
+        self._stream: Any = None
+        self._newest: FloatArray | None = None
         self._control: Any = None
         self._io: Any = None
 
     def connect(self, model: str) -> Controller:
-        """Check the controller, end what runs on it, upload the script, arm the watchdog."""
+        """Check the controller, end what runs on it, upload the script, begin to receive.
+
+        The packets must be read from then on; ``arm`` comes next.
+        """
         identity = self._check_controller(model)
         from rtde_io import RTDEIOInterface
-        from rtde_receive import RTDEReceiveInterface
 
-        self._receive = self._constructed(
-            "state stream", lambda: RTDEReceiveInterface(self.address, self.rate, list(VARIABLES))
-        )
         self._control = self._constructed("control", self._make_control)
         self._io = self._constructed("digital outputs", lambda: RTDEIOInterface(self.address))
-        self._wait_until_running()
-        self.arm()
+        self._stream = RtdeStream(self.address, self.rate)
         return identity
 
     def arm(self) -> None:
         """Poses are the flange's: no tool offset, read back; then the watchdog."""
+        self._wait_until_running()
         self._check(self._control.setTcp(NO_OFFSET), "set the tool offset to zero")
         offset = list(self._control.getTCPOffset())
         if any(abs(value) > 1e-9 for value in offset):
@@ -77,32 +64,11 @@ class Link:
             )
         self._check(self._control.setWatchdog(WATCHDOG_HZ), f"arm the watchdog at {WATCHDOG_HZ:g} Hz")
 
-    def packet(self) -> FloatArray | None:
-        """The newest packet, ``(pipe.WIDTH,)``, or None if it changed while it was read."""
-        receive = self._receive
-        stamp = receive.getTimestamp()
-        values = np.zeros(pipe.WIDTH)
-        fields = pipe.FIELDS
-        values[fields["time"]] = now()
-        values[fields["controller_time"]] = stamp
-        values[fields["joints"]] = receive.getActualQ()
-        values[fields["joint_speeds"]] = receive.getActualQd()
-        values[fields["pose"]] = receive.getActualTCPPose()
-        values[fields["wrench"]] = receive.getActualTCPForce()
-        values[fields["safety_bits"]] = receive.getSafetyStatusBits()
-        values[fields["status_bits"]] = receive.getRobotStatus()
-        values[fields["runtime_state"]] = receive.getRuntimeState()
-        values[fields["robot_mode"]] = receive.getRobotMode()
-        values[fields["output_bits"]] = receive.getActualDigitalOutputBits()
-        return values if receive.getTimestamp() == stamp else None
-
-    def timestamp(self) -> float:
-        """Seconds on the controller's clock, of the newest packet."""
-        return float(self._receive.getTimestamp())
-
-    def connected(self) -> bool:
-        """Whether the state stream's connection is open."""
-        return bool(self._receive.isConnected())
+    def packets(self) -> Iterator[FloatArray | None]:
+        """Each packet as it arrives; None whenever there was none for a moment."""
+        for packet in self._stream.packets():
+            self._newest = self._newest if packet is None else packet
+            yield packet
 
     def kick(self) -> None:
         """Tell the watchdog that this program is well."""
@@ -149,23 +115,21 @@ class Link:
     def revive(self) -> None:
         """Upload the script again; only for an arm at rest whose script this program let die."""
         self._check(self._control.reuploadScript(), "upload the control script again")
-        self._wait_until_running()
         self.arm()
 
     def why(self) -> TouchstoneError:
         """What the controller's state says about a call that failed."""
-        receive = self._receive
-        if receive is None or not receive.isConnected():
-            return BenchFault(
-                "the controller closed the connection; check the network cable of the control box"
-            )
-        safety = ur_words.safety_words(receive.getSafetyStatusBits())
-        state = ur_words.RUNTIME_STATES.get(receive.getRuntimeState(), "unknown")
-        mode = ur_words.ROBOT_MODES.get(receive.getRobotMode(), "unknown")
-        words = f"the controller says: safety {safety}, program {state}, robot {mode}"
-        if safety not in ur_words.MAY_MOVE:
-            return ProtectiveStop(words)
-        return BenchFault(words)
+        if self._newest is None:
+            return BenchFault("the controller has sent no state; check the network cable of the control box")
+        safety, state, mode = (
+            int(self._newest[pipe.FIELDS[name]][0]) for name in ("safety_bits", "runtime_state", "robot_mode")
+        )
+        words = ur_words.safety_words(safety)
+        text = (
+            f"the controller says: safety {words}, program {ur_words.RUNTIME_STATES.get(state, 'unknown')}, "
+            f"robot {ur_words.ROBOT_MODES.get(mode, 'unknown')}"
+        )
+        return BenchFault(text) if words in ur_words.MAY_MOVE else ProtectiveStop(text)
 
     def _check(self, accepted: object, what: str) -> None:
         if accepted is not True:

@@ -1,8 +1,7 @@
-"""The arm's state, polled packet by packet in the child, and the force guard that reads each one."""
+"""The arm's state in the child, packet by packet, and the force guard that reads each one."""
 
 import threading
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -11,23 +10,19 @@ import numpy as np
 from drivers import pipe, ur_words
 from harness.arrays import FloatArray
 from harness.clock import now
+from harness.errors import BenchFault
 
 AT_REST: Final = 1e-3  # rad/s of the fastest joint
 CONTACT_PACKETS: Final = 2  # in a row above the threshold; one alone may be noise
-_SLEEP_SHARE: Final = 0.6  # of a period, before polling begins
-_POLL_SHARE: Final = 0.125  # of a period, between polls
 
 
 class Source(Protocol):
-    """What packets are polled from."""
+    """What packets come from."""
 
     rate: float
 
-    def timestamp(self) -> float:
-        """Seconds on the controller's clock."""
-
-    def packet(self) -> FloatArray | None:
-        """The newest packet, or None if it changed under the reader."""
+    def packets(self) -> Iterator[FloatArray | None]:
+        """Each packet as it arrives; None whenever there was none for a moment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +51,7 @@ class Trip:
 
 
 class Stream:
-    """Polls the newest packet in a thread, hands on each new one, watches the force."""
+    """Reads every packet in a thread, hands each on, watches the force."""
 
     def __init__(self, source: Source, send: Callable[[FloatArray], None], wake: Callable[[], None]) -> None:
         self._source = source
@@ -77,7 +72,7 @@ class Stream:
         self.trip: Trip | None = None
 
     def start(self) -> None:
-        """Begin to poll."""
+        """Begin to read."""
         self._thread.start()
 
     def close(self) -> None:
@@ -118,25 +113,14 @@ class Stream:
     def _run(self) -> None:
         period = 1.0 / self._source.rate
         try:
-            while not self._closed.is_set():
-                if self._poll(period):
-                    time.sleep(max(0.0, self.changed + _SLEEP_SHARE * period - now()))
-                else:
-                    time.sleep(max(_POLL_SHARE * period, 0.25e-3))
-        except (RuntimeError, pipe.PipeBroken) as error:
+            for packet in self._source.packets():
+                if self._closed.is_set():
+                    return
+                if packet is not None:
+                    self._accept(packet, period)
+        except (BenchFault, pipe.PipeBroken) as error:
             self.failure = str(error) or "the state stream ended"
             self._wake()
-
-    def _poll(self, period: float) -> bool:
-        """Take the newest packet if there is a new one."""
-        previous = self._field("controller_time")[0]
-        if self._source.timestamp() == previous:
-            return False
-        packet = self._source.packet()
-        if packet is None or packet[pipe.FIELDS["controller_time"]][0] == previous:
-            return False
-        self._accept(packet, period)
-        return True
 
     def _accept(self, packet: FloatArray, period: float) -> None:
         fields = pipe.FIELDS

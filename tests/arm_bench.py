@@ -15,7 +15,7 @@ from drivers.safety import SafetyLimits
 from drivers.ur_arm import UrArm
 from harness.arrays import FloatArray
 
-LIMITS = SafetyLimits(workspace_low=(-0.9, -0.6, 0.02), workspace_high=(-0.1, 0.6, 0.9))
+LIMITS = SafetyLimits(workspace_low=(-0.9, -0.6, 0.02), workspace_high=(-0.1, 0.6, 0.9), speed=0.6)
 READY: FloatArray = np.array([0.0, -1.4, 1.7, -1.87, -1.57, 0.0])
 FLOOR = 0.15
 DOWN: FloatArray = np.array([0.0, 0.0, -1.0])

@@ -28,7 +28,7 @@ def line(
     target: FloatArray, start: FloatArray = READY, points: FloatArray = FLANGE, speed: float = 0.1
 ) -> paths.Path:
     pose = kinematics.forward(MODEL, start)
-    return paths.line_path(MODEL, points, start, pose, target @ pose, speed)
+    return paths.line_path(MODEL, points, start, pose, target @ pose, speed, 1.5)
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1", "127.0.0.2", "127.255.1.9", "::1"])
@@ -120,7 +120,7 @@ def test_the_tool_point_is_what_stays_in_the_box_not_the_flange() -> None:
 def test_a_joint_motion_whose_ends_are_inside_is_refused_for_its_middle() -> None:
     half_turn = READY + np.array([2.6, 0, 0, 0, 0, 0])
     box = replace(LIMITS, workspace_low=(-0.9, -0.2, 0.02), workspace_high=(0.9, 0.9, 0.9))
-    path = paths.joint_path(MODEL, FLANGE, READY, half_turn, 0.1)
+    path = paths.joint_path(MODEL, FLANGE, READY, half_turn, 0.1, 2.0)
     assert path.tool_points[-1, 0, 1] > -0.2
     with pytest.raises(LimitExceeded, match="y = -0"):
         safety.check_path(box, path, None, "joint motion")
@@ -144,7 +144,7 @@ def test_joint_range_names_the_joint() -> None:
 
 def test_joint_step_is_limited_even_where_all_else_would_do() -> None:
     wrist = READY + np.array([0, 0, 0, 0, 0, 3.2])
-    path = paths.joint_path(MODEL, FLANGE, READY, wrist, 0.1)
+    path = paths.joint_path(MODEL, FLANGE, READY, wrist, 0.1, 2.0)
     with pytest.raises(LimitExceeded, match=r"joint 6 would turn by 3\.2"):
         safety.check_path(LIMITS, path, None, "joint motion")
 
@@ -153,10 +153,17 @@ def test_speed_is_of_the_tool_point_and_the_message_says_what_would_do() -> None
     away = READY + np.array([0.5, 0, 0, 0, 0, 0])
     reach = float(np.hypot(*kinematics.forward(MODEL, READY)[:2, 3]))
     speed = 2 * LIMITS.speed / reach
-    path = paths.joint_path(MODEL, FLANGE, READY, away, speed)
+    path = paths.joint_path(MODEL, FLANGE, READY, away, speed, 2.0)
     assert path.greatest_tool_speed == pytest.approx(2 * LIMITS.speed, rel=1e-3)
     with pytest.raises(LimitExceeded, match="ask for 50 % of this speed"):
         safety.check_path(LIMITS, path, None, "joint motion")
+
+
+def test_a_way_too_short_to_reach_the_speed_is_judged_by_the_speed_it_reaches() -> None:
+    beside = READY + np.array([0.01, 0, 0, 0, 0, 0])
+    path = paths.joint_path(MODEL, FLANGE, READY, beside, 1.5, 2.0)
+    reach = float(np.hypot(*kinematics.forward(MODEL, READY)[:2, 3]))
+    assert path.greatest_tool_speed == pytest.approx(reach * math.sqrt(0.01 * 2.0), rel=1e-3)
 
 
 def test_near_the_last_contact_the_slow_limit_holds_for_arriving_and_leaving() -> None:
@@ -193,7 +200,7 @@ def test_a_sampled_line_starts_and_ends_where_it_should_and_its_joints_reach_its
 ) -> None:
     start = kinematics.forward(MODEL, READY)
     end = transform(start[:3, :3] @ rotation_about(np.array([0.0, 0.0, 1.0]), angle), start[:3, 3] + offset)
-    path = paths.line_path(MODEL, GEL, READY, start, end, 0.1)
+    path = paths.line_path(MODEL, GEL, READY, start, end, 0.1, 1.5)
     reached = kinematics.forward(MODEL, path.joints)
     assert np.abs(reached[-1] - end).max() < 1e-9
     assert np.abs(path.flange_positions - reached[:, :3, 3]).max() < 1e-9

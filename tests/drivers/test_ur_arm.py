@@ -314,7 +314,7 @@ BEYOND: dict[str, Callable[[UrArm], object]] = {
     "joint speed": lambda arm: arm.move_joints(NEAR_BY, 2.0, 1.0),
     "joint acceleration": lambda arm: arm.move_joints(NEAR_BY, 0.2, 9.0),
     "no speed": lambda arm: arm.move_joints(NEAR_BY, 0.0, 1.0),
-    "tool speed": lambda arm: arm.move_joints(NEAR_BY, 1.2, 1.0),
+    "tool speed": lambda arm: arm.move_joints(READY + 0.4 * np.eye(6)[0], 1.2, 2.0),
     "joint range": lambda arm: arm.move_joints(READY + 7.0 * np.eye(6)[5], 0.1, 1.0),
     "line speed": lambda arm: arm.move_line(here(arm), 0.3, 1.0),
     "line acceleration": lambda arm: arm.move_line(here(arm), 0.1, 5.0),

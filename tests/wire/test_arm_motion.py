@@ -38,7 +38,7 @@ def arm(opened: UrArm) -> UrArm:
     height = opened.state().base_from_flange[2, 3]
     if height < FLOOR + 0.03:
         opened.move_line(above(opened, FLOOR + 0.05 - height), 0.05, 0.5)
-    opened.move_joints(READY, 0.15, 1.5)
+    opened.move_joints(READY, 0.5, 2.0)
     opened.zero_force()
     return opened
 
@@ -49,8 +49,8 @@ def above(arm: UrArm, height: float) -> FloatArray:
 
 def lower_to(arm: UrArm, height: float) -> None:
     """Straight down to ``height`` over the floor, slowly where it was touched before."""
-    for stage, speed in ((max(height, 0.02), 0.2), (height, 0.05)):
-        arm.move_line(above(arm, FLOOR + stage - arm.state().base_from_flange[2, 3]), speed, 1.2)
+    for stage, speed in ((max(height, 0.02), 0.4), (height, 0.05)):
+        arm.move_line(above(arm, FLOOR + stage - arm.state().base_from_flange[2, 3]), speed, 1.5)
 
 
 def test_the_controller_is_who_it_says(arm: UrArm) -> None:
@@ -69,7 +69,7 @@ def test_state_is_fresh_and_agrees_with_the_kinematics(arm: UrArm) -> None:
 
 def test_a_joint_motion_reaches_its_target(arm: UrArm, far_end: FarEnd) -> None:
     target = READY + np.array([0.15, -0.1, 0.1, 0.05, -0.05, 0.3])
-    arm.move_joints(target, 0.15, 1.5)
+    arm.move_joints(target, 0.5, 2.0)
     assert np.abs(arm.state().joints - target).max() < 1e-6
     assert np.abs(far_end.joints() - target).max() < 1e-6
     assert not arm.state().moving
@@ -116,7 +116,7 @@ def test_a_stop_from_another_thread_ends_a_motion_within_150_ms(arm: UrArm) -> N
 def test_a_stop_at_rest_changes_nothing(arm: UrArm) -> None:
     arm.stop()
     arm.stop()
-    arm.move_joints(READY + 0.01, 0.1, 1.5)
+    arm.move_joints(READY + 0.01, 0.2, 2.0)
 
 
 def test_contact_is_found_and_the_arm_rests_there(arm: UrArm) -> None:
@@ -173,23 +173,20 @@ def test_limits_refuse_before_anything_moves(arm: UrArm, far_end: FarEnd) -> Non
     with pytest.raises(LimitExceeded, match="workspace"):
         arm.move_line(above(arm, -0.5), 0.1, 1.0)
     with pytest.raises(LimitExceeded, match="m/s"):
-        arm.move_joints(READY + 0.2 * np.eye(6)[0], 1.2, 1.5)
+        arm.move_joints(READY + 1.0 * np.eye(6)[0], 1.4, 2.0)
     with pytest.raises(LimitExceeded):
         arm.move_joints(READY * np.nan, 0.1, 1.0)
     assert np.array_equal(far_end.joints(), before)
 
 
-def test_history_covers_the_motion_with_every_packet_accounted_for(arm: UrArm) -> None:
-    drops = arm.health().drops
+def test_history_covers_the_motion_packet_by_packet(arm: UrArm) -> None:
     began = time.monotonic()
     arm.move_joints(READY + 0.05, 0.1, 1.0)
-    seconds = time.monotonic() - began
-    joints, _, _, clock = arm.history(seconds)
-    steps = np.round(np.diff(clock.values) / 0.002).astype(int)
+    joints, _, _, clock = arm.history(time.monotonic() - began)
     assert np.all(np.diff(joints.times) >= 0)
-    assert np.all(steps >= 1)
-    assert np.sum(steps - 1) <= arm.health().drops - drops
-    assert np.abs(np.diff(clock.values) - 0.002 * steps).max() < 1e-9
+    assert np.abs(np.diff(clock.values) - 0.002).max() < 1e-9
+    assert np.abs(joints.values[0] - READY).max() < 1e-6
+    assert np.abs(joints.values[-1] - READY - 0.05).max() < 1e-6
 
 
 @pytest.mark.parametrize("rate", [125.0, 500.0])
@@ -205,10 +202,9 @@ def test_the_stream_runs_at_the_rate_asked_for(
     arm.close()
     opened.open()
     steps = np.diff(clock) * rate
-    assert np.abs(steps - np.round(steps)).max() < 1e-6
-    assert np.median(steps) == pytest.approx(1.0)
-    assert len(clock) + np.sum(np.round(steps) - 1) == pytest.approx(0.8 * rate, rel=0.15)
-    assert health.drops < 0.1 * 0.8 * rate
+    assert np.abs(steps - 1.0).max() < 1e-6
+    assert len(clock) == pytest.approx(0.8 * rate, rel=0.15)
+    assert health.drops == 0
 
 
 def test_one_motion_at_a_time(arm: UrArm) -> None:
@@ -217,5 +213,5 @@ def test_one_motion_at_a_time(arm: UrArm) -> None:
     while not arm.state().moving:
         time.sleep(0.005)
     with pytest.raises(BenchFault, match="during a motion"):
-        arm.move_joints(READY, 0.15, 1.5)
+        arm.move_joints(READY, 0.5, 2.0)
     mover.join()
