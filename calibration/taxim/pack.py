@@ -61,7 +61,7 @@ def read_pack(path: Path) -> PressPack:
                     f"{path} has no {sorted(missing)}; a pack of presses holds {sorted(_KEYS)}"
                 )
             found = {name: archive[name] for name in _KEYS}
-    except (OSError, ValueError, BadZipFile) as error:
+    except (OSError, EOFError, ValueError, BadZipFile) as error:
         raise CalibrationRefused(f"{path} does not read as a pack of presses: {error}") from error
     images, presses = found["imgs"], len(found["imgs"])
     shapes_agree = (

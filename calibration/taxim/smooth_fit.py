@@ -12,10 +12,10 @@ import numpy as np
 from calibration.taxim.pack import PressPack
 from harness.arrays import BoolArray, FloatArray, read_only
 from harness.errors import CalibrationRefused
-from harness.sim.shading import POSITION_TERMS, design, scaled_position
+from harness.sim.shading import POSITION_TERMS, design, scaled_position, shades
 from harness.sim.tactile_calibration import POSITION_DEGREE
 
-_ROUNDS = 12
+_ROUNDS = 6
 _HUBER = 10.0
 """Grey levels beyond which a residual counts as an outlier: about twice the typical one."""
 
@@ -30,9 +30,6 @@ by 16 grey levels without this and by 6 with it, for 0.1 dB on presses held out.
 """
 
 _PLACE_DEGREES = np.array([c + d for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)])
-
-_STEP = 0.25
-"""Pixels, for the derivative by the centre; the model is smooth over several."""
 
 _FAR = 2.5
 """Ball radii from the centre beyond which the gel is taken to be untouched."""
@@ -119,7 +116,7 @@ def residual(
 ) -> FloatArray:
     """``(pixels, 3)`` model less picture, grey levels, inside the contact of one press."""
     inside = _distance(pack, centre) <= edge
-    return _terms(centre, inside, ball) @ smooth - change[inside]
+    return _shades(centre, inside, smooth, ball)[0] - change[inside]
 
 
 def refined_centre(
@@ -134,16 +131,24 @@ def refined_centre(
     """The centre ``(2,)`` in pixels that explains one press best; Gauss-Newton steps of at most 1 px."""
     inside = _distance(pack, centre) <= edge
     for _ in range(steps):
-        left = _terms(centre, inside, ball) @ smooth - change[inside]
-        slopes = [
-            (_terms(centre + e, inside, ball) - _terms(centre - e, inside, ball)) @ smooth / (2 * _STEP)
-            for e in _STEP * np.eye(2)
-        ]
-        weight = np.sqrt(_huber(left))
-        jacobian = np.stack([(weight[:, None] * slope).ravel() for slope in slopes], axis=1)
-        step = -np.linalg.lstsq(jacobian, (weight[:, None] * left).ravel(), rcond=None)[0]
+        shade, by_normal = _shades(centre, inside, smooth, ball)
+        left = shade - change[inside]
+        weight = _huber(left)
+        jacobian = by_normal / -ball
+        normal = np.einsum("p,pca,pcb->ab", weight, jacobian, jacobian)
+        step = -np.linalg.solve(normal, np.einsum("p,pca,pc->a", weight, jacobian, left))
         centre = centre + step * min(1.0, 1.0 / max(float(np.linalg.norm(step)), 1e-12))
     return centre
+
+
+def _shades(
+    centre: FloatArray, inside: BoolArray, smooth: FloatArray, ball: float
+) -> tuple[FloatArray, FloatArray]:
+    place = np.argwhere(inside)
+    normal = (place[:, ::-1] - centre) / ball
+    shade, by_normal = np.empty((len(place), 3)), np.empty((len(place), 3, 2))
+    shades(smooth, normal, place, inside.shape[0], inside.shape[1], shade, by_normal)
+    return shade, by_normal
 
 
 def _coefficients(

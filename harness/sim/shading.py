@@ -8,7 +8,7 @@ the slopes that presses supported the normal is bent smoothly towards the limit.
 
 import numpy as np
 
-from harness.arrays import FloatArray
+from harness.arrays import FloatArray, IntArray
 from harness.sim.compiled import compiled
 from harness.sim.tactile_calibration import NORMAL_DEGREE, POSITION_DEGREE
 
@@ -23,8 +23,10 @@ def design(normal: FloatArray, position: FloatArray) -> FloatArray:
     """``(n, 120)`` the terms at ``(n, 2)`` normals and ``(n, 2)`` scaled positions."""
     powers = [(a, b) for a in range(NORMAL_DEGREE + 1) for b in range(NORMAL_DEGREE + 1 - a) if a + b]
     places = [(c, d) for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)]
-    slopes = np.stack([normal[:, 0] ** a * normal[:, 1] ** b for a, b in powers], axis=1)
-    where = np.stack([position[:, 0] ** c * position[:, 1] ** d for c, d in places], axis=1)
+    x, y = (np.vander(normal[:, k], NORMAL_DEGREE + 1, increasing=True) for k in range(2))
+    u, v = (np.vander(position[:, k], POSITION_DEGREE + 1, increasing=True) for k in range(2))
+    slopes = np.stack([x[:, a] * y[:, b] for a, b in powers], axis=1)
+    where = np.stack([u[:, c] * v[:, d] for c, d in places], axis=1)
     terms: FloatArray = (slopes[:, :, None] * where[:, None, :]).reshape(len(normal), -1)
     return terms
 
@@ -96,3 +98,34 @@ def softly_limited(sine: float, limit: float) -> float:
     room = limit - knee
     bent: float = knee + room * (1.0 - np.exp(-(sine - knee) / room))
     return bent
+
+
+@compiled
+def shades(
+    smooth: FloatArray,
+    normal: FloatArray,
+    place: IntArray,
+    rows: int,
+    columns: int,
+    out: FloatArray,
+    by: FloatArray,
+) -> None:
+    """Write the change of colour, and its derivatives by the normal, at chosen pixels.
+
+    Args:
+        smooth: ``(120, 3)`` coefficients.
+        normal: ``(n, 2)``.
+        place: ``(n, 2)`` row and column, in the order of the rows for speed.
+        rows: of the image.
+        columns: of the image.
+        out: ``(n, 3)`` overwritten.
+        by: ``(n, 3, 2)`` overwritten.
+    """
+    row, here = np.empty((3, 60)), np.empty(60)
+    last = -1
+    for k in range(len(normal)):
+        if place[k, 0] != last:
+            last = place[k, 0]
+            at_row(smooth, last, rows, row)
+        at_pixel(row, place[k, 1], columns, here)
+        colour_and_slope(here, normal[k, 0], normal[k, 1], out[k], by[k])

@@ -180,7 +180,7 @@ def load_calibration(path: Path) -> TactileCalibration:
     try:
         with np.load(path, allow_pickle=False) as archive:
             found = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, BadZipFile) as error:
+    except (OSError, EOFError, ValueError, BadZipFile) as error:
         raise CalibrationRefused(f"{path} does not read as a calibration: {error}") from error
     wanted = {"header", "background", "table", "support", "smooth"}
     if set(found) != wanted:
