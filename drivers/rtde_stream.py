@@ -5,6 +5,7 @@ the others, so a busy computer loses a tenth of them. This reader takes every pa
 the time at which it arrived, and the fields of one packet always belong together.
 """
 
+import contextlib
 import socket
 import struct
 from collections.abc import Iterator
@@ -51,15 +52,18 @@ class RtdeStream:
         self.rate = rate
         self._address = address
         self._waiting = b""
-        try:
-            self._socket = socket.create_connection((address, PORT), timeout=CONNECT_WITHIN)
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._agree(rate)
-        except OSError as error:
-            raise BenchFault(
-                f"the arm at {address}: no state on port {PORT} ({error}); check the network cable of the "
-                "control box"
-            ) from error
+        with contextlib.ExitStack() as undo:
+            try:
+                self._socket = socket.create_connection((address, PORT), timeout=CONNECT_WITHIN)
+                undo.callback(self._socket.close)
+                self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._agree(rate)
+            except OSError as error:
+                raise BenchFault(
+                    f"the arm at {address}: no state on port {PORT} ({error}); check the network cable of "
+                    "the control box"
+                ) from error
+            undo.pop_all()
         self._socket.settimeout(SILENT)
 
     def close(self) -> None:
@@ -72,7 +76,11 @@ class RtdeStream:
         Raises:
             BenchFault: the controller closed the connection.
         """
+        time = now()
         while True:
+            for kind, payload in self._whole_packages():
+                if kind == _DATA and len(payload) == _SAMPLE.size:
+                    yield _packet(payload, time)
             try:
                 arrived = self._socket.recv(1 << 16)
             except TimeoutError:
@@ -84,9 +92,6 @@ class RtdeStream:
                 raise BenchFault(self._closed("end of file"))
             time = now()
             self._waiting += arrived
-            for kind, payload in self._whole_packages():
-                if kind == _DATA and len(payload) == _SAMPLE.size:
-                    yield _packet(payload, time)
 
     def _agree(self, rate: float) -> None:
         """Version 2, the quantities wanted, start."""

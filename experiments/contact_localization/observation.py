@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from harness.sim.inverse import invert
 
 from experiments.contact_localization.grid import Contact
 from experiments.contact_localization.model import Model
@@ -13,6 +12,7 @@ from harness.arrays import ByteArray, FloatArray, read_only
 from harness.errors import DataRefused
 from harness.geometry import rotation_from_quaternion, transform
 from harness.reading import Reading
+from harness.sim.inverse import invert
 
 IMAGE = "gel.image"
 POSE = "arm.base_from_flange"

@@ -9,11 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.arrays import AnyArray, FloatArray, IntArray, read_only
+from harness.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only
 from harness.sim.compiled import compiled
 
+_CORE = 0.2
 _SUNKEN = -6.0e-3
 """Where the object is farther than this below its highest place, or absent, the gel reads nothing."""
+
+
+LEVEL_SLOPE = 0.06
+"""Mean slope of a pixel below which it may be the gel at rest."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +52,15 @@ class TouchMap:
         pitch: metres.
         touched: ``(n, 2)`` row and column of the pixels surely in contact; empty for a contact
             that the image does not show.
+        flat: ``(rows, columns)`` where the gel is level: pressed by something level, or at rest
+            beyond an edge too steep for its height to be read from the colour.
         blur: ``(m,)`` one half of the skirt's kernel, from its centre out.
     """
 
     heights: FloatArray
     pitch: float
     touched: IntArray
+    flat: BoolArray
     blur: FloatArray
 
 
@@ -105,8 +113,20 @@ def touch_map(heights: FloatArray, pitch: float, block: int, skirt: float, thres
     kernel = np.exp(-0.5 * (np.arange(reach + 1) * coarse_pitch / skirt) ** 2)
     kernel /= kernel[0] + 2.0 * kernel[1:].sum()
     return TouchMap(
-        read_only(np.ascontiguousarray(coarse)), coarse_pitch, read_only(touched), read_only(kernel)
+        read_only(np.ascontiguousarray(coarse)),
+        coarse_pitch,
+        read_only(touched),
+        read_only(_level(cut, pitch, block) & (coarse > 0.0)),
+        read_only(kernel),
     )
+
+
+def _level(heights: FloatArray, pitch: float, block: int) -> BoolArray:
+    down, right = np.gradient(heights, pitch)
+    steep = np.hypot(down, right)
+    rows, columns = heights.shape[0] // block, heights.shape[1] // block
+    mean = steep.reshape(rows, block, columns, block).mean(axis=(1, 3))
+    return np.asarray(mean < LEVEL_SLOPE)
 
 
 def view_scores(view: View, touch: TouchMap, noise: TouchNoise, pixels: IntArray) -> None:
@@ -118,6 +138,7 @@ def view_scores(view: View, touch: TouchMap, noise: TouchNoise, pixels: IntArray
         touch.heights,
         touch.pitch,
         touch.touched,
+        touch.flat,
         touch.blur,
         noise.rms,
         noise.tilt,
@@ -164,6 +185,7 @@ def touch_terms(
         touch.heights,
         touch.pitch,
         touch.touched,
+        touch.flat,
         touch.blur,
         noise.rms,
         noise.tilt,
@@ -229,7 +251,7 @@ def _similarities(
     behind: float,
 ) -> FloatArray:
     rows, columns = heights.shape
-    crop, work = np.empty(heights.shape), np.empty(heights.shape)
+    crop, work, kept = np.empty(heights.shape), np.empty(heights.shape), np.empty(heights.shape)
     result = np.zeros(len(places))
     for n in range(len(places)):
         column = int(np.round((places[n, 0] - origin[0]) / view_pitch))
@@ -244,7 +266,7 @@ def _similarities(
         for i in range(rows):
             for j in range(columns):
                 crop[i, j] = max(0.0, crop[i, j] - lift)
-        _blur(crop, blur, work)
+        _hang(crop, blur, work, kept)
         both = np.sqrt(np.sum(crop * crop) * np.sum(heights * heights))
         if both > 0.0:
             result[n] = max(0.0, np.sum(crop * heights) / both)
@@ -300,11 +322,13 @@ def _score(
     heights: FloatArray,
     pitch: float,
     touched: IntArray,
+    flat: BoolArray,
     blur: FloatArray,
     rms: float,
     tilt: float,
     crop: FloatArray,
     work: FloatArray,
+    kept: FloatArray,
 ) -> tuple[float, float]:
     """The term at one pixel, and the depth of the gel's centre above it, along the view."""
     rows, columns = heights.shape
@@ -338,13 +362,28 @@ def _score(
         for j in range(columns):
             x = (j + 0.5 - 0.5 * columns) * pitch
             crop[i, j] = max(0.0, crop[i, j] - plane[0] - plane[1] * x - plane[2] * y)
-    _blur(crop, blur, work)
+    _hang(crop, blur, work, kept)
     total = 0.0
     for i in range(rows):
         for j in range(columns):
-            total += (crop[i, j] - heights[i, j]) ** 2
+            gap = crop[i, j] - heights[i, j]
+            if flat[i, j]:
+                gap = min(np.abs(gap), crop[i, j])
+            total += gap * gap
     cost = total / (len(touched) * rms * rms) + (plane[1] ** 2 + plane[2] ** 2) / (tilt * tilt)
     return -0.5 * cost, reference - plane[0]
+
+
+@compiled
+def _hang(image: FloatArray, kernel: FloatArray, work: FloatArray, kept: FloatArray) -> None:
+    """The gel's skirt: blurred, with what the object surely shapes put back (Taxim, section III-A)."""
+    core = _CORE * image.max()
+    kept[:] = image
+    _blur(image, kernel, work)
+    for i in range(image.shape[0]):
+        for j in range(image.shape[1]):
+            if kept[i, j] > core:
+                image[i, j] = kept[i, j]
 
 
 @compiled
@@ -372,17 +411,18 @@ def _fill(
     heights: FloatArray,
     pitch: float,
     touched: IntArray,
+    flat: BoolArray,
     blur: FloatArray,
     rms: float,
     tilt: float,
     pixels: AnyArray,
 ) -> None:
-    crop, work = np.empty(heights.shape), np.empty(heights.shape)
+    crop, work, kept = np.empty(heights.shape), np.empty(heights.shape), np.empty(heights.shape)
     for n in range(len(pixels)):
         r, c = pixels[n, 0], pixels[n, 1]
         if np.isnan(score[r, c]):
             score[r, c], gel_depth[r, c] = _score(
-                depth, r, c, heights, pitch, touched, blur, rms, tilt, crop, work
+                depth, r, c, heights, pitch, touched, flat, blur, rms, tilt, crop, work, kept
             )
 
 
@@ -398,6 +438,7 @@ def _terms(
     heights: FloatArray,
     pitch: float,
     touched: IntArray,
+    flat: BoolArray,
     blur: FloatArray,
     rms: float,
     tilt: float,
@@ -409,7 +450,7 @@ def _terms(
     cap: float,
     temperature: float,
 ) -> FloatArray:
-    crop, work = np.empty(heights.shape), np.empty(heights.shape)
+    crop, work, kept = np.empty(heights.shape), np.empty(heights.shape), np.empty(heights.shape)
     terms = np.empty(len(places))
     around = np.empty((2 * rings + 1) ** 2)
     # What the shifts' prior leaves on a grid of cells, so that a sure match costs nothing.
@@ -431,7 +472,7 @@ def _terms(
                     continue
                 if np.isnan(score[r, c]):
                     score[r, c], gel_depth[r, c] = _score(
-                        depth, r, c, heights, pitch, touched, blur, rms, tilt, crop, work
+                        depth, r, c, heights, pitch, touched, flat, blur, rms, tilt, crop, work, kept
                     )
                 if score[r, c] == -np.inf:
                     continue
