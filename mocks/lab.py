@@ -32,7 +32,7 @@ from harness.gap import load_gap
 from harness.kinematics import forward
 from mocks.faults import parse
 from mocks.gelsight_stream import MjpegServer
-from mocks.lab_processes import CAMERA_PORT, GEL_PORT, Child, Line, free_address
+from mocks.lab_processes import CAMERA_PORT, GEL_PORT, Child, Line, free_address, keep_time
 from mocks.lab_scene import read_lab_scene
 from mocks.shared_pose import Mark, SharedPose
 from mocks.truth import TruthFile
@@ -199,6 +199,7 @@ def _controller(world: World, model: str, shared: SharedPose, seed: int) -> Call
         shared.set_pose(np.array(base_from_flange))
 
     def run(address: str, line: Line) -> None:
+        keep_time()
         serve(
             ControllerConfig(host=address, model=model, seed=seed),
             Push(),
