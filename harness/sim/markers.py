@@ -11,5 +11,5 @@ def move_markers(indentation: FloatArray, sensor: TactileSensor) -> FloatArray:
         NotImplementedError: always; no sensor that ships has markers.
     """
     raise NotImplementedError(
-        f"move_markers: the dots of {sensor.name} cannot be simulated yet; {len(indentation)} contacts were asked"
+        f"move_markers: the dots of {sensor.name} are not simulated yet ({len(indentation)} contacts asked)"
     )
