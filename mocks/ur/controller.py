@@ -51,6 +51,7 @@ class Controller:
         self._on_cycle = on_cycle
         self._step = step
         self._motions = 0
+        self._feel()
 
     def cycle(self) -> None:
         """2 ms of the controller's time."""

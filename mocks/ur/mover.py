@@ -129,9 +129,11 @@ class Mover:
         self.history.append(self.joints)
 
     def finish(self, motion: Motion) -> None:
-        """A move has come to rest."""
+        """A move has come to rest: its last step's mean speed is over."""
         if self._motion is motion:
             self._motion, self._owner = None, 0
+            self._still = 1
+            self.speeds, self.twist = (0.0,) * 6, _AT_REST
 
     def hold(self) -> None:
         """Stand still at once: the brakes close."""

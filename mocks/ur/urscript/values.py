@@ -7,6 +7,11 @@ from typing import Any, Final
 
 from mocks.ur.urscript.errors import ScriptError
 
+INT32: Final = 2**31
+"""Whole numbers from here on become floating-point ones, as whole numbers are 32 bits wide."""
+
+LONGEST_STRING: Final = 10_000
+
 
 class Pose(list[float]):
     """Six numbers that name a place rather than joint angles."""
@@ -91,10 +96,17 @@ def _position(target: list[Any], index: Any) -> int:
 def _arithmetic(apply: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     def checked(a: Any, b: Any) -> Any:
         if type(a) is str and type(b) is str and apply is operator.add:
-            return a + b
-        return apply(number(a), number(b))
+            return _joined(a, b)
+        result = apply(number(a), number(b))
+        return result if type(result) is not int or -INT32 <= result < INT32 else float(result)
 
     return checked
+
+
+def _joined(a: str, b: str) -> str:
+    if len(a) + len(b) > LONGEST_STRING:
+        raise ScriptError(f"a string of {len(a) + len(b)} letters; {LONGEST_STRING} is the limit")
+    return a + b
 
 
 def _divide(a: Any, b: Any) -> float:
