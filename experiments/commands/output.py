@@ -12,7 +12,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from harness.step_file import Step
 
 CONSOLE = Console(stderr=True, highlight=False, soft_wrap=True)
-ANSWERS = Console(highlight=False, soft_wrap=True)
+WIDE = 132
+"""Columns of a table where standard output is no terminal."""
+
+ANSWERS = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else WIDE)
 
 
 def emit(result: Mapping[str, Any]) -> None:
