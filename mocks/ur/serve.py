@@ -13,8 +13,8 @@ give it a process of its own. ::
         on_ready=line.ready,                  # once, when all ports listen
     )
 
-The controller's cycles keep an absolute schedule of 2 ms; those that are late are made up for one
-by one, so the stream of time stamps has no gaps.
+The controller's cycles keep an absolute schedule of 2 ms; those that are a little late are made up
+for one by one, so the stream of time stamps has no gaps.
 """
 
 import asyncio
@@ -40,8 +40,9 @@ _STOP_EVERY: Final = 25
 _BURST: Final = 4
 """Late cycles made up for before the ports are served again."""
 
-_LATEST: Final = 1.0
-"""s; where the machine slept for longer, its lost time is not made up for."""
+_LATEST: Final = 0.02
+"""s of delay that are made up for. Where the machine stood still for longer, so did the clients, and
+the controller's clock stands still with them: else it would run past the watchdogs they kick."""
 
 _SWITCH_INTERVAL: Final = 5e-4
 """s that the translating thread may hold the interpreter while a cycle is due."""

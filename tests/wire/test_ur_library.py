@@ -69,7 +69,7 @@ def test_the_stream_keeps_its_rate(mock: UrProcess, rate: float, seconds: float)
     steps = np.diff(stamps) * rate
     # a busy machine shows two packets at once; never a stamp between the grid's
     assert np.abs(steps - np.round(steps)).max() < 1e-5
-    assert stamps[-1] - stamps[0] == pytest.approx(elapsed, abs=0.25)
+    assert 0.5 * elapsed < stamps[-1] - stamps[0] < elapsed + 0.05
 
 
 def test_two_controllers_side_by_side_move_at_the_same_time(receive: Any, control: Any) -> None:
