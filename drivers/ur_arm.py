@@ -18,7 +18,6 @@ from drivers import paths, pipe, safety, ur_state, ur_words
 from drivers.safety import SafetyLimits
 from drivers.ur_process import rate_of
 from drivers.ur_session import UrSession
-from harness import kinematics
 from harness.arrays import FloatArray
 from harness.clock import now
 from harness.device import ArmState, Health
@@ -30,7 +29,6 @@ ANSWER_WITHIN: Final = 2.0  # s
 MOTION_SPARE: Final = 3.0  # s beyond the time a motion should take, before the child gives up
 KILL_SPARE: Final = 1.5  # s beyond that, before the child is killed
 SEEN_WITHIN: Final = 0.3  # s for an output or a zeroed sensor to show in the stream
-SAME_POSE: Final = 5e-3  # m between the model's flange and the controller's
 SETTLED: Final = 1e-6  # rad or m; a target this close is where the arm is
 
 
@@ -81,7 +79,7 @@ class UrArm:
         self._contact = None
         self._session = UrSession(self.address, self._command, self.rate, self._lock_folder)
         try:
-            self._require_model()
+            ur_state.require_model(self.model, self.address, self.state())
         except BaseException:
             self.close()
             raise
@@ -296,16 +294,4 @@ class UrArm:
             raise SafetyStop(
                 f"zero the force sensor: the flange is {1e3 * away:.1f} mm from the last contact; it must be "
                 f"{1e3 * clear:g} mm or more: retreat first, or the force of the contact would become zero"
-            )
-
-    def _require_model(self) -> None:
-        """The station's model, the controller's pose and its zero tool offset agree."""
-        state = self.state()
-        expected = kinematics.forward(self.model, state.joints)
-        off = float(np.linalg.norm(expected[:3, 3] - state.base_from_flange[:3, 3]))
-        if off > SAME_POSE:
-            raise BenchFault(
-                f"the flange of a {self.model} with these joints is {1e3 * off:.1f} mm from where the "
-                f"controller at {self.address} says it is (limit {1e3 * SAME_POSE:g} mm): the station file "
-                "names another model, or the controller keeps a tool offset"
             )

@@ -19,19 +19,17 @@ from drivers.safety import require_loopback
 from drivers.ur_link import Link
 from drivers.ur_motion import Motion, Outcome
 from drivers.ur_stream import Stream
+from drivers.ur_watchdog import Watchdog
 from harness.arrays import FloatArray
 from harness.clock import now
 from harness.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
 
-KICK_PERIOD: Final = 0.02  # s; five kicks in the 0.1 s that the watchdog waits
-STARVED: Final = 0.08  # s between two kicks; the watchdog may have ended the script
-STARVED_LATELY: Final = 0.2  # s
 TICK: Final = 0.002  # s between looks at a motion
 REST_TICK: Final = 0.01
 STALE: Final = 0.05  # s without a packet: nothing is commanded, the watchdog is not kicked
 LOST_MOVING: Final = 0.5  # s without a packet during a motion: give up
 LOST_AT_REST: Final = 2.0
-BEAT_LATE: Final = 0.15  # s without a heartbeat during a motion: stop
+BEAT_LATE: Final = 0.3  # s without a heartbeat during a motion: stop
 LAST_WORDS: Final = 1.5  # s that this process may take to stop the arm when its parent is gone
 
 
@@ -49,9 +47,7 @@ class Child:
         self._closed = False
         self._epoch = 0
         self._beat = now()
-        self._kicked = now()
-        self._starved = -STARVED_LATELY
-        self._script_ran = True
+        self._watchdog = Watchdog(link)
 
     def run(self, model: str) -> None:
         """Connect, then serve until the parent closes the pipe or the link is lost."""
@@ -63,7 +59,7 @@ class Child:
         except TouchstoneError as error:
             self._refuse(0, error)
             return
-        self._kicked = now()
+        self._watchdog.start()
         self._answer(0, [controller.model, controller.serial, controller.version])
         try:
             while not self._closed:
@@ -146,7 +142,7 @@ class Child:
             raise self._latched
         if self._motion is not None:
             raise BenchFault(f"the arm was asked to {what} during a motion; wait for it to end")
-        if self._stream.age > STALE:
+        if not self._becomes_fresh(LOST_MOVING):
             raise BenchFault(
                 f"the arm was asked to {what}, but its state is {1e3 * self._stream.age:.0f} ms old "
                 f"(limit {1e3 * STALE:.0f} ms); check the load of this computer and the network"
@@ -159,6 +155,13 @@ class Child:
             self._kick()
             time.sleep(TICK)
         return self._stream.at_rest
+
+    def _becomes_fresh(self, seconds: float) -> bool:
+        """Whether the arm's state is, or within some seconds becomes, fresh enough to command on."""
+        end = now() + seconds
+        while self._stream.age > STALE and now() < end:
+            time.sleep(TICK)
+        return self._stream.age <= STALE
 
     # What goes on meanwhile
 
@@ -200,25 +203,15 @@ class Child:
             dashboard.stop(self._link.address)
 
     def _check_script(self) -> None:
-        """Start the script again if this computer's own delay let the watchdog end it, at rest.
+        """Start the script again if this computer's own delay let the watchdog end it; at rest only.
 
-        A script that ended for any other reason (the stop button at the pendant) stays ended.
+        A motion it was cut out of has failed, and was told so.
         """
-        ran, self._script_ran = self._script_ran, self._link.program_running()
-        starved = now() - self._starved < STARVED_LATELY or now() - self._kicked > STARVED
-        if (
-            not ran
-            or self._script_ran
-            or not starved
-            or self._motion is not None
-            or self._latched is not None
-        ):
-            return
-        self._link.revive()
-        self._link.kick()
-        self._kicked = now()
-        self._script_ran = True
-        self._stream.restarts += 1
+        self._watchdog.look()
+        if self._watchdog.bit and not self._motion and not self._latched and self._stream.at_rest:
+            self._link.revive()
+            self._watchdog.start()
+            self._stream.restarts += 1
 
     def _check_link(self) -> None:
         if self._stream.failure:
@@ -231,12 +224,8 @@ class Child:
             )
 
     def _kick(self) -> None:
-        if now() - self._kicked < KICK_PERIOD or self._stream.age > STALE:
-            return
-        if now() - self._kicked > STARVED:
-            self._starved = now()
-        self._link.kick()
-        self._kicked = now()
+        if self._stream.age <= STALE:
+            self._watchdog.kick()
 
     # The pipe
 

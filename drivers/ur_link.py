@@ -3,7 +3,9 @@
 Each call's result is checked: where ur_rtde says False, the controller's own state says why.
 """
 
+import itertools
 import time
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
@@ -36,6 +38,7 @@ class Link:
         self.rate = rate
         self._stream: Any = None
         self._newest: FloatArray | None = None
+        self._kicks: deque[float] = deque([now()], maxlen=50)
         self._control: Any = None
         self._io: Any = None
 
@@ -72,7 +75,13 @@ class Link:
 
     def kick(self) -> None:
         """Tell the watchdog that this program is well."""
+        self._kicks.append(now())
         self._control.kickWatchdog()
+
+    def longest_silence(self) -> float:
+        """Seconds, the longest that the watchdog had to wait of late."""
+        times = [*self._kicks, now()]
+        return max(later - earlier for earlier, later in itertools.pairwise(times))
 
     def start_joints(self, joints: list[float], speed: float, acceleration: float) -> None:
         """Start a joint motion and return."""
@@ -129,6 +138,9 @@ class Link:
             f"the controller says: safety {words}, program {ur_words.RUNTIME_STATES.get(state, 'unknown')}, "
             f"robot {ur_words.ROBOT_MODES.get(mode, 'unknown')}"
         )
+        if state != ur_words.PLAYING and self.longest_silence() > 0.8 / WATCHDOG_HZ:
+            silence = 1e3 * self.longest_silence()
+            text += f", its watchdog kept waiting for {silence:.0f} ms (limit {1e3 / WATCHDOG_HZ:.0f} ms)"
         return BenchFault(text) if words in ur_words.MAY_MOVE else ProtectiveStop(text)
 
     def _check(self, accepted: object, what: str) -> None:

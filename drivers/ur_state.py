@@ -1,10 +1,14 @@
 """From packets of the arm's stream to states and readings; UR's rotation vectors end here."""
 
+from typing import Final
+
 import numpy as np
 
 from drivers import pipe, ur_words
+from harness import kinematics
 from harness.arrays import FloatArray
 from harness.device import ArmState
+from harness.errors import BenchFault
 from harness.geometry import (
     quaternion_from_rotation,
     rotation_from_vector,
@@ -12,6 +16,8 @@ from harness.geometry import (
     vector_from_rotation,
 )
 from harness.reading import Channel, Reading
+
+SAME_POSE: Final = 5e-3  # m between the model's flange and the controller's
 
 
 def pose_vector(base_from_flange: FloatArray) -> list[float]:
@@ -77,3 +83,15 @@ def stopped_by_controller(packet: FloatArray, during: str) -> str:
         f"base, force ({fx:.1f}, {fy:.1f}, {fz:.1f}) N. Look for the cause, free the arm and release the "
         "stop at the pendant, then start again; nothing resumes by itself"
     )
+
+
+def require_model(model: str, address: str, state: ArmState) -> None:
+    """The station's model, the controller's pose and its zero tool offset agree, or ``BenchFault``."""
+    expected = kinematics.forward(model, state.joints)
+    off = float(np.linalg.norm(expected[:3, 3] - state.base_from_flange[:3, 3]))
+    if off > SAME_POSE:
+        raise BenchFault(
+            f"the flange of a {model} with these joints is {1e3 * off:.1f} mm from where the controller at "
+            f"{address} says it is (limit {1e3 * SAME_POSE:g} mm): the station file names another model, or "
+            "the controller keeps a tool offset"
+        )

@@ -217,3 +217,27 @@ def test_no_process_is_left_after_closing(arm: UrArm) -> None:
     pid = child_pid(arm)
     arm.close()
     assert gone(pid, 0.5)
+
+
+def freeze(pid: int, seconds: float) -> None:
+    os.kill(pid, signal.SIGSTOP)
+    time.sleep(seconds)
+    os.kill(pid, signal.SIGCONT)
+
+
+def test_a_delay_at_rest_that_wakes_the_watchdog_is_mended_and_told(arm: UrArm) -> None:
+    freeze(child_pid(arm), 0.25)
+    time.sleep(0.6)
+    arm.move_joints(READY + 0.02, 0.2, 1.5)
+    assert "restarted 1 times" in arm.health().detail
+
+
+def test_a_delay_in_flight_fails_the_motion_and_only_that(arm: UrArm, far_end: FarEnd) -> None:
+    motion = InFlight(arm)
+    freeze(child_pid(arm), 0.25)
+    error = motion.join()
+    assert isinstance(error, BenchFault)
+    assert "watchdog kept waiting" in str(error)
+    assert comes_to_rest(far_end, 1.0)
+    time.sleep(0.6)
+    arm.move_joints(READY, 0.2, 1.5)

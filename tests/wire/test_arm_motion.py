@@ -182,7 +182,7 @@ def test_limits_refuse_before_anything_moves(arm: UrArm, far_end: FarEnd) -> Non
 def test_history_covers_the_motion_packet_by_packet(arm: UrArm) -> None:
     began = time.monotonic()
     arm.move_joints(READY + 0.05, 0.1, 1.0)
-    joints, _, _, clock = arm.history(time.monotonic() - began)
+    joints, _, _, clock = arm.history(time.monotonic() - began + 0.05)
     assert np.all(np.diff(joints.times) >= 0)
     assert np.abs(np.diff(clock.values) - 0.002).max() < 1e-9
     assert np.abs(joints.values[0] - READY).max() < 1e-6
