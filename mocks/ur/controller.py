@@ -129,22 +129,15 @@ class Controller:
             (self.player.stop if watchdog.action == "stop" else self.player.pause)()
 
     def _move(self) -> None:
-        mover = self.robot.mover
-        scaling = self.robot.outputs.slider if self.player.state is RuntimeState.PLAYING else 1.0
+        robot, mover = self.robot, self.robot.mover
+        scaling = robot.outputs.slider if self.player.state is RuntimeState.PLAYING else 1.0
         try:
             mover.advance(CYCLE * scaling)
         except MotionFault as fault:
-            self.protective_stop(str(fault))
-            if self.robot.safety.mode is SafetyMode.PROTECTIVE_STOP and not self._can_brake():
-                mover.hold()
-
-    def _can_brake(self) -> bool:
-        """Whether the arm can slow down where it is; else its brakes close."""
-        try:
-            self.robot.mover.advance(CYCLE)
-        except MotionFault:
-            return False
-        return True
+            if robot.safety.mode is SafetyMode.NORMAL:
+                self.protective_stop(str(fault))
+            else:
+                mover.hold()  # there is no room to brake in
 
     def _feel(self) -> None:
         robot = self.robot

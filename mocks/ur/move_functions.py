@@ -122,7 +122,7 @@ class MoveFunctions:
     def _require_free(self) -> None:
         if self._robot.thread <= 0:
             raise ScriptError("a secondary program must not move the arm")
-        if self._mover.owner not in (0, -1, self._robot.thread):
+        if self._mover.owner not in (0, self._robot.thread):
             raise ScriptError("another thread is already controlling the robot")
 
     def _joints(self, value: Any, what: str) -> Six:

@@ -18,10 +18,12 @@ SAFETY_STOP: Final = 20.0
 HISTORY: Final = 500
 STEADY_CYCLES: Final = 50
 TCP_SPEED_LIMIT: Final = 1.5
-"""m/s, the least restricted of the e-Series' factory safety presets."""
+"""m/s; a setting of the safety configuration on a real controller."""
+
+_CONTROLLER: Final = -1
+"""Owner of the stops that the controller makes by itself; threads are numbered from 1."""
 
 _AT_REST: Final[Twist] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-_STILL: Final = 1e-9
 
 
 class MotionFault(Exception):
@@ -87,8 +89,8 @@ class Mover:
 
     @property
     def owner(self) -> int:
-        """The thread that moves the arm; 0 where none does."""
-        return self._owner if self._motion is not None else 0
+        """The thread that moves the arm; 0 where none does, or where the controller stops it."""
+        return max(self._owner, 0) if self._motion is not None else 0
 
     def begin(self, motion: Motion, owner: int) -> None:
         """Take the arm over, from wherever it is and at whatever speed."""
@@ -107,7 +109,7 @@ class Mover:
     def brake(self, deceleration: float) -> None:
         """Stop; nobody's motion any more."""
         if self._motion is not None or self._still == 0:
-            self.begin(StopJoints(deceleration), -1)
+            self.begin(StopJoints(deceleration), _CONTROLLER)
 
     def advance(self, seconds: float) -> None:
         """One cycle, ``seconds`` long where nothing slows the program down.
@@ -120,9 +122,9 @@ class Mover:
         if motion is not None:
             if self._owner == 0:
                 motion = self._motion = StopJoints(PROGRAM_STOP)
-                self._owner = -1
+                self._owner = _CONTROLLER
             motion.advance(self, seconds)
-            if motion.done and (self._owner == -1):
+            if motion.done and self._owner == _CONTROLLER:
                 self._motion = None
         self._differentiate(*before)
         self.moving_cycles += 1
@@ -137,7 +139,7 @@ class Mover:
 
     def hold(self) -> None:
         """Stand still at once: the brakes close."""
-        self._motion, self._suspended = None, None
+        self._motion = None
 
     def suspend(self) -> None:
         """Stop as fast as the controller may; the motion can be taken up again."""

@@ -8,7 +8,7 @@ UNLOCK_AFTER: Final = 5.0
 """s from a protective stop to when it may be unlocked."""
 
 FORCE_LIMIT: Final = 150.0
-"""N at the tool; the least restricted of the e-Series' factory safety presets allows 250, the default 150."""
+"""N at the tool; a setting of the safety configuration on a real controller."""
 
 
 class RobotMode(IntEnum):

@@ -35,9 +35,12 @@ class ScriptServer:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def close(self) -> None:
-        """End the worker."""
+    async def close(self) -> None:
+        """End the worker; what was not translated yet is not run."""
         self._worker.shutdown(wait=False, cancel_futures=True)
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def _run(self, text: str) -> None:
         controller = self._controller

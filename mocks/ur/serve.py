@@ -96,7 +96,7 @@ async def _serve(
     dashboard, dashboards = Dashboard(controller), set[DashboardConnection]()
     faults = Faults(controller, rtde, scripts, dashboards)
     async with contextlib.AsyncExitStack() as stack:
-        stack.callback(scripts.close)
+        stack.push_async_callback(scripts.close)
         await _listen(stack, controller, DASHBOARD_PORT, lambda: DashboardConnection(dashboard, dashboards))
         for port in SCRIPT_PORTS:
             await _listen(stack, controller, port, lambda: ScriptConnection(scripts))

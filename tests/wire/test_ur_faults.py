@@ -55,15 +55,15 @@ def _moving(receive: Any) -> bool:
     return any(receive.getTargetQd())
 
 
-def test_a_protective_stop_pauses_latches_and_is_unlocked_after_five_seconds(
+def test_a_protective_stop_latches_and_nothing_resumes_by_itself(
     mock: UrProcess, receive: Any, control: Any
 ) -> None:
     assert control.moveJ(FAR.tolist(), 0.5, 4.0, True)
     wait_until(lambda: _moving(receive), 1.0)
     time.sleep(0.2)
-    stopped_at = receive.getTimestamp()
-    mock.cue("protective_stop")
+    control.triggerProtectiveStop()  # the script that would confirm it is paused
     wait_until(receive.isProtectiveStopped, 0.5)
+    stopped_at = receive.getTimestamp()
     assert receive.getSafetyMode() == 3
     assert receive.getSafetyStatusBits() == 1 << 2 | 1 << 10
     assert receive.getRuntimeState() == 4
@@ -71,37 +71,19 @@ def test_a_protective_stop_pauses_latches_and_is_unlocked_after_five_seconds(
     resting = receive.getActualQ()
     assert not control.moveJ(HOME.tolist())
 
-    refusal = "Cannot unlock protective stop until 5s after occurrence. "
-    assert mock.ask("unlock protective stop").startswith(refusal)
     assert mock.ask("close safety popup") == "closing safety popup"
+    assert mock.ask("unlock protective stop").startswith(
+        "Cannot unlock protective stop until 5s after occurr"
+    )
     assert mock.ask("play") == "Failed to execute: play"
-    assert receive.getActualQ() == resting
-    wait_until(lambda: receive.getTimestamp() > stopped_at + 5.2, 8.0)
+    assert mock.ask("stop") == "Stopped"
+    wait_until(lambda: receive.getTimestamp() > stopped_at + 5.1, 10.0)
     assert mock.ask("unlock protective stop") == "Protective stop releasing"
     wait_until(lambda: not receive.isProtectiveStopped(), 0.5)
-    assert receive.getActualQ() == resting
-
-    assert mock.ask("play") == "Starting program"  # takes the interrupted move up again
-    wait_until(lambda: np.abs(receive.getActualQ() - FAR).max() < 1e-9, 4.0)
-
-
-def test_after_a_protective_stop_the_program_can_be_ended_and_started_afresh(
-    mock: UrProcess, receive: Any, control: Any
-) -> None:
-    assert control.moveJ(FAR.tolist(), 0.5, 4.0, True)
-    wait_until(lambda: _moving(receive), 1.0)
-    assert control.triggerProtectiveStop() in (True, False)  # the script that would confirm it is paused
-    wait_until(receive.isProtectiveStopped, 0.5)
-    begin = receive.getTimestamp()
-    assert mock.ask("stop") == "Stopped"
-    wait_until(lambda: receive.getRuntimeState() == 1, 0.5)
-    wait_until(lambda: receive.getTimestamp() > begin + 5.2, 8.0)
-    assert mock.ask("unlock protective stop") == "Protective stop releasing"
-    resting = receive.getActualQ()
     assert control.reuploadScript()
     wait_until(control.isProgramRunning, 2.0)
     time.sleep(0.2)
-    assert receive.getActualQ() == resting  # nothing resumes by itself
+    assert receive.getActualQ() == resting
     assert control.moveJ(HOME.tolist(), 1.0, 4.0)
 
 

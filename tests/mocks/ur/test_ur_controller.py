@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from mocks.ur.controller import Controller
-from mocks.ur.dashboard import LOCAL, Dashboard
+from mocks.ur.dashboard import LOCAL, TOO_EARLY, Dashboard
 from mocks.ur.hooks import CYCLE, HOME, ControllerConfig, Six
 from mocks.ur.plane import PlaneContact
 from mocks.ur.player import RuntimeState
@@ -216,6 +216,23 @@ def test_a_paused_move_is_taken_up_again_where_it_was() -> None:
     assert dashboard.reply("pause") == "Pausing program"
     joints = _run(controller, 1.0)
     assert joints[-1, 0] == joints[-200, 0]
+    assert dashboard.reply("play") == "Starting program"
+    _run_until_stopped(controller)
+    assert controller.robot.mover.joints == (1.0, *HOME[1:])
+
+
+def test_after_a_protective_stop_play_takes_the_interrupted_move_up_again() -> None:
+    controller = _controller(f"movej({FAR}, a=2.0, v=0.5)")
+    dashboard = Dashboard(controller)
+    _run(controller, 1.0)
+    controller.protective_stop("the test asks for it")
+    joints = _run(controller, 4.9)
+    assert joints[-1, 0] == joints[100, 0]
+    assert dashboard.reply("unlock protective stop") == TOO_EARLY
+    _run(controller, 0.1)
+    assert dashboard.reply("play") == "Failed to execute: play"
+    assert dashboard.reply("unlock protective stop") == "Protective stop releasing"
+    assert (_run(controller, 0.5)[:, 0] == joints[-1, 0]).all()
     assert dashboard.reply("play") == "Starting program"
     _run_until_stopped(controller)
     assert controller.robot.mover.joints == (1.0, *HOME[1:])
