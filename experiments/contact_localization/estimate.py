@@ -109,7 +109,7 @@ def each_estimate(
         raise WrongUse("no contacts were given; a run needs at least one")
     levels, noise = accuracy or Levels(), noise or Noise()
     started = time.perf_counter()
-    contacts = read_contacts(observations, model, levels.block, noise.touch.skirt)
+    contacts = read_contacts(observations, model, levels.block, noise.touch)
     images = time.perf_counter() - started
     return locate(contacts, model, prior, levels, noise, seed, first, images)
 

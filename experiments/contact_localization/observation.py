@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.contact_localization.grid import Contact
 from experiments.contact_localization.model import Model
-from experiments.contact_localization.touch import touch_map
+from experiments.contact_localization.touch import TouchNoise, touch_map
 from harness.arrays import ByteArray, FloatArray, read_only
 from harness.errors import DataRefused
 from harness.geometry import rotation_from_quaternion, transform
@@ -49,7 +49,7 @@ class Observation:
 
 
 def read_contacts(
-    observations: Sequence[Observation], model: Model, block: int, skirt: float
+    observations: Sequence[Observation], model: Model, block: int, noise: TouchNoise
 ) -> tuple[Contact, ...]:
     """Recover each contact's height map and average it into the map that is compared.
 
@@ -57,12 +57,12 @@ def read_contacts(
         observations: the contacts.
         model: gives the sensor and its calibration.
         block: tactile pixels a side of one compared pixel.
-        skirt: metres, sigma of the gel's blur.
+        noise: gives the gel's blurs.
     """
     return tuple(
         Contact(
             observation.base_from_gel,
-            touch_map(height_map(observation, model), model.sensor.pitch, block, skirt, CONTACT_THRESHOLD),
+            touch_map(height_map(observation, model), model.sensor.pitch, block, noise.skirt, noise.edge, CONTACT_THRESHOLD),
         )
         for observation in observations
     )

@@ -29,6 +29,7 @@ class TouchNoise:
         rms: metres, root mean square over the touched area at the true place, one sigma.
         tilt: rad, one sigma about each axis of the image: sensor frame and object's attitude.
         skirt: metres, sigma of the blur that stands for the gel hanging from the contact.
+        edge: metres, sigma of the blur over the contact's own edges: what the sensor cannot resolve.
         shift: metres, one sigma in the plane of the gel of where the arm says a contact was
             relative to the others.
         depth: metres, one sigma across it.
@@ -38,6 +39,7 @@ class TouchNoise:
     rms: float = 0.064e-3
     tilt: float = np.radians(1.75)
     skirt: float = 1.0e-3
+    edge: float = 0.6e-3
     shift: float = 0.6e-3
     depth: float = 0.6e-3
     cap: float = 12.0
@@ -55,6 +57,7 @@ class TouchMap:
         flat: ``(rows, columns)`` where the gel is level: pressed by something level, or at rest
             beyond an edge too steep for its height to be read from the colour.
         blur: ``(m,)`` one half of the skirt's kernel, from its centre out.
+        finish: ``(m,)`` one half of the kernel that softens the contact's own edges.
     """
 
     heights: FloatArray
@@ -62,6 +65,7 @@ class TouchMap:
     touched: IntArray
     flat: BoolArray
     blur: FloatArray
+    finish: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,14 +95,17 @@ class View:
     gel_depth: FloatArray
 
 
-def touch_map(heights: FloatArray, pitch: float, block: int, skirt: float, threshold: float) -> TouchMap:
+def touch_map(
+    heights: FloatArray, pitch: float, block: int, skirt: float, edge: float, threshold: float
+) -> TouchMap:
     """A height map averaged over blocks of pixels.
 
     Args:
         heights: ``(rows, columns)`` metres of indentation.
         pitch: metres a pixel.
         block: pixels a side; rows and columns left over are cut evenly at both ends.
-        skirt: metres, sigma of the gel's blur.
+        skirt: metres, sigma of the gel's blur around a contact.
+        edge: metres, sigma of the blur of the contact itself.
         threshold: metres; a map that rises no higher shows no contact.
     """
     rows, columns = heights.shape[0] // block, heights.shape[1] // block
@@ -109,16 +116,20 @@ def touch_map(heights: FloatArray, pitch: float, block: int, skirt: float, thres
     core = coarse > max(threshold, 0.4 * peak)
     touched = np.argwhere(core) if peak > threshold else np.empty((0, 2), dtype=np.int64)
     coarse_pitch = pitch * block
-    reach = int(np.ceil(2.5 * skirt / coarse_pitch))
-    kernel = np.exp(-0.5 * (np.arange(reach + 1) * coarse_pitch / skirt) ** 2)
-    kernel /= kernel[0] + 2.0 * kernel[1:].sum()
     return TouchMap(
         read_only(np.ascontiguousarray(coarse)),
         coarse_pitch,
         read_only(touched),
         read_only(_level(cut, pitch, block) & (coarse > 0.0)),
-        read_only(kernel),
+        read_only(_half_kernel(skirt / coarse_pitch)),
+        read_only(_half_kernel(edge / coarse_pitch)),
     )
+
+
+def _half_kernel(sigma: float) -> FloatArray:
+    """A Gaussian of ``sigma`` pixels from its centre out, all of it summing to 1."""
+    kernel = np.exp(-0.5 * (np.arange(int(np.ceil(2.5 * sigma)) + 1) / sigma) ** 2)
+    return np.asarray(kernel / (kernel[0] + 2.0 * kernel[1:].sum()))
 
 
 def _level(heights: FloatArray, pitch: float, block: int) -> BoolArray:
@@ -140,6 +151,7 @@ def view_scores(view: View, touch: TouchMap, noise: TouchNoise, pixels: IntArray
         touch.touched,
         touch.flat,
         touch.blur,
+        touch.finish,
         noise.rms,
         noise.tilt,
         pixels,
@@ -187,6 +199,7 @@ def touch_terms(
         touch.touched,
         touch.flat,
         touch.blur,
+        touch.finish,
         noise.rms,
         noise.tilt,
         places,
@@ -237,7 +250,9 @@ def similarities(view: View, touch: TouchMap, places: FloatArray, behind: float 
     Returns:
         ``(n,)`` between 0 and 1.
     """
-    return _similarities(view.origin, view.pitch, view.depth, touch.heights, touch.blur, places, behind)
+    return _similarities(
+        view.origin, view.pitch, view.depth, touch.heights, touch.blur, touch.finish, places, behind
+    )
 
 
 @compiled
@@ -247,6 +262,7 @@ def _similarities(
     depth: FloatArray,
     heights: FloatArray,
     blur: FloatArray,
+    finish: FloatArray,
     places: FloatArray,
     behind: float,
 ) -> FloatArray:
@@ -266,7 +282,7 @@ def _similarities(
         for i in range(rows):
             for j in range(columns):
                 crop[i, j] = max(0.0, crop[i, j] - lift)
-        _hang(crop, blur, work, kept)
+        _hang(crop, blur, finish, work, kept)
         both = np.sqrt(np.sum(crop * crop) * np.sum(heights * heights))
         if both > 0.0:
             result[n] = max(0.0, np.sum(crop * heights) / both)
@@ -297,21 +313,20 @@ def _crop(depth: FloatArray, row: int, column: int, crop: FloatArray) -> float:
 
 
 @compiled
-def _solve3(a: FloatArray, b: FloatArray, x: FloatArray) -> None:
-    """Cramer's rule for the symmetric 3 x 3 normal equations of a plane."""
-    c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
-    c01 = a[1, 0] * a[2, 2] - a[1, 2] * a[2, 0]
-    c02 = a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0]
-    det = a[0, 0] * c00 - a[0, 1] * c01 + a[0, 2] * c02
-    x[0] = (
-        b[0] * c00 - a[0, 1] * (b[1] * a[2, 2] - a[1, 2] * b[2]) + a[0, 2] * (b[1] * a[2, 1] - a[1, 1] * b[2])
-    ) / det
-    x[1] = (
-        a[0, 0] * (b[1] * a[2, 2] - a[1, 2] * b[2]) - b[0] * c01 + a[0, 2] * (a[1, 0] * b[2] - b[1] * a[2, 0])
-    ) / det
-    x[2] = (
-        a[0, 0] * (a[1, 1] * b[2] - b[1] * a[2, 1]) - a[0, 1] * (a[1, 0] * b[2] - b[1] * a[2, 0]) + b[0] * c02
-    ) / det
+def _solve3(a: FloatArray, b: FloatArray, plane: FloatArray, ridge: float, change: FloatArray) -> None:
+    """Add the least-squares plane to ``plane``, its total tilt held to zero by ``ridge``.
+
+    Cramer's rule on the symmetric normal equations, whose upper half is given.
+    """
+    a11, a22 = a[1, 1] + ridge, a[2, 2] + ridge
+    a01, a02, a12 = a[0, 1], a[0, 2], a[1, 2]
+    b0, b1, b2 = b[0], b[1] - ridge * plane[1], b[2] - ridge * plane[2]
+    c00, c01, c02 = a11 * a22 - a12 * a12, a01 * a22 - a12 * a02, a01 * a12 - a11 * a02
+    det = a[0, 0] * c00 - a01 * c01 + a02 * c02
+    change[0] = (b0 * c00 - a01 * (b1 * a22 - a12 * b2) + a02 * (b1 * a12 - a11 * b2)) / det
+    change[1] = (a[0, 0] * (b1 * a22 - a12 * b2) - b0 * c01 + a02 * (a01 * b2 - b1 * a02)) / det
+    change[2] = (a[0, 0] * (a11 * b2 - b1 * a12) - a01 * (a01 * b2 - b1 * a02) + b0 * c02) / det
+    plane += change
 
 
 @compiled
@@ -324,58 +339,81 @@ def _score(
     touched: IntArray,
     flat: BoolArray,
     blur: FloatArray,
+    finish: FloatArray,
     rms: float,
     tilt: float,
     crop: FloatArray,
     work: FloatArray,
     kept: FloatArray,
+    pressed: FloatArray,
 ) -> tuple[float, float]:
     """The term at one pixel, and the depth of the gel's centre above it, along the view."""
     rows, columns = heights.shape
     reference = _crop(depth, row, column, crop)
     if not np.isfinite(reference):
         return -np.inf, np.nan
-    a = np.zeros((3, 3))
-    b = np.zeros(3)
+    # One tilt sigma weighs as much as one rms sigma of the whole map.
+    ridge = (rms / tilt) ** 2
+    a, b, plane, change = np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.empty(3)
     for n in range(len(touched)):
         i, j = touched[n, 0], touched[n, 1]
         x, y = (j + 0.5 - 0.5 * columns) * pitch, (i + 0.5 - 0.5 * rows) * pitch
-        gap = crop[i, j] - heights[i, j]
-        a[0, 0] += 1.0
-        a[0, 1] += x
-        a[0, 2] += y
-        a[1, 1] += x * x
-        a[1, 2] += x * y
-        a[2, 2] += y * y
-        b[0] += gap
-        b[1] += x * gap
-        b[2] += y * gap
-    a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
-    # One tilt sigma weighs as much as one rms sigma of the whole map.
-    ridge = len(touched) * (rms / tilt) ** 2
-    a[1, 1] += ridge
-    a[2, 2] += ridge
-    plane = np.empty(3)
-    _solve3(a, b, plane)
+        _add(a, b, x, y, crop[i, j] - heights[i, j])
+    _solve3(a, b, plane, len(touched) * ridge, change)
+    _press(crop, plane, pitch, pressed)
+    _hang(pressed, blur, finish, work, kept)
+    # The gel hangs over edges, so the first fit, to the object's own shape, sinks too deep there:
+    # what is left over where the object presses corrects it.
+    a[:], b[:] = 0.0, 0.0
     for i in range(rows):
-        y = (i + 0.5 - 0.5 * rows) * pitch
         for j in range(columns):
-            x = (j + 0.5 - 0.5 * columns) * pitch
-            crop[i, j] = max(0.0, crop[i, j] - plane[0] - plane[1] * x - plane[2] * y)
-    _hang(crop, blur, work, kept)
+            if kept[i, j] > 0.0:
+                x, y = (j + 0.5 - 0.5 * columns) * pitch, (i + 0.5 - 0.5 * rows) * pitch
+                _add(a, b, x, y, pressed[i, j] - heights[i, j])
+    if a[0, 0] > 0.0:
+        _solve3(a, b, plane, a[0, 0] * ridge, change)
+        _press(crop, plane, pitch, pressed)
+        _hang(pressed, blur, finish, work, kept)
     total = 0.0
     for i in range(rows):
         for j in range(columns):
-            gap = crop[i, j] - heights[i, j]
+            gap = pressed[i, j] - heights[i, j]
             if flat[i, j]:
-                gap = min(np.abs(gap), crop[i, j])
+                gap = min(np.abs(gap), pressed[i, j])
             total += gap * gap
+    crop[:] = pressed
     cost = total / (len(touched) * rms * rms) + (plane[1] ** 2 + plane[2] ** 2) / (tilt * tilt)
     return -0.5 * cost, reference - plane[0]
 
 
 @compiled
-def _hang(image: FloatArray, kernel: FloatArray, work: FloatArray, kept: FloatArray) -> None:
+def _add(a: FloatArray, b: FloatArray, x: float, y: float, gap: float) -> None:
+    a[0, 0] += 1.0
+    a[0, 1] += x
+    a[0, 2] += y
+    a[1, 1] += x * x
+    a[1, 2] += x * y
+    a[2, 2] += y * y
+    b[0] += gap
+    b[1] += x * gap
+    b[2] += y * gap
+
+
+@compiled
+def _press(crop: FloatArray, plane: FloatArray, pitch: float, pressed: FloatArray) -> None:
+    """How deep the object reaches into a gel at rest in a plane."""
+    rows, columns = crop.shape
+    for i in range(rows):
+        y = (i + 0.5 - 0.5 * rows) * pitch
+        for j in range(columns):
+            x = (j + 0.5 - 0.5 * columns) * pitch
+            pressed[i, j] = max(0.0, crop[i, j] - plane[0] - plane[1] * x - plane[2] * y)
+
+
+@compiled
+def _hang(
+    image: FloatArray, kernel: FloatArray, finish: FloatArray, work: FloatArray, kept: FloatArray
+) -> None:
     """The gel's skirt: blurred, with what the object surely shapes put back (Taxim, section III-A)."""
     core = _CORE * image.max()
     kept[:] = image
@@ -384,6 +422,7 @@ def _hang(image: FloatArray, kernel: FloatArray, work: FloatArray, kept: FloatAr
         for j in range(image.shape[1]):
             if kept[i, j] > core:
                 image[i, j] = kept[i, j]
+    _blur(image, finish, work)
 
 
 @compiled
@@ -413,16 +452,18 @@ def _fill(
     touched: IntArray,
     flat: BoolArray,
     blur: FloatArray,
+    finish: FloatArray,
     rms: float,
     tilt: float,
     pixels: AnyArray,
 ) -> None:
-    crop, work, kept = np.empty(heights.shape), np.empty(heights.shape), np.empty(heights.shape)
+    shape = heights.shape
+    crop, work, kept, pressed = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
     for n in range(len(pixels)):
         r, c = pixels[n, 0], pixels[n, 1]
         if np.isnan(score[r, c]):
             score[r, c], gel_depth[r, c] = _score(
-                depth, r, c, heights, pitch, touched, flat, blur, rms, tilt, crop, work, kept
+                depth, r, c, heights, pitch, touched, flat, blur, finish, rms, tilt, crop, work, kept, pressed
             )
 
 
@@ -440,6 +481,7 @@ def _terms(
     touched: IntArray,
     flat: BoolArray,
     blur: FloatArray,
+    finish: FloatArray,
     rms: float,
     tilt: float,
     places: FloatArray,
@@ -450,7 +492,8 @@ def _terms(
     cap: float,
     temperature: float,
 ) -> FloatArray:
-    crop, work, kept = np.empty(heights.shape), np.empty(heights.shape), np.empty(heights.shape)
+    shape = heights.shape
+    crop, work, kept, pressed = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
     terms = np.empty(len(places))
     around = np.empty((2 * rings + 1) ** 2)
     # What the shifts' prior leaves on a grid of cells, so that a sure match costs nothing.
@@ -472,7 +515,21 @@ def _terms(
                     continue
                 if np.isnan(score[r, c]):
                     score[r, c], gel_depth[r, c] = _score(
-                        depth, r, c, heights, pitch, touched, flat, blur, rms, tilt, crop, work, kept
+                        depth,
+                        r,
+                        c,
+                        heights,
+                        pitch,
+                        touched,
+                        flat,
+                        blur,
+                        finish,
+                        rms,
+                        tilt,
+                        crop,
+                        work,
+                        kept,
+                        pressed,
                     )
                 if score[r, c] == -np.inf:
                     continue
