@@ -22,6 +22,7 @@ def localization(
     only: Annotated[list[str] | None, typer.Option(help="Only this object; may be given again.")] = None,
     spacing: Annotated[list[str] | None, typer.Option(help="close or spread; both if left out.")] = None,
     gap: Annotated[list[str] | None, typer.Option(help="default or none; both if left out.")] = None,
+    yaw: Annotated[list[str] | None, typer.Option(help="known or unknown; both if left out.")] = None,
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs; a stopped table resumes there.")] = Path(
         "runs/tables/localization"
@@ -52,6 +53,7 @@ def localization(
         range(first_seed, first_seed + seeds),
         spacing or ["close", "spread"],
         gap or ["default", "none"],
+        yaw or ["known", "unknown"],
     )
     results: dict[Cell, Any] = {}
     columns = (

@@ -12,7 +12,7 @@ import numpy as np
 from experiments.contact_localization.pace import joint_speed
 from harness.arrays import FloatArray
 from harness.device import Arm
-from harness.errors import NotTouched
+from harness.errors import BenchFault, NotTouched
 from harness.geometry import transform
 from harness.reading import Reading
 from harness.recording import Recording
@@ -111,7 +111,7 @@ class Speeds:
     press: float = 0.005
     retreat: float = 0.040
     acceleration: float = 0.2
-    touch_force: float = 0.4
+    touch_force: float = 0.3
     overtravel: float = 0.008
 
 
@@ -154,7 +154,7 @@ class ContactLocalization:
         self._line(arm, _moved(motion.base_from_stand_off, touched, motion.press * motion.axis), "press")
         bench.pause(SETTLE)
         bench.mark(step.index, 0)
-        image = bench.gel.read(FRAMES_PER_CONTACT, timeout=3.0)
+        image = self._read(bench, motion)
         history = arm.history(arm.state().time - began)
         self._line(arm, motion.base_from_stand_off, "retreat")
         return (image, *history)
@@ -166,6 +166,14 @@ class ContactLocalization:
             speed = joint_speed(bench.station, here, joints, self.speeds.travel)
             bench.arm.move_joints(joints, speed, self.speeds.travel_acceleration)
             here = joints
+
+    def _read(self, bench: Bench, motion: ContactMotion) -> Reading:
+        """The frames; where the camera fails the arm is well, and does not stay pressed on the object."""
+        try:
+            return bench.gel.read(FRAMES_PER_CONTACT, timeout=3.0)
+        except BenchFault:
+            self._line(bench.arm, motion.base_from_stand_off, "retreat")
+            raise
 
     def _touch(self, step: Step, motion: ContactMotion, arm: Arm) -> None:
         travel = motion.search + self.speeds.overtravel

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.table_cell import METHODS, YAWS, Cell, run_cell
+from experiments.contact_localization.table_cell import METHODS, Cell, run_cell
 from harness.arrays import FloatArray
 from harness.errors import TouchstoneError, WrongUse
 from harness.metrics import Interval, bootstrap, mean, median, share_above
@@ -128,28 +128,21 @@ def rows(results: Mapping[Cell, Mapping[str, Any]]) -> list[Row]:
     performed = {cell: result for cell, result in results.items() if "rows" in result}
     if not performed:
         raise WrongUse("no run of the table has been performed yet")
-    conditions = sorted({(cell.spacing, cell.gap) for cell in performed})
-    return [
-        _row(performed, spacing, gap, yaw, method)
-        for spacing, gap in conditions
-        for yaw in YAWS
-        for method in METHODS
-    ]
+    conditions = sorted({(cell.spacing, cell.gap, cell.yaw) for cell in performed})
+    return [_row(performed, condition, method) for condition in conditions for method in METHODS]
 
 
-def _row(performed: Mapping[Cell, Mapping[str, Any]], spacing: str, gap: str, yaw: str, method: str) -> Row:
+def _row(performed: Mapping[Cell, Mapping[str, Any]], condition: tuple[str, str, str], method: str) -> Row:
     found = [
-        result["rows"][yaw][method]
+        result["rows"][method]
         for cell, result in performed.items()
-        if (cell.spacing, cell.gap) == (spacing, gap)
+        if (cell.spacing, cell.gap, cell.yaw) == condition
     ]
     held = [bool(one["in_region90"]) for one in found if "in_region90" in one]
     raw = np.array([one["error_m"] for one in found])
     symmetric = [one["error_symmetric_m"] for one in found]
     return Row(
-        spacing,
-        gap,
-        yaw,
+        *condition,
         method,
         len(found),
         _statistics(raw),

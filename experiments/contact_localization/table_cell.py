@@ -36,7 +36,6 @@ from harness.symmetry import SymmetryGroup, find_symmetries
 from mocks.in_process import in_process_bench
 
 METHODS = ("random", "geometry", "geometry + axis", "paper's filter", "ours")
-YAWS = ("known", "unknown")
 PAPER = Levels(method="particle", particles=1000)
 
 
@@ -45,21 +44,23 @@ class Cell:
     """Which run.
 
     Attributes:
-        object: name of a built-in object, or of a mesh file.
+        object: its name in the table.
         spacing: ``"close"`` or ``"spread"``.
         gap: ``"default"`` or ``"none"``.
+        yaw: ``"known"`` to the estimator or ``"unknown"``.
         seed: of the sites, the world and the draws.
     """
 
     object: str
     spacing: str
     gap: str
+    yaw: str
     seed: int
 
     @property
     def name(self) -> str:
         """Of the cell's file."""
-        return f"{Path(self.object).stem.removeprefix('builtin:')}-{self.spacing}-{self.gap}-{self.seed}"
+        return f"{self.object}-{self.spacing}-{self.gap}-{self.yaw}-{self.seed}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +89,8 @@ def run_cell(cell: Cell, scene: SceneFile, station: Station) -> dict[str, Any]:
     mesh = known_object(scene).mesh
     run = _perform(cell, scene, station, mesh)
     symmetry = find_symmetries(mesh)
-    rows: dict[str, Any] = {}
-    for yaw in YAWS:
-        prior = _prior(run, yaw)
-        rows[yaw] = {method: _scored(method, run, prior, symmetry) for method in METHODS}
+    prior = _prior(run, cell.yaw)
+    rows = {method: _scored(method, run, prior, symmetry) for method in METHODS}
     return {"schema": 1, "cell": asdict(cell), "contacts": len(run.observations), "rows": rows}
 
 
@@ -178,8 +177,12 @@ def _errors(point: FloatArray, true: FloatArray, symmetry: SymmetryGroup, second
 
 
 def cells(
-    objects: Sequence[str], seeds: Sequence[int], spacings: Sequence[str], gaps: Sequence[str]
+    objects: Sequence[str],
+    seeds: Sequence[int],
+    spacings: Sequence[str],
+    gaps: Sequence[str],
+    yaws: Sequence[str],
 ) -> list[Cell]:
     """Every run of a table, one seed of every object before the next: a table that is stopped is even."""
-    first = [Cell(o, s, g, 0) for g in gaps for s in spacings for o in objects]
+    first = [Cell(o, s, g, y, 0) for y in yaws for g in gaps for s in spacings for o in objects]
     return [replace(cell, seed=seed) for seed in seeds for cell in first]
