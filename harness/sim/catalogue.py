@@ -3,7 +3,8 @@
 The functions here only take apart what the kernels take; the mathematics is theirs. Sources,
 which the caller gives: ``object.mesh`` (``Mesh``), ``object.material`` (``Material``),
 ``contact.gel_from_object`` (``(n, 4, 4)``), ``sensor`` (``TactileSensor``),
-``sensor.calibration`` (``TactileCalibration``), ``sensor.noise`` (grey levels), ``seed``.
+``sensor.calibration`` (``TactileCalibration``), ``sensor.shadow_table`` (``ShadowTable``),
+``sensor.noise`` (grey levels), ``seed``.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,8 +20,10 @@ from harness.effects import Condition, Effect
 from harness.sensor import TactileSensor
 from harness.sim.gel import deform, over_range
 from harness.sim.height_map import RasterMesh, height_maps, penetration, rest_surface
+from harness.sim.markers import draw_markers, marker_displacements
 from harness.sim.noise import with_camera_noise
 from harness.sim.optics import Optics
+from harness.sim.shadow_image import darkened, darkening
 from harness.sim.tactile_calibration import TactileCalibration
 
 Given = Mapping[str, Any]
@@ -29,6 +32,7 @@ Levels = Mapping[str, Level]
 SUPERSAMPLING = Knob("touch.supersampling", (1, 2, 3), "rays a side", "number", 1, "rays a pixel, each way")
 GEL = Knob("touch.gel", ("fast", "exact"), "", "method", "exact", "how wide blurs of the gel are done")
 OPTICS = Knob("touch.optics", ("smooth", "fast", "exact"), "", "method", "fast", "slope to colour")
+MARKER_NODES = Knob("touch.marker_motion", (2, 4, 8), "nodes", "number", 4, "loads to one gel thickness")
 
 
 def _prepare(given: Given, _levels: Levels) -> RasterMesh:
@@ -67,6 +71,35 @@ def _optics(calibration: TactileCalibration, level: str, sensor: TactileSensor) 
         case "exact" | "fast" | "smooth":
             return Optics(calibration, level, rest)
     raise ValueError(f"no optics level {level!r}")
+
+
+def _darkening(given: Given, _levels: Levels) -> tuple[FloatArray, FloatArray]:
+    return darkening(
+        given["touch.colour"],
+        given["touch.height_map"],
+        given["touch.gel"],
+        given["sensor"],
+        given["sensor.calibration"],
+        given["sensor.shadow_table"],
+    )
+
+
+def _shadow(given: Given, _levels: Levels) -> ByteArray:
+    return darkened(given["touch.colour"], given["touch.darkening"][0])
+
+
+def _shadow_out_of_table(given: Given, _levels: Levels) -> FloatArray:
+    share: FloatArray = given["touch.darkening"][1]
+    return share
+
+
+def _marker_motion(given: Given, levels: Levels) -> FloatArray:
+    held, _ = over_range(given["touch.height_map"], given["sensor"])
+    return marker_displacements(held, given["sensor"], float(levels[MARKER_NODES.name]))
+
+
+def _markers(given: Given, _levels: Levels) -> ByteArray:
+    return draw_markers(given["touch.shadow"], given["touch.marker_motion"], given["sensor"])
 
 
 def _noise(given: Given, _levels: Levels) -> FloatArray:
@@ -112,16 +145,31 @@ EFFECTS = (
     Effect("touch.gel", ("touch.height_map", "sensor", "sensor.calibration"), _gel, knobs=(GEL,)),
     Effect("touch.colour", ("touch.gel", "sensor", "sensor.calibration"), _colour, knobs=(OPTICS,)),
     Effect(
-        "touch.shadow",
-        ("touch.colour", "touch.gel", "sensor"),
-        _later("touch.shadow"),
+        "touch.darkening",
+        (
+            "touch.colour",
+            "touch.height_map",
+            "touch.gel",
+            "sensor",
+            "sensor.calibration",
+            "sensor.shadow_table",
+        ),
+        _darkening,
         when=SHADOW,
-        bypass="touch.colour",
+    ),
+    Effect("touch.shadow", ("touch.colour", "touch.darkening"), _shadow, when=SHADOW, bypass="touch.colour"),
+    Effect("touch.shadow_out_of_table", ("touch.darkening",), _shadow_out_of_table, when=SHADOW),
+    Effect(
+        "touch.marker_motion",
+        ("touch.height_map", "sensor"),
+        _marker_motion,
+        when=MARKERS,
+        knobs=(MARKER_NODES,),
     ),
     Effect(
         "touch.markers",
-        ("touch.shadow", "touch.gel", "sensor"),
-        _later("touch.markers"),
+        ("touch.shadow", "touch.marker_motion", "sensor"),
+        _markers,
         when=MARKERS,
         bypass="touch.shadow",
     ),

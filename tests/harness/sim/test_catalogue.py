@@ -18,11 +18,15 @@ from harness.mesh import Mesh
 from harness.objects.household import build
 from harness.plan import default_accuracy, plan
 from harness.scene import Light, Room, SceneFile, Sensors, scene_from_options
-from harness.sensor import GELSIGHT_R15
+from harness.sensor import GELSIGHT_R15, MarkerGrid
 from harness.sim.catalogue import EFFECTS
+from harness.sim.markers import draw_markers
+from harness.sim.shadow import ShadowTable
 from harness.sim.tactile_calibration import TactileCalibration, shipped_calibration
 
 SCENE = scene_from_options("builtin:mug")
+DOTTED = replace(GELSIGHT_R15, markers=MarkerGrid(7, 9, 2e-3, 0.4e-3))
+GRAZED = replace(GELSIGHT_R15, casts_shadow=True)
 
 
 @pytest.fixture(scope="module")
@@ -162,6 +166,59 @@ def test_in_the_open_no_room_is_computed_and_in_a_room_it_is_planned() -> None:
     assert ran == ["object.modes", "object.sound", "microphone.pressure"]
     indoors = sound.model_copy(update={"room": Room(size=("4 m", "3 m", "2.5 m"))})  # type: ignore[arg-type]
     assert "room.reverberation" in [step.effect.provides for step in scene_plan(indoors, GELSIGHT_R15).ran]
+
+
+def shadow_table(level: float) -> ShadowTable:
+    """Made up: every pin of every depth holds the colour down to ``level`` for 12 samples."""
+    lengths = np.full((3, 63, 9), 12)
+    return ShadowTable(np.linspace(0.0, 6.2, 63), lengths, np.full(int(lengths.sum()), level), 0.4e-3)
+
+
+def test_markers_run_only_where_the_gel_has_them(mug: Mesh, calibration: TactileCalibration) -> None:
+    for sensor, times in ((GELSIGHT_R15, 0), (DOTTED, 1)):
+        count: Counter[str] = Counter()
+        effects = counting(count)
+        made = plan(effects, Facts(SCENE, sensor), ["touch.image"], default_accuracy(effects))
+        evaluate(made, sources(mug, calibration, 1e-3) | {"sensor": sensor})
+        assert (count["touch.marker_motion"], count["touch.markers"]) == (times, times)
+        assert count == {step.effect.provides: 1 for step in made.ran}
+    scene = SCENE.model_copy(update={"observe": ("touch.marker_motion",)})
+    with pytest.raises(WrongUse, match="the gel has no markers"):
+        scene_plan(scene, GELSIGHT_R15)
+
+
+def test_untouched_dots_are_at_rest_and_pressed_ones_move(mug: Mesh, calibration: TactileCalibration) -> None:
+    given = sources(mug, calibration, -5e-3, 1e-3) | {"sensor": DOTTED}
+    done = evaluate(scene_plan(SCENE, DOTTED), given)
+    bare = evaluate(scene_plan(SCENE, GELSIGHT_R15), sources(mug, calibration, -5e-3, 1e-3))
+    at_rest = draw_markers(calibration.background[None], np.zeros((1, 63, 2)), DOTTED)
+    assert np.array_equal(done["touch.image"][0], at_rest[0])
+    assert not done["touch.marker_motion"][0].any()
+    assert np.abs(done["touch.marker_motion"][1]).max() > 2e-5
+    same = (done["touch.image"] == bare["touch.image"]).all(axis=-1).mean(axis=(1, 2))
+    assert ((same > 0.8) & (same < 0.95)).all()  # 63 dots of 0.4 mm are a tenth of the window
+
+
+def test_a_sensor_that_casts_shadows_needs_its_table(mug: Mesh, calibration: TactileCalibration) -> None:
+    with pytest.raises(WrongUse, match=r"sensor\.shadow_table: needed"):
+        evaluate(scene_plan(SCENE, GRAZED), sources(mug, calibration, 1e-3) | {"sensor": GRAZED})
+
+
+def test_shadows_only_darken_around_what_touches(mug: Mesh, calibration: TactileCalibration) -> None:
+    scene = SCENE.model_copy(update={"observe": ("touch.image", "touch.shadow_out_of_table")})
+    made = scene_plan(scene, GRAZED)
+    depths = (-5e-3, 1e-3)
+    given = sources(mug, calibration, *depths) | {"sensor": GRAZED}
+    done = evaluate(made, given | {"sensor.shadow_table": shadow_table(-60.0)})
+    bare = evaluate(scene_plan(SCENE, GELSIGHT_R15), sources(mug, calibration, *depths))["touch.image"]
+    assert np.array_equal(done["touch.colour"], bare)
+    assert np.array_equal(done["touch.image"][0], calibration.background)
+    assert (done["touch.image"] <= bare).all()
+    assert (done["touch.image"][1] < bare[1]).sum() > 500
+    assert done["touch.shadow_out_of_table"].shape == (2,)
+    assert done.calls == {step.effect.provides: 1 for step in made.ran}
+    light = evaluate(made, given | {"sensor.shadow_table": shadow_table(1e3)})
+    assert np.array_equal(light["touch.image"], bare)
 
 
 def test_lights_call_for_shadows_of_the_scene_camera() -> None:
