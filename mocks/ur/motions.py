@@ -10,15 +10,13 @@ from typing import Final, Protocol
 from mocks.ur import poses
 from mocks.ur.hooks import CYCLE, Matrix, Six
 from mocks.ur.poses import Vector
-from mocks.ur.profiles import Trapezoid, braking_way, lasting, trapezoid
+from mocks.ur.profiles import Trapezoid, lasting, trapezoid
 
 TURN_LENGTH: Final = 0.1
 """m of way that one radian of turning counts as, for the speed of a line that turns more than it moves."""
 
 Twist = tuple[Vector, Vector]
 """m/s and rad/s of the tool centre point, in base."""
-
-_STILL: Final = 1e-9
 
 
 class Body(Protocol):
@@ -192,68 +190,12 @@ class SpeedLine:
         target = [seconds / CYCLE * speed for speed in self._target]
         velocity, there = _approached(linear, target[:3], self._rates[0] * CYCLE, norm=True)
         turning, turned = _approached(angular, target[3:], self._rates[1] * CYCLE, norm=True)
-        body.put_tcp(_carried(body.base_from_tcp, (*velocity, *turning), CYCLE))
+        body.put_tcp(poses.carried(body.base_from_tcp, (*velocity, *turning), CYCLE))
         self._left = None if self._left is None else self._left - CYCLE
         self.done = (there and turned) if self._left is None else self._left < 0.5 * CYCLE
 
     def replan(self) -> None:
         """Nothing to plan."""
-
-
-class StopJoints:
-    """``stopj``: every joint to rest in proportion, the fastest at ``deceleration`` rad/s^2."""
-
-    def __init__(self, deceleration: float) -> None:
-        self._deceleration = deceleration
-        self._start: tuple[Six, Six] | None = None
-        self._until = 0.0
-        self._time = 0.0
-        self.done = False
-
-    def advance(self, body: Body, _seconds: float) -> None:
-        """Move on."""
-        if self._start is None:
-            self._start = body.joints, body.speeds
-            self._until = max(map(abs, body.speeds)) / self._deceleration
-        self._time += CYCLE
-        way = braking_way(self._time, self._until)
-        joints, speeds = self._start
-        body.put_joints(as_six([q + way * speed for q, speed in zip(joints, speeds, strict=True)]))
-        self.done = self._time >= self._until + CYCLE
-
-    def replan(self) -> None:
-        """From the speed the arm has then: none."""
-        self._start, self._time = None, 0.0
-
-
-class StopLine:
-    """``stopl``: the tool centre point to rest along its present velocity."""
-
-    def __init__(self, deceleration: float, turning: float) -> None:
-        self._rates = deceleration, turning
-        self._start: tuple[Matrix, Twist] | None = None
-        self._until = 0.0
-        self._time = 0.0
-        self.done = False
-
-    def advance(self, body: Body, _seconds: float) -> None:
-        """Move on."""
-        if self._start is None:
-            self._start = body.base_from_tcp, body.twist
-            linear, angular = (math.hypot(*part) for part in body.twist)
-            turning = angular / self._rates[1] if linear < _STILL else 0.0
-            self._until = max(linear / self._rates[0], turning)
-        self._time += CYCLE
-        pose, (linear_start, angular_start) = self._start
-        if self._until > 0.0:
-            body.put_tcp(
-                _carried(pose, (*linear_start, *angular_start), braking_way(self._time, self._until))
-            )
-        self.done = self._time >= self._until + CYCLE
-
-    def replan(self) -> None:
-        """From the speed the arm has then: none."""
-        self._start, self._time = None, 0.0
 
 
 class ServoJoints:
@@ -295,11 +237,3 @@ def _approached(
     if size <= step:
         return list(target), True
     return [a + step / size * d for a, d in zip(present, change, strict=True)], False
-
-
-def _carried(pose: Matrix, velocity: Sequence[float], seconds: float) -> Matrix:
-    """The pose after moving at a velocity (of the tool centre point, in base)."""
-    x, y, z, rx, ry, rz = (seconds * part for part in velocity)
-    turned = poses.compose(poses.matrix_from_pose((0.0, 0.0, 0.0, rx, ry, rz)), pose)
-    px, py, pz = poses.translation(pose)
-    return poses.moved_to(turned, (px + x, py + y, pz + z))

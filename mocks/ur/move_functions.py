@@ -16,12 +16,11 @@ from mocks.ur.motions import (
     ServoJoints,
     SpeedJoints,
     SpeedLine,
-    StopJoints,
-    StopLine,
     as_six,
 )
 from mocks.ur.mover import PROGRAM_STOP
 from mocks.ur.robot import Robot
+from mocks.ur.stops import StopJoints, StopLine
 from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import Pose, number, six

@@ -7,7 +7,8 @@ from typing import Final
 from mocks.ur import kinematics, poses
 from mocks.ur.hooks import CYCLE, Matrix, Six
 from mocks.ur.kinematics import ArmModel
-from mocks.ur.motions import Motion, StopJoints, Twist
+from mocks.ur.motions import Motion, Twist
+from mocks.ur.stops import StopJoints
 
 PROGRAM_STOP: Final = 10.0
 """rad/s^2 of the fastest joint, where a program ends or lets go of a moving arm."""

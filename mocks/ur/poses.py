@@ -132,3 +132,11 @@ def between(start: Matrix, turn: Vector, goal: Vector, share: float) -> Matrix:
     step = matrix_from_pose((0.0, 0.0, 0.0, share * turn[0], share * turn[1], share * turn[2]))
     position = (x + share * (goal[0] - x), y + share * (goal[1] - y), z + share * (goal[2] - z))
     return moved_to(compose(start, step), position)
+
+
+def carried(pose: Matrix, velocity: Sequence[float], seconds: float) -> Matrix:
+    """The pose after moving at a velocity (of the tool centre point, in base)."""
+    x, y, z, rx, ry, rz = (seconds * part for part in velocity)
+    turned = compose(matrix_from_pose((0.0, 0.0, 0.0, rx, ry, rz)), pose)
+    px, py, pz = translation(pose)
+    return moved_to(turned, (px + x, py + y, pz + z))

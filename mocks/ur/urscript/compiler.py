@@ -3,17 +3,16 @@
 Only the built-ins that are handed in can be reached; nothing of Python can.
 """
 
-import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from mocks.ur.urscript import syntax, values, variables
+from mocks.ur.urscript.calls import Function, builtin_call, call_now, call_steps
 from mocks.ur.urscript.code import (
     Builtin,
     Code,
     Leave,
-    at_line,
     combined,
     exhaust,
     located,
@@ -45,17 +44,6 @@ class Compiled:
         yield from value_of(self.main, frame)
 
 
-class _Function:
-    """A ``def`` or ``thread``; its code is filled in after all functions are known."""
-
-    def __init__(self, source: syntax.Function, takes_time: bool) -> None:
-        self.source = source
-        self.takes_time = takes_time
-        self.names = [name for name, _ in source.parameters]
-        self.code = Code()
-        self.defaults: dict[str, Code] = {}
-
-
 def compile_program(program: syntax.Program, builtins: Mapping[str, Builtin]) -> Compiled:
     """Closures of a program.
 
@@ -71,7 +59,7 @@ class _Compiler:
         self._builtins = builtins
         slow = slow_functions(program, builtins)
         self._functions = {
-            name: _Function(function, name in slow) for name, function in program.functions.items()
+            name: Function(function, name in slow) for name, function in program.functions.items()
         }
 
     def compiled(self) -> Compiled:
@@ -237,10 +225,10 @@ class _Compiler:
             return self._user_call(self._functions[call.name], arguments, keywords, call)
         if call.name not in self._builtins or call.run:
             raise ScriptError(f"there is no {'thread' if call.run else 'function'} '{call.name}'", call.line)
-        return _builtin_call(self._builtins[call.name], arguments, keywords, call)
+        return builtin_call(self._builtins[call.name], arguments, keywords, call)
 
     def _user_call(
-        self, function: _Function, arguments: list[Code], keywords: list[str], call: syntax.Call
+        self, function: Function, arguments: list[Code], keywords: list[str], call: syntax.Call
     ) -> Code:
         plain = len(arguments) - len(keywords)
         names = [*function.names[:plain], *keywords]
@@ -254,14 +242,14 @@ class _Compiler:
         if call.run:
             return combined(
                 lambda frame, *given: frame.process.start(
-                    lambda task: _function_steps(function, frame.process.frame(task), names, given)
+                    lambda task: call_steps(function, frame.process.frame(task), names, given)
                 ),
                 arguments,
                 frame=True,
             )
         if not function.takes_time:
             return combined(
-                lambda frame, *given: _function_now(function, frame, names, given, call.line),
+                lambda frame, *given: call_now(function, frame, names, given, call.line),
                 arguments,
                 frame=True,
             )
@@ -272,59 +260,9 @@ class _Compiler:
             for argument in arguments:
                 given.append((yield from value_of(argument, frame)))
             inner = frame.process.frame(frame.task)
-            return (yield from _function_steps(function, inner, names, given))
+            return (yield from call_steps(function, inner, names, given))
 
         return Code(steps=steps)
-
-
-def _builtin_call(builtin: Builtin, arguments: list[Code], keywords: list[str], call: syntax.Call) -> Code:
-    plain = len(arguments) - len(keywords)
-    try:
-        inspect.signature(builtin.function).bind(*[None] * plain, **dict.fromkeys(keywords))
-    except TypeError as error:
-        raise ScriptError(f"'{call.name}': {error}", call.line) from error
-
-    def invoke(*given: Any) -> Any:
-        return builtin.function(*given[:plain], **dict(zip(keywords, given[plain:], strict=True)))
-
-    if not builtin.takes_time:
-        return combined(located(builtin.function if not keywords else invoke, call.line), arguments)
-
-    def steps(frame: Frame) -> Steps:
-        given = []
-        for argument in arguments:
-            given.append((yield from value_of(argument, frame)))
-        try:
-            return (yield from invoke(*given))
-        except ScriptError as error:
-            raise at_line(error, call.line) from error
-
-    return Code(steps=steps)
-
-
-def _function_now(
-    function: _Function, frame: Frame, names: list[str], given: Sequence[Any], line: int
-) -> Any:
-    frame.task.spend(line)
-    inner = frame.process.frame(frame.task)
-    _fill(function, inner, names, given)
-    assert function.code.now is not None, "functions that take time are stepped"
-    function.code.now(inner)
-    return inner.result
-
-
-def _function_steps(function: _Function, inner: Frame, names: list[str], given: Sequence[Any]) -> Steps:
-    _fill(function, inner, names, given)
-    yield from value_of(function.code, inner)
-    return inner.result
-
-
-def _fill(function: _Function, inner: Frame, names: list[str], given: Sequence[Any]) -> None:
-    for name, value in zip(names, given, strict=True):
-        inner.variables[name] = values.copied(value)
-    for name, default in function.defaults.items():
-        if name not in inner.variables and default.now is not None:
-            inner.variables[name] = default.now(inner)
 
 
 def _word(word: str) -> Code:

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from mocks.ur.controller import Controller
-from mocks.ur.dashboard import LOCAL, TOO_EARLY, Dashboard
+from mocks.ur.dashboard import TOO_EARLY, Dashboard
 from mocks.ur.hooks import CYCLE, HOME, ControllerConfig, Six
 from mocks.ur.plane import PlaneContact
 from mocks.ur.player import RuntimeState
@@ -146,8 +146,7 @@ def test_pressing_too_hard_is_a_protective_stop() -> None:
     assert controller.robot.force.base[2] < 250.0
 
 
-def test_moving_until_contact_in_script() -> None:
-    script = """
+UNTIL_CONTACT = """
     while True:
         step_back = tool_contact(direction=[0, 0, -1, 0, 0, 0])
         if step_back <= 0:
@@ -159,10 +158,20 @@ def test_moving_until_contact_in_script() -> None:
             break
         end
     end"""
-    controller = _controller(script, DOWN - 0.02)
+
+
+@pytest.mark.parametrize("wait", [0.0, 0.777])
+def test_moving_until_contact_ends_at_the_same_place_however_long_it_was_waited_for(wait: float) -> None:
+    controller = Controller(CONFIG, PlaneContact(DOWN - 0.02, 20e3))
+    _run(controller, wait)
+    _start(controller, UNTIL_CONTACT)
     _run_until_stopped(controller)
-    assert controller.robot.mover.base_from_flange[2][3] == pytest.approx(DOWN - 0.02, abs=1e-4)
+    height = controller.robot.mover.base_from_flange[2][3]
+    assert height == pytest.approx(DOWN - 0.02, abs=1e-4)
     assert controller.robot.safety.mode is SafetyMode.NORMAL
+    reference = _controller(UNTIL_CONTACT, DOWN - 0.02)
+    _run_until_stopped(reference)
+    assert controller.robot.mover.joints == reference.robot.mover.joints
 
 
 def _forces(step: int, seed: int, wait: float) -> list[Six]:
@@ -277,34 +286,3 @@ def test_a_secondary_program_runs_beside_the_first_and_must_not_move() -> None:
     assert controller.robot.outputs.digital == 1 << 17
     assert (joints == HOME).all()
     assert controller.player.state is RuntimeState.PLAYING
-
-
-@pytest.mark.parametrize(
-    ("asked", "answer"),
-    [
-        ("robotmode", "Robotmode: RUNNING"),
-        ("SAFETYSTATUS", "Safetystatus: NORMAL"),
-        ("PolyscopeVersion", "URSoftware 5.12.4.1101661 (Mar 22 2022)"),
-        ("get serial number", "20225500001"),
-        ("get robot model", "UR5"),
-        ("programState", "STOPPED unnamed"),
-        ("close popup", "closing popup"),
-        ("stop", "Stopped"),
-        ("play", "Failed to execute: play"),
-        ("popup hello", "showing popup"),
-        ("no such thing", "could not understand: no such thing"),
-        ("", "could not understand: "),
-    ],
-)
-def test_the_dashboard_answers_in_the_controllers_words(asked: str, answer: str) -> None:
-    assert Dashboard(Controller(CONFIG)).reply(asked) == answer
-
-
-def test_local_control_answers_questions_and_refuses_commands() -> None:
-    controller = Controller(CONFIG)
-    controller.robot.remote = False
-    dashboard = Dashboard(controller)
-    assert dashboard.reply("is in remote control") == "false"
-    assert dashboard.reply("robotmode") == "Robotmode: RUNNING"
-    assert dashboard.reply("stop") == LOCAL
-    assert dashboard.reply("load x.urp") == LOCAL
