@@ -8,6 +8,7 @@ import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from typing import Any
 
 import typer
@@ -15,6 +16,15 @@ from rich.console import Console
 from typer.exceptions import TyperException
 
 from harness.errors import TouchstoneError
+
+
+class Interrupted(TouchstoneError):
+    """Ctrl-C ended a command before it had an answer."""
+
+    exit_code = 130
+
+    def __init__(self) -> None:
+        super().__init__("interrupted; what is committed is kept, go on with --resume")
 
 
 @dataclass(frozen=True)
@@ -72,9 +82,9 @@ def invoke(arguments: list[str]) -> int:
     except TouchstoneError as error:
         return _report(str(error), error.exit_code, "--json" in arguments)
     except KeyboardInterrupt:
-        return _report(
-            "interrupted; what is committed is kept, go on with --resume", 130, "--json" in arguments
-        )
+        return _report(str(Interrupted()), Interrupted.exit_code, "--json" in arguments)
+    except OSError as error:
+        return _report(_of_system(error), 1, "--json" in arguments)
     except TyperException as error:
         return _report(error.format_message(), error.exit_code, "--json" in arguments)
     return result if isinstance(result, int) else 0
@@ -100,7 +110,7 @@ def _app(chosen: str | None) -> typer.Typer:
     for name, command in COMMANDS.items():
         *group, last = name.split()
         parent = groups[group[0]] if group else app
-        body = load(command.target) if name == chosen else _stub
+        body = _interruptible(load(command.target)) if name == chosen else _stub
         parent.command(last, help=None if name == chosen else command.summary, short_help=command.summary)(
             body
         )
@@ -116,6 +126,19 @@ def load(target: str) -> Callable[..., Any]:
     return loaded
 
 
+def _interruptible(body: Callable[..., Any]) -> Callable[..., Any]:
+    """The command, with Ctrl-C named as every other end is: typer would leave without a word."""
+
+    @wraps(body)
+    def command(*arguments: Any, **options: Any) -> Any:
+        try:
+            return body(*arguments, **options)
+        except KeyboardInterrupt as interrupt:
+            raise Interrupted from interrupt
+
+    return command
+
+
 def _stub() -> None:
     """Stand in for a command that is listed but not run."""
 
@@ -125,6 +148,12 @@ def _report(message: str, code: int, as_json: bool) -> int:
     if as_json:
         sys.stdout.write(json.dumps({"schema": 1, "error": message, "exit_code": code}) + "\n")
     return code
+
+
+def _of_system(error: OSError) -> str:
+    """A folder that may not be written, a full disk: what, and of which file."""
+    reason = error.strerror or type(error).__name__
+    return f"{error.filename}: {reason}" if error.filename is not None else reason
 
 
 def _escape(message: str) -> str:

@@ -8,6 +8,14 @@ import typer
 Station = Annotated[
     str, typer.Option("--station", help="A bench: a name under stations/, or a station file.", metavar="NAME")
 ]
+StationOrOwn = Annotated[
+    str | None,
+    typer.Option(
+        "--station",
+        help="A bench: a name under stations/, or a station file; mock if left out.",
+        metavar="NAME",
+    ),
+]
 SceneOption = Annotated[
     Path | None, typer.Option("--scene", help="A scene file; examples are under scenes/.", metavar="FILE")
 ]

@@ -33,7 +33,7 @@ class Yaw(StrEnum):
 
 def run(
     experiment: Annotated[Experiment, typer.Argument(help="What to run.")] = Experiment.CONTACT_LOCALIZATION,
-    station: options.Station = "mock",
+    station: options.StationOrOwn = None,
     scene: options.SceneOption = None,
     object_: options.Object = None,
     material: options.Material = None,
@@ -72,8 +72,12 @@ def run(
     accuracy = chosen(level or [])
     if resume is not None:
         _refuse_with_resume(
+            station=station,
             scene=scene,
             object=object_,
+            material=material,
+            units=units,
+            wall=wall,
             seed=seed,
             gap=gap,
             out=out,
@@ -84,17 +88,13 @@ def run(
         recording = Recording(resume)
     else:
         wanted = resolve(scene, object_, material, units, wall, contacts, spacing, yaw)
-        bench = load_station(station_path(station))
+        bench = load_station(station_path(station or "mock"))
         begun = session_of.start(wanted, bench, wanted.localization.seed if seed is None else seed, gap, out)
         recording = begun.recording
         _describe(begun)
     complete, health = _perform(recording)
     if not complete:
-        CONSOLE.print(
-            f"stopped after contact {recording.committed}; go on with "
-            f"`touchstone run {experiment} --resume {recording.folder}`"
-        )
-        return 130
+        return _stopped(recording, json)
     with CONSOLE.status("estimating, comparing, drawing the report"):
         result = session_of.finish(recording, accuracy, health)
     show(result, json)
@@ -136,10 +136,24 @@ def answer_line(result: dict[str, Any]) -> str:
     return mock + "; ".join(said)
 
 
+def _stopped(recording: Any, as_json: bool) -> int:
+    """Ctrl-C ended the session after a contact: how to go on."""
+    said = (
+        f"stopped after contact {recording.committed}; go on with "
+        f"`touchstone run contact-localization --resume {recording.folder}`"
+    )
+    CONSOLE.print(said, markup=False)
+    if as_json:
+        emit({"schema": 1, "error": said, "exit_code": 130, "recording": str(recording.folder)})
+    return 130
+
+
 def _perform(recording: Any) -> tuple[bool, Any]:
     from experiments.contact_localization import session_of
 
     total = len(recording.header.plan["contacts"])
+    if recording.committed == total:
+        return True, None  # nothing is left to touch: no bench is opened
     CONSOLE.print(f"recording to {recording.folder}")
     with step_progress(recording.committed, total) as progress:
         return session_of.perform_on_bench(recording, progress)

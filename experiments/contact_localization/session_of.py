@@ -22,6 +22,8 @@ from experiments.contact_localization.trade import trade
 from experiments.contact_localization.truth import read_truth
 from harness.accuracy import Accuracy
 from harness.device import Health
+from harness.errors import WrongUse
+from harness.gap import gap_path, load_gap
 from harness.recording import Recording, write_text_whole
 from harness.report.page import write_report
 from harness.run_folder import RunFiles, create_run, station_calibration
@@ -50,13 +52,17 @@ def start(
     """Take in the object, plan and rehearse the contacts, make the run's folder.
 
     Raises:
-        MeshRefused, WrongUse: of the object or the scene.
+        MeshRefused, WrongUse: of the object, the scene, the gap, or a folder that holds a run.
         MotionRefused: the rehearsal found a motion that must not be made; nothing was created.
     """
+    if folder is not None and (folder / "run.json").exists():
+        raise WrongUse(f"{folder} holds a run already; go on with it by --resume, or name another folder")
+    mock = None if station.mock is None else {"gap": _gap(gap or station.mock.gap)}
+    if gap is not None and mock is None:
+        raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")
     known = known_object(scene)
     calibration = station_calibration(station)
     plan = plan_run(scene, station, known.mesh, seed)
-    mock = None if station.mock is None else {"gap": gap or station.mock.gap}
     described = {
         "contacts": plan.parameters(),
         "pressed": [site.base_from_gel.tolist() for site in plan.sites],
@@ -152,6 +158,13 @@ def _doubts(found: Answer) -> tuple[str, ...]:
         f"the answer is ambiguous: {len(found.last.modes)} places stay likely ({shares}); "
         "one more contact elsewhere on the object would tell them apart",
     )
+
+
+def _gap(named: str) -> str:
+    """A gap that can be read: a shipped name, or a path that holds wherever the run is resumed from."""
+    load_gap(named)
+    path = gap_path(named)
+    return named if path.stem == named else str(path)
 
 
 def _new_folder(scene: SceneFile) -> Path:

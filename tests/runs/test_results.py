@@ -1,0 +1,215 @@
+"""The result and the report of a run: every promised key, null without the truth, both sides named."""
+
+import importlib
+import json
+import sys
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from whole_run import copied
+
+from experiments.contact_localization import session_of
+from experiments.contact_localization.dials import chosen
+from experiments.contact_localization.result import result_of
+from harness import explain
+from harness.cli import invoke
+from harness.effects import Effect
+from harness.recording import Recording
+from harness.run_folder import RunFiles
+from harness.sim import catalogue
+from harness.sim.optics import Optics
+
+KERNELS = (
+    "harness.sim.height_map:height_maps",
+    "harness.sim.gel:deform",
+    "harness.sim.noise:with_camera_noise",
+)
+"""Simulation of readings; the estimator has its own cheaper terms, and calls none of these."""
+
+NOT_CALLED_FOR = (
+    "touch.shadow",
+    "touch.markers",
+    "touch.noise",
+    "object.modes",
+    "object.sound",
+    "room.reverberation",
+    "microphone.pressure",
+    "camera.radiance",
+    "camera.shadow",
+    "arm.dynamics",
+)
+
+
+class Counting:
+    """Counts the calls of every effect and kernel for as long as it is in place."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.effects: Counter[str] = Counter()
+        self.kernels: Counter[str] = Counter()
+        original = catalogue.EFFECTS
+        effects = tuple(self._effect(effect) for effect in original)
+        for module in list(sys.modules.values()):
+            if vars(module).get("EFFECTS") is original:
+                patch.setattr(module, "EFFECTS", effects)
+        for target in KERNELS:
+            home, _, name = target.partition(":")
+            kernel = vars(importlib.import_module(home))[name]
+            counted = self._counted(name, kernel, self.kernels)
+            for module in list(sys.modules.values()):
+                if vars(module).get(name) is kernel:
+                    patch.setattr(module, name, counted)
+        patch.setattr(Optics, "render", self._counted("render", Optics.render, self.kernels))
+
+    def _effect(self, effect: Effect) -> Effect:
+        return replace(effect, compute=self._counted(effect.provides, effect.compute, self.effects))
+
+    @staticmethod
+    def _counted(name: str, function: Callable[..., Any], counter: Counter[str]) -> Callable[..., Any]:
+        def counted(*arguments: Any, **named: Any) -> Any:
+            counter[name] += 1
+            return function(*arguments, **named)
+
+        return counted
+
+
+@pytest.fixture(scope="module")
+def finished(
+    done: Recording, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[dict[str, Any], Counting, Path]:
+    """A real ``finish``, report and all, with every call counted."""
+    folder = tmp_path_factory.mktemp("finished")
+    recording = copied(done, folder / "run")
+    with pytest.MonkeyPatch.context() as patch:
+        counting = Counting(patch)
+        result = session_of.finish(recording, chosen([]), None)
+    return result, counting, recording.folder
+
+
+@pytest.fixture(scope="module")
+def result(finished: tuple[dict[str, Any], Counting, Path]) -> dict[str, Any]:
+    return finished[0]
+
+
+def test_every_promised_key_is_there(result: dict[str, Any]) -> None:
+    touch = result["estimates"]["touch"]
+    assert len(touch["position_m"]) == 3
+    for key in ("error_m", "error_mean_m", "error_top10_m", "credible90_m", "seconds"):
+        assert isinstance(touch[key], float), key
+        assert touch[key] > 0.0, key
+    assert touch["modes"]
+    assert sum(mode["weight"] for mode in touch["modes"]) <= 1.0 + 1e-9
+    assert isinstance(result["random_baseline_m"], float)
+    assert isinstance(result["geometry_baseline_m"], float)
+    assert set(result["plan"]) == {"ran", "skipped"}
+    assert set(result["accuracy"]) >= {"localization.method", "touch.optics"}
+    assert Path(result["recording"]).is_dir()
+    assert Path(result["report"]).is_file()
+    assert result["schema"] == 1
+    json.dumps(result, allow_nan=False)
+
+
+def test_the_error_is_the_distance_to_the_true_contact(result: dict[str, Any], done: Recording) -> None:
+    truth = json.loads(done.truth_path.read_text())
+    points = np.array([contact["point_in_object_m"] for contact in truth["contacts"]])
+    touch = result["estimates"]["touch"]
+    contacts = np.array([contact["position_m"] for contact in touch["contacts"]])
+    assert touch["error_m"] == pytest.approx(np.linalg.norm(touch["position_m"] - points[-1]), abs=1e-15)
+    assert touch["error_mean_m"] == pytest.approx(np.linalg.norm(contacts - points, axis=1).mean(), abs=1e-15)
+
+
+def test_the_result_lies_beside_the_readings(finished: tuple[dict[str, Any], Counting, Path]) -> None:
+    result, _, folder = finished
+    assert json.loads((folder / "result.json").read_text()) == json.loads(json.dumps(result))
+    page = Path(result["report"]).read_text()
+    assert "<script src" not in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    assert list(Path(result["report"]).parent.glob("*.png"))
+
+
+def test_exactly_the_plan_ran(finished: tuple[dict[str, Any], Counting, Path]) -> None:
+    result, counting, _ = finished
+    ran = [step["effect"] for step in result["plan"]["ran"]]
+    assert dict(counting.effects) == dict.fromkeys(ran, 1)
+    assert [step["calls"] for step in result["plan"]["ran"]] == [1] * len(ran)
+    skipped = {step["effect"]: step["reason"] for step in result["plan"]["skipped"]}
+    assert set(NOT_CALLED_FOR) <= set(skipped)
+    assert all(skipped.values())
+    assert set(skipped) | set(ran) == {effect.provides for effect in catalogue.EFFECTS}
+    assert dict(counting.kernels) == {"height_maps": 1, "deform": 1, "render": 1}
+
+
+def test_what_is_not_planned_would_be_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The control: the counters stand where an evaluation looks for its effects."""
+    counting = Counting(monkeypatch)
+    shadow = next(effect for effect in explain.EFFECTS if effect.provides == "touch.shadow")
+    with pytest.raises(KeyError):
+        shadow.compute({}, {})
+    assert counting.effects == {"touch.shadow": 1}
+
+
+def test_world_and_estimator_differ_and_both_are_named(
+    finished: tuple[dict[str, Any], Counting, Path], done: Recording
+) -> None:
+    result, _, _ = finished
+    world, run = result["world"], RunFiles(done)
+    assert world["mesh_vertices"] != len(run.mesh.vertices)
+    assert world["mesh_faces"] != len(run.mesh.faces)
+    assert world["optics_level"] != result["accuracy"]["touch.optics"]
+    assert world["calibration_sha256"] != run.calibration.sha256
+    page = Path(result["report"]).read_text()
+    for named in (
+        world["mesh_faces"],
+        len(run.mesh.faces),
+        world["optics_level"],
+        result["accuracy"]["touch.optics"],
+        world["calibration_sha256"][:8],
+        run.calibration.sha256[:8],
+    ):
+        assert str(named) in page, f"the report does not name {named}"
+
+
+def without_what_may_differ(result: dict[str, Any]) -> Any:
+    """A result less its seconds and paths."""
+    if isinstance(result, dict):
+        left_out = ("seconds", "seconds_by_stage", "recording", "report")
+        return {key: without_what_may_differ(v) for key, v in result.items() if key not in left_out}
+    return [without_what_may_differ(item) for item in result] if isinstance(result, list) else result
+
+
+def test_a_replay_gives_the_same_numbers_to_the_bit(finished: tuple[dict[str, Any], Counting, Path]) -> None:
+    first, _, folder = finished
+    again = result_of(session_of.score(Recording(folder), chosen([])), None)
+    assert without_what_may_differ(again) == without_what_may_differ(first)
+
+
+SCORES = ("error_m", "error_symmetric_m", "error_mean_m", "error_top10_m", "in_region90")
+
+
+def test_a_replay_without_the_truth_has_the_same_answer_and_no_scores(
+    finished: tuple[dict[str, Any], Counting, Path],
+    done: Recording,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    first = without_what_may_differ(json.loads(json.dumps(finished[0])))["estimates"]["touch"]
+    folder = copied(done, tmp_path / "run", truth=False).folder
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert invoke(["replay", str(folder), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    again = without_what_may_differ(result)["estimates"]["touch"]
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    assert [again.pop(key) for key in SCORES] == [None] * len(SCORES)
+    assert [contact.pop("error_m") for contact in again["contacts"]] == [None] * 3
+    for key in SCORES:
+        del first[key]
+    for contact in first["contacts"]:
+        del contact["error_m"]
+    assert again == first
+    assert [result[key] for key in ("random_baseline_m", "geometry_baseline_m", "world")] == [None] * 3
+    assert Path(result["report"]).parent.parent == tmp_path / "run-replay"
+    assert (tmp_path / "run-replay" / "result.json").is_file()
