@@ -177,7 +177,6 @@ class Child:
             return
         self._end_motion()
         if outcome.latch:
-            dashboard.stop(self._link.address)
             self._latched = outcome.error
         if outcome.error is not None:
             self._refuse(motion.id, outcome.error)
@@ -200,7 +199,7 @@ class Child:
             self._refuse(self._motion.id, self._latched)
             self._end_motion()
         with contextlib.suppress(BenchFault):
-            dashboard.stop(self._link.address)
+            self._link.halt()
 
     def _check_script(self) -> None:
         """Start the script again if this computer's own delay let the watchdog end it; at rest only.
@@ -266,7 +265,7 @@ class Child:
 
     def _give_up(self, error: Exception) -> None:
         with contextlib.suppress(BenchFault):
-            dashboard.stop(self._link.address)
+            self._link.halt()
         fault = (
             error
             if isinstance(error, TouchstoneError)
@@ -280,8 +279,7 @@ class Child:
             if self._motion is not None:
                 self._motion.stop(self._link, Outcome(error=SafetyStop("the program ended")))
                 self._comes_to_rest(0.5)
-            if self._link.program_running():
-                self._link.end_script()
+            self._link.end_script()
 
 
 def main() -> None:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from drivers import pipe, ur_words
+from drivers import dashboard, pipe, ur_words
 from drivers.rtde_stream import RtdeStream
 from harness.arrays import FloatArray
 from harness.clock import now
@@ -38,6 +38,7 @@ class Link:
         self.rate = rate
         self._stream: Any = None
         self._newest: FloatArray | None = None
+        self._halted = False
         self._kicks: deque[float] = deque([now()], maxlen=50)
         self._control: Any = None
         self._io: Any = None
@@ -74,7 +75,12 @@ class Link:
             yield packet
 
     def kick(self) -> None:
-        """Tell the watchdog that this program is well."""
+        """Tell the watchdog that this program is well.
+
+        Nothing is sent to a script that does not run: ur_rtde would wait seconds for its answer.
+        """
+        if self._halted or not self.program_running():
+            return
         self._kicks.append(now())
         self._control.kickWatchdog()
 
@@ -97,7 +103,13 @@ class Link:
 
     def brake(self) -> None:
         """Start to decelerate and return."""
-        self._control.stopL(DECELERATION, True)
+        if not self._halted:
+            self._control.stopL(DECELERATION, True)
+
+    def halt(self) -> None:
+        """End the controller's program through its dashboard; nothing is sent to it after that."""
+        self._halted = True
+        dashboard.stop(self.address)
 
     def progress(self) -> tuple[int, bool]:
         """(change count, whether an asynchronous motion or stop is running)."""
@@ -118,7 +130,7 @@ class Link:
 
     def end_script(self) -> None:
         """End the uploaded script, which disarms nothing it leaves running."""
-        if self._control is not None:
+        if self.program_running() and not self._halted:
             self._control.stopScript()
 
     def revive(self) -> None:

@@ -5,6 +5,7 @@ stop, no watchdog kick), has no travel limit and no force threshold of ours, and
 the contact. Here the search is a straight line to the end of the travel, and the guard ends it.
 """
 
+import threading
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -19,6 +20,7 @@ from harness.errors import BenchFault, SafetyStop, TouchstoneError
 
 START_WITHIN: Final = 0.5  # s for the script to begin a motion it accepted
 SETTLE_WITHIN: Final = 0.5  # s from the end of the script's motion to rest at the target
+BRAKE_WITHIN: Final = 0.05  # s for ur_rtde to pass on a brake, before the program is ended without it
 STOP_WITHIN: Final = 1.0  # s from braking to rest
 RISE: Final = 0.5  # N; a motion that starts beyond the press limit may go on while the force falls
 JOINT_TOLERANCE: Final = 1e-3  # rad
@@ -140,8 +142,7 @@ class Motion:
                 f"{self.what} met {trip.force:.1f} N; the limit is {self.guard.hard:g} N: the arm is stopped "
                 "and stays so until it is opened again. Free it by hand (pendant, freedrive) first"
             )
-            link.brake()
-            dashboard.stop(link.address)
+            self._stop_twice(link)
             self._since = now()
             self._outcome = Outcome(error=SafetyStop(text), latch=True)
         elif trip.kind == "press":
@@ -152,11 +153,20 @@ class Motion:
         elif trip.kind == "contact":
             self.stop(link, Outcome(value=True))
 
+    def _stop_twice(self, link: Link) -> None:
+        """Brake, then end the program; end it all the same if braking does not return."""
+        backup = threading.Timer(BRAKE_WITHIN, dashboard.stop, (link.address,))
+        backup.start()
+        if not self.stopping:
+            link.brake()
+        backup.cancel()
+        link.halt()
+
     def _stopped(self, link: Link, stream: Stream) -> Outcome | None:
         if stream.at_rest:
             return self._outcome
         if now() > self._since + STOP_WITHIN:
-            dashboard.stop(link.address)
+            link.halt()
             raise BenchFault(
                 f"{self.what}: the arm did not come to rest within {STOP_WITHIN:g} s of braking; it was "
                 "stopped through its dashboard"

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers import dashboard, pipe, ur_motion, ur_words
+from drivers import pipe, ur_motion, ur_words
 from drivers.ur_motion import Motion, Outcome
 from drivers.ur_stream import Guard, Stream
 from harness.arrays import FloatArray
@@ -136,6 +136,9 @@ class ScriptedLink:
     def brake(self) -> None:
         self.done.append("brake")
 
+    def halt(self) -> None:
+        self.done.append("halt")
+
     def progress(self) -> tuple[int, bool]:
         return self.count, self.running
 
@@ -180,18 +183,6 @@ class Rig:
 
     def look(self) -> Outcome | None:
         return self.motion.look(self.link, self.stream)
-
-
-@pytest.fixture
-def dashboard_heard(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    heard: list[str] = []
-
-    def stop(address: str) -> bool:
-        heard.append(address)
-        return True
-
-    monkeypatch.setattr(dashboard, "stop", stop)
-    return heard
 
 
 def test_each_packet_is_sent_and_gaps_are_counted() -> None:
@@ -308,14 +299,14 @@ def test_a_motion_that_begins_pressed_may_go_on_while_the_force_falls() -> None:
     assert "brake" in rig.link.done
 
 
-def test_beyond_the_hard_limit_the_arm_is_stopped_twice_and_latched(dashboard_heard: list[str]) -> None:
+def test_beyond_the_hard_limit_the_arm_is_stopped_twice_and_latched() -> None:
     rig = Rig()
     rig.begin()
     rig.feed(force=12.0, speed=0.1)
     rig.look()
     rig.feed(force=26.0, speed=0.1)
     assert rig.look() is None
-    assert dashboard_heard == [rig.link.address]
+    assert rig.link.done == ["joints", "brake", "halt"]
     rig.feed(count=3)
     outcome = rig.look()
     assert outcome is not None
@@ -324,7 +315,7 @@ def test_beyond_the_hard_limit_the_arm_is_stopped_twice_and_latched(dashboard_he
 
 
 def test_an_arm_that_does_not_come_to_rest_is_stopped_through_the_dashboard(
-    dashboard_heard: list[str], monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(ur_motion, "STOP_WITHIN", 0.0)
     rig = Rig()
@@ -332,7 +323,7 @@ def test_an_arm_that_does_not_come_to_rest_is_stopped_through_the_dashboard(
     rig.motion.stop(rig.link, Outcome(error=SafetyStop("asked")))
     with pytest.raises(BenchFault, match="did not come to rest"):
         rig.look()
-    assert dashboard_heard == [rig.link.address]
+    assert rig.link.done == ["joints", "brake", "halt"]
 
 
 def test_the_first_reason_to_stop_stands() -> None:
