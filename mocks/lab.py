@@ -29,6 +29,7 @@ from harness.arrays import ByteArray, FloatArray
 from harness.clock import now
 from harness.errors import TouchstoneError, WrongUse
 from harness.gap import load_gap
+from harness.geometry import frame_facing, inverse, transform
 from harness.kinematics import forward
 from mocks.faults import parse
 from mocks.gelsight_stream import MjpegServer
@@ -38,7 +39,7 @@ from mocks.shared_pose import Mark, SharedPose
 from mocks.truth import TruthFile
 from mocks.ur.hooks import HOME, ControllerConfig
 from mocks.ur.serve import serve
-from mocks.world import World
+from mocks.world import NominalBench, World
 
 READY_TIMEOUT = 30.0
 GEL_RATE = 25.0
@@ -187,6 +188,18 @@ def _say(answer: Mapping[str, Any]) -> None:
     sys.stdout.flush()
 
 
+def _compile(world: World, bench: NominalBench, away: FloatArray) -> None:
+    """Run every kernel once, before the fork: compiled in an instrument's process it would hold that up."""
+    normal = bench.mesh.face_normals[0]
+    gel = transform(frame_facing(-normal, 0.0), bench.mesh.corners[0].mean(axis=0) - 1e-3 * normal)
+    pressed = bench.base_from_object @ gel @ inverse(bench.flange_from_gel)
+    for pose in (away, pressed):
+        world.contact_wrench(pose, 0)
+        world.tactile_image(pose, 0, 0)
+        world.penetration(pose, 0)
+        world.true_contact(pose, 0)
+
+
 def _controller(world: World, model: str, shared: SharedPose, seed: int) -> Callable[[str, Line], None]:
     """What the arm's process does."""
 
@@ -219,8 +232,7 @@ def _begin(arguments: argparse.Namespace) -> Lab:
     bench, model = read_lab_scene(arguments.scene)
     world = World(bench, load_gap(arguments.gap), arguments.seed)
     start = forward(model, np.array(HOME))
-    world.contact_wrench(start, 0)  # compile before the fork, once for all
-    world.tactile_image(start, 0, 0)
+    _compile(world, bench, start)
     shared = SharedPose(start)
     return Lab(
         world,
