@@ -36,6 +36,7 @@ class UrSession:
         self.address = address
         self.latched: TouchstoneError | None = None
         self.epoch = 0
+        self._closing = False
         self._lock = arm_lock.take(address, lock_folder)
         self._process: ChildProcess | None = None
         try:
@@ -55,6 +56,7 @@ class UrSession:
 
     def close(self) -> None:
         """Stop the arm, end the child, release the lock."""
+        self._closing = True
         if self._process is not None:
             self._process.end(CLOSE_WITHIN)
         if self._lock >= 0:
@@ -92,7 +94,8 @@ class UrSession:
     def stop(self) -> None:
         """Stop now; takes no lock, so that a signal handler may call it."""
         self.epoch += 1
-        if self.process.lost or not self._stop_by_child():
+        stopped = not self.process.lost and self._stop_by_child()
+        if not stopped and not self._closing:  # a closing child stops the arm itself
             dashboard.stop(self.address)
             self.latched = self.latched or BenchFault(
                 f"the arm at {self.address} was stopped through its dashboard, for its process did not "

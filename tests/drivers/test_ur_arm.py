@@ -187,9 +187,11 @@ def test_reopening_after_a_fault_gives_a_working_arm(make_arm: MakeArm) -> None:
 def test_a_stop_ends_a_motion_from_another_thread(make_arm: MakeArm, far_end: FarEnd) -> None:
     arm = make_arm("hang")
     arm.open()
-    threading.Timer(0.1, arm.stop).start()
+    stopper = threading.Timer(0.1, arm.stop)
+    stopper.start()
     with pytest.raises(SafetyStop, match="by request"):
         move(arm)
+    stopper.join()
     assert far_end.heard == []
 
 
