@@ -96,7 +96,7 @@ def _contact(scored: Scored, index: int) -> Contact:
     fit = "no contact in the image" if gate.fit is None else f"{gate.fit:.1f} nats"
     return Contact(
         number=index + 1,
-        step=f"step {index + 1}",
+        step=str(index + 1),
         live=comparison.live[index],
         simulated=comparison.simulated[index],
         live_height=comparison.live_height[index],
