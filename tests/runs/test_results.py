@@ -16,7 +16,6 @@ from whole_run import copied
 from experiments.contact_localization import session_of
 from experiments.contact_localization.dials import chosen
 from experiments.contact_localization.result import result_of
-from harness import explain
 from harness.cli import invoke
 from harness.effects import Effect
 from harness.recording import Recording
@@ -146,7 +145,8 @@ def test_exactly_the_plan_ran(finished: tuple[dict[str, Any], Counting, Path]) -
 def test_what_is_not_planned_would_be_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """The control: the counters stand where an evaluation looks for its effects."""
     counting = Counting(monkeypatch)
-    shadow = next(effect for effect in explain.EFFECTS if effect.provides == "touch.shadow")
+    effects: tuple[Effect, ...] = vars(importlib.import_module("harness.explain"))["EFFECTS"]
+    shadow = next(effect for effect in effects if effect.provides == "touch.shadow")
     with pytest.raises(KeyError):
         shadow.compute({}, {})
     assert counting.effects == {"touch.shadow": 1}
