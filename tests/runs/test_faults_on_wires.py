@@ -1,0 +1,232 @@
+"""Faults at the far ends of the cables during a run: one sentence, nothing lost, the arm at rest."""
+
+import json
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from whole_run import Quiet, copied, edited
+
+from experiments.contact_localization import session_of
+from harness.cli import invoke
+from harness.device import Health
+from harness.errors import SafetyStop, TouchstoneError
+from harness.recording import Recording
+from harness.run_folder import RunFiles
+from harness.session import Progress
+from harness.station import Bench, RunContext
+from harness.step_file import Step
+from mocks.in_process import in_process_bench
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),
+    pytest.mark.timeout(180),
+]
+
+Cue = Callable[[Bench], None]
+
+BRAKING = 0.2
+"""s: a stop is told as it begins; at 0.9 rad/s a joint is at rest within this."""
+
+
+@dataclass
+class Session:
+    """What became of a session in which something was cued as its first contact began.
+
+    Attributes:
+        code: the program's exit code.
+        said: the JSON object it printed.
+        failed: after the failure and before the bench was closed: what the test looks at.
+    """
+
+    code: int
+    said: dict[str, Any]
+    failed: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Cued:
+    """A progress that cues a fault as a step begins."""
+
+    progress: Progress
+    bench: Bench
+    cue: Cue
+
+    def began(self, step: Step) -> None:
+        self.progress.began(step)
+        self.cue(self.bench)
+
+    def ended(self, step: Step, seconds: float) -> None:
+        self.progress.ended(step, seconds)
+
+
+def cue(bench: Bench, instrument: str, kind: str) -> None:
+    assert bench.lab is not None
+    bench.lab.fault(instrument, kind)
+
+
+def moved_in(bench: Bench, seconds: float) -> float:
+    """rad by which any joint turns in so many seconds, once the brakes have had their time."""
+    time.sleep(BRAKING)
+    first = bench.arm.state().joints
+    time.sleep(seconds)
+    return float(np.abs(bench.arm.state().joints - first).max())
+
+
+Resume = Callable[[Recording, Cue, Callable[[Bench], dict[str, Any]]], Session]
+
+
+@pytest.fixture
+def resume(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Resume:
+    """Goes on with a run by the command line, cues a fault, and looks at the bench after the failure."""
+    perform_on = session_of.perform_on
+
+    def go_on(recording: Recording, fault: Cue, look: Callable[[Bench], dict[str, Any]]) -> Session:
+        failed: dict[str, Any] = {}
+
+        def faulty(bench: Bench, run: Recording, progress: Progress) -> tuple[bool, dict[str, Health]]:
+            try:
+                return perform_on(bench, run, Cued(progress, bench, fault))
+            except TouchstoneError:
+                failed.update(moved=moved_in(bench, 0.3), **look(bench))
+                raise
+
+        monkeypatch.setattr(session_of, "perform_on", faulty)
+        code = invoke(["run", "--resume", str(recording.folder), "--json"])
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.err
+        said = json.loads(captured.out)
+        assert said["exit_code"] == code
+        assert "\n" not in said["error"]
+        monkeypatch.setattr(session_of, "perform_on", perform_on)
+        return Session(code, said, failed)
+
+    return go_on
+
+
+@pytest.fixture
+def begun(done: Recording, tmp_path: Path) -> Recording:
+    """A run with two of three contacts on the disk."""
+    recording = copied(done, tmp_path / "run")
+    (recording.folder / "steps" / "002.mcap").unlink()
+    return recording
+
+
+def hashes(recording: Recording) -> dict[str, str]:
+    steps = sorted((recording.folder / "steps").glob("*"))
+    return {path.name: sha256(path.read_bytes()).hexdigest() for path in steps}
+
+
+def test_a_stalled_camera(resume: Resume, begun: Recording) -> None:
+    before = hashes(begun)
+    place = np.array(begun.header.plan["contacts"][2]["base_from_stand_off"])[:3, 3]
+
+    def away(bench: Bench) -> dict[str, Any]:
+        return {"away": float(np.linalg.norm(bench.arm.state().base_from_flange[:3, 3] - place))}
+
+    session = resume(begun, lambda bench: cue(bench, "gel", "stall"), away)
+    assert session.code == 1
+    assert session.said["error"].startswith("gel sent ")
+    assert "stalled" in session.said["error"]
+    assert session.failed["moved"] < 1e-3
+    assert session.failed["away"] < 1e-3, "it does not stay pressed on the object"
+    assert hashes(begun) == before
+    run = RunFiles(begun)
+    context = RunContext(begun.truth_path, run.mesh, begun.header.seed, "default")
+    complete, _ = session_of.perform_on(in_process_bench(run.scene, run.station, context), begun, Quiet())
+    assert complete
+    assert begun.committed == 3
+    assert before.items() <= hashes(begun).items()
+
+
+def test_a_protective_stop_in_the_middle_of_a_motion(resume: Resume, begun: Recording) -> None:
+    before = hashes(begun)
+    timers: list[threading.Timer] = []
+
+    def soon(bench: Bench) -> None:
+        timers.append(threading.Timer(0.7, lambda: bench.lab.fault("arm", "protective_stop")))  # type: ignore[union-attr]
+        timers[0].start()
+
+    def latched(bench: Bench) -> dict[str, Any]:
+        state = bench.arm.state()
+        with pytest.raises(SafetyStop) as refused:
+            bench.arm.move_joints(state.joints + 0.05, 0.1, 0.5)
+        return {"safety": state.safety, "refused": str(refused.value), "again": moved_in(bench, 0.2)}
+
+    session = resume(begun, soon, latched)
+    timers[0].join()
+    assert session.code == 3
+    assert "protective stop" in session.said["error"]
+    assert session.failed["safety"] == "protective stop"
+    assert "protective stop" in session.failed["refused"]
+    assert session.failed["moved"] < 1e-3
+    assert session.failed["again"] < 1e-3
+    assert hashes(begun) == before
+
+
+def test_an_object_that_is_not_there(resume: Resume, begun: Recording) -> None:
+    def take_away(tree: dict[str, Any]) -> None:
+        tree["scene"]["object"]["pose"]["position"] = ["0.6 m", "0.6 m", "0.25 m"]
+
+    before = hashes(begun)
+    place = np.array(begun.header.plan["contacts"][2]["base_from_stand_off"])[:3, 3]
+
+    def away(bench: Bench) -> dict[str, Any]:
+        return {"away": float(np.linalg.norm(bench.arm.state().base_from_flange[:3, 3] - place))}
+
+    session = resume(edited(begun, take_away), lambda bench: None, away)
+    assert session.code == 1
+    assert session.said["error"].startswith("contact 3: the gel travelled ")
+    assert "met nothing" in session.said["error"]
+    assert "[object.pose]" in session.said["error"]
+    assert session.failed["moved"] < 1e-3
+    assert session.failed["away"] < 1e-3, "it is back at the stand-off"
+    assert hashes(begun) == before
+
+
+STATION = """
+schema = 1
+[arm]
+kind = "ur"
+model = "ur5e"
+address = "127.7.7.7"
+rate = "500 Hz"
+[arm.safety]
+workspace_low = ["-1.0 m", "-0.8 m", "0.02 m"]
+workspace_high = ["0.4 m", "0.8 m", "1.2 m"]
+[gel]
+kind = "gelsight-http"
+make = "gelsight-r1.5"
+serial = "none"
+url = "http://127.7.7.7:{port}/?action=stream"
+calibration = "gelsight_r15_bench"
+[frames.flange_from_gel]
+position = ["0 mm", "0 mm", "120 mm"]
+rotation = ["0 deg", "0 deg", "0 deg"]
+"""
+
+
+def test_a_wrong_port(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing listens: every instrument is named, with what to check, and nothing is waited for long."""
+    with socket.create_server(("127.7.7.7", 0)) as closed_again:
+        port = closed_again.getsockname()[1]
+    (tmp_path / "station.toml").write_text(STATION.format(port=port))
+    code = invoke(["check", "--station", str(tmp_path / "station.toml"), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert code == said["exit_code"] == 1
+    first, arm, gel = said["error"].split("\n  - ")
+    assert first == "2 instruments did not open:"
+    assert arm.startswith("arm: ")
+    assert "127.7.7.7" in arm
+    assert gel.startswith("gel: ")
+    assert str(port) in gel
+    assert "check" in arm
+    assert "check" in gel
