@@ -62,7 +62,14 @@ def read_contacts(
     return tuple(
         Contact(
             observation.base_from_gel,
-            touch_map(height_map(observation, model), model.sensor.pitch, block, noise.skirt, noise.edge, CONTACT_THRESHOLD),
+            touch_map(
+                height_map(observation, model),
+                model.sensor.pitch,
+                block,
+                noise.skirt,
+                noise.edge,
+                CONTACT_THRESHOLD,
+            ),
         )
         for observation in observations
     )
