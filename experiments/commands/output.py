@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from harness.step_file import Step
@@ -25,7 +26,7 @@ def emit(result: Mapping[str, Any]) -> None:
 
 def warn(sentence: str) -> None:
     """Something the operator should know."""
-    CONSOLE.print(f"[yellow]note:[/] {sentence}")
+    CONSOLE.print(f"[yellow]note:[/] {escape(sentence)}")
 
 
 class StepProgress:

@@ -154,7 +154,7 @@ def _perform(recording: Any) -> tuple[bool, Any]:
     total = len(recording.header.plan["contacts"])
     if recording.committed == total:
         return True, None  # nothing is left to touch: no bench is opened
-    CONSOLE.print(f"recording to {recording.folder}")
+    CONSOLE.print(f"recording to {recording.folder}", markup=False)
     with step_progress(recording.committed, total) as progress:
         return session_of.perform_on_bench(recording, progress)
 

@@ -1,7 +1,10 @@
 """Sessions on the bench in process: resumed, failed, complete; the wires are tried elsewhere."""
 
 import json
+import os
+import signal
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +12,7 @@ import numpy as np
 import pytest
 from whole_run import Quiet, copied, edited, in_process_run, touch_scene
 
+from experiments.commands.output import warn
 from experiments.contact_localization import session_of
 from harness.cli import invoke
 from harness.errors import BenchFault, NotTouched, WrongUse
@@ -106,6 +110,7 @@ class Blind:
 
     def __init__(self, bench: Bench, at: int) -> None:
         self._gel, self._left = bench.gel, at
+        self.open, self.close, self.health = bench.gel.open, bench.gel.close, bench.gel.health
 
     def read(self, count: int, timeout: float) -> Reading:
         if self._left == 0:
@@ -120,10 +125,8 @@ def test_a_gel_that_fails_does_not_stay_pressed(tmp_path: Path) -> None:
     )
     recording = started.recording
     bench = bench_of(recording)
-    blind = Blind(bench, 1)
-    object.__setattr__(bench, "gel", blind)
     with pytest.raises(BenchFault, match="gel: no frame"):
-        session_of.perform_on(bench, recording, Quiet())
+        session_of.perform_on(replace(bench, gel=Blind(bench, 1)), recording, Quiet())
     assert recording.committed == 1
     stand_off = np.array(recording.header.plan["contacts"][1]["base_from_stand_off"])
     assert bench.arm.state().base_from_flange[:3, 3] == pytest.approx(stand_off[:3, 3], abs=1e-4)
@@ -156,22 +159,25 @@ def test_what_no_command_foresaw_is_one_sentence_too(
     )
 
 
-def stopped_after(count: int) -> type[Quiet]:
-    """A progress at which Ctrl-C is pressed during a step."""
-    import os
-    import signal
+def test_a_warning_keeps_its_brackets(capsys: pytest.CaptureFixture[str]) -> None:
+    warn("see [object.pose] of the scene")
+    assert "[object.pose]" in capsys.readouterr().err
 
-    class Pressing(Quiet):
-        def began(self, step: Step) -> None:
-            if step.index == count - 1:
-                os.kill(os.getpid(), signal.SIGINT)
 
-    return Pressing
+@dataclass
+class Pressing(Quiet):
+    """A progress at which Ctrl-C is pressed as a step begins."""
+
+    at: int
+
+    def began(self, step: Step) -> None:
+        if step.index == self.at:
+            os.kill(os.getpid(), signal.SIGINT)
 
 
 def test_ctrl_c_once_ends_after_the_step(done: Recording, tmp_path: Path) -> None:
     stopped = cut(done, tmp_path / "run", 0)
-    complete, _ = session_of.perform_on(bench_of(stopped), stopped, stopped_after(2)())
+    complete, _ = session_of.perform_on(bench_of(stopped), stopped, Pressing(at=1))
     assert not complete
     assert stopped.committed == 2
 
