@@ -59,7 +59,8 @@ def _first_hit(corners: FloatArray, origin: FloatArray, axis: FloatArray) -> flo
 @compiled
 def _nearest(corners: FloatArray, point: FloatArray) -> FloatArray:
     """Ericson, Real-Time Collision Detection, 2005, section 5.1.5."""
-    best, best_gap = corners[0, 0].copy(), np.inf
+    best: FloatArray = corners[0, 0].copy()
+    best_gap = np.inf
     for f in range(len(corners)):
         a, b, c = corners[f, 0], corners[f, 1], corners[f, 2]
         ab, ac, ap = b - a, c - a, point - a
