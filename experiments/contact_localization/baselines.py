@@ -1,48 +1,90 @@
-"""What can be said without looking at one tactile image; a table without these rows is not honest."""
+"""What an answer is worth that reads no image: the rows that every table must carry.
+
+The translations between contacts alone say much about where on a known object they were
+made; a method that reads tactile images must be seen beside them.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from experiments.contact_localization.contact_point import nearest_point
 from experiments.contact_localization.grid import Contact, Noise, Search
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior import best_point
 from experiments.contact_localization.surface import random_points
-from harness.arrays import FloatArray, IntArray
+from harness.arrays import FloatArray
 from harness.mesh import Mesh
 
-_RANDOM_POINTS = 4000
+
+@dataclass(frozen=True, eq=False)
+class BaselineAnswer:
+    """An answer without images.
+
+    Attributes:
+        position_in_object: ``(3,)`` metres, on the surface.
+        candidates: ``(10, 3)`` metres, the most probable samples.
+    """
+
+    position_in_object: FloatArray
+    candidates: FloatArray
 
 
-def geometry_answer(
-    observations: Sequence[Observation],
+def random_point(mesh: Mesh, seed: int) -> FloatArray:
+    """``(3,)`` metres: a point drawn evenly from the surface, the paper's baseline."""
+    return np.asarray(random_points(mesh, 1, np.random.default_rng(seed))[0][0])
+
+
+def mean_random_error(mesh: Mesh, truth_in_object: FloatArray, count: int = 4000) -> float:
+    """Metres: the mean distance from a point drawn evenly from the surface to a ``(3,)`` truth."""
+    points = random_points(mesh, count, np.random.default_rng(0))[0]
+    return float(np.linalg.norm(points - truth_in_object, axis=1).mean())
+
+
+def geometry_only(
+    base_from_gels: Sequence[FloatArray],
     model: Model,
     prior: Prior,
-    spacing: float = 2.0e-3,
-    use_axis: bool = False,
+    spacing: float,
     noise: Noise | None = None,
-) -> FloatArray:
-    """``(3,)`` metres: the last contact, from the arm's translations and the object's shape alone.
+) -> BaselineAnswer:
+    """Where the last contact was, from the arm's translations alone: all contacts lie on the surface.
 
     Args:
-        observations: their images are not opened.
-        model: the object.
+        base_from_gels: ``(4, 4)`` each, in order.
+        model: of the object.
         prior: of its orientation.
-        spacing: metres between the surface's samples.
-        use_axis: whether the tool's attitude counts too: that it was within 15 degrees of the normal.
-        noise: of the places and axes.
+        spacing: metres between surface samples.
+        noise: of places.
     """
-    contacts = [Contact(observation.base_from_gel, None) for observation in observations]
-    search = Search(contacts, model, prior, spacing, noise or Noise())
-    members: IntArray = np.arange(len(contacts), dtype=np.int64)
-    found = search.grid(members, len(contacts) - 1, use_axis)
-    cloud = search.surface_points(len(contacts) - 1, found.gels, found.yaws)
-    return nearest_point(model.mesh, best_point(cloud, found.weights))
+    return _without_images(base_from_gels, model, prior, spacing, noise or Noise(), use_axis=False)
 
 
-def random_error(mesh: Mesh, true: FloatArray) -> float:
-    """Metres: the expected distance from ``(3,)`` ``true`` of a point drawn evenly from the surface."""
-    points, _ = random_points(mesh, _RANDOM_POINTS, np.random.default_rng(0))
-    return float(np.linalg.norm(points - true, axis=1).mean())
+def geometry_and_axis(
+    base_from_gels: Sequence[FloatArray],
+    model: Model,
+    prior: Prior,
+    spacing: float,
+    noise: Noise | None = None,
+) -> BaselineAnswer:
+    """As ``geometry_only``, and the tool stood near the surface's normal at every contact."""
+    return _without_images(base_from_gels, model, prior, spacing, noise or Noise(), use_axis=True)
+
+
+def _without_images(
+    base_from_gels: Sequence[FloatArray],
+    model: Model,
+    prior: Prior,
+    spacing: float,
+    noise: Noise,
+    use_axis: bool,
+) -> BaselineAnswer:
+    contacts = [Contact(np.asarray(pose), None) for pose in base_from_gels]
+    search = Search(contacts, model, prior, spacing, noise)
+    last = len(contacts) - 1
+    hypotheses = search.grid(np.arange(len(contacts)), last, use_axis)
+    points = search.contact_places(last, hypotheses)
+    ranked = np.argsort(-hypotheses.log_weights, kind="stable")[:10]
+    position = nearest_point(model.mesh, best_point(points, hypotheses.weights))
+    return BaselineAnswer(position, points[ranked])

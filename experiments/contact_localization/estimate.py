@@ -30,6 +30,8 @@ FLOOR = 1.0e-3
 _CANDIDATES = 10
 _UNKNOWN_YAW_FACTOR = 4
 _ANCHORS = 3
+_WORTH_A_LOOK = 12.0
+_MOST_LOOKS = 3000
 _SUSPICIOUS_BELOW = -8.0
 
 
@@ -131,7 +133,8 @@ def locate(
     for k in range(count if first is None else first, count + 1):
         seconds = {"images": image_seconds * k / count}
         found = _solve(search, k, levels, seed, seconds)
-        if k == count:
+        # The paper's filter has no measure of fit to be refused by.
+        if k == count and levels.method == "grid":
             refuse_bad_fit(found.members, found.fits)
         answers.append(_answer(search, k, found, seconds))
     return tuple(answers)
@@ -176,9 +179,17 @@ def _by_grid(
     grid = search.grid(members, anchor)
     _lap(seconds, "grid", start)
     start = time.perf_counter()
-    terms = search.weigh(grid.gels, grid.yaws, members, step=2, rings=1)
+    # Between samples 2 mm apart the best place is up to 1.2 mm away: cells that fine would tell no more.
+    step = max(1, round(search.surface.spacing / (0.5 * search.touch_pitch)))
+    off = 0.4 * search.surface.spacing
+    terms = search.weigh(grid.gels, grid.yaws, members, step, rings=1, blur=off)
     log_weights = terms.sum(axis=1) + search.log_yaw_prior(grid.yaws)
-    weighed = Hypotheses(grid.gels, grid.yaws, log_weights - log_weights.max())
+    weighed = Hypotheses(grid.gels, grid.yaws, log_weights - log_weights.max()).best(
+        _WORTH_A_LOOK, _MOST_LOOKS
+    )
+    terms = search.weigh(weighed.gels, weighed.yaws, members, max(1, step // 2), rings=1)
+    log_weights = terms.sum(axis=1) + search.log_yaw_prior(weighed.yaws)
+    weighed = Hypotheses(weighed.gels, weighed.yaws, log_weights - log_weights.max())
     _lap(seconds, "touch", start)
     start = time.perf_counter()
     samples = levels.samples * (1 if search.prior.yaw == "known" else _UNKNOWN_YAW_FACTOR)

@@ -85,6 +85,11 @@ class Hypotheses:
         weights = np.exp(self.log_weights)
         return np.asarray(weights / weights.sum())
 
+    def best(self, within: float, most: int) -> "Hypotheses":
+        """Those within so many nats of the best, evenly thinned where they are more than ``most``."""
+        kept = _best(self.log_weights, within, most)
+        return Hypotheses(self.gels[kept], self.yaws[kept], self.log_weights[kept])
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -150,7 +155,7 @@ class Search:
         return Hypotheses(gels, self.yaws[yaws], log_weights[kept] - log_weights[kept].max())
 
     def weigh(
-        self, gels: FloatArray, yaws: FloatArray, members: IntArray, step: int, rings: int
+        self, gels: FloatArray, yaws: FloatArray, members: IntArray, step: int, rings: int, blur: float = 0.0
     ) -> FloatArray:
         """``(n, m)`` nats: the place and image of each of ``(m,)`` contacts under each hypothesis.
 
@@ -160,10 +165,13 @@ class Search:
             members: indices of contacts whose image shows a contact.
             step: view pixels between the cells over which the arm's error is integrated.
             rings: cells on each side.
+            blur: metres, one sigma by which the hypotheses themselves are off their best place.
         """
         terms = np.zeros((len(gels), len(members)))
         noise, temperatures = self.noise.touch, self._temperatures(members)
-        for column, (k, sigma) in enumerate(zip(members, self._place_sigmas(members), strict=True)):
+        for column, (k, sigma) in enumerate(
+            zip(members, np.hypot(self._place_sigmas(members), blur), strict=True)
+        ):
             for chosen, view, places in self.placed(int(k), gels, yaws):
                 terms[chosen, column] = touch_terms(
                     view, self.touch(int(k)), noise, places, step, rings, sigma, temperatures[column]
@@ -212,6 +220,13 @@ class Search:
             lost = chosen[~hit]
             points[lost] = self.surface.points[self.surface.tree.query(points[lost])[1]]
         return points
+
+    def contact_places(self, contact: int, hypotheses: Hypotheses) -> FloatArray:
+        """``(n, 3)`` metres: where a contact lies if the gel's centre was pressed in as it seems."""
+        rotations = self.prior.object_from_base(hypotheses.yaws)
+        inward = rotations @ self.axes[contact]
+        gels = hypotheses.gels + rotations @ self.positions[contact]
+        return np.asarray(gels - self.contacts[contact].indentation * inward)
 
     def touch(self, contact: int) -> TouchMap:
         """What the gel read at a contact whose image counts."""
@@ -295,7 +310,8 @@ def refine(
             np.column_stack([current.gels[unique] / width, current.yaws[unique] / turn]),
             repeats / samples,
         )
-        terms = search.weigh(gels, yaws, members, step=1, rings=3)
+        finest = attempt == rounds - 1
+        terms = search.weigh(gels, yaws, members, step=1 if finest else 2, rings=2)
         log_weights = terms.sum(axis=1) + search.log_yaw_prior(yaws) - log_density
         current = Hypotheses(gels, yaws, log_weights - log_weights.max())
     return current

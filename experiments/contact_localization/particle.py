@@ -15,6 +15,7 @@ from experiments.contact_localization.touch import similarities
 from harness.arrays import FloatArray, IntArray
 
 CANDIDATES = 10
+_YAW_STEP = 10.0
 TEMPERATURE = 0.05
 """Of the weight ``exp(cosine / temperature)``; the paper states none, with 1 it hardly converges."""
 
@@ -75,7 +76,7 @@ def particle_filter(
 def _first_yaws(search: Search, count: int, rng: np.random.Generator) -> FloatArray:
     if search.prior.yaw == "known":
         return np.zeros(count)
-    return rng.uniform(0.0, 2.0 * np.pi, count)
+    return np.radians(_YAW_STEP * rng.integers(0, round(360.0 / _YAW_STEP), count))
 
 
 def _similarity(search: Search, contact: int, at: IntArray, yaws: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from harness.arrays import BoolArray, FloatArray, read_only
 _GROSS = 20.0e-3
 _MODE_RADIUS = 12.0e-3
 _SMALLEST_MODE = 0.05
-_MOST_POINTS = 1500
+_MOST_POINTS = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def best_point(points: FloatArray, weights: FloatArray) -> FloatArray:
 
 
 def thinned(points: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """At most 1,500 points standing for all, each weight drawn evenly."""
+    """At most 400 points standing for all, each weight drawn evenly."""
     if len(points) <= _MOST_POINTS:
         return points, weights / weights.sum()
     marks = (np.arange(_MOST_POINTS) + 0.5) / _MOST_POINTS

@@ -13,6 +13,11 @@ from harness.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only
 from harness.sim.compiled import compiled
 
 _CORE = 0.2
+_HOPELESS = 150.0
+
+POOL = 4
+"""Pixels of a view, each way, that share the limits on where the gel can be."""
+
 _SUNKEN = -6.0e-3
 """Where the object is farther than this below its highest place, or absent, the gel reads nothing."""
 
@@ -77,9 +82,9 @@ class View:
         origin: ``(2,)`` metres, view x and y of the centre of pixel (0, 0).
         pitch: metres a pixel, half of the touch map's.
         depth: ``(rows, columns)`` metres along z of the first surface, inf where there is none.
-        nearest: ``(rows, columns)`` metres along z: the gel's centre cannot be nearer to the arm,
-            or nothing would touch it.
-        farthest: ``(rows, columns)`` metres along z: it cannot be farther, or the object would
+        nearest: for blocks of ``POOL`` pixels each way, metres along z: the gel's centre cannot be
+            nearer to the arm, or nothing would touch it.
+        farthest: for the same blocks, metres along z: it cannot be farther, or the object would
             reach through the gel.
         score: ``(rows, columns)`` nats, NaN where not asked for yet.
         gel_depth: ``(rows, columns)`` metres along z of the gel's centre, from the fit.
@@ -362,28 +367,44 @@ def _score(
     _solve3(a, b, plane, len(touched) * ridge, change)
     _press(crop, plane, pitch, pressed)
     _hang(pressed, blur, finish, work, kept)
-    # The gel hangs over edges, so the first fit, to the object's own shape, sinks too deep there:
-    # what is left over where the object presses corrects it.
-    a[:], b[:] = 0.0, 0.0
-    for i in range(rows):
-        for j in range(columns):
-            if kept[i, j] > 0.0:
-                x, y = (j + 0.5 - 0.5 * columns) * pitch, (i + 0.5 - 0.5 * rows) * pitch
-                _add(a, b, x, y, pressed[i, j] - heights[i, j])
-    if a[0, 0] > 0.0:
-        _solve3(a, b, plane, a[0, 0] * ridge, change)
-        _press(crop, plane, pitch, pressed)
-        _hang(pressed, blur, finish, work, kept)
+    cost = _misfit(pressed, heights, flat, plane, len(touched), rms, tilt)
+    # A place that fits this badly is capped whatever a second look would find.
+    if cost < _HOPELESS:
+        # The gel hangs over edges, so the first fit, to the object's own shape, sinks too deep
+        # there: what is left over where the object presses corrects it.
+        a[:], b[:] = 0.0, 0.0
+        for i in range(rows):
+            for j in range(columns):
+                if kept[i, j] > 0.0:
+                    x, y = (j + 0.5 - 0.5 * columns) * pitch, (i + 0.5 - 0.5 * rows) * pitch
+                    _add(a, b, x, y, pressed[i, j] - heights[i, j])
+        if a[0, 0] > 0.0:
+            _solve3(a, b, plane, a[0, 0] * ridge, change)
+            _press(crop, plane, pitch, pressed)
+            _hang(pressed, blur, finish, work, kept)
+            cost = _misfit(pressed, heights, flat, plane, len(touched), rms, tilt)
+    crop[:] = pressed
+    return -0.5 * cost, reference - plane[0]
+
+
+@compiled
+def _misfit(
+    pressed: FloatArray,
+    heights: FloatArray,
+    flat: BoolArray,
+    plane: FloatArray,
+    count: int,
+    rms: float,
+    tilt: float,
+) -> float:
     total = 0.0
-    for i in range(rows):
-        for j in range(columns):
+    for i in range(heights.shape[0]):
+        for j in range(heights.shape[1]):
             gap = pressed[i, j] - heights[i, j]
             if flat[i, j]:
                 gap = min(np.abs(gap), pressed[i, j])
             total += gap * gap
-    crop[:] = pressed
-    cost = total / (len(touched) * rms * rms) + (plane[1] ** 2 + plane[2] ** 2) / (tilt * tilt)
-    return -0.5 * cost, reference - plane[0]
+    return float(total / (count * rms * rms) + (plane[1] ** 2 + plane[2] ** 2) / (tilt * tilt))
 
 
 @compiled
@@ -511,7 +532,7 @@ def _terms(
                 r, c = middle_r + u * step, middle_c + v * step
                 if r < 0 or c < 0 or r >= depth.shape[0] or c >= depth.shape[1]:
                     continue
-                if not nearest[r, c] < places[n, 2] < farthest[r, c]:
+                if not nearest[r // POOL, c // POOL] < places[n, 2] < farthest[r // POOL, c // POOL]:
                     continue
                 if np.isnan(score[r, c]):
                     score[r, c], gel_depth[r, c] = _score(

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import minimum_filter
 
-from experiments.contact_localization.touch import View
+from experiments.contact_localization.touch import POOL, View
 from harness.arrays import FloatArray, read_only
 from harness.geometry import transform
 from harness.sensor import TactileSensor
@@ -32,8 +32,9 @@ def view_along(raster: RasterMesh, object_from_gel: FloatArray, pitch: float, se
     view_from_object = transform(object_from_gel.T, np.array([-centre[0], -centre[1], 0.0]))
     depth = depth_image(raster, view_from_object, pitch, int(rows), int(columns)).depth
     origin = centre - 0.5 * pitch * np.array([columns - 1.0, rows - 1.0])
-    nearest = _front(depth, pitch, sensor.window, _SLACK) - _SLACK
-    farthest = _front(depth, pitch, sensor.window, -_SLACK) + sensor.gel_thickness + _SLACK
+    pooled = _pooled(depth)
+    nearest = _front(pooled, pitch, sensor.window, _SLACK) - _SLACK
+    farthest = _front(pooled, pitch, sensor.window, -_SLACK) + sensor.gel_thickness + _SLACK
     missing = np.full(depth.shape, np.nan)
     return View(
         read_only(object_from_gel.copy()),
@@ -47,10 +48,18 @@ def view_along(raster: RasterMesh, object_from_gel: FloatArray, pitch: float, se
     )
 
 
-def _front(depth: FloatArray, pitch: float, window: tuple[float, float], wider: float) -> FloatArray:
-    """The first surface under a window, widened on every side, centred on each pixel."""
-    columns, rows = (2 * round((0.5 * side + wider) / pitch) + 1 for side in window)
-    return np.asarray(minimum_filter(depth, size=(rows, columns), mode="constant", cval=np.inf))
+def _pooled(depth: FloatArray) -> FloatArray:
+    """The first surface in blocks of pixels: as fine as the limits on the gel's place need be."""
+    rows, columns = (-(-side // POOL) for side in depth.shape)
+    padded = np.full((rows * POOL, columns * POOL), np.inf)
+    padded[: depth.shape[0], : depth.shape[1]] = depth
+    return np.asarray(padded.reshape(rows, POOL, columns, POOL).min(axis=(1, 3)))
+
+
+def _front(pooled: FloatArray, pitch: float, window: tuple[float, float], wider: float) -> FloatArray:
+    """The first surface under a window, widened on every side, centred on each block."""
+    columns, rows = (2 * round((0.5 * side + wider) / (POOL * pitch)) + 1 for side in window)
+    return np.asarray(minimum_filter(pooled, size=(rows, columns), mode="constant", cval=np.inf))
 
 
 def window_depth(
