@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.answer import Answer
-from experiments.contact_localization.baselines import random_error
+from experiments.contact_localization.baselines import mean_random_error
 from experiments.contact_localization.comparison import Comparison
 from experiments.contact_localization.gate import Gate
 from experiments.contact_localization.posterior import Mode
@@ -66,7 +66,7 @@ def result_of(scored: Scored, report: str | None) -> dict[str, Any]:
         "seed": run.recording.header.seed,
         "contacts": len(found.observations),
         "estimates": {"touch": touch_estimate(scored)},
-        "random_baseline_m": None if last_true is None else random_error(run.mesh, last_true),
+        "random_baseline_m": None if last_true is None else mean_random_error(run.mesh, last_true),
         "geometry_baseline_m": _distance(scored.geometry, last_true),
         "symmetry": scored.symmetry.name,
         "plan": _plan(scored.comparison),

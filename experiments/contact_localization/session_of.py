@@ -11,16 +11,18 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.answer import Answer, answer
-from experiments.contact_localization.baselines import geometry_answer
+from experiments.contact_localization.baselines import geometry_only
 from experiments.contact_localization.comparison import compare
 from experiments.contact_localization.dials import levels_of
 from experiments.contact_localization.experiment import ContactLocalization
+from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.planning import RunPlan, plan_run, twin_of, way_between
 from experiments.contact_localization.report_of import report_of
 from experiments.contact_localization.result import Scored, result_of
 from experiments.contact_localization.trade import trade
 from experiments.contact_localization.truth import read_truth
 from harness.accuracy import Accuracy
+from harness.arrays import FloatArray
 from harness.device import Health
 from harness.errors import WrongUse
 from harness.gap import gap_path, load_gap
@@ -105,7 +107,7 @@ def score(recording: Recording, accuracy: Accuracy) -> Scored:
     return Scored(
         run=run,
         found=found,
-        geometry=geometry_answer(found.observations, found.model, found.prior),
+        geometry=_without_images(found, len(found.observations)),
         comparison=compare(found, run, accuracy),
         truth=read_truth(recording),
         symmetry=find_symmetries(run.mesh),
@@ -139,8 +141,14 @@ def _geometry_errors(scored: Scored) -> tuple[float, ...] | None:
     true, found = scored.true_points, scored.found
     if true is None:
         return None
-    alone = [geometry_answer(found.observations[: k + 1], found.model, found.prior) for k in range(len(true))]
+    alone = [_without_images(found, k + 1) for k in range(len(true))]
     return tuple(float(np.linalg.norm(a - b)) for a, b in zip(alone, true, strict=True))
+
+
+def _without_images(found: Answer, count: int) -> FloatArray:
+    """``(3,)`` metres: the last of the first ``count`` contacts, from the arm's translations alone."""
+    poses = [observation.base_from_gel for observation in found.observations[:count]]
+    return geometry_only(poses, found.model, found.prior, Levels().spacing).position_in_object
 
 
 def _trade(scored: Scored) -> Any:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.answer import observe_step
-from experiments.contact_localization.baselines import geometry_answer, random_error
+from experiments.contact_localization.baselines import geometry_and_axis, geometry_only, mean_random_error
 from experiments.contact_localization.estimate import Estimate, estimate
 from experiments.contact_localization.experiment import ContactLocalization
 from experiments.contact_localization.levels import Levels
@@ -127,11 +127,12 @@ def _prior(run: _Run, yaw: str) -> Prior:
 def _scored(method: str, run: _Run, prior: Prior, symmetry: SymmetryGroup) -> dict[str, Any]:
     start = now()
     if method == "random":
-        error = random_error(run.model.mesh, run.true)
+        error = mean_random_error(run.model.mesh, run.true)
         return {"error_m": error, "error_symmetric_m": None, "seconds": 0.0}
     if method.startswith("geometry"):
-        use_axis = method.endswith("axis")
-        point = geometry_answer(run.observations, run.model, prior, use_axis=use_axis)
+        method_of = geometry_and_axis if method.endswith("axis") else geometry_only
+        poses = [observation.base_from_gel for observation in run.observations]
+        point = method_of(poses, run.model, prior, Levels().spacing).position_in_object
         return _errors(point, run.true, symmetry, now() - start)
     levels = PAPER if method == "paper's filter" else Levels()
     return _estimated(run, prior, levels, symmetry, start)
@@ -144,7 +145,7 @@ def _estimated(
         found = estimate(run.observations, run.model, prior, levels, seed=run.seed)
     except FitRefused as refusal:
         # A refused fit of the right object is a failure, counted at the value of a random answer.
-        error = random_error(run.model.mesh, run.true)
+        error = mean_random_error(run.model.mesh, run.true)
         seconds = now() - start
         return {
             "error_m": error,
