@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from experiments.contact_localization.first_touch import first_touch
 from experiments.contact_localization.pace import joint_speed
 from harness.arrays import FloatArray
 from harness.device import Arm
@@ -101,7 +102,7 @@ class Speeds:
         press: m/s once the gel touches.
         retreat: m/s away from the object.
         acceleration: m/s^2 of every straight line.
-        touch_force: N at which the gel counts as touching.
+        touch_force: N that end the search; the press is measured from where half of it was met.
         overtravel: m beyond the nominal surface before a touch is given up.
     """
 
@@ -150,8 +151,7 @@ class ContactLocalization:
         arm.zero_force()
         began = arm.state().time
         self._touch(step, motion, arm)
-        touched = arm.state().base_from_flange
-        self._line(arm, _moved(motion.base_from_stand_off, touched, motion.press * motion.axis), "press")
+        self._press(motion, arm, began)
         bench.pause(SETTLE)
         bench.mark(step.index, 0)
         image = self._read(bench, motion)
@@ -166,6 +166,16 @@ class ContactLocalization:
             speed = joint_speed(bench.station, here, joints, self.speeds.travel)
             bench.arm.move_joints(joints, speed, self.speeds.travel_acceleration)
             here = joints
+
+    def _press(self, motion: ContactMotion, arm: Arm, began: float) -> None:
+        """On to the planned depth behind the first touch, wherever the search came to rest."""
+        state = arm.state()
+        search = arm.history(state.time - began)
+        touched = first_touch(search, motion.axis, 0.5 * self.speeds.touch_force)
+        further = motion.press - (float(state.base_from_flange[:3, 3] @ motion.axis) - touched)
+        self._line(
+            arm, _moved(motion.base_from_stand_off, state.base_from_flange, further * motion.axis), "press"
+        )
 
     def _read(self, bench: Bench, motion: ContactMotion) -> Reading:
         """The frames; where the camera fails the arm is well, and does not stay pressed on the object."""
