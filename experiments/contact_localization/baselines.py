@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.contact_point import nearest_point
-from experiments.contact_localization.grid import Contact, Noise, Search
+from experiments.contact_localization.hypotheses import Contact, Noise
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior import best_point
+from experiments.contact_localization.search import Search
 from experiments.contact_localization.surface import random_points
 from harness.arrays import FloatArray
 from harness.mesh import Mesh
@@ -80,7 +81,7 @@ def _without_images(
     noise: Noise,
     use_axis: bool,
 ) -> BaselineAnswer:
-    contacts = [Contact(np.asarray(pose), None) for pose in base_from_gels]
+    contacts = [Contact(np.asarray(pose)) for pose in base_from_gels]
     search = Search(contacts, model, prior, spacing, noise)
     last = len(contacts) - 1
     hypotheses = search.grid(np.arange(len(contacts)), last, use_axis)

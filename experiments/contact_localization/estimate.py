@@ -8,7 +8,8 @@ import numpy as np
 
 from experiments.contact_localization.contact_point import contact_point, nearest_point
 from experiments.contact_localization.gate import Gate, gates, refuse_bad_fit
-from experiments.contact_localization.grid import Contact, Hypotheses, Noise, Search, refine
+from experiments.contact_localization.grid import on_samples, refine
+from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation, read_contacts
@@ -21,6 +22,7 @@ from experiments.contact_localization.posterior import (
     credible_region,
     modes,
 )
+from experiments.contact_localization.search import Search
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import WrongUse
 
@@ -30,8 +32,6 @@ FLOOR = 1.0e-3
 _CANDIDATES = 10
 _UNKNOWN_YAW_FACTOR = 4
 _ANCHORS = 3
-_WORTH_A_LOOK = 12.0
-_MOST_LOOKS = 3000
 _SUSPICIOUS_BELOW = -8.0
 
 
@@ -176,24 +176,11 @@ def _by_grid(
     search: Search, members: IntArray, anchor: int, levels: Levels, seed: int, seconds: dict[str, float]
 ) -> _Solution:
     start = time.perf_counter()
-    grid = search.grid(members, anchor)
+    coarse = on_samples(search, members, anchor)
     _lap(seconds, "grid", start)
     start = time.perf_counter()
-    # Between samples 2 mm apart the best place is up to 1.2 mm away: cells that fine would tell no more.
-    step = max(1, round(search.surface.spacing / (0.5 * search.touch_pitch)))
-    off = 0.4 * search.surface.spacing
-    terms = search.weigh(grid.gels, grid.yaws, members, step, rings=1, blur=off)
-    log_weights = terms.sum(axis=1) + search.log_yaw_prior(grid.yaws)
-    weighed = Hypotheses(grid.gels, grid.yaws, log_weights - log_weights.max()).best(
-        _WORTH_A_LOOK, _MOST_LOOKS
-    )
-    terms = search.weigh(weighed.gels, weighed.yaws, members, max(1, step // 2), rings=1)
-    log_weights = terms.sum(axis=1) + search.log_yaw_prior(weighed.yaws)
-    weighed = Hypotheses(weighed.gels, weighed.yaws, log_weights - log_weights.max())
-    _lap(seconds, "touch", start)
-    start = time.perf_counter()
     samples = levels.samples * (1 if search.prior.yaw == "known" else _UNKNOWN_YAW_FACTOR)
-    refined = refine(search, weighed, members, samples, levels.rounds, seed)
+    refined = refine(search, coarse, members, samples, levels.rounds, seed)
     top = int(np.argmax(refined.log_weights))
     fits = search.gates(refined.gels[top], float(refined.yaws[top]), members)
     _lap(seconds, "refine", start)

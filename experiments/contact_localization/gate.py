@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.grid import SAME_AXIS, SAME_PLACE, Search
+from experiments.contact_localization.search import SAME_AXIS, SAME_PLACE, Search
 from harness.arrays import FloatArray, IntArray
 from harness.errors import FitRefused
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.grid import Contact
+from experiments.contact_localization.hypotheses import Contact
 from experiments.contact_localization.model import Model
 from experiments.contact_localization.touch import TouchNoise, touch_map
 from harness.arrays import ByteArray, FloatArray, read_only
@@ -59,20 +59,23 @@ def read_contacts(
         block: tactile pixels a side of one compared pixel.
         noise: gives the gel's blurs.
     """
+    pitch = model.sensor.pitch
     return tuple(
-        Contact(
-            observation.base_from_gel,
-            touch_map(
-                height_map(observation, model),
-                model.sensor.pitch,
-                block,
-                noise.skirt,
-                noise.edge,
-                CONTACT_THRESHOLD,
-            ),
+        contact_of(
+            observation.base_from_gel, height_map(observation, model), model.sensor.pitch, block, noise
         )
         for observation in observations
     )
+
+
+def contact_of(
+    base_from_gel: FloatArray, heights: FloatArray, pitch: float, block: int, noise: TouchNoise
+) -> Contact:
+    """A contact from its pose ``(4, 4)`` and its height map in metres at ``pitch`` metres a pixel."""
+    fine = touch_map(heights, pitch, block, noise.skirt, noise.edge, CONTACT_THRESHOLD)
+    # A contact of one fine pixel is still seen in the four times larger one that holds it.
+    coarse = touch_map(heights, pitch, 2 * block, noise.skirt, noise.edge, 0.25 * CONTACT_THRESHOLD)
+    return Contact(base_from_gel, fine, coarse)
 
 
 def height_map(observation: Observation, model: Model) -> FloatArray:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.grid import Search
+from experiments.contact_localization.search import Search
 from experiments.contact_localization.touch import similarities
 from harness.arrays import FloatArray, IntArray
 
@@ -76,7 +76,7 @@ def particle_filter(
 def _first_yaws(search: Search, count: int, rng: np.random.Generator) -> FloatArray:
     if search.prior.yaw == "known":
         return np.zeros(count)
-    return np.radians(_YAW_STEP * rng.integers(0, round(360.0 / _YAW_STEP), count))
+    return np.asarray(np.radians(_YAW_STEP * rng.integers(0, round(360.0 / _YAW_STEP), count)))
 
 
 def _similarity(search: Search, contact: int, at: IntArray, yaws: FloatArray) -> FloatArray:

@@ -9,18 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only
-from harness.sim.compiled import compiled
-
-_CORE = 0.2
-_HOPELESS = 150.0
-
-POOL = 4
-"""Pixels of a view, each way, that share the limits on where the gel can be."""
-
-_SUNKEN = -6.0e-3
-"""Where the object is farther than this below its highest place, or absent, the gel reads nothing."""
-
+from experiments.contact_localization.touch_kernels import Reading, fill_scores, similarities_at, terms_at
+from harness.arrays import BoolArray, FloatArray, IntArray, read_only
 
 LEVEL_SLOPE = 0.06
 """Mean slope of a pixel below which it may be the gel at rest."""
@@ -61,16 +51,21 @@ class TouchMap:
             that the image does not show.
         flat: ``(rows, columns)`` where the gel is level: pressed by something level, or at rest
             beyond an edge too steep for its height to be read from the colour.
-        blur: ``(m,)`` one half of the skirt's kernel, from its centre out.
-        finish: ``(m,)`` one half of the kernel that softens the contact's own edges.
+        skirt: ``(m,)`` one half of the skirt's kernel, from its centre out.
+        edge: ``(m,)`` one half of the kernel that softens the contact's own edges.
     """
 
     heights: FloatArray
     pitch: float
     touched: IntArray
     flat: BoolArray
-    blur: FloatArray
-    finish: FloatArray
+    skirt: FloatArray
+    edge: FloatArray
+
+    @property
+    def reading(self) -> Reading:
+        """As the loops take it."""
+        return self.heights, self.pitch, self.touched, self.flat, self.skirt, self.edge
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,16 +142,11 @@ def _level(heights: FloatArray, pitch: float, block: int) -> BoolArray:
 
 def view_scores(view: View, touch: TouchMap, noise: TouchNoise, pixels: IntArray) -> None:
     """Fill in the touch term at ``(n, 2)`` pixels (row, column) of a view."""
-    _fill(
+    fill_scores(
         view.depth,
         view.score,
         view.gel_depth,
-        touch.heights,
-        touch.pitch,
-        touch.touched,
-        touch.flat,
-        touch.blur,
-        touch.finish,
+        touch.reading,
         noise.rms,
         noise.tilt,
         pixels,
@@ -191,7 +181,7 @@ def touch_terms(
     Returns:
         ``(n,)`` nats, not below ``-noise.cap``.
     """
-    return _terms(
+    return terms_at(
         view.origin,
         view.pitch,
         view.depth,
@@ -199,12 +189,7 @@ def touch_terms(
         view.farthest,
         view.score,
         view.gel_depth,
-        touch.heights,
-        touch.pitch,
-        touch.touched,
-        touch.flat,
-        touch.blur,
-        touch.finish,
+        touch.reading,
         noise.rms,
         noise.tilt,
         places,
@@ -255,314 +240,4 @@ def similarities(view: View, touch: TouchMap, places: FloatArray, behind: float 
     Returns:
         ``(n,)`` between 0 and 1.
     """
-    return _similarities(
-        view.origin, view.pitch, view.depth, touch.heights, touch.blur, touch.finish, places, behind
-    )
-
-
-@compiled
-def _similarities(
-    origin: FloatArray,
-    view_pitch: float,
-    depth: FloatArray,
-    heights: FloatArray,
-    blur: FloatArray,
-    finish: FloatArray,
-    places: FloatArray,
-    behind: float,
-) -> FloatArray:
-    rows, columns = heights.shape
-    crop, work, kept = np.empty(heights.shape), np.empty(heights.shape), np.empty(heights.shape)
-    result = np.zeros(len(places))
-    for n in range(len(places)):
-        column = int(np.round((places[n, 0] - origin[0]) / view_pitch))
-        row = int(np.round((places[n, 1] - origin[1]) / view_pitch))
-        if row < 0 or column < 0 or row >= depth.shape[0] or column >= depth.shape[1]:
-            continue
-        if not np.abs(depth[row, column] - places[n, 2]) < behind:
-            continue
-        _crop(depth, row, column, crop)
-        # The press is unknown: as deep as the reading's deepest point.
-        lift = crop.max() - heights.max()
-        for i in range(rows):
-            for j in range(columns):
-                crop[i, j] = max(0.0, crop[i, j] - lift)
-        _hang(crop, blur, finish, work, kept)
-        both = np.sqrt(np.sum(crop * crop) * np.sum(heights * heights))
-        if both > 0.0:
-            result[n] = max(0.0, np.sum(crop * heights) / both)
-    return result
-
-
-@compiled
-def _crop(depth: FloatArray, row: int, column: int, crop: FloatArray) -> float:
-    """Heights at every second pixel around a pixel, over the greatest of them; its depth is returned.
-
-    Two view pixels make one of the map, so every map pixel's centre is a view pixel whether
-    the map's sides are even or odd.
-    """
-    rows, columns = crop.shape
-    top, left = row - (rows - 1), column - (columns - 1)
-    reference = np.inf
-    for i in range(rows):
-        for j in range(columns):
-            r, c = top + 2 * i, left + 2 * j
-            crop[i, j] = np.inf
-            if 0 <= r < depth.shape[0] and 0 <= c < depth.shape[1]:
-                crop[i, j] = depth[r, c]
-                reference = min(reference, depth[r, c])
-    for i in range(rows):
-        for j in range(columns):
-            crop[i, j] = max(_SUNKEN, reference - crop[i, j])
-    return float(reference)
-
-
-@compiled
-def _solve3(a: FloatArray, b: FloatArray, plane: FloatArray, ridge: float, change: FloatArray) -> None:
-    """Add the least-squares plane to ``plane``, its total tilt held to zero by ``ridge``.
-
-    Cramer's rule on the symmetric normal equations, whose upper half is given.
-    """
-    a11, a22 = a[1, 1] + ridge, a[2, 2] + ridge
-    a01, a02, a12 = a[0, 1], a[0, 2], a[1, 2]
-    b0, b1, b2 = b[0], b[1] - ridge * plane[1], b[2] - ridge * plane[2]
-    c00, c01, c02 = a11 * a22 - a12 * a12, a01 * a22 - a12 * a02, a01 * a12 - a11 * a02
-    det = a[0, 0] * c00 - a01 * c01 + a02 * c02
-    change[0] = (b0 * c00 - a01 * (b1 * a22 - a12 * b2) + a02 * (b1 * a12 - a11 * b2)) / det
-    change[1] = (a[0, 0] * (b1 * a22 - a12 * b2) - b0 * c01 + a02 * (a01 * b2 - b1 * a02)) / det
-    change[2] = (a[0, 0] * (a11 * b2 - b1 * a12) - a01 * (a01 * b2 - b1 * a02) + b0 * c02) / det
-    plane += change
-
-
-@compiled
-def _score(
-    depth: FloatArray,
-    row: int,
-    column: int,
-    heights: FloatArray,
-    pitch: float,
-    touched: IntArray,
-    flat: BoolArray,
-    blur: FloatArray,
-    finish: FloatArray,
-    rms: float,
-    tilt: float,
-    crop: FloatArray,
-    work: FloatArray,
-    kept: FloatArray,
-    pressed: FloatArray,
-) -> tuple[float, float]:
-    """The term at one pixel, and the depth of the gel's centre above it, along the view."""
-    rows, columns = heights.shape
-    reference = _crop(depth, row, column, crop)
-    if not np.isfinite(reference):
-        return -np.inf, np.nan
-    # One tilt sigma weighs as much as one rms sigma of the whole map.
-    ridge = (rms / tilt) ** 2
-    a, b, plane, change = np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.empty(3)
-    for n in range(len(touched)):
-        i, j = touched[n, 0], touched[n, 1]
-        x, y = (j + 0.5 - 0.5 * columns) * pitch, (i + 0.5 - 0.5 * rows) * pitch
-        _add(a, b, x, y, crop[i, j] - heights[i, j])
-    _solve3(a, b, plane, len(touched) * ridge, change)
-    _press(crop, plane, pitch, pressed)
-    _hang(pressed, blur, finish, work, kept)
-    cost = _misfit(pressed, heights, flat, plane, len(touched), rms, tilt)
-    # A place that fits this badly is capped whatever a second look would find.
-    if cost < _HOPELESS:
-        # The gel hangs over edges, so the first fit, to the object's own shape, sinks too deep
-        # there: what is left over where the object presses corrects it.
-        a[:], b[:] = 0.0, 0.0
-        for i in range(rows):
-            for j in range(columns):
-                if kept[i, j] > 0.0:
-                    x, y = (j + 0.5 - 0.5 * columns) * pitch, (i + 0.5 - 0.5 * rows) * pitch
-                    _add(a, b, x, y, pressed[i, j] - heights[i, j])
-        if a[0, 0] > 0.0:
-            _solve3(a, b, plane, a[0, 0] * ridge, change)
-            _press(crop, plane, pitch, pressed)
-            _hang(pressed, blur, finish, work, kept)
-            cost = _misfit(pressed, heights, flat, plane, len(touched), rms, tilt)
-    crop[:] = pressed
-    return -0.5 * cost, reference - plane[0]
-
-
-@compiled
-def _misfit(
-    pressed: FloatArray,
-    heights: FloatArray,
-    flat: BoolArray,
-    plane: FloatArray,
-    count: int,
-    rms: float,
-    tilt: float,
-) -> float:
-    total = 0.0
-    for i in range(heights.shape[0]):
-        for j in range(heights.shape[1]):
-            gap = pressed[i, j] - heights[i, j]
-            if flat[i, j]:
-                gap = min(np.abs(gap), pressed[i, j])
-            total += gap * gap
-    return float(total / (count * rms * rms) + (plane[1] ** 2 + plane[2] ** 2) / (tilt * tilt))
-
-
-@compiled
-def _add(a: FloatArray, b: FloatArray, x: float, y: float, gap: float) -> None:
-    a[0, 0] += 1.0
-    a[0, 1] += x
-    a[0, 2] += y
-    a[1, 1] += x * x
-    a[1, 2] += x * y
-    a[2, 2] += y * y
-    b[0] += gap
-    b[1] += x * gap
-    b[2] += y * gap
-
-
-@compiled
-def _press(crop: FloatArray, plane: FloatArray, pitch: float, pressed: FloatArray) -> None:
-    """How deep the object reaches into a gel at rest in a plane."""
-    rows, columns = crop.shape
-    for i in range(rows):
-        y = (i + 0.5 - 0.5 * rows) * pitch
-        for j in range(columns):
-            x = (j + 0.5 - 0.5 * columns) * pitch
-            pressed[i, j] = max(0.0, crop[i, j] - plane[0] - plane[1] * x - plane[2] * y)
-
-
-@compiled
-def _hang(
-    image: FloatArray, kernel: FloatArray, finish: FloatArray, work: FloatArray, kept: FloatArray
-) -> None:
-    """The gel's skirt: blurred, with what the object surely shapes put back (Taxim, section III-A)."""
-    core = _CORE * image.max()
-    kept[:] = image
-    _blur(image, kernel, work)
-    for i in range(image.shape[0]):
-        for j in range(image.shape[1]):
-            if kept[i, j] > core:
-                image[i, j] = kept[i, j]
-    _blur(image, finish, work)
-
-
-@compiled
-def _blur(image: FloatArray, kernel: FloatArray, work: FloatArray) -> None:
-    rows, columns = image.shape
-    for i in range(rows):
-        for j in range(columns):
-            total = kernel[0] * image[i, j]
-            for k in range(1, len(kernel)):
-                total += kernel[k] * (image[i, max(j - k, 0)] + image[i, min(j + k, columns - 1)])
-            work[i, j] = total
-    for i in range(rows):
-        for j in range(columns):
-            total = kernel[0] * work[i, j]
-            for k in range(1, len(kernel)):
-                total += kernel[k] * (work[max(i - k, 0), j] + work[min(i + k, rows - 1), j])
-            image[i, j] = total
-
-
-@compiled
-def _fill(
-    depth: FloatArray,
-    score: FloatArray,
-    gel_depth: FloatArray,
-    heights: FloatArray,
-    pitch: float,
-    touched: IntArray,
-    flat: BoolArray,
-    blur: FloatArray,
-    finish: FloatArray,
-    rms: float,
-    tilt: float,
-    pixels: AnyArray,
-) -> None:
-    shape = heights.shape
-    crop, work, kept, pressed = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    for n in range(len(pixels)):
-        r, c = pixels[n, 0], pixels[n, 1]
-        if np.isnan(score[r, c]):
-            score[r, c], gel_depth[r, c] = _score(
-                depth, r, c, heights, pitch, touched, flat, blur, finish, rms, tilt, crop, work, kept, pressed
-            )
-
-
-@compiled
-def _terms(
-    origin: FloatArray,
-    view_pitch: float,
-    depth: FloatArray,
-    nearest: FloatArray,
-    farthest: FloatArray,
-    score: FloatArray,
-    gel_depth: FloatArray,
-    heights: FloatArray,
-    pitch: float,
-    touched: IntArray,
-    flat: BoolArray,
-    blur: FloatArray,
-    finish: FloatArray,
-    rms: float,
-    tilt: float,
-    places: FloatArray,
-    step: int,
-    rings: int,
-    shift: float,
-    depth_sigma: float,
-    cap: float,
-    temperature: float,
-) -> FloatArray:
-    shape = heights.shape
-    crop, work, kept, pressed = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    terms = np.empty(len(places))
-    around = np.empty((2 * rings + 1) ** 2)
-    # What the shifts' prior leaves on a grid of cells, so that a sure match costs nothing.
-    spread = 0.0
-    for u in range(-rings, rings + 1):
-        for v in range(-rings, rings + 1):
-            spread += np.exp(-0.5 * (u * u + v * v) * (step * view_pitch / shift) ** 2)
-    for n in range(len(places)):
-        column = (places[n, 0] - origin[0]) / view_pitch
-        row = (places[n, 1] - origin[1]) / view_pitch
-        middle_r, middle_c = int(np.round(row / step)) * step, int(np.round(column / step)) * step
-        count, best = 0, -np.inf
-        for u in range(-rings, rings + 1):
-            for v in range(-rings, rings + 1):
-                r, c = middle_r + u * step, middle_c + v * step
-                if r < 0 or c < 0 or r >= depth.shape[0] or c >= depth.shape[1]:
-                    continue
-                if not nearest[r // POOL, c // POOL] < places[n, 2] < farthest[r // POOL, c // POOL]:
-                    continue
-                if np.isnan(score[r, c]):
-                    score[r, c], gel_depth[r, c] = _score(
-                        depth,
-                        r,
-                        c,
-                        heights,
-                        pitch,
-                        touched,
-                        flat,
-                        blur,
-                        finish,
-                        rms,
-                        tilt,
-                        crop,
-                        work,
-                        kept,
-                        pressed,
-                    )
-                if score[r, c] == -np.inf:
-                    continue
-                dx, dy = (c - column) * view_pitch, (r - row) * view_pitch
-                dz = (places[n, 2] - gel_depth[r, c]) / depth_sigma
-                value = temperature * score[r, c] - 0.5 * ((dx * dx + dy * dy) / (shift * shift) + dz * dz)
-                around[count] = value
-                count += 1
-                best = max(best, value)
-        total = -np.inf
-        if count > 0 and best > -np.inf:
-            total = best + np.log(np.sum(np.exp(around[:count] - best)) / spread)
-        # A mixture with an outlier: smooth, and never more costly than the cap.
-        terms[n] = np.logaddexp(total, -cap)
-    return terms
+    return similarities_at(view.origin, view.pitch, view.depth, touch.reading, places, behind)

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.ndimage import minimum_filter
 
-from experiments.contact_localization.touch import POOL, View
+from experiments.contact_localization.touch import View
+from experiments.contact_localization.touch_kernels import POOL
 from harness.arrays import FloatArray, read_only
 from harness.geometry import transform
 from harness.sensor import TactileSensor
@@ -12,8 +13,8 @@ from harness.sim.height_map import RasterMesh, depth_image
 _SLACK = 3.0e-3
 """Metres by which place and picture may disagree: arm, shape, attitude over the window's width."""
 
-_MARGIN = 2
-"""Pixels around the object, so that a rounded place never leaves the picture by itself."""
+_MARGIN = 4.0e-3
+"""Metres around the object: a tool's line may miss it by a little while the gel still touches."""
 
 
 def view_along(raster: RasterMesh, object_from_gel: FloatArray, pitch: float, sensor: TactileSensor) -> View:
@@ -27,7 +28,7 @@ def view_along(raster: RasterMesh, object_from_gel: FloatArray, pitch: float, se
     """
     in_view = raster.mesh.vertices[np.unique(raster.mesh.faces)] @ object_from_gel
     low, high = in_view.min(axis=0)[:2], in_view.max(axis=0)[:2]
-    columns, rows = np.ceil((high - low) / pitch).astype(np.int64) + 2 * _MARGIN
+    columns, rows = np.ceil((high - low) / pitch).astype(np.int64) + 2 * round(_MARGIN / pitch)
     centre = 0.5 * (low + high)
     view_from_object = transform(object_from_gel.T, np.array([-centre[0], -centre[1], 0.0]))
     depth = depth_image(raster, view_from_object, pitch, int(rows), int(columns)).depth

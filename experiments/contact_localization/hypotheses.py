@@ -1,0 +1,98 @@
+"""What the search is about: contacts, places they may have been, and how noisy everything is."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from experiments.contact_localization.likelihood import GeometryNoise
+from experiments.contact_localization.touch import TouchMap, TouchNoise
+from harness.arrays import FloatArray, IntArray
+
+UNKNOWN_INDENTATION = 1.0e-3
+"""Metres that a press usually leaves at the gel's centre."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """One contact as the estimator knows it.
+
+    Attributes:
+        base_from_gel: ``(4, 4)``; its translation is used only against other contacts'.
+        touch: what the gel read; None for a contact whose image must not be used.
+        coarse: the same at half the resolution, for a first look at many places.
+    """
+
+    base_from_gel: FloatArray
+    touch: TouchMap | None = None
+    coarse: TouchMap | None = None
+
+    @property
+    def shows_contact(self) -> bool:
+        """Whether there is an image and it shows one."""
+        return self.touch is not None and len(self.touch.touched) > 0
+
+    @property
+    def axis(self) -> FloatArray:
+        """``(3,)`` unit, in base: where the tool points."""
+        return np.asarray(self.base_from_gel[:3, 2])
+
+    @property
+    def indentation(self) -> float:
+        """Metres at the gel's centre, or what presses usually leave where the image does not say."""
+        if self.touch is None or not self.shows_contact:
+            return UNKNOWN_INDENTATION
+        heights = self.touch.heights
+        rows, columns = heights.shape
+        middle = heights[(rows - 1) // 2 : rows // 2 + 1, (columns - 1) // 2 : columns // 2 + 1]
+        return float(middle.mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Hypotheses:
+    """Weighted places of the gel's centre at the first contact.
+
+    Attributes:
+        gels: ``(n, 3)`` metres, in the object's frame.
+        yaws: ``(n,)`` rad away from the nominal one.
+        log_weights: ``(n,)`` nats, the greatest 0.
+    """
+
+    gels: FloatArray
+    yaws: FloatArray
+    log_weights: FloatArray
+
+    @property
+    def weights(self) -> FloatArray:
+        """``(n,)``, summing to 1."""
+        weights = np.exp(self.log_weights)
+        return np.asarray(weights / weights.sum())
+
+    def best(self, within: float, most: int) -> "Hypotheses":
+        """Those within so many nats of the best, evenly thinned where they are more than ``most``."""
+        kept = best_of(self.log_weights, within, most)
+        return Hypotheses(self.gels[kept], self.yaws[kept], self.log_weights[kept])
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of every term, as measured on calibration runs.
+
+    Attributes:
+        geometry: of places and tool axes.
+        touch: of the images.
+        temperature: factor on the images' share: their errors are shared between contacts.
+    """
+
+    geometry: GeometryNoise = field(default_factory=GeometryNoise)
+    touch: TouchNoise = field(default_factory=TouchNoise)
+    temperature: float = 0.3
+
+
+def best_of(log_weights: FloatArray, within: float, most: int) -> IntArray:
+    """Indices within so many nats of the best; where they are too many, evenly thinned.
+
+    Hypotheses come in the samples' random order, so every n-th of them covers the surface.
+    """
+    kept = np.nonzero(log_weights > log_weights.max() - within)[0]
+    stride = -(-len(kept) // most)
+    return kept[::stride].astype(np.int64)

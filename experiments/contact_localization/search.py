@@ -1,0 +1,236 @@
+"""One run's contacts over one object: every hypothesis is weighed here.
+
+A hypothesis fixes where the gel's centre was at the first contact, in the object's frame, and
+the object's yaw; the arm's translations carry it to every other contact. Its position enters
+only through differences, so where the bench stands cannot matter.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise, best_of
+from experiments.contact_localization.likelihood import arrange, geometry_terms, possible_anchors
+from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.surface import Surface
+from experiments.contact_localization.touch import TouchMap, View, best_fit, touch_terms
+from experiments.contact_localization.view import view_along
+from harness.arrays import FloatArray, IntArray
+
+_KNOWN_YAWS = np.radians(np.arange(-5.0, 5.5, 1.0))
+_ALL_YAWS = np.radians(np.arange(0.0, 360.0, 2.0))
+_PRUNE = 30.0
+_MOST_HYPOTHESES = 20_000
+
+SAME_PLACE = 1.5e-3
+"""Metres between two presses that count as one place."""
+
+SAME_AXIS = np.radians(4.0)
+"""rad between their tools."""
+
+
+class Search:
+    """One run's contacts over one object: what every stage of the grid shares."""
+
+    def __init__(
+        self, contacts: Sequence[Contact], model: Model, prior: Prior, spacing: float, noise: Noise
+    ) -> None:
+        self.contacts = tuple(contacts)
+        self.model = model
+        self.prior = prior
+        self.noise = noise
+        self.surface: Surface = model.surface(spacing)
+        self.yaws = _KNOWN_YAWS if prior.yaw == "known" else _ALL_YAWS
+        self.positions = np.array([contact.base_from_gel[:3, 3] for contact in contacts])
+        self.positions -= self.positions[0]
+        self.axes = np.array([contact.axis for contact in contacts])
+        self._pitch = next((c.touch.pitch for c in contacts if c.touch is not None), 1.0e-3)
+        self._views: dict[tuple[int, int, bool], View] = {}
+
+    def view(self, contact: int, picture: int, coarse: bool = False) -> View:
+        """The object along the tool at a contact, under the yaw of a numbered picture."""
+        key = (contact, picture, coarse)
+        if key not in self._views:
+            nominal = 0.0 if self.prior.yaw == "known" else _ALL_YAWS[picture]
+            object_from_base = self.prior.object_from_base(np.array([nominal]))[0]
+            object_from_gel = object_from_base @ self.contacts[contact].base_from_gel[:3, :3]
+            pitch = self._pitch if coarse else 0.5 * self._pitch
+            self._views[key] = view_along(self.model.raster, object_from_gel, pitch, self.model.sensor)
+        return self._views[key]
+
+    def grid(self, members: IntArray, anchor: int, use_axis: bool = True) -> Hypotheses:
+        """Hypotheses on the surface's samples, weighed by the places and tool axes of some contacts.
+
+        Args:
+            members: ``(m,)`` indices of the contacts that count.
+            anchor: the one of them that a hypothesis puts on a sample.
+            use_axis: whether the tool's attitude counts, or only places.
+        """
+        samples, yaws, terms = self._geometry(members, anchor, use_axis)
+        log_weights = terms.sum(axis=1) + self._log_prior(samples, yaws)
+        kept = best_of(log_weights, _PRUNE, _MOST_HYPOTHESES)
+        samples, yaws = samples[kept], yaws[kept]
+        rotations = self.prior.object_from_base(self.yaws)
+        inward = (rotations @ self.axes[anchor])[yaws]
+        gels_at_anchor = self.surface.points[samples] + self.contacts[anchor].indentation * inward
+        gels = gels_at_anchor - (rotations @ self.positions[anchor])[yaws]
+        return Hypotheses(gels, self.yaws[yaws], log_weights[kept] - log_weights[kept].max())
+
+    def look(self, start: Hypotheses, members: IntArray, within: float) -> Hypotheses:
+        """Weigh samples' hypotheses by coarse images, dropping what falls behind as contacts come in.
+
+        Args:
+            start: on the surface's samples; their weights are not used.
+            members: ``(m,)`` indices of contacts whose image shows a contact.
+            within: nats behind the best at which a hypothesis is dropped.
+        """
+        # Between samples the best place is up to half their spacing away.
+        off, pitch = 0.4 * self.surface.spacing, self._pitch
+        step = max(1, round(self.surface.spacing / pitch))
+        total = self.log_yaw_prior(start.yaws)
+        gels, yaws = start.gels, start.yaws
+        for k, sigma, temperature in self._scales(members):
+            total = total + self._term(k, gels, yaws, step, 1, float(np.hypot(sigma, off)), temperature, True)
+            kept = best_of(total, within, len(total))
+            gels, yaws, total = gels[kept], yaws[kept], total[kept]
+        return Hypotheses(gels, yaws, total - total.max())
+
+    def weigh(
+        self, gels: FloatArray, yaws: FloatArray, members: IntArray, step: int, rings: int
+    ) -> FloatArray:
+        """``(n,)`` nats: the posterior of hypotheses, up to a constant.
+
+        Args:
+            gels: ``(n, 3)`` metres, see ``Hypotheses``.
+            yaws: ``(n,)`` rad.
+            members: ``(m,)`` indices of contacts whose image shows a contact.
+            step: view pixels between the cells over which the arm's error is integrated.
+            rings: cells on each side.
+        """
+        total = self.log_yaw_prior(yaws)
+        for k, sigma, temperature in self._scales(members):
+            total = total + self._term(k, gels, yaws, step, rings, sigma, temperature, False)
+        return total
+
+    def _term(
+        self,
+        contact: int,
+        gels: FloatArray,
+        yaws: FloatArray,
+        step: int,
+        rings: int,
+        sigma: float,
+        temperature: float,
+        coarse: bool,
+    ) -> FloatArray:
+        term = np.empty(len(gels))
+        touch, noise = self.touch(contact, coarse), self.noise.touch
+        for chosen, view, places in self.placed(contact, gels, yaws, coarse):
+            term[chosen] = touch_terms(view, touch, noise, places, step, rings, sigma, temperature)
+        return term
+
+    def _scales(self, members: IntArray) -> Iterator[tuple[int, float, float]]:
+        """Contact, sigma of its place and temperature of its image."""
+        sigmas, temperatures = self._place_sigmas(members), self._temperatures(members)
+        for k, sigma, temperature in zip(members, sigmas, temperatures, strict=True):
+            yield int(k), float(sigma), float(temperature)
+
+    def gates(self, gel: FloatArray, yaw: float, members: IntArray) -> FloatArray:
+        """``(m,)`` nats: how well each contact fits at one hypothesis, untempered and uncapped."""
+        values = np.empty(len(members))
+        for column, (k, sigma, _) in enumerate(self._scales(members)):
+            ((_, view, places),) = self.placed(k, gel[None], np.array([yaw]))
+            values[column] = best_fit(view, self.touch(k), self.noise.touch, places[0], sigma)
+        return values
+
+    def placed(
+        self, contact: int, gels: FloatArray, yaws: FloatArray, coarse: bool = False
+    ) -> Iterator[tuple[IntArray, View, FloatArray]]:
+        """Hypotheses by the picture that serves them, with the gel's centre in view coordinates."""
+        places_in_object = self.gel_centres(contact, gels, yaws)
+        pictures = self.pictures(yaws)
+        for picture in np.unique(pictures):
+            chosen = np.nonzero(pictures == picture)[0].astype(np.int64)
+            view = self.view(contact, int(picture), coarse)
+            yield chosen, view, places_in_object[chosen] @ view.object_from_view
+
+    def gel_centres(self, contact: int, gels: FloatArray, yaws: FloatArray) -> FloatArray:
+        """``(n, 3)`` metres, in the object's frame, at one contact."""
+        moved = self.prior.object_from_base(yaws) @ self.positions[contact]
+        return np.asarray(gels + moved)
+
+    def surface_points(self, contact: int, gels: FloatArray, yaws: FloatArray) -> FloatArray:
+        """``(n, 3)`` metres: where the tool's line first meets the object, to a view's pixel.
+
+        Where it misses the object, the sample nearest to the gel's centre.
+        """
+        points = self.gel_centres(contact, gels, yaws)
+        for chosen, view, places in self.placed(contact, gels, yaws):
+            row, column = np.round((places[:, :2] - view.origin) / view.pitch).astype(np.int64).T[::-1]
+            rows, columns = view.depth.shape
+            inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+            depth = np.full(len(places), np.inf)
+            depth[inside] = view.depth[row[inside], column[inside]]
+            hit = np.isfinite(depth)
+            met = np.column_stack([places[hit, :2], depth[hit]]) @ view.object_from_view.T
+            points[chosen[hit]] = met
+            lost = chosen[~hit]
+            points[lost] = self.surface.points[self.surface.tree.query(points[lost])[1]]
+        return points
+
+    def contact_places(self, contact: int, hypotheses: Hypotheses) -> FloatArray:
+        """``(n, 3)`` metres: where a contact lies if the gel's centre was pressed in as it seems."""
+        rotations = self.prior.object_from_base(hypotheses.yaws)
+        inward = rotations @ self.axes[contact]
+        gels = hypotheses.gels + rotations @ self.positions[contact]
+        return np.asarray(gels - self.contacts[contact].indentation * inward)
+
+    def touch(self, contact: int, coarse: bool = False) -> TouchMap:
+        """What the gel read at a contact whose image counts."""
+        touch = self.contacts[contact].coarse if coarse else self.contacts[contact].touch
+        assert touch is not None
+        return touch
+
+    def members(self, count: int) -> IntArray:
+        """Those of the first ``count`` contacts whose image shows a contact."""
+        shown = [k for k, c in enumerate(self.contacts[:count]) if c.shows_contact]
+        return np.array(shown, dtype=np.int64)
+
+    def log_yaw_prior(self, yaws: FloatArray) -> FloatArray:
+        """``(n,)`` nats, up to a constant."""
+        if self.prior.yaw == "unknown":
+            return np.zeros(len(yaws))
+        return np.asarray(-0.5 * (yaws / self.prior.yaw_sigma) ** 2)
+
+    def _geometry(
+        self, members: IntArray, anchor: int, use_axis: bool
+    ) -> tuple[IntArray, IntArray, FloatArray]:
+        rotations = self.prior.object_from_base(self.yaws)
+        indentations = np.array([self.contacts[k].indentation for k in members])
+        points = self.positions[members] - indentations[:, None] * self.axes[members]
+        index = int(np.nonzero(members == anchor)[0][0])
+        arrangement = arrange(rotations, points, self.axes[members], index)
+        geometry = self.noise.geometry
+        samples, yaws = possible_anchors(self.surface, arrangement, geometry, use_axis)
+        terms = geometry_terms(self.surface, arrangement, samples, yaws, geometry, use_axis)
+        return samples, yaws, terms
+
+    def _log_prior(self, samples: IntArray, yaws: IntArray) -> FloatArray:
+        return np.asarray(np.log(self.surface.areas[samples]) + self.log_yaw_prior(self.yaws)[yaws])
+
+    def _place_sigmas(self, members: IntArray) -> FloatArray:
+        centre = self.positions[members].mean(axis=0)
+        reach = np.linalg.norm(self.positions[members] - centre, axis=1)
+        return np.asarray(np.hypot(self.noise.touch.shift, self.noise.geometry.gap_per_metre * reach))
+
+    def _temperatures(self, members: IntArray) -> FloatArray:
+        """A press repeated at one place shares its errors: its images together count as one."""
+        gaps = np.linalg.norm(self.positions[members][:, None] - self.positions[members][None], axis=2)
+        alike = (gaps < SAME_PLACE) & (self.axes[members] @ self.axes[members].T > np.cos(SAME_AXIS))
+        return np.asarray(self.noise.temperature / alike.sum(axis=1))
+
+    def pictures(self, yaws: FloatArray) -> IntArray:
+        """``(n,)`` number of the picture whose yaw is nearest."""
+        if self.prior.yaw == "known":
+            return np.zeros(len(yaws), dtype=np.int64)
+        return np.asarray(np.round(np.degrees(yaws) / 2.0).astype(np.int64) % len(_ALL_YAWS))
