@@ -51,8 +51,11 @@ class RunProcess:
         """Until something is so; fails where the program ends first, or it takes too long."""
         end = time.monotonic() + seconds
         while not what():
-            assert not self.ended(), f"it ended first: {self.said}"
-            assert time.monotonic() < end, f"not within {seconds:g} s: {self.said}"
+            ended, late = self.ended(), time.monotonic() > end
+            if ended or late:
+                self.kill()
+            assert not ended, f"it ended first: {self.said}"
+            assert not late, f"not within {seconds:g} s: {self.said}"
             time.sleep(0.02)
 
     def interrupt(self) -> None:

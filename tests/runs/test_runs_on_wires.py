@@ -23,12 +23,16 @@ pytestmark = [
     pytest.mark.timeout(180, func_only=True),  # on a cold machine the first run compiles
 ]
 
-MUG = ("run", "contact-localization", "--object", "builtin:mug", "--contacts", "2", "--seed", "3")
+CONTACTS = 3
+MUG = (
+    *("run", "contact-localization", "--object", "builtin:mug"),
+    *("--contacts", str(CONTACTS), "--spacing", "spread", "--seed", "3"),
+)
 KILLS = int(os.environ.get("TOUCHSTONE_KILLS", "2"))
 PATIENCE = 150.0
 SAME_ANSWER = 0.2e-3
-PHASES = (10.0, 7.0, 3.0)
-"""s within which to kill before the first contact is on the disk, before the second, and after it. It
+PHASES = (10.0, *[7.0] * (CONTACTS - 1), 3.0)
+"""s within which to kill while the first contact is made, each other one, and after the last. The run
 estimates then, and draws its report, which takes longer."""
 
 
@@ -83,7 +87,7 @@ def test_a_run_answers(whole: Whole) -> None:
     wanted = "random_baseline_m geometry_baseline_m plan accuracy recording report"
     assert set(result) >= set(wanted.split())
     assert set(result["plan"]) == {"ran", "skipped"}
-    assert result["contacts"] == 2
+    assert result["contacts"] == CONTACTS
     assert touch["error_m"] < result["random_baseline_m"]
     assert Path(result["recording"]) == whole.folder
     assert Path(result["report"]).is_file()
@@ -122,7 +126,7 @@ def test_kill_loses_at_most_the_step_in_flight(whole: Whole, tmp_path: Path, kil
     assert len(Recording(tmp_path / "run").steps()) == len(committed)
     result = resumed(tmp_path)
     assert {path: digest for path, digest in hashes(steps).items() if path in committed} == committed
-    assert result["contacts"] == 2
+    assert result["contacts"] == CONTACTS
     assert_same_answer(result, whole)
 
 
