@@ -42,6 +42,7 @@ class SafetyLimits:
         travel: m, the longest search for contact.
         force_press: N; a motion during which the force grows beyond this is stopped.
         force_any: N; beyond this the arm is stopped twice over and stays stopped.
+        patience: s that the controller's watchdog waits for this computer before it stops the arm.
     """
 
     workspace_low: Triple
@@ -58,6 +59,7 @@ class SafetyLimits:
     travel: float = 0.2
     force_press: float = 10.0
     force_any: float = 25.0
+    patience: float = 0.1
 
     def __post_init__(self) -> None:
         for name, low, high in (

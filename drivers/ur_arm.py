@@ -62,7 +62,7 @@ class UrArm:
         self._points = np.asarray(tool_points, dtype=np.float64).reshape(-1, 3)
         self._lock_folder = lock_folder
         child = [sys.executable, "-m", "drivers.ur_child", "--address", address, "--model", model]
-        self._command = command or [*child, "--rate", f"{rate:g}"]
+        self._command = command or [*child, "--rate", f"{rate:g}", "--patience", f"{limits.patience:g}"]
         self._session: UrSession | None = None
         self._contact: FloatArray | None = None
         self._busy = threading.Lock()
@@ -77,7 +77,9 @@ class UrArm:
         if self._session is not None:
             return
         self._contact = None
-        self._session = UrSession(self.address, self._command, self.rate, self._lock_folder)
+        self._session = UrSession(
+            self.address, self._command, self.rate, self._lock_folder, self.limits.patience
+        )
         try:
             ur_state.require_model(self.model, self.address, self.state())
         except BaseException:

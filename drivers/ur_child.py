@@ -16,7 +16,7 @@ from typing import Final
 
 from drivers import dashboard, pipe, ur_state
 from drivers.safety import require_loopback
-from drivers.ur_link import Link
+from drivers.ur_link import PATIENCE, Link
 from drivers.ur_motion import Motion, Outcome
 from drivers.ur_stream import Stream
 from drivers.ur_watchdog import Watchdog
@@ -26,10 +26,11 @@ from harness.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneErr
 
 TICK: Final = 0.002  # s between looks at a motion
 REST_TICK: Final = 0.01
-STALE: Final = 0.05  # s without a packet: nothing is commanded, the watchdog is not kicked
-LOST_MOVING: Final = 0.5  # s without a packet during a motion: give up
-LOST_AT_REST: Final = 2.0
-BEAT_LATE: Final = 0.3  # s without a heartbeat during a motion: stop
+# In units of the watchdog's patience, 0.1 s at a real bench:
+STALE: Final = 0.5  # without a packet: nothing is commanded, the watchdog is not kicked
+LOST_MOVING: Final = 5.0  # without a packet during a motion: give up
+LOST_AT_REST: Final = 20.0
+BEAT_LATE: Final = 3.0  # without a heartbeat during a motion: stop
 LAST_WORDS: Final = 1.5  # s that this process may take to stop the arm when its parent is gone
 
 
@@ -48,6 +49,7 @@ class Child:
         self._epoch = 0
         self._beat = now()
         self._watchdog = Watchdog(link)
+        self._patience = link.patience
 
     def run(self, model: str) -> None:
         """Connect, then serve until the parent closes the pipe or the link is lost."""
@@ -142,10 +144,10 @@ class Child:
             raise self._latched
         if self._motion is not None:
             raise BenchFault(f"the arm was asked to {what} during a motion; wait for it to end")
-        if not self._becomes_fresh(LOST_MOVING):
+        if not self._becomes_fresh(LOST_MOVING * self._patience):
             raise BenchFault(
                 f"the arm was asked to {what}, but its state is {1e3 * self._stream.age:.0f} ms old "
-                f"(limit {1e3 * STALE:.0f} ms); check the load of this computer and the network"
+                f"(limit {1e3 * STALE * self._patience:.0f} ms); check this computer's load and the network"
             )
 
     def _comes_to_rest(self, seconds: float) -> bool:
@@ -159,15 +161,18 @@ class Child:
     def _becomes_fresh(self, seconds: float) -> bool:
         """Whether the arm's state is, or within some seconds becomes, fresh enough to command on."""
         end = now() + seconds
-        while self._stream.age > STALE and now() < end:
+        while not self._is_fresh() and now() < end:
             time.sleep(TICK)
-        return self._stream.age <= STALE
+        return self._is_fresh()
+
+    def _is_fresh(self) -> bool:
+        return self._stream.age <= STALE * self._patience
 
     # What goes on meanwhile
 
     def _watch(self, motion: Motion) -> None:
         late = now() - self._beat
-        if late > BEAT_LATE and not motion.stopping:
+        if late > BEAT_LATE * self._patience and not motion.stopping:
             text = (
                 f"{motion.what} was stopped: the program that asked for it fell behind by {1e3 * late:.0f} ms"
             )
@@ -215,7 +220,7 @@ class Child:
     def _check_link(self) -> None:
         if self._stream.failure:
             raise BenchFault(self._stream.failure)
-        limit = LOST_MOVING if self._motion else LOST_AT_REST
+        limit = (LOST_MOVING if self._motion else LOST_AT_REST) * self._patience
         if self._stream.age > limit:
             raise BenchFault(
                 f"no state arrived from the arm for {self._stream.age:.1f} s (limit {limit:g} s); "
@@ -223,7 +228,7 @@ class Child:
             )
 
     def _kick(self) -> None:
-        if self._stream.age <= STALE:
+        if self._is_fresh():
             self._watchdog.kick()
 
     # The pipe
@@ -288,13 +293,14 @@ def main() -> None:
     parser.add_argument("--address", required=True)
     parser.add_argument("--model", required=True)
     parser.add_argument("--rate", type=float, required=True)
+    parser.add_argument("--patience", type=float, default=PATIENCE)
     arguments = parser.parse_args()
     require_loopback(arguments.address)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
     replies = os.dup(sys.stdout.fileno())
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # ur_rtde prints; that must not enter the frames
     pipe.prepare_to_write(replies)
-    child = Child(Link(arguments.address, arguments.rate), sys.stdin.fileno(), replies)
+    child = Child(Link(arguments.address, arguments.rate, arguments.patience), sys.stdin.fileno(), replies)
     child.run(arguments.model)
     os._exit(0)  # the library's destructors race with its threads and crash
 

@@ -16,7 +16,7 @@ from harness.arrays import FloatArray
 from harness.clock import now
 from harness.errors import BenchFault, ProtectiveStop, TouchstoneError
 
-WATCHDOG_HZ: Final = 10.0
+PATIENCE: Final = 0.1  # s that the watchdog waits for a kick
 DECELERATION: Final = 10.0  # m/s^2; 25 ms from the free speed of 0.25 m/s
 NO_OFFSET: Final = [0.0] * 6
 
@@ -33,9 +33,10 @@ class Controller:
 class Link:
     """ur_rtde's interfaces to one controller; ``control`` and ``io`` only from one thread."""
 
-    def __init__(self, address: str, rate: float) -> None:
+    def __init__(self, address: str, rate: float, patience: float = PATIENCE) -> None:
         self.address = address
         self.rate = rate
+        self.patience = patience
         self._stream: Any = None
         self._newest: FloatArray | None = None
         self._halted = False
@@ -66,7 +67,8 @@ class Link:
                 f"the controller keeps a tool offset of {offset} after it was set to zero; "
                 "remove it in the pendant's installation"
             )
-        self._check(self._control.setWatchdog(WATCHDOG_HZ), f"arm the watchdog at {WATCHDOG_HZ:g} Hz")
+        hertz = 1.0 / self.patience
+        self._check(self._control.setWatchdog(hertz), f"arm the watchdog at {hertz:g} Hz")
 
     def packets(self) -> Iterator[FloatArray | None]:
         """Each packet as it arrives; None whenever there was none for a moment."""
@@ -150,9 +152,9 @@ class Link:
             f"the controller says: safety {words}, program {ur_words.RUNTIME_STATES.get(state, 'unknown')}, "
             f"robot {ur_words.ROBOT_MODES.get(mode, 'unknown')}"
         )
-        if state != ur_words.PLAYING and self.longest_silence() > 0.8 / WATCHDOG_HZ:
+        if state != ur_words.PLAYING and self.longest_silence() > 0.8 * self.patience:
             silence = 1e3 * self.longest_silence()
-            text += f", its watchdog kept waiting for {silence:.0f} ms (limit {1e3 / WATCHDOG_HZ:.0f} ms)"
+            text += f", its watchdog kept waiting for {silence:.0f} ms (limit {1e3 * self.patience:.0f} ms)"
         return BenchFault(text) if words in ur_words.MAY_MOVE else ProtectiveStop(text)
 
     def _check(self, accepted: object, what: str) -> None:

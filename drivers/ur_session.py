@@ -10,6 +10,7 @@ from typing import Any, Final, NoReturn
 
 from drivers import arm_lock, dashboard, pipe
 from drivers.safety import require_loopback
+from drivers.ur_link import PATIENCE
 from drivers.ur_process import ChildLost, ChildProcess, DeadlineMissed
 from harness.arrays import FloatArray
 from harness.clock import now
@@ -21,7 +22,7 @@ FIRST_PACKET_WITHIN: Final = 2.0  # s
 CLOSE_WITHIN: Final = 3.0  # s
 ACKNOWLEDGE_WITHIN: Final = 0.15  # s for the child to brake
 REST_WITHIN: Final = 1.0  # s from braking to rest
-STALE: Final = 0.5  # s
+STALE: Final = 5.0  # of the watchdog's patience
 
 
 class UrSession:
@@ -31,9 +32,17 @@ class UrSession:
         where the controller has stopped the arm, ``BenchFault`` for all else.
     """
 
-    def __init__(self, address: str, command: Sequence[str], rate: float, lock_folder: Path | None) -> None:
+    def __init__(
+        self,
+        address: str,
+        command: Sequence[str],
+        rate: float,
+        lock_folder: Path | None,
+        patience: float = PATIENCE,
+    ) -> None:
         require_loopback(address)
         self.address = address
+        self._stale = STALE * patience
         self.latched: TouchstoneError | None = None
         self.epoch = 0
         self._closing = False
@@ -67,11 +76,11 @@ class UrSession:
         """The newest packet; raises ``BenchFault`` where it is stale."""
         packet = self.process.newest()
         age = float("inf") if packet is None else now() - float(packet[0])
-        if packet is None or age > STALE:
+        if packet is None or age > self._stale:
             why = self.process.lost or "its stream stalled"
             raise BenchFault(
-                f"the state of the arm at {self.address} is {age:.2f} s old (limit {STALE:g} s): {why}; "
-                "check the network cable of the control box"
+                f"the state of the arm at {self.address} is {age:.2f} s old (limit {self._stale:g} s): "
+                f"{why}; check the network cable of the control box"
             )
         return packet
 

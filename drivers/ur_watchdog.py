@@ -2,11 +2,11 @@
 
 from typing import Final
 
-from drivers.ur_link import WATCHDOG_HZ, Link
+from drivers.ur_link import Link
 from harness.clock import now
 
-KICK_PERIOD: Final = 0.02  # s; five kicks in the 0.1 s that the watchdog waits
-LATE: Final = 0.8 / WATCHDOG_HZ  # s between two kicks; the watchdog may have ended the script
+KICK_PERIOD: Final = 0.02  # s; five kicks in the 0.1 s that the watchdog waits at a real bench
+LATE: Final = 0.8  # of the watchdog's patience between two kicks: it may have ended the script
 LATELY: Final = 0.2  # s
 
 
@@ -46,4 +46,4 @@ class Watchdog:
             self.bit = self._is_late() or now() - self._late < LATELY
 
     def _is_late(self) -> bool:
-        return now() - self._kicked > LATE
+        return now() - self._kicked > LATE * self._link.patience

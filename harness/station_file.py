@@ -21,6 +21,7 @@ from harness.quantities import (
     Pixels,
     Positive,
     Speed,
+    Time,
 )
 from harness.sensor import GELSIGHT_R15, MarkerGrid, TactileSensor
 from harness.toml_file import StrictModel, load_toml, nearest, validate
@@ -70,6 +71,7 @@ class Safety(StrictModel):
         travel: m, the longest search for contact.
         force_press: N; a press beyond this is stopped.
         force_any: N; beyond this the arm is stopped and stays stopped.
+        patience: s that the controller's watchdog waits for this computer before it stops the arm.
     """
 
     workspace_low: Three
@@ -86,6 +88,7 @@ class Safety(StrictModel):
     travel: Annotated[Length, Positive] = 0.2
     force_press: Annotated[Force, Positive] = 10.0
     force_any: Annotated[Force, Positive] = 25.0
+    patience: Annotated[Time, Positive] = 0.1
 
     @model_validator(mode="after")
     def _not_empty(self) -> Self:
