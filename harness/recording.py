@@ -60,8 +60,7 @@ class Recording:
     @classmethod
     def create(cls, folder: Path, header: RunHeader) -> "Recording":
         """Make the folder and its ``run.json``; refuses a folder that holds a run already."""
-        if (folder / "run.json").exists():
-            raise WrongUse(f"{folder} holds a run already; resume it with --resume, or name another folder")
+        require_unused(folder)
         (folder / "steps").mkdir(parents=True, exist_ok=True)
         write_text_whole(folder / "run.json", json.dumps(asdict(header), indent=1, allow_nan=False))
         return cls(folder)
@@ -100,6 +99,12 @@ class Recording:
 
     def _path(self, index: int) -> Path:
         return self.folder / "steps" / f"{index:03d}.mcap"
+
+
+def require_unused(folder: Path) -> None:
+    """Refuse a folder that holds a run, before anything in it is touched."""
+    if (folder / "run.json").exists():
+        raise WrongUse(f"{folder} holds a run already; resume it with --resume, or name another folder")
 
 
 def write_text_whole(path: Path, text: str) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from harness.clock import ClockOffset
 from harness.errors import RecordingDamaged
 from harness.mesh import Mesh
-from harness.recording import Recording, RunHeader
+from harness.recording import Recording, RunHeader, require_unused
 from harness.scene import SceneFile, scene_from_json
 from harness.sim.tactile_calibration import (
     TactileCalibration,
@@ -60,6 +60,7 @@ def create_run(
         seed: of everything random.
         mock: how the mocked bench is started; None at a real one.
     """
+    require_unused(folder)
     folder.mkdir(parents=True, exist_ok=True)
     np.savez(folder / OBJECT, vertices=mesh.vertices, faces=mesh.faces)
     save_calibration(calibration, folder / CALIBRATION)

@@ -59,7 +59,6 @@ def read_contacts(
         block: tactile pixels a side of one compared pixel.
         noise: gives the gel's blurs.
     """
-    pitch = model.sensor.pitch
     return tuple(
         contact_of(
             observation.base_from_gel, height_map(observation, model), model.sensor.pitch, block, noise

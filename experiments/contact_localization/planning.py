@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.experiment import ContactMotion
-from experiments.contact_localization.sites import Site, plan_sites
+from experiments.contact_localization.sites import Presses, Site, plan_sites
 from harness.arrays import FloatArray
 from harness.errors import WrongUse
 from harness.mesh import Mesh
@@ -94,6 +94,7 @@ def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> RunPl
         wanted.spacing,
         seed,
         reachable=partial(reachable, bench),
+        presses=Presses(wanted.step, wanted.tilt, wanted.depth),
     )
     chosen, contacts = _ways(bench, sites, wanted.contacts, seed)
     plan = RunPlan(bench, chosen, contacts, RehearsalReport(0, (), (), ()))

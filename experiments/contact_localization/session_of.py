@@ -26,7 +26,7 @@ from harness.arrays import FloatArray
 from harness.device import Health
 from harness.errors import WrongUse
 from harness.gap import gap_path, load_gap
-from harness.recording import Recording, write_text_whole
+from harness.recording import Recording, require_unused, write_text_whole
 from harness.report.page import write_report
 from harness.run_folder import RunFiles, create_run, station_calibration
 from harness.scene import SceneFile
@@ -57,8 +57,8 @@ def start(
         MeshRefused, WrongUse: of the object, the scene, the gap, or a folder that holds a run.
         MotionRefused: the rehearsal found a motion that must not be made; nothing was created.
     """
-    if folder is not None and (folder / "run.json").exists():
-        raise WrongUse(f"{folder} holds a run already; go on with it by --resume, or name another folder")
+    if folder is not None:
+        require_unused(folder)
     mock = None if station.mock is None else {"gap": _gap(gap or station.mock.gap)}
     if gap is not None and mock is None:
         raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")

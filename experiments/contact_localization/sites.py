@@ -17,10 +17,7 @@ from harness.sim.height_map import RasterMesh
 Steps = Literal["close", "spread"]
 Reachable = Callable[[FloatArray], bool]
 
-LONGEST_CLOSE_STEP = 25.0e-3
 SHORTEST_STEP = 3.0e-3
-MOST_TILT = np.radians(15.0)
-PRESS = (0.5e-3, 2.0e-3)
 MOST_PENETRATION = 2.5e-3
 TOUCH_VOLUME = 8.0e-9
 """Cubic metres of gel displaced when the arm notices a touch: 0.4 N on a bed of 50 N/cm^3."""
@@ -29,6 +26,21 @@ _LEAST_PRESS = 0.1e-3
 _PITCH = 0.5e-3
 _LOWEST_TOOL = 0.25
 _PATIENCE = 6000
+
+
+@dataclass(frozen=True)
+class Presses:
+    """What is asked of every contact of a run.
+
+    Attributes:
+        longest_step: m from a contact to the next, where steps are close.
+        tilt: rad, the most between the tool and the surface's normal.
+        depth: m of indentation at the gel's centre, from and to.
+    """
+
+    longest_step: float = 25.0e-3
+    tilt: float = float(np.radians(15.0))
+    depth: tuple[float, float] = (0.5e-3, 2.0e-3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +76,7 @@ def plan_sites(
     steps: Steps,
     seed: int,
     reachable: Reachable = from_above_or_aside,
+    presses: Presses = Presses(),
 ) -> tuple[Site, ...]:
     """Contacts to make, drawn at random among those that the sensor's housing allows.
 
@@ -72,16 +85,17 @@ def plan_sites(
         sensor: whose flat housing must fit.
         base_from_object: ``(4, 4)`` nominal pose.
         count: contacts.
-        steps: ``"close"``: each within 25 mm of the one before; ``"spread"``: anywhere.
+        steps: ``"close"``: each within a step of the one before; ``"spread"``: anywhere.
         seed: of the draws; the same seed gives the same sites.
         reachable: whether the arm can take the gel there without a collision.
+        presses: how far apart, how tilted, how deep.
 
     Raises:
         WrongUse: the object has no such places.
     """
     rng = np.random.default_rng(seed)
     for _ in range(20):
-        sites = _chain(raster, sensor, base_from_object, count, steps, rng, reachable)
+        sites = _chain(raster, sensor, base_from_object, count, steps, rng, reachable, presses)
         if len(sites) == count:
             return tuple(sites)
     raise WrongUse(
@@ -99,6 +113,7 @@ def _chain(
     steps: Steps,
     rng: np.random.Generator,
     reachable: Reachable,
+    presses: Presses,
 ) -> list[Site]:
     sites: list[Site] = []
     tries = 0
@@ -108,21 +123,21 @@ def _chain(
         for point, normal in zip(points, raster.mesh.face_normals[faces], strict=True):
             if len(sites) == count:
                 break
-            if not _may_follow(point, sites, steps):
+            if not _may_follow(point, sites, steps, presses.longest_step):
                 continue
-            site = try_site(raster, sensor, base_from_object, point, normal, rng)
+            site = try_site(raster, sensor, base_from_object, point, normal, rng, presses)
             if site is not None and reachable(site.base_from_gel):
                 sites.append(site)
     return sites
 
 
-def _may_follow(point: FloatArray, sites: list[Site], steps: Steps) -> bool:
+def _may_follow(point: FloatArray, sites: list[Site], steps: Steps, longest_step: float) -> bool:
     if not sites:
         return True
     gaps = np.array([np.linalg.norm(point - site.point_in_object) for site in sites])
     if gaps.min() < SHORTEST_STEP:
         return False
-    return steps == "spread" or bool(gaps[-1] <= LONGEST_CLOSE_STEP)
+    return steps == "spread" or bool(gaps[-1] <= longest_step)
 
 
 def try_site(
@@ -132,6 +147,7 @@ def try_site(
     point_in_object: FloatArray,
     normal_in_object: FloatArray,
     rng: np.random.Generator,
+    presses: Presses = Presses(),
 ) -> Site | None:
     """A press at a point with a random tilt, sensor yaw and depth; None where it does not fit.
 
@@ -139,11 +155,11 @@ def try_site(
     where no part of the object reaches 2.5 mm behind the gel's plane anywhere under the
     housing.
     """
-    tilt = float(np.arccos(rng.uniform(np.cos(MOST_TILT), 1.0)))
+    tilt = float(np.arccos(rng.uniform(np.cos(presses.tilt), 1.0)))
     aside = frame_facing(-normal_in_object, rng.uniform(0.0, 2.0 * np.pi))
     axis = rotation_about(aside[:, 0], tilt) @ -normal_in_object
     object_from_gel = frame_facing(axis / np.linalg.norm(axis), rng.uniform(0.0, 2.0 * np.pi))
-    indentation = rng.uniform(*PRESS)
+    indentation = rng.uniform(*presses.depth)
     heights = -window_depth(raster, object_from_gel, point_in_object, sensor.housing, _PITCH)
     rows, columns = heights.shape
     centre = heights[rows // 2, columns // 2]
