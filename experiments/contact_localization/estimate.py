@@ -41,7 +41,7 @@ class Estimate:
 
     Attributes:
         position_in_object: ``(3,)`` metres: the last contact, a point on the surface.
-        contacts: ``(contacts, 3)`` metres: all of them, on the surface.
+        contacts: ``(contacts, 3)`` metres: all of them, on the surface to half a pixel of a view.
         modes: places the last contact may be, heaviest first.
         region: the part of the surface that holds 90 % of the posterior.
         credible90: metres around the answer that hold 90 % of it.
@@ -161,7 +161,8 @@ def _solve(search: Search, count: int, levels: Levels, seed: int, seconds: dict[
         found = _by_grid(search, members, int(anchor), levels, seed, seconds)
         if best is None or np.median(found.fits) > np.median(best.fits):
             best = found
-        if best.fits.min() > _SUSPICIOUS_BELOW:
+        of_anchor = float(found.fits[np.nonzero(members == anchor)[0][0]])
+        if min(of_anchor, float(np.median(found.fits))) > _SUSPICIOUS_BELOW:
             break
     assert best is not None
     return best
@@ -209,7 +210,9 @@ def _answer(search: Search, count: int, found: _Solution, seconds: dict[str, flo
     mesh, hypotheses = search.model.mesh, found.hypotheses
     weights = hypotheses.weights
     clouds = [search.surface_points(k, hypotheses.gels, hypotheses.yaws) for k in range(count)]
-    answers = np.array([nearest_point(mesh, best_point(cloud, weights)) for cloud in clouds])
+    answers = np.array([best_point(cloud, weights) for cloud in clouds])
+    # A view's pixel is off the surface where that curves within it; the answer is not.
+    answers[-1] = nearest_point(mesh, answers[-1])
     points = clouds[-1]
     ranked = np.argsort(-hypotheses.log_weights, kind="stable")[:_CANDIDATES]
     top = int(ranked[0])

@@ -85,29 +85,33 @@ def possible_anchors(
     return samples.astype(np.int64), yaws.astype(np.int64)
 
 
-def geometry_terms(
+def geometry_scores(
     surface: Surface,
     arrangement: Arrangement,
     samples: IntArray,
     yaws: IntArray,
+    log_prior: FloatArray,
     noise: GeometryNoise,
     use_axis: bool,
+    within: float,
 ) -> FloatArray:
-    """Log-likelihood of each contact's place (and tool axis) under each hypothesis.
+    """Log posterior of hypotheses by the contacts' places (and tool axes).
 
     Args:
         surface: of the object.
         arrangement: the contacts.
         samples: ``(n,)`` sample index of the anchor.
         yaws: ``(n,)`` yaw index.
+        log_prior: ``(n,)`` nats.
         noise: of the terms.
         use_axis: whether the tool's attitude counts, or only places.
+        within: nats; a hypothesis is given up, as -inf, once it is farther behind the best.
 
     Returns:
-        ``(n, contacts)`` nats, between ``-noise.cap`` and 0.
+        ``(n,)`` nats, up to a constant; each contact costs at most ``noise.cap``.
     """
     table = surface.table
-    return _geometry_terms(
+    return _geometry_scores(
         surface.points,
         surface.normals,
         surface.neighbours,
@@ -120,11 +124,13 @@ def geometry_terms(
         arrangement.anchor,
         samples,
         yaws,
+        log_prior,
         arrangement.gap_sigmas(noise),
         noise.free_angle,
         noise.angle,
         noise.cap,
         use_axis,
+        within,
     )
 
 
@@ -157,7 +163,7 @@ def _fit(
 
 
 @compiled
-def _geometry_terms(
+def _geometry_scores(
     points: FloatArray,
     normals: FloatArray,
     neighbours: AnyArray,
@@ -170,17 +176,24 @@ def _geometry_terms(
     anchor: int,
     samples: IntArray,
     yaws: IntArray,
+    log_prior: FloatArray,
     sigmas: FloatArray,
     free_angle: float,
     angle: float,
     cap: float,
     use_axis: bool,
+    within: float,
 ) -> FloatArray:
     contacts = offsets.shape[1]
-    terms = np.empty((len(samples), contacts))
+    scores = np.empty(len(samples))
+    leader = -np.inf
     for n in range(len(samples)):
         i, j = samples[n], yaws[n]
+        total = log_prior[n]
         for k in range(contacts):
+            if total < leader - within:
+                total = -np.inf
+                break
             x = points[i, 0] + offsets[j, k, 0]
             y = points[i, 1] + offsets[j, k, 1]
             z = points[i, 2] + offsets[j, k, 2]
@@ -194,7 +207,7 @@ def _geometry_terms(
             elif inside:
                 sample = nearest[a, b, c]
             if sample < 0:
-                terms[n, k] = -cap
+                total -= cap
                 continue
             axis = axes[j, k]
             best = _fit(
@@ -208,5 +221,7 @@ def _geometry_terms(
                         points, normals, spacing, other, x, y, z, axis, sigmas[k], free_angle, angle, use_axis
                     )
                     best = max(best, fit)
-            terms[n, k] = max(best, -cap)
-    return terms
+            total += max(best, -cap)
+        scores[n] = total
+        leader = max(leader, total)
+    return scores

@@ -8,13 +8,10 @@ import numpy as np
 from experiments.contact_localization.surface import Surface, sample_surface
 from harness.arrays import FloatArray, read_only
 from harness.errors import WrongUse
-from harness.geometry import rotation_about
 from harness.mesh import Mesh
 from harness.sensor import TactileSensor
 from harness.sim.height_map import RasterMesh
 from harness.sim.tactile_calibration import TactileCalibration
-
-_VERTICAL = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +36,12 @@ class Prior:
 
     def object_from_base(self, yaws: FloatArray) -> FloatArray:
         """``(n, 3, 3)`` rotations for ``(n,)`` yaws in rad away from the nominal one."""
-        turned = [self.base_from_object.T @ rotation_about(_VERTICAL, -float(yaw)) for yaw in yaws]
-        return np.array(turned)
+        turned = np.zeros((len(yaws), 3, 3))
+        cosines, sines = np.cos(yaws), np.sin(yaws)
+        turned[:, 0, 0] = turned[:, 1, 1] = cosines
+        turned[:, 0, 1], turned[:, 1, 0] = sines, -sines
+        turned[:, 2, 2] = 1.0
+        return np.asarray(self.base_from_object.T @ turned)
 
 
 @dataclass(frozen=True, eq=False)

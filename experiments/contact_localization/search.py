@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise, best_of
-from experiments.contact_localization.likelihood import arrange, geometry_terms, possible_anchors
+from experiments.contact_localization.likelihood import arrange, geometry_scores, possible_anchors
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.surface import Surface
 from experiments.contact_localization.touch import TouchMap, View, best_fit, touch_terms
@@ -55,7 +55,9 @@ class Search:
             object_from_base = self.prior.object_from_base(np.array([nominal]))[0]
             object_from_gel = object_from_base @ self.contacts[contact].base_from_gel[:3, :3]
             pitch = self._pitch if coarse else 0.5 * self._pitch
-            self._views[key] = view_along(self.model.raster, object_from_gel, pitch, self.model.sensor)
+            self._views[key] = view_along(
+                self.model.raster, self.surface.points, object_from_gel, pitch, self.model.sensor
+            )
         return self._views[key]
 
     def grid(self, members: IntArray, anchor: int, use_axis: bool = True) -> Hypotheses:
@@ -66,8 +68,7 @@ class Search:
             anchor: the one of them that a hypothesis puts on a sample.
             use_axis: whether the tool's attitude counts, or only places.
         """
-        samples, yaws, terms = self._geometry(members, anchor, use_axis)
-        log_weights = terms.sum(axis=1) + self._log_prior(samples, yaws)
+        samples, yaws, log_weights = self._geometry(members, anchor, use_axis)
         kept = best_of(log_weights, _PRUNE, _MOST_HYPOTHESES)
         samples, yaws = samples[kept], yaws[kept]
         rotations = self.prior.object_from_base(self.yaws)
@@ -149,7 +150,7 @@ class Search:
         """Hypotheses by the picture that serves them, with the gel's centre in view coordinates."""
         places_in_object = self.gel_centres(contact, gels, yaws)
         pictures = self.pictures(yaws)
-        for picture in np.unique(pictures):
+        for picture in (0,) if self.prior.yaw == "known" else np.unique(pictures):
             chosen = np.nonzero(pictures == picture)[0].astype(np.int64)
             view = self.view(contact, int(picture), coarse)
             yield chosen, view, places_in_object[chosen] @ view.object_from_view
@@ -212,11 +213,11 @@ class Search:
         arrangement = arrange(rotations, points, self.axes[members], index)
         geometry = self.noise.geometry
         samples, yaws = possible_anchors(self.surface, arrangement, geometry, use_axis)
-        terms = geometry_terms(self.surface, arrangement, samples, yaws, geometry, use_axis)
-        return samples, yaws, terms
-
-    def _log_prior(self, samples: IntArray, yaws: IntArray) -> FloatArray:
-        return np.asarray(np.log(self.surface.areas[samples]) + self.log_yaw_prior(self.yaws)[yaws])
+        prior = np.log(self.surface.areas[samples]) + self.log_yaw_prior(self.yaws)[yaws]
+        log_weights = geometry_scores(
+            self.surface, arrangement, samples, yaws, prior, geometry, use_axis, _PRUNE
+        )
+        return samples, yaws, log_weights
 
     def _place_sigmas(self, members: IntArray) -> FloatArray:
         centre = self.positions[members].mean(axis=0)

@@ -17,16 +17,19 @@ _MARGIN = 4.0e-3
 """Metres around the object: a tool's line may miss it by a little while the gel still touches."""
 
 
-def view_along(raster: RasterMesh, object_from_gel: FloatArray, pitch: float, sensor: TactileSensor) -> View:
+def view_along(
+    raster: RasterMesh, samples: FloatArray, object_from_gel: FloatArray, pitch: float, sensor: TactileSensor
+) -> View:
     """The object as the gel would meet it, everywhere at once.
 
     Args:
         raster: the object.
+        samples: ``(n, 3)`` metres, points of its surface that say how far it reaches.
         object_from_gel: ``(3, 3)`` rotation; its third column is the way the tool points.
         pitch: metres a pixel.
         sensor: gives the gel's window and thickness.
     """
-    in_view = raster.mesh.vertices[np.unique(raster.mesh.faces)] @ object_from_gel
+    in_view = samples @ object_from_gel
     low, high = in_view.min(axis=0)[:2], in_view.max(axis=0)[:2]
     columns, rows = np.ceil((high - low) / pitch).astype(np.int64) + 2 * round(_MARGIN / pitch)
     centre = 0.5 * (low + high)
