@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.contact_point import contact_point, nearest_point
-from experiments.contact_localization.gate import Gate, gates, refuse_bad_fit
+from experiments.contact_localization.gate import Gate, gates, refuse_bad_fit, refuse_inside_out
 from experiments.contact_localization.grid import on_samples, refine
 from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise
 from experiments.contact_localization.levels import Levels
@@ -136,6 +136,9 @@ def locate(
         # The paper's filter has no measure of fit to be refused by.
         if k == count and levels.method == "grid":
             refuse_bad_fit(found.members, found.fits)
+            top = int(np.argmax(found.hypotheses.log_weights))
+            best = found.hypotheses.gels[top], float(found.hypotheses.yaws[top])
+            refuse_inside_out(search, *best, found.members)
         answers.append(_answer(search, k, found, seconds))
     return tuple(answers)
 

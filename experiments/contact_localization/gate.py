@@ -71,6 +71,32 @@ def refuse_bad_fit(members: IntArray, fits: FloatArray) -> None:
         )
 
 
+def refuse_inside_out(search: Search, gel: FloatArray, yaw: float, members: IntArray) -> None:
+    """Raise where most contacts touch the surface from the side its normals call inside.
+
+    Raises:
+        FitRefused: naming the contact that faces away most.
+    """
+    facing = np.array([_facing(search, int(k), gel, yaw) for k in members])
+    if np.median(facing) > 0.0:
+        worst = int(members[np.argmax(facing)])
+        raise FitRefused(
+            f"the object is inside out: its normals point away from the gel at most contacts, the worst is "
+            f"contact {worst + 1}, where the angle between tool and outward normal is "
+            f"{np.degrees(np.arccos(min(1.0, float(facing.max())))):.0f} degrees (at least 90 wanted); "
+            "turn the faces of the mesh"
+        )
+
+
+def _facing(search: Search, contact: int, gel: FloatArray, yaw: float) -> float:
+    """Cosine between the tool's axis and the outward normal at a contact; -1 for a square press."""
+    yaws = np.array([yaw])
+    point = search.surface_points(contact, gel[None], yaws)[0]
+    normal = search.surface.normals[search.surface.tree.query(point)[1]]
+    axis = search.prior.object_from_base(yaws)[0] @ search.contacts[contact].axis
+    return float(normal @ axis)
+
+
 def _repeated(search: Search, contact: int) -> int | None:
     for earlier in range(contact):
         near = np.linalg.norm(search.positions[contact] - search.positions[earlier]) < SAME_PLACE

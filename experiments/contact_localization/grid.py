@@ -10,6 +10,8 @@ from harness.sim.compiled import compiled
 _DROPPED_AT = 18.0
 _WORTH_A_LOOK = 12.0
 _MOST_LOOKS = 3000
+_DRAWS_EACH = 8.0
+_FILLED = 0.15
 
 
 def on_samples(search: Search, members: IntArray, anchor: int) -> Hypotheses:
@@ -39,28 +41,38 @@ def refine(
         search: the run.
         start: the grid's hypotheses, weighed with their images.
         members: ``(m,)`` indices of the contacts that count.
-        samples: draws a round.
-        rounds: how often; 0 returns ``start``.
+        samples: least draws a round; a wide posterior gets up to five times as many.
+        rounds: most rounds, each narrower; they end early where the draws already fill the
+            posterior, because a further round would only lose places by chance. 0 returns ``start``.
         seed: of the draws.
     """
     rng = np.random.default_rng(seed)
     current = start
     for attempt in range(rounds):
+        draws = int(np.clip(_DRAWS_EACH * _perplexity(current.weights), samples, 5 * samples))
         width = np.array([0.8e-3, 0.8e-3, 0.6e-3]) * 0.65**attempt
         turn = np.radians(0.8 if search.prior.yaw == "known" else 1.5) * 0.65**attempt
-        parents = _systematic(current.weights, samples, rng)
-        gels = current.gels[parents] + rng.normal(size=(samples, 3)) * width
-        yaws = current.yaws[parents] + rng.normal(size=samples) * turn
+        parents = _systematic(current.weights, draws, rng)
+        gels = current.gels[parents] + rng.normal(size=(draws, 3)) * width
+        yaws = current.yaws[parents] + rng.normal(size=draws) * turn
         unique, repeats = np.unique(parents, return_counts=True)
         log_density = _mixture(
             np.column_stack([gels / width, yaws / turn]),
             np.column_stack([current.gels[unique] / width, current.yaws[unique] / turn]),
-            repeats / samples,
+            repeats / draws,
         )
         finest = attempt == rounds - 1
         log_weights = search.weigh(gels, yaws, members, step=1 if finest else 2, rings=2) - log_density
         current = Hypotheses(gels, yaws, log_weights - log_weights.max())
+        if 1.0 / np.sum(current.weights**2) > _FILLED * draws:
+            break
     return current
+
+
+def _perplexity(weights: FloatArray) -> float:
+    """How many equal weights would be as undecided as these."""
+    positive = weights[weights > 0.0]
+    return float(np.exp(-np.sum(positive * np.log(positive))))
 
 
 def _systematic(weights: FloatArray, count: int, rng: np.random.Generator) -> IntArray:

@@ -163,7 +163,8 @@ class Search:
     def surface_points(self, contact: int, gels: FloatArray, yaws: FloatArray) -> FloatArray:
         """``(n, 3)`` metres: where the tool's line first meets the object, to a view's pixel.
 
-        Where it misses the object, the sample nearest to the gel's centre.
+        Where it meets nothing within the gel's thickness, the sample nearest to the gel's centre:
+        what lies behind an edge that was just missed was not touched.
         """
         points = self.gel_centres(contact, gels, yaws)
         for chosen, view, places in self.placed(contact, gels, yaws):
@@ -172,7 +173,7 @@ class Search:
             inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
             depth = np.full(len(places), np.inf)
             depth[inside] = view.depth[row[inside], column[inside]]
-            hit = np.isfinite(depth)
+            hit = depth <= places[:, 2] + self.model.sensor.gel_thickness
             met = np.column_stack([places[hit, :2], depth[hit]]) @ view.object_from_view.T
             points[chosen[hit]] = met
             lost = chosen[~hit]
