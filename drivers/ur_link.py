@@ -152,7 +152,8 @@ class Link:
             f"the controller says: safety {words}, program {ur_words.RUNTIME_STATES.get(state, 'unknown')}, "
             f"robot {ur_words.ROBOT_MODES.get(mode, 'unknown')}"
         )
-        if state != ur_words.PLAYING and self.longest_silence() > 0.8 * self.patience:
+        # Also of a program that plays: it may have been started again, or its last packet be old.
+        if self.longest_silence() > 0.8 * self.patience:
             silence = 1e3 * self.longest_silence()
             text += f", its watchdog kept waiting for {silence:.0f} ms (limit {1e3 * self.patience:.0f} ms)"
         return BenchFault(text) if words in ur_words.MAY_MOVE else ProtectiveStop(text)
