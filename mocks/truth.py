@@ -1,11 +1,11 @@
 """The truth of a run, written beside its folder for scoring; nothing that estimates reads it."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
 from harness.arrays import FloatArray
+from harness.recording import write_text_whole
 from mocks.world import World
 
 SCHEMA = 1
@@ -43,7 +43,7 @@ class TruthFile:
             "base_from_flange": base_from_flange.tolist(),
         }
         contacts = [self._contacts[index] for index in sorted(self._contacts)]
-        _write_whole(self._path, json.dumps({**self._head, "contacts": contacts}, indent=1) + "\n")
+        write_text_whole(self._path, json.dumps({**self._head, "contacts": contacts}, indent=1) + "\n")
 
     def _resumed(self) -> dict[int, dict[str, Any]]:
         if not self._path.exists():
@@ -52,13 +52,3 @@ class TruthFile:
         if any(written.get(key) != self._head[key] for key in ("schema", "seed", "base_from_object")):
             return {}
         return {contact["step"]: contact for contact in written["contacts"]}
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write aside and rename: a reader sees the old file or the new one, never half of one."""
-    aside = path.with_name(f".{path.name}.part")
-    with aside.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    aside.replace(path)
