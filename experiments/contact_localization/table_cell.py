@@ -64,7 +64,7 @@ class Cell:
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
+class PerformedRun:
     """A performed run, as an estimator may see it, and its truth."""
 
     observations: tuple[Observation, ...]
@@ -87,14 +87,15 @@ def run_cell(cell: Cell, scene: SceneFile, station: Station) -> dict[str, Any]:
     """Perform and answer one run; the result as JSON values."""
     scene = scene_of(cell, scene)
     mesh = known_object(scene).mesh
-    run = _perform(cell, scene, station, mesh)
+    run = perform_cell(cell, scene, station, mesh)
     symmetry = find_symmetries(mesh)
-    prior = _prior(run, cell.yaw)
+    prior = believed(run, cell.yaw)
     rows = {method: _scored(method, run, prior, symmetry) for method in METHODS}
     return {"schema": 1, "cell": asdict(cell), "contacts": len(run.observations), "rows": rows}
 
 
-def _perform(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> _Run:
+def perform_cell(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> PerformedRun:
+    """Plan and perform one run on the bench in process, without answering it."""
     plan = plan_run(scene, station, mesh, cell.seed)
     experiment = ContactLocalization(lambda start, end: way_between(plan.bench, start, end))
     with TemporaryDirectory(prefix="touchstone-table-") as folder:
@@ -107,7 +108,7 @@ def _perform(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> _Run
             observations.append(observe_step(StepRecord(step, readings, 0.0), station.flange_from_gel))
         true = _last_truth(context.truth)
     model = Model(mesh, station.gel.sensor, station_calibration(station))
-    return _Run(tuple(observations), model, scene.base_from_object(mesh), true, cell.seed)
+    return PerformedRun(tuple(observations), model, scene.base_from_object(mesh), true, cell.seed)
 
 
 def _last_truth(path: Path) -> FloatArray:
@@ -115,7 +116,8 @@ def _last_truth(path: Path) -> FloatArray:
     return np.array(contacts[-1]["point_in_object_m"])
 
 
-def _prior(run: _Run, yaw: str) -> Prior:
+def believed(run: PerformedRun, yaw: str) -> Prior:
+    """What an estimator is told of the object's orientation, its yaw ``"known"`` or ``"unknown"``."""
     rotation = run.base_from_object[:3, :3]
     if yaw == "known":
         return Prior(rotation, "known")
@@ -124,7 +126,7 @@ def _prior(run: _Run, yaw: str) -> Prior:
     return Prior(rotation_about(np.array([0.0, 0.0, 1.0]), angle) @ rotation, "unknown")
 
 
-def _scored(method: str, run: _Run, prior: Prior, symmetry: SymmetryGroup) -> dict[str, Any]:
+def _scored(method: str, run: PerformedRun, prior: Prior, symmetry: SymmetryGroup) -> dict[str, Any]:
     start = now()
     if method == "random":
         error = mean_random_error(run.model.mesh, run.true)
@@ -139,7 +141,7 @@ def _scored(method: str, run: _Run, prior: Prior, symmetry: SymmetryGroup) -> di
 
 
 def _estimated(
-    run: _Run, prior: Prior, levels: Levels, symmetry: SymmetryGroup, start: float
+    run: PerformedRun, prior: Prior, levels: Levels, symmetry: SymmetryGroup, start: float
 ) -> dict[str, Any]:
     try:
         found = estimate(run.observations, run.model, prior, levels, seed=run.seed)
