@@ -4,6 +4,7 @@ Every method states an intention and may be called twice. Poses are of the flang
 robot's base; what the flange carries is the station's business.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -103,6 +104,40 @@ class TactileCamera(Protocol):
 
     def read(self, count: int, timeout: float) -> Reading:
         """The next ``count`` frames that arrive from now on, or ``BenchFault`` after ``timeout`` s."""
+
+    def health(self) -> Health:
+        """Rate, drops and latency since opening."""
+
+
+class ImpactHammer(Protocol):
+    """A hammer's force cell and, where one clock serves both, the microphone that hears it."""
+
+    def open(self) -> None:
+        """Connect and begin to sample."""
+
+    def close(self) -> None:
+        """Stop sampling and disconnect."""
+
+    def capture(
+        self, fire: Callable[[], None], before: float, after: float, timeout: float
+    ) -> tuple[Reading, ...]:
+        """Listen, call ``fire()``, and return what was read around the strike.
+
+        Args:
+            fire: strikes, or asks a person to; called once, when samples are arriving.
+            before: s kept from before the trigger.
+            after: s kept from the trigger on.
+            timeout: s from ``fire()``'s return to the trigger.
+
+        Returns:
+            Channels ``hammer.force`` and ``microphone.pressure`` (raw counts in blocks, each with the
+            time of its first sample), ``hammer.clock`` and ``hammer.flags``
+            (``harness.acquisition_channels``). Without a trigger within ``timeout`` they are of the
+            last ``before + after`` s, and flagged silent.
+
+        Raises:
+            BenchFault: samples were lost, their order was lost, or the link went away.
+        """
 
     def health(self) -> Health:
         """Rate, drops and latency since opening."""

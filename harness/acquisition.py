@@ -1,0 +1,299 @@
+"""What a data-acquisition box read of one strike, and what it means in newtons and pascals.
+
+A capture is recorded as read: whole counts in blocks, each block with the bench-clock time of its
+first sample, channel by channel, so that the skew of a multiplexed converter is in the times and
+not in the samples. ``strike_from_readings`` makes physics of it: one time axis for both channels,
+newtons, pascals, and whether the strike can be used.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from harness.acquisition_channels import (
+    FLAG_FIELDS,
+    FLAGS,
+    FORCE,
+    GUARD,
+    PRESSURE,
+    SHORTEST_REST,
+    judge,
+)
+from harness.arrays import FloatArray, read_only
+from harness.errors import CalibrationRefused, DataRefused, RecordingDamaged
+from harness.reading import Reading
+from harness.resampling import resample
+
+SCHEMA = 1
+
+_SHIPPED = Path(__file__).parent / "data"
+_STEADY = 1e-4
+_TEXTS = ("model", "serial", "hammer_serial", "microphone_serial", "date", "made_from")
+_SIGNED = ("hammer_offset", "microphone_offset")
+_FULL_SCALES = (2**11 - 1, 2**15 - 1, 2**23 - 1, 2**31 - 1)
+
+
+@dataclass(frozen=True)
+class AcquisitionCalibration:
+    """What counts mean: a dated artefact of one box with one hammer and one microphone.
+
+    Attributes:
+        model: of the box, for example ``"DI-2108"``.
+        serial: of the box, as it states it (``info 6``).
+        hammer_serial: of the force cell.
+        microphone_serial: of the microphone.
+        date: ISO 8601, of the calibration.
+        made_from: what it was made from: the certificates, or the recording of a known mass being struck.
+        volts_per_count: V, of the box.
+        full_scale_counts: greatest count that the box can say; ``-full_scale_counts - 1`` is the least.
+        hammer_newtons_per_volt: N/V at the box's input; the cell's sensitivity and its conditioner's gain.
+        hammer_offset: counts at rest.
+        hammer_limit: N, the greatest force of the calibration; beyond it a strike counts as overload.
+        microphone_volts_per_count: V, of the converter that the microphone is on; the box's own if that.
+        microphone_full_scale_counts: of that converter.
+        microphone_pascals_per_volt: Pa/V at the converter's input, sensitivity and gain inside.
+        microphone_offset: counts at rest.
+        microphone_limit: Pa, the greatest pressure of the calibration.
+        offset_tolerance: counts by which a rest may differ from its offset; less than half of the two
+            offsets' difference, or a swap of the channels could not be told.
+        residual: relative, of the fit or as the certificates state it.
+    """
+
+    model: str
+    serial: str
+    hammer_serial: str
+    microphone_serial: str
+    date: str
+    made_from: str
+    volts_per_count: float
+    full_scale_counts: int
+    hammer_newtons_per_volt: float
+    hammer_offset: float
+    hammer_limit: float
+    microphone_volts_per_count: float
+    microphone_full_scale_counts: int
+    microphone_pascals_per_volt: float
+    microphone_offset: float
+    microphone_limit: float
+    offset_tolerance: float
+    residual: float
+
+    def __post_init__(self) -> None:
+        values = asdict(self)
+        for name in _TEXTS:
+            if not isinstance(values[name], str) or not values[name]:
+                raise CalibrationRefused(f"calibration: {name} = {values[name]!r}; it must be a text")
+        for name in (field.name for field in fields(self) if field.name not in _TEXTS):
+            _check_number(name, values[name])
+        for name in ("full_scale_counts", "microphone_full_scale_counts"):
+            if values[name] not in _FULL_SCALES:
+                raise CalibrationRefused(
+                    f"calibration: {name} = {values[name]}; a converter has one of {_FULL_SCALES}"
+                )
+
+    @classmethod
+    def load(cls, path: Path) -> "AcquisitionCalibration":
+        """An artefact as ``save`` writes it.
+
+        Raises:
+            CalibrationRefused: it cannot be read, has a key too few or too many, a number that is not
+                finite or of the wrong sign, or was changed after it was made.
+        """
+        try:
+            tree = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise CalibrationRefused(f"{path}: not a calibration of an acquisition box ({error})") from error
+        if not isinstance(tree, dict) or tree.get("schema") != SCHEMA:
+            raise CalibrationRefused(f"{path}: not schema {SCHEMA} of an acquisition box's calibration")
+        values = {name: value for name, value in tree.items() if name not in ("schema", "hash")}
+        expected = {field.name for field in fields(cls)}
+        if set(values) != expected:
+            raise CalibrationRefused(f"{path}: wrong or missing keys: {sorted(set(values) ^ expected)}")
+        made = cls(**values)
+        if tree.get("hash") != made.hash:
+            raise CalibrationRefused(
+                f"{path}: its contents hash to {made.hash}, not {tree.get('hash')!r}; make it again"
+            )
+        return made
+
+    def save(self, path: Path) -> None:
+        """Write the artefact with its schema and hash."""
+        path.write_text(
+            json.dumps({"schema": SCHEMA, **asdict(self), "hash": self.hash}, indent=1) + "\n",
+            encoding="utf-8",
+        )
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the contents, 16 digits of it."""
+        text = json.dumps(asdict(self), sort_keys=True, allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    @property
+    def newtons_per_count(self) -> float:
+        """N."""
+        return self.volts_per_count * self.hammer_newtons_per_volt
+
+    @property
+    def pascals_per_count(self) -> float:
+        """Pa."""
+        return self.microphone_volts_per_count * self.microphone_pascals_per_volt
+
+
+def shipped_acquisition(name: str) -> AcquisitionCalibration:
+    """An artefact that comes with the package, by its name; ``CalibrationRefused`` where there is none."""
+    return AcquisitionCalibration.load(_SHIPPED / f"{name}.json")
+
+
+def _check_number(name: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise CalibrationRefused(f"calibration: {name} = {value!r}; it must be a finite number")
+    if name not in _SIGNED and not value > 0:
+        raise CalibrationRefused(f"calibration: {name} = {value!r}; it must be above zero")
+
+
+@dataclass(frozen=True, eq=False)
+class Strike:
+    """One captured strike, on one time axis.
+
+    Attributes:
+        rate: Hz, of both channels, fitted on the bench clock.
+        force: ``(t,)`` N, compression positive, rest taken off.
+        pressure: ``(t,)`` Pa at the same times as the force, rest taken off.
+        onset: sample at which the force reached the trigger's threshold; 0 where silent.
+        start: s on the bench clock, of sample 0.
+        overload: full scale was read, or the calibrated range was left: amplitudes are not to be trusted.
+        double_hit: the hammer touched twice.
+        silent: no force reached the threshold; there is nothing to analyse.
+    """
+
+    rate: float
+    force: FloatArray
+    pressure: FloatArray
+    onset: int
+    start: float
+    overload: bool
+    double_hit: bool
+    silent: bool
+
+    @property
+    def times(self) -> FloatArray:
+        """``(t,)`` s on the bench clock."""
+        return self.start + np.arange(len(self.force)) / self.rate
+
+
+def strike_from_readings(readings: Mapping[str, Reading], calibration: AcquisitionCalibration) -> Strike:
+    """One captured strike in newtons and pascals, both at the times of the force's samples.
+
+    The pressure is resampled, band-limited, to the times of the force: spectra of the two are divided
+    by each other, and a skew of 10 us would be 0.6 rad at 10 kHz. What the two records do not
+    share in time is left out.
+
+    Args:
+        readings: by channel name, as a step's record holds them; other channels are ignored.
+        calibration: of the box, the hammer and the microphone.
+
+    Raises:
+        DataRefused: a channel is missing, holds counts that the calibrated box cannot say, or rests far
+            from its calibrated offset (as it does when the channels are swapped).
+        RecordingDamaged: block times that no steady clock gives.
+    """
+    force, pressure = (_Record.of(readings, name) for name in (FORCE, PRESSURE))
+    threshold = float(_reading(readings, FLAGS).values[0][FLAG_FIELDS.index("threshold")])
+    scales = calibration.full_scale_counts, calibration.microphone_full_scale_counts
+    _check_counts(force, scales[0])
+    _check_counts(pressure, scales[1])
+    flags = judge(force.counts, pressure.counts, threshold, *scales)
+    tolerance = calibration.offset_tolerance
+    onset_time = force.start + (flags.onset - GUARD) / force.rate
+    quiet_until = None if flags.silent else onset_time
+    force_rest = _rest(force, quiet_until, calibration.hammer_offset, tolerance)
+    pressure_rest = _rest(pressure, quiet_until, calibration.microphone_offset, tolerance)
+    newtons = (force.counts - force_rest) * calibration.newtons_per_count
+    pascals = (pressure.counts - pressure_rest) * calibration.pascals_per_count
+    times = force.start + np.arange(len(newtons)) / force.rate
+    shared = (times >= pressure.start) & (times <= pressure.end)
+    if not np.any(shared):
+        raise DataRefused(f"{FORCE} and {PRESSURE} have no moment in common; they are of different strikes")
+    first = int(np.argmax(shared))
+    beyond = np.abs(newtons).max() > calibration.hammer_limit or (
+        np.abs(pascals).max() > calibration.microphone_limit
+    )
+    return Strike(
+        force.rate,
+        read_only(newtons[shared]),
+        read_only(resample(pascals, pressure.start, pressure.rate, times[shared], force.rate)),
+        0 if flags.silent else max(0, flags.onset - first),
+        float(times[first]),
+        bool(flags.overload or beyond),
+        flags.double_hit,
+        flags.silent,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Record:
+    """All blocks of one channel in a row, and the steady clock that their times give."""
+
+    name: str
+    counts: FloatArray
+    start: float
+    rate: float
+
+    @property
+    def end(self) -> float:
+        return self.start + (len(self.counts) - 1) / self.rate
+
+    @classmethod
+    def of(cls, readings: Mapping[str, Reading], name: str) -> "_Record":
+        reading = _reading(readings, name)
+        blocks, block = reading.values.shape
+        if blocks < 2:
+            raise DataRefused(f"{name} has {blocks} block; two are needed to know the rate of its samples")
+        numbers = np.arange(blocks) * block
+        origin = reading.times[0]
+        period, late = np.polyfit(numbers, reading.times - origin, 1)
+        astray = np.abs(reading.times - origin - late - period * numbers).max()
+        if not period > 0.0 or astray > _STEADY:
+            raise RecordingDamaged(
+                f"{name}: block times leave a steady clock by {astray * 1e6:.0f} us; "
+                f"at most {_STEADY * 1e6:.0f} us are possible"
+            )
+        counts = reading.values.ravel().astype(np.float64)
+        return cls(name, counts, float(origin + late), 1.0 / float(period))
+
+
+def _reading(readings: Mapping[str, Reading], name: str) -> Reading:
+    if name not in readings:
+        raise DataRefused(f"the step has no channel {name}; it recorded {', '.join(sorted(readings))}")
+    return readings[name]
+
+
+def _check_counts(record: _Record, full_scale: int) -> None:
+    low, high = record.counts.min(), record.counts.max()
+    if low < -full_scale - 1 or high > full_scale:
+        raise DataRefused(
+            f"{record.name} holds counts from {low:.0f} to {high:.0f}; the calibrated box says "
+            f"{-full_scale - 1} to {full_scale}: the calibration is of another box"
+        )
+
+
+def _rest(record: _Record, quiet_until: float | None, offset: float, tolerance: float) -> float:
+    """Counts at rest: measured before the strike, and checked against the calibrated offset."""
+    count = (quiet_until - record.start) * record.rate if quiet_until is not None else len(record.counts)
+    quiet = record.counts[: max(0, int(count))]
+    if len(quiet) < SHORTEST_REST:
+        return offset
+    rest = float(np.median(quiet))
+    if abs(rest - offset) > tolerance:
+        raise DataRefused(
+            f"{record.name} rests at {rest:.0f} counts; it was calibrated at {offset:.0f}, within "
+            f"{tolerance:.0f}: check that the channels are not swapped, or calibrate again"
+        )
+    return rest
