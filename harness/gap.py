@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from harness.errors import WrongUse
-from harness.quantities import Angle, Length, Level, Nonnegative, Ordered, Positive, Ratio, Time
+from harness.quantities import Angle, Decay, Length, Level, Nonnegative, Ordered, Positive, Ratio, Time
 from harness.toml_file import StrictModel, load_toml, nearest
 
 _FOLDER = Path(__file__).parent / "gaps"
@@ -104,14 +104,21 @@ class SoundGap(StrictModel):
         damping: of the logarithm, of all modes together, per run.
         damping_per_mode: of the logarithm.
         microphone_gain: dB, per mode, common to a run, with a random phase.
-        strike_direction: rad, per strike.
-        strike_point: m, per axis and strike.
+        strike_direction: rad, the angle between the blow and the hammer's axis, about an axis drawn
+            uniformly, per strike.
+        strike_point: m, per axis across the hammer and strike.
         force_gain: relative, per run.
         pulse: s, the length of the half sine: the value itself.
         pulse_spread: relative, per strike, uniform between minus and plus this.
         reverberation_time: s to fall by 60 dB: the value itself; zero without a room.
         direct_to_reverberant: dB: the value itself.
-        signal_to_noise: dB: the value itself.
+        signal_to_noise: dB, of a middling strike over its first half second: the value itself.
+        gain_per_strike: dB, per mode and strike: a microphone, or an object, that moves in between.
+        phase_per_strike: rad, per mode and strike.
+        extra_damping: 1/s on top of every mode's, as of a hand that holds the object: the value itself.
+        silent_strikes: contacts, counted from 0, at which the striker does not reach the object.
+        saturated_strikes: contacts at which the blow is ten times as hard.
+        double_strikes: contacts at which the hammer bounces and hits twice.
     """
 
     wall: Annotated[tuple[Ratio, Ratio], Ordered]
@@ -130,6 +137,12 @@ class SoundGap(StrictModel):
     reverberation_time: Annotated[Time, Nonnegative]
     direct_to_reverberant: Level
     signal_to_noise: Level
+    gain_per_strike: Annotated[Level, Nonnegative] = 0.0
+    phase_per_strike: Annotated[Angle, Nonnegative] = 0.0
+    extra_damping: Annotated[Decay, Nonnegative] = 0.0
+    silent_strikes: tuple[int, ...] = ()
+    saturated_strikes: tuple[int, ...] = ()
+    double_strikes: tuple[int, ...] = ()
 
 
 class Gap(StrictModel):

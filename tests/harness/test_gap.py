@@ -2,7 +2,9 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from harness.errors import WrongUse
@@ -40,7 +42,52 @@ def test_the_gap_switched_off_leaves_only_noise() -> None:
     assert not any(systematic)
 
 
-@pytest.mark.parametrize("name", ["default", "none"])
+SHIPPED = ["default", "none", "doubled", "moved_microphone", "hand_held"]
+
+VALUES_THEMSELVES = {
+    *("schema_number", "title", "deviation_length", "calibration"),
+    *("pulse", "reverberation_time", "direct_to_reverberant"),
+}
+
+
+def numbers(tree: Any, name: str = "") -> dict[str, Any]:
+    """The leaves of a gap, by their dotted names."""
+    if isinstance(tree, dict):
+        return {
+            key: leaf
+            for part, branch in tree.items()
+            for key, leaf in numbers(branch, f"{name}.{part}").items()
+        }
+    return {name: tree}
+
+
+def test_the_doubled_gap_is_the_default_twice_over() -> None:
+    once, twice = (numbers(load_gap(name).model_dump()) for name in ("default", "doubled"))
+    for name, value in once.items():
+        leaf = name.rpartition(".")[2]
+        if leaf in VALUES_THEMSELVES:
+            continue
+        if leaf == "skirt":  # estimators assume a blur of 1 mm
+            assert twice[name] - 1e-3 == pytest.approx(2 * (value - 1e-3))
+        elif leaf == "signal_to_noise":
+            assert twice[name] == pytest.approx(value - 20 * np.log10(2), abs=0.05)
+        elif isinstance(value, tuple) and not value:
+            assert twice[name] == ()
+        else:
+            assert twice[name] == pytest.approx(2 * np.array(value)), name
+
+
+@pytest.mark.parametrize(
+    ("name", "own"),
+    [("moved_microphone", {"gain_per_strike", "phase_per_strike"}), ("hand_held", {"extra_damping"})],
+)
+def test_a_gap_for_one_thing_differs_from_the_default_in_that_alone(name: str, own: set[str]) -> None:
+    default, other = (numbers(load_gap(which).model_dump()) for which in ("default", name))
+    differs = {key.rpartition(".")[2] for key in default if default[key] != other[key]}
+    assert differs == {"title", *own}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
 def test_a_gap_survives_json(name: str) -> None:
     gap = load_gap(name)
     assert validate(json.loads(gap.model_dump_json()), Gap, "recording") == gap
