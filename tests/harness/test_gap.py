@@ -45,7 +45,7 @@ def test_the_gap_switched_off_leaves_only_noise() -> None:
 SHIPPED = ["default", "none", "doubled", "moved_microphone", "hand_held"]
 
 VALUES_THEMSELVES = {
-    *("schema_number", "title", "deviation_length", "calibration"),
+    *("schema", "title", "deviation_length", "calibration"),
     *("pulse", "reverberation_time", "direct_to_reverberant"),
 }
 
