@@ -18,6 +18,7 @@ from harness.geometry import apply, inverse
 from harness.mesh import Mesh
 from harness.sensor import TactileSensor
 from harness.twin.arm import Part, add_arm, arm_parts, reaches
+from harness.twin.striker import striker
 from harness.twin.triangles import ConvexBody, Solid
 from harness.ur_tables import arm_table
 
@@ -81,6 +82,8 @@ class TwinBench:
         clearance: m that everything keeps from everything, outside a press; at least 1 mm,
             because motions are sampled every 2 mm of surface motion.
         joint_range: ``(2, 6)`` rad, within the maker's, which holds alone where it is None.
+        flange_from_hammer: ``(4, 4)``, the tip of the striker at rest, z along the strike; None
+            without one.
 
     Raises:
         WrongUse: an unknown arm, or an object that reaches below the table.
@@ -97,6 +100,7 @@ class TwinBench:
         pedestal_radius: float = 0.03,
         clearance: float = 2e-3,
         joint_range: FloatArray | None = None,
+        flange_from_hammer: FloatArray | None = None,
     ) -> None:
         if clearance < 1e-3:
             raise WrongUse(f"twin: a clearance of {1e3 * clearance:g} mm; it must be at least 1 mm")
@@ -112,7 +116,9 @@ class TwinBench:
         self._object_in_base = apply(self.base_from_object, self.solid.hull)
         self.object_top = float(self._object_in_base[:, 2].max())
         self.pad = _pad(sensor, depth=HOUSING_LENGTH)
-        tool = _tool(sensor, self.flange_from_gel)
+        tool = [*_tool(sensor, self.flange_from_gel)]
+        if flange_from_hammer is not None:
+            tool.append(striker(np.asarray(flange_from_hammer, dtype=np.float64)))
         standing = [Part(name, 0, np.zeros((1, 3))) for name in ("table", "pedestal", "object")]
         self.parts = [*arm_parts(model), *tool, *standing]
         self.reach = reaches(model, self.parts)
@@ -212,7 +218,7 @@ class TwinBench:
         spec = mujoco.MjSpec()
         spec.compiler.degree = False
         flange = add_arm(spec, self.model)
-        for part, colour in zip(tool, (_GREY, _BLACK, _GEL), strict=True):
+        for part, colour in zip(tool, (_GREY, _BLACK, _GEL, _GREY), strict=False):
             _add_hull(spec, flange, part.name, part.vertices, colour)
         _add_hull(spec, spec.worldbody, "object", self._object_in_base, _OBJECT)
         low = self._object_in_base[:, 2].min()
