@@ -1,0 +1,292 @@
+"""How probable the sounds of a run are, given where its strikes fell.
+
+At a peak the strikes' shares are ``y = c (G a + e)``: ``G`` the gains of the mode, or of a group of
+near-equal modes, at the struck places along the strikes; ``a`` how the microphone hears each; ``c`` any
+complex number; ``e`` what the model does not know. With ``a`` and ``c`` integrated out the direction
+of ``y`` is complex angular central Gaussian with matrix ``G G^T + spread^2 I`` (Kent, Data analysis for
+shapes and images, JSPI 57, 1997). The microphone's gains need not be known and signs between strikes count.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.sound_analysis import Peak, SoundEvidence
+from experiments.contact_localization.sound_kernels import (
+    MOST_RANK,
+    nearest_in_table,
+    sound_scores,
+)
+from experiments.contact_localization.sound_matching import (
+    Scales,
+    SoundNoise,
+    group_starts,
+    likely_scales,
+)
+from experiments.contact_localization.surface import Surface
+from harness.arrays import AnyArray, FloatArray, IntArray, read_only
+from harness.errors import WrongUse
+from harness.materials import Material
+from harness.sim.modes import Modes, dampings
+
+_FAR = 4.0
+"""Sigmas of frequency at which a mode is no longer considered for a peak."""
+
+_LEAST_DENSITY = 0.05
+"""Of modes at a peak, in units of one mode right at it: with fewer about, clutter gains."""
+
+
+@dataclass(frozen=True, eq=False)
+class GainTable:
+    """The modes at a surface's samples, made once an object.
+
+    Attributes:
+        surface: whose samples; gives the sample nearest to any place.
+        shapes: ``(samples, m, 3)`` 1/sqrt(kg), float32.
+    """
+
+    surface: Surface
+    shapes: AnyArray
+
+    def nearest(self, points: FloatArray) -> IntArray:
+        """``(n,)`` sample nearest to each of ``(n, 3)`` points in metres, however far."""
+        table = self.surface.table
+        found = nearest_in_table(np.ascontiguousarray(points), table.nearest, table.origin, table.pitch)
+        far = np.nonzero(found < 0)[0]
+        if len(far):
+            found[far] = self.surface.tree.query(points[far])[1]
+        return found
+
+
+def gain_table(modes: Modes, surface: Surface) -> GainTable:
+    """Tabulate the modes at a surface's samples."""
+    return GainTable(surface, read_only(modes.at(surface.points).astype(np.float32)))
+
+
+@dataclass(frozen=True)
+class ModeRow:
+    """One row of the table of peaks and modes.
+
+    Attributes:
+        frequency: Hz, of the peak.
+        damping: 1/s, as heard.
+        residual: share of the peak's band that is not one waveform.
+        level: dB against the strongest peak.
+        modes: numbers of the matched group's modes, from 0; empty for a peak that no mode explains.
+        model_frequency: Hz, of the matched modes, under the scale; NaN-free: 0 where there is none.
+        model_damping: 1/s, of the matched modes; 0 where there is none.
+        probability: of the match.
+        nats: that the peak adds at the given places, over a peak that says nothing.
+    """
+
+    frequency: float
+    damping: float
+    residual: float
+    level: float
+    modes: tuple[int, ...]
+    model_frequency: float
+    model_damping: float
+    probability: float
+    nats: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Pairs:
+    """Which group may sound at which peak, pairs of a peak side by side."""
+
+    starts: IntArray
+    groups: IntArray
+    shares: FloatArray
+    clutter: FloatArray
+
+
+class SoundTerm:
+    """The sounds of one run as a term of its posterior.
+
+    Attributes:
+        evidence: what the strikes said.
+        scales: frequency scales between object and model, most probable first.
+    """
+
+    def __init__(
+        self,
+        evidence: SoundEvidence,
+        table: GainTable,
+        modes: Modes,
+        material: Material,
+        noise: SoundNoise | None = None,
+    ) -> None:
+        """Prepare the term.
+
+        Args:
+            evidence: of the run's strikes.
+            table: of the modes, at any spacing.
+            modes: of the object.
+            material: for the damping that the modes should have.
+            noise: of the term.
+
+        Raises:
+            WrongUse: a group may be larger than the kernel takes.
+        """
+        noise = noise or SoundNoise()
+        if not 1 <= noise.most <= MOST_RANK:
+            raise WrongUse(f"groups of {noise.most} modes were asked for; 1 to {MOST_RANK} can be weighed")
+        self.evidence = evidence
+        self._table, self._modes, self._material, self._noise = table, modes, material, noise
+        self._starts = group_starts(modes.frequencies, noise)
+        self._peaks = evidence.peaks if len(modes.frequencies) else ()
+        frequencies = np.array([peak.frequency for peak in self._peaks])
+        self.scales: Scales = likely_scales(frequencies, modes.frequencies, noise)
+        self._pairs = _pair(frequencies, self._group_frequencies(), self.scales.factors, noise)
+        self._gain_scales = self._unit_gains()
+
+    @property
+    def says_something(self) -> bool:
+        """Whether any peak can set places apart."""
+        return len(self._pairs.groups) > 0
+
+    def log_likelihood(self, points: FloatArray, directions: FloatArray) -> FloatArray:
+        """``(h,)`` nats of hypotheses, 0 for sounds that say nothing.
+
+        Args:
+            points: ``(h, K, 3)`` metres, in the object's frame: where each strike fell.
+            directions: ``(h, K, 3)`` or ``(K, 3)`` unit, in the object's frame: where the hammer went.
+
+        Raises:
+            WrongUse: shapes that are not those of the evidence's strikes.
+        """
+        strikes = len(self.evidence.used)
+        if points.ndim != 3 or points.shape[1:] != (strikes, 3):
+            raise WrongUse(
+                f"points of shape {points.shape} were given; {strikes} strikes need (h, {strikes}, 3)"
+            )
+        if directions.shape not in ((strikes, 3), points.shape):
+            raise WrongUse(
+                f"directions of shape {directions.shape} were given; ({strikes}, 3) or {points.shape} wanted"
+            )
+        if not self.says_something or len(points) == 0:
+            return np.zeros(len(points))
+        return self._scores(points, directions, self._peaks, self._pairs, self._noise.weight)
+
+    def mode_table(self, points: FloatArray, directions: FloatArray) -> tuple[ModeRow, ...]:
+        """Every peak with the group of modes that explains it best at one set of places.
+
+        Args:
+            points: ``(K, 3)`` metres, in the object's frame.
+            directions: ``(K, 3)`` unit.
+        """
+        return tuple(self._row(index, points, directions) for index in range(len(self._peaks)))
+
+    def _scores(
+        self,
+        points: FloatArray,
+        directions: FloatArray,
+        peaks: tuple[Peak, ...],
+        pairs: _Pairs,
+        weight: float,
+    ) -> FloatArray:
+        strikes = len(self.evidence.used)
+        samples = self._table.nearest(points.reshape(-1, 3)).reshape(-1, strikes)
+        rows, real, imaginary, counts = _whitened(peaks, self._noise.spread)
+        return sound_scores(
+            self._table.shapes,
+            samples,
+            np.ascontiguousarray(directions.reshape(-1, strikes, 3)),
+            self._gain_scales,
+            rows,
+            real,
+            imaginary,
+            counts,
+            pairs.starts,
+            pairs.groups,
+            self._starts,
+            pairs.shares,
+            pairs.clutter,
+            np.full(len(peaks), weight),
+            self.scales.log_shares,
+        )
+
+    def _group_frequencies(self) -> FloatArray:
+        logs = np.log(self._modes.frequencies)
+        return np.array(
+            [np.exp(logs[a:b].mean()) for a, b in zip(self._starts[:-1], self._starts[1:], strict=True)]
+        )
+
+    def _unit_gains(self) -> FloatArray:
+        """``(m,)``: one over the noise of each mode's gain; one figure a group, so that any basis will do."""
+        normals = self._table.surface.normals
+        squares = np.array(
+            [np.mean(np.sum(shape * normals, axis=1) ** 2) for shape in self._table.shapes.transpose(1, 0, 2)]
+        )
+        result = np.empty(len(squares))
+        for a, b in zip(self._starts[:-1], self._starts[1:], strict=True):
+            result[a:b] = 1.0 / (np.sqrt(squares[a:b].mean()) * self._noise.spread)
+        return result
+
+    def _row(self, index: int, points: FloatArray, directions: FloatArray) -> ModeRow:
+        peak, pairs = self._peaks[index], self._pairs
+        span = range(int(pairs.starts[index]), int(pairs.starts[index + 1]))
+        prior = np.exp(self.scales.log_shares)
+        odds = np.array([prior @ pairs.clutter[:, index]] + [prior @ pairs.shares[:, q] for q in span])
+        fits = np.array([0.0] + [self._fit_of(peak, int(pairs.groups[q]), points, directions) for q in span])
+        total = float(np.sum(odds * np.exp(fits)))
+        chances = odds * np.exp(fits) / total
+        best = int(np.argmax(chances))
+        group = int(pairs.groups[span[best - 1]]) if best else -1
+        modes = tuple(range(int(self._starts[group]), int(self._starts[group + 1]))) if best else ()
+        at = np.array([self._group_frequencies()[group]]) if best else np.zeros(0)
+        return ModeRow(
+            peak.frequency,
+            peak.damping,
+            peak.residual,
+            peak.level,
+            modes,
+            float(at[0] * self.scales.factors[0]) if best else 0.0,
+            float(dampings(at * self.scales.factors[0], self._material)[0]) if best else 0.0,
+            float(chances[best]),
+            float(np.log(total)),
+        )
+
+    def _fit_of(self, peak: Peak, group: int, points: FloatArray, directions: FloatArray) -> float:
+        """Nats of one peak if one group of modes made it."""
+        sure = _Pairs(
+            np.array([0, 1], dtype=np.int64),
+            np.array([group], dtype=np.int64),
+            np.ones((len(self.scales.factors), 1)),
+            np.zeros((len(self.scales.factors), 1)),
+        )
+        return float(self._scores(points[None], directions, (peak,), sure, 1.0)[0])
+
+
+def _pair(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> _Pairs:
+    starts, found, shares = [0], [], []
+    clutter = np.ones((len(factors), len(peaks)))
+    for index, peak in enumerate(peaks):
+        sigmas = (np.log(peak) - np.log(groups)[None] - np.log(factors)[:, None]) / noise.frequency
+        density = np.where(np.abs(sigmas) < _FAR, np.exp(-0.5 * sigmas**2), 0.0)
+        share = (1.0 - noise.clutter) * density / (density.sum(axis=1, keepdims=True) + _LEAST_DENSITY)
+        near = np.nonzero(share.any(axis=0))[0]
+        found.extend(near.tolist())
+        shares.append(share[:, near])
+        clutter[:, index] = 1.0 - share.sum(axis=1)
+        starts.append(len(found))
+    joined = np.concatenate(shares, axis=1) if shares else np.zeros((len(factors), 0))
+    return _Pairs(
+        np.array(starts, dtype=np.int64),
+        np.array(found, dtype=np.int64),
+        np.ascontiguousarray(joined),
+        clutter,
+    )
+
+
+def _whitened(peaks: tuple[Peak, ...], spread: float) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+    """Rows' factors, ``y`` of unit length in two parts, and how many strikes heard each peak."""
+    rows, ys = [], []
+    for peak in peaks:
+        unit = np.sqrt(np.mean(np.abs(peak.y[peak.heard]) ** 2))
+        row = peak.heard / np.hypot(1.0, peak.sigma / (spread * unit))
+        rows.append(row)
+        ys.append(row * peak.y / np.linalg.norm(row * peak.y))
+    y = np.array(ys)
+    counts = np.array([peak.heard.sum() for peak in peaks], dtype=np.int64)
+    return np.array(rows), np.ascontiguousarray(y.real), np.ascontiguousarray(y.imag), counts
