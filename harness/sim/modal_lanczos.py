@@ -1,0 +1,203 @@
+"""All modes of an object below a frequency: block Lanczos on the inverse of the shifted stiffness.
+
+Grimes, Lewis and Simon, A Shifted Block Lanczos Algorithm for Solving Sparse Symmetric
+Generalized Eigenproblems, SIAM J. Matrix Analysis 15(1), 1994, with one shift below the
+spectrum, every block held orthogonal to all earlier ones and to the rigid motions, and the
+number of modes checked against the inertia of ``K - w^2 M`` at the limit.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh, solve_triangular
+from scipy.sparse.linalg import SuperLU
+
+from harness.arrays import FloatArray
+from harness.errors import MeshRefused
+from harness.sim.modal_system import ModalSystem, factorised, negative_pivots
+
+_BLOCK = 8
+_TOLERANCE = 1e-9
+"""Of a Ritz pair's residual against its own value."""
+
+_BEYOND = 1e-2
+"""The same for the first mode beyond the limit, which only has to be known to be beyond."""
+
+
+@dataclass(frozen=True, eq=False)
+class EigenPairs:
+    """The modes of a system.
+
+    Attributes:
+        values: ``(m,)`` (rad/s)^2, ascending.
+        vectors: ``(3 n, m)`` 1/sqrt(kg), mass-orthonormal.
+        residual: the worst ``|K x - w^2 M x| / (w^2 |M x|)``.
+        certified: whether an inertia count confirmed that none is missing.
+    """
+
+    values: FloatArray
+    vectors: FloatArray
+    residual: float
+    certified: bool
+
+
+def modes_below(system: ModalSystem, limit: float, certify: bool = True) -> EigenPairs:
+    """Every elastic mode up to ``limit`` Hz.
+
+    Raises:
+        MeshRefused: the stiffness cannot be factorised, or modes were missed twice.
+    """
+    ceiling = (2.0 * np.pi * limit) ** 2
+    factor = factorised(system.shifted(system.shift))
+    lowest = float(factor.U.diagonal().min())
+    if lowest <= 0.0:
+        raise MeshRefused(
+            f"the stiffness of the object has a pivot of {lowest:.2g}, which must be above 0; its "
+            "volume mesh has an inverted element: mesh the object again"
+        )
+    expected = _count_below(system, ceiling) if certify else None
+    pairs = _Lanczos(system, factor, seed=1).run(ceiling)
+    if expected is not None and len(pairs[0]) < expected:
+        pairs = _Lanczos(system, factor, seed=2, block=2 * _BLOCK).run(ceiling)
+    if expected is not None and len(pairs[0]) < expected:
+        raise MeshRefused(
+            f"{len(pairs[0])} modes were found below {limit:g} Hz where the inertia of the system says "
+            f"{expected}; the volume mesh is too poor to be trusted: mesh it with another element size"
+        )
+    values, vectors = pairs
+    return EigenPairs(values, vectors, _residual(system, values, vectors), len(values) == expected)
+
+
+def _count_below(system: ModalSystem, ceiling: float) -> int | None:
+    """How many elastic eigenvalues are below ``ceiling``; None where the factors cannot say."""
+    negative = negative_pivots(factorised(system.shifted(-ceiling)))
+    return None if negative is None else negative - system.rigid.shape[1]
+
+
+def _residual(system: ModalSystem, values: FloatArray, vectors: FloatArray) -> float:
+    if len(values) == 0:
+        return 0.0
+    inertia = system.weighted(vectors) * values
+    gap = np.linalg.norm(system.stiffness @ vectors - inertia, axis=0)
+    return float((gap / np.linalg.norm(inertia, axis=0)).max())
+
+
+class _Lanczos:
+    """One run from one random block."""
+
+    def __init__(self, system: ModalSystem, factor: SuperLU, seed: int, block: int = _BLOCK) -> None:
+        self.system = system
+        self.factor = factor
+        self.rigid_weighted = system.weighted(system.rigid)
+        size = system.rigid.shape[0]
+        self.block = min(block, size - system.rigid.shape[1])
+        self.most = size - system.rigid.shape[1]
+        self.basis = np.empty((size, 0), order="F")
+        self.used = 0
+        self.projected = np.zeros((0, 0))
+        self.random = np.random.default_rng(seed)
+
+    def run(self, ceiling: float) -> tuple[FloatArray, FloatArray]:
+        """Values and vectors of every mode up to ``ceiling`` (rad/s)^2."""
+        start = self._cleared(self.random.standard_normal((self.basis.shape[0], self.block)))
+        current, _ = self._normalised(start)
+        check_at = 6 * self.block
+        while True:
+            self._append(current)
+            last = self.used + self.block > self.most
+            step, coupling = self._step(current)
+            if self.used >= check_at or last:
+                found = self._converged(coupling, ceiling, last)
+                if found is not None:
+                    return found
+                check_at = int(1.15 * self.used) + self.block
+            current = step
+
+    def _append(self, current: FloatArray) -> None:
+        """Take a block into the basis, which doubles when it is full."""
+        end = self.used + current.shape[1]
+        if end > self.basis.shape[1]:
+            room = min(max(2 * self.basis.shape[1], 24 * self.block), self.most + self.block)
+            grown = np.empty((self.basis.shape[0], room), order="F")
+            grown[:, : self.used] = self.basis[:, : self.used]
+            projected = np.zeros((room, room))
+            projected[: self.used, : self.used] = self.projected[: self.used, : self.used]
+            self.basis, self.projected = grown, projected
+        self.basis[:, self.used : end] = current
+        self.used = end
+
+    def _step(self, current: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The next block, and ``(b, b)`` what couples it to this one."""
+        image = self.factor.solve(self.system.weighted(current))
+        image -= self.system.rigid @ (self.rigid_weighted.T @ image)
+        known = self.basis[:, : self.used]
+        first = known.T @ self.system.weighted(image)
+        image -= known @ first
+        second = known.T @ self.system.weighted(image)
+        image -= known @ second
+        span = slice(self.used - current.shape[1], self.used)
+        self.projected[: self.used, span] = first + second
+        self.projected[span, : self.used] = self.projected[: self.used, span].T
+        image -= self.system.rigid @ (self.rigid_weighted.T @ image)
+        return self._normalised(image)
+
+    def _cleared(self, block: FloatArray) -> FloatArray:
+        """Without rigid motion and without what the basis already holds."""
+        known = self.basis[:, : self.used]
+        for _ in range(2):
+            block = block - self.system.rigid @ (self.rigid_weighted.T @ block)
+            block = block - known @ (known.T @ self.system.weighted(block))
+        return block
+
+    def _normalised(self, block: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mass-orthonormal columns and ``(b, b)`` their combination that is ``block``.
+
+        Columns that the others or the basis already span are replaced by random ones.
+        """
+        unit, first = self._orthonormal(block)
+        again, second = self._orthonormal(self._cleared(unit))
+        return again, second @ first
+
+    def _orthonormal(self, block: FloatArray) -> tuple[FloatArray, FloatArray]:
+        gram = block.T @ self.system.weighted(block)
+        scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+        safe = np.where(scale > 0.0, scale, 1.0)
+        values, turned = np.linalg.eigh(gram / np.outer(safe, safe))
+        if values[0] > 1e-12:
+            upper = np.linalg.cholesky(gram / np.outer(safe, safe)).T * safe
+            return solve_triangular(upper, block.T, trans="T").T, upper
+        return self._refilled(block / safe, values, turned, safe)
+
+    def _refilled(
+        self, block: FloatArray, values: FloatArray, turned: FloatArray, scale: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """As ``_orthonormal`` where the columns depend on each other."""
+        kept = values > 1e-12
+        roots = np.sqrt(np.where(kept, values, 1.0))
+        unit = block @ turned / roots
+        unit[:, ~kept] = self._cleared(self.random.standard_normal((len(block), int((~kept).sum()))))
+        for _ in range(2):
+            fresh, old = unit[:, ~kept], unit[:, kept]
+            fresh = fresh - old @ (old.T @ self.system.weighted(fresh))
+            upper = np.linalg.cholesky(fresh.T @ self.system.weighted(fresh)).T
+            unit[:, ~kept] = solve_triangular(upper, fresh.T, trans="T").T
+        combination = np.where(kept, roots, 0.0)[:, None] * turned.T * scale
+        return unit, combination
+
+    def _converged(
+        self, coupling: FloatArray, ceiling: float, last: bool
+    ) -> tuple[FloatArray, FloatArray] | None:
+        """The modes up to the ceiling if all are known, and the first beyond it well enough."""
+        inverse, ritz = eigh(self.projected[: self.used, : self.used])
+        inverse, ritz = inverse[::-1], ritz[:, ::-1]
+        error = np.linalg.norm(coupling @ ritz[-self.block :], axis=0)
+        threshold = 1.0 / (ceiling + self.system.shift)
+        wanted = inverse >= threshold
+        number = int(wanted.sum())
+        if not last:
+            if number == self.used or (error[wanted] > _TOLERANCE * inverse[wanted]).any():
+                return None
+            if error[number] > _BEYOND * inverse[number] or inverse[number] + error[number] >= threshold:
+                return None
+        vectors = self.basis[:, : self.used] @ ritz[:, :number]
+        return 1.0 / inverse[:number] - self.system.shift, vectors
