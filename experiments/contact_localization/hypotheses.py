@@ -8,6 +8,8 @@ from experiments.contact_localization.likelihood import GeometryNoise
 from experiments.contact_localization.touch import TouchMap, TouchNoise
 from harness.arrays import FloatArray, IntArray
 
+_GOLDEN = 0.6180339887498949
+
 UNKNOWN_INDENTATION = 1.0e-3
 """Metres that a press usually leaves at the gel's centre."""
 
@@ -64,8 +66,7 @@ class Hypotheses:
     @property
     def weights(self) -> FloatArray:
         """``(n,)``, summing to 1."""
-        weights = np.exp(self.log_weights)
-        return np.asarray(weights / weights.sum())
+        return normalised(self.log_weights)
 
     def best(self, within: float, most: int) -> "Hypotheses":
         """Those within so many nats of the best, evenly thinned where they are more than ``most``."""
@@ -88,11 +89,21 @@ class Noise:
     temperature: float = 0.3
 
 
-def best_of(log_weights: FloatArray, within: float, most: int) -> IntArray:
-    """Indices within so many nats of the best; where they are too many, evenly thinned.
+def normalised(log_weights: FloatArray) -> FloatArray:
+    """``(n,)`` weights summing to 1, of ``(n,)`` nats the greatest of which is 0."""
+    weights = np.exp(log_weights)
+    return np.asarray(weights / weights.sum())
 
-    Hypotheses come in the samples' random order, so every n-th of them covers the surface.
+
+def best_of(log_weights: FloatArray, within: float, most: int) -> IntArray:
+    """Rising indices within so many nats of the best; of more than ``most``, an even choice of ``most``.
+
+    Hypotheses come in the samples' random order with the yaws of each in turn, so any even choice
+    covers the surface; one without a period covers the yaws too (a stride that their number
+    divides would keep one yaw of all). Multiples of the golden section, modulo 1, are such a choice.
     """
-    kept = np.nonzero(log_weights > log_weights.max() - within)[0]
-    stride = -(-len(kept) // most)
-    return kept[::stride].astype(np.int64)
+    kept = np.nonzero(log_weights > log_weights.max() - within)[0].astype(np.int64)
+    if len(kept) <= most:
+        return kept
+    ranks = np.mod(np.arange(len(kept)) * _GOLDEN, 1.0)
+    return np.asarray(kept[np.sort(np.argpartition(ranks, most)[:most])])

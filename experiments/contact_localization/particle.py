@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.contact_localization.hypotheses import normalised
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.touch import similarities
 from harness.arrays import FloatArray, IntArray
@@ -37,8 +38,7 @@ class Particles:
     @property
     def weights(self) -> FloatArray:
         """``(n,)``, summing to 1."""
-        weights = np.exp(self.log_weights)
-        return np.asarray(weights / weights.sum())
+        return normalised(self.log_weights)
 
     def candidates(self) -> FloatArray:
         """``(10, 3)`` metres: the most probable particles."""
@@ -94,8 +94,7 @@ def _similarity(search: Search, contact: int, at: IntArray, yaws: FloatArray) ->
 def _resampled(
     at: IntArray, yaws: FloatArray, log_weights: FloatArray, rng: np.random.Generator
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    weights = np.exp(log_weights)
-    weights /= weights.sum()
+    weights = normalised(log_weights)
     count = len(at)
     if 1.0 / np.sum(weights**2) >= 0.5 * count:
         return at, yaws, log_weights
