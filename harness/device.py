@@ -141,3 +141,27 @@ class ImpactHammer(Protocol):
 
     def health(self) -> Health:
         """Rate, drops and latency since opening."""
+
+
+class Microphone(Protocol):
+    """What hears the object ring; readings are blocks of counts on ``microphone.pressure``."""
+
+    def open(self) -> None:
+        """Begin to listen; raises ``BenchFault`` naming the device that is missing or does not fit."""
+
+    def close(self) -> None:
+        """Stop listening."""
+
+    def record(self, seconds: float) -> tuple[Reading, ...]:
+        """The next ``seconds`` of sound: counts, flags, callback times and the fitted clock."""
+
+    def capture(
+        self, fire: Callable[[], None], before: float, after: float, timeout: float
+    ) -> tuple[Reading, ...]:
+        """Call ``fire()``; the sound from ``before`` s before it is heard to ``after`` s after.
+
+        Flagged, not raised, where nothing is heard for ``timeout`` s.
+        """
+
+    def health(self) -> Health:
+        """Rate, bad blocks and latency since opening."""

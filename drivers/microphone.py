@@ -1,0 +1,286 @@
+"""A microphone on a sound card, by PortAudio: raw counts, the clock fitted, every doubt flagged."""
+
+from collections.abc import Callable
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from drivers import portaudio
+from drivers.microphone_blocks import Block, Blocks, Format
+from drivers.microphone_readings import clock_of, readings, since_last_gap, states_ages
+from drivers.microphone_trigger import Trigger
+from harness.clock import now
+from harness.device import Health
+from harness.errors import BenchFault
+from harness.microphone_take import OTHER_STATUS, SAMPLES_LOST, SILENCE_INSERTED, UNTRIGGERED
+from harness.reading import Reading
+
+STALL = 0.5
+"""s without a block after which the device is taken to be gone."""
+
+OPEN_TIMEOUT = 5.0
+"""s until a stream that delivers nothing is given up."""
+
+RATE_TOLERANCE = 2e-3
+"""Largest relative difference of the measured rate from the asked one; no crystal is that far off."""
+
+_RATE_SECONDS = 2.0
+_CLOCK_SECONDS = 10.0
+_BASELINE_SECONDS = 0.2
+_BITS = (24, 32)
+
+
+class PortAudioMicrophone:
+    """A microphone as a sound card's input; a ``Microphone``.
+
+    Open the card itself (on Linux a device with ``hw:`` in its name). A sound server between
+    resamples and mixes without a word; channel counts are therefore compared exactly.
+
+    Args:
+        device: its name; see `drivers.portaudio.find_input`.
+        rate: samples a second; one that the card has itself.
+        channels: that the device has, exactly.
+        channel: which of them is the microphone, from 0.
+        bits: 24 or 32, of one count.
+        block: samples handed over at a time.
+        threshold: counts from the baseline at which `capture` triggers, above zero.
+        name: of the instrument, as messages call it.
+        serial: of the microphone, as the station states it.
+        keep: s of sound kept.
+
+    Raises:
+        ValueError: a number above that cannot be.
+    """
+
+    def __init__(
+        self,
+        device: str,
+        rate: int,
+        channels: int = 1,
+        channel: int = 0,
+        bits: int = 24,
+        block: int = 512,
+        threshold: int = 2**18,
+        name: str = "microphone",
+        serial: str = "",
+        keep: float = 30.0,
+    ) -> None:
+        if bits not in _BITS or not 0 <= channel < channels or min(rate, block, threshold) < 1:
+            raise ValueError(
+                f"{name}: bits must be 24 or 32 (is {bits}), channel below channels ({channel}, {channels}), "
+                f"and rate, block and threshold above zero ({rate}, {block}, {threshold})"
+            )
+        self.name = name
+        self.form = Format(rate, bits, channels, channel, block)
+        self._device = device
+        self._serial = serial
+        self._threshold = threshold
+        self._keep = keep
+        self._blocks = self._empty()
+        self._next = 0
+        self._stream: Any = None
+
+    def open(self) -> None:
+        """Begin to listen, and wait for the first block; does nothing if already open.
+
+        Raises:
+            BenchFault: PortAudio or the device is missing, the device has another number of
+                channels or not this rate, or it is silent.
+        """
+        if self._stream is not None:
+            return
+        library = portaudio.acquire()
+        try:
+            self._stream = self._begin(library)
+        except BaseException:
+            portaudio.release()
+            raise
+        try:
+            self._hear(1, OPEN_TIMEOUT)
+        except BenchFault:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Stop listening; does nothing if already closed."""
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+            portaudio.release()
+
+    def record(self, seconds: float) -> tuple[Reading, ...]:
+        """The next ``seconds`` of sound, in whole blocks.
+
+        Returns:
+            As `drivers.microphone_readings.readings`; a bad take says so in ``microphone.flags``.
+
+        Raises:
+            BenchFault: the microphone is not open, is gone, or runs at another rate than asked.
+        """
+        self._require(seconds)
+        first = self._heard()
+        end = first + self._samples(seconds)
+        self._hear(end)
+        return self._readings(first, end)
+
+    def capture(
+        self, fire: Callable[[], None], before: float, after: float, timeout: float
+    ) -> tuple[Reading, ...]:
+        """Call ``fire()`` and record the sound that follows.
+
+        The trigger is the first sample, of those handed over after the call, further than
+        ``threshold`` from the median of the last 0.2 s before it.
+
+        Args:
+            fire: makes the sound; may return before it is heard.
+            before: s to record before the trigger.
+            after: s to record after it.
+            timeout: s to wait for the trigger.
+
+        Returns:
+            As `record`; where nothing triggered, the newest ``before + after`` s, flagged.
+
+        Raises:
+            BenchFault: the microphone is not open, is gone, or runs at another rate than asked.
+        """
+        self._require(before + after)
+        self._hear(self._samples(before))
+        start = self._heard()
+        trigger = Trigger(self._blocks, self.form, start, self._baseline(start), self._threshold)
+        fire()
+        if not self._hear_trigger(trigger, timeout):
+            end = self._heard()
+            return self._readings(end - self._samples(before + after), end, UNTRIGGERED)
+        end = trigger.index + self._samples(after)
+        self._hear(end)
+        return self._readings(trigger.index - self._samples(before), end)
+
+    def health(self) -> Health:
+        """Rate by the fitted clock, bad blocks and the sound's age on arrival, since opening."""
+        identity = f"{self._device} {self._serial}".strip() + f" by PortAudio, {self.form.bits} bit"
+        blocks = self._blocks.since(0)
+        if not blocks:
+            return Health(self.name, identity, 0.0, 0, None, "nothing heard yet")
+        clock = clock_of(blocks, self.form)
+        stated = states_ages(blocks, self.form)
+        latency = median(block.age for block in blocks) if stated else None
+        detail = f"clock fitted to {clock.residual * 1e6:.0f} us"
+        detail += "" if stated else "; the sound card does not say when it sampled"
+        return Health(self.name, identity, clock.rate, self._blocks.bad, latency, detail)
+
+    def _begin(self, library: Any) -> Any:
+        """The stream, running."""
+        found = portaudio.find_input(library, self._device)
+        self._check_channels(found)
+        self._blocks = self._empty()
+        self._next = 0
+        kind = {
+            "device": found["index"],
+            "channels": self.form.channels,
+            "dtype": f"int{self.form.bits}",
+            "samplerate": self.form.rate,
+        }
+        try:
+            library.check_input_settings(**kind)
+            # High latency: a late computer then loses nothing. Clipping and dither are left off:
+            # both would change counts.
+            stream = library.RawInputStream(
+                **kind,
+                blocksize=self.form.block,
+                latency="high",
+                clip_off=True,
+                dither_off=True,
+                callback=self._listen,
+            )
+            stream.start()
+        except library.PortAudioError as error:
+            raise BenchFault(
+                f"{self.name}: {found['name']!r} does not open with {self.form.channels} channels of "
+                f"{self.form.bits} bit at {self.form.rate} Hz: {error.args[0]}; "
+                "close other programs that use it, or set another rate in the station"
+            ) from error
+        return stream
+
+    def _check_channels(self, found: dict[str, Any]) -> None:
+        if found["max_input_channels"] != self.form.channels:
+            raise BenchFault(
+                f"{self.name}: {found['name']!r} has {found['max_input_channels']} input channels and the "
+                f"station says {self.form.channels}; another number would be mixed without a word: set "
+                "the station's channels to the device's"
+            )
+
+    def _listen(self, data: Any, frames: int, times: Any, status: Any) -> None:
+        """PortAudio's thread: keep the block and what is known of it, and nothing else."""
+        arrived = now()
+        flags = SILENCE_INSERTED * bool(status.input_underflow) | SAMPLES_LOST * bool(status.input_overflow)
+        if status and not flags and not status.priming_output:
+            flags = OTHER_STATUS
+        age = times.currentTime - times.inputBufferAdcTime if times.inputBufferAdcTime > 0.0 else 0.0
+        self._blocks.add(Block(self._next, arrived, age, flags, bytes(data)))
+        self._next += frames
+
+    def _empty(self) -> Blocks:
+        capacity = int(np.ceil(self._keep * self.form.rate / self.form.block))
+        return Blocks(capacity, self.form.block)
+
+    def _require(self, seconds: float) -> None:
+        if not 0.0 < seconds <= 0.5 * self._keep:
+            raise ValueError(
+                f"{seconds:g} s asked for; above zero and up to {0.5 * self._keep:g} s can be kept"
+            )
+        if self._stream is None:
+            raise BenchFault(f"{self.name} was read before it was opened; open the bench first")
+
+    def _samples(self, seconds: float) -> int:
+        return int(np.ceil(seconds * self.form.rate))
+
+    def _heard(self) -> int:
+        """How many samples have been handed over since opening."""
+        newest = self._blocks.newest()
+        return 0 if newest is None else newest.first + self.form.block
+
+    def _hear(self, end: int, stall: float = STALL) -> None:
+        """Wait until sample number ``end`` is there; a fault where blocks cease for ``stall`` s."""
+        while True:
+            total = self._blocks.total
+            if self._blocks.wait(lambda: self._heard() >= end, stall):
+                return
+            if self._blocks.total == total:
+                raise self._gone(stall)
+
+    def _hear_trigger(self, trigger: Trigger, timeout: float) -> bool:
+        """Whether it came within ``timeout`` s; a fault where no block came at all."""
+        total = self._blocks.total
+        found = self._blocks.wait(trigger.look, timeout)
+        if self._blocks.total == total:
+            raise self._gone(timeout)
+        return found
+
+    def _gone(self, seconds: float) -> BenchFault:
+        return BenchFault(
+            f"{self.name}: {self._device!r} has sent nothing for {seconds:g} s: the device is gone or "
+            "its sound server has stopped; check its cable, then open the bench again"
+        )
+
+    def _baseline(self, end: int) -> float:
+        blocks = self._blocks.since(end - self._samples(_BASELINE_SECONDS))
+        counts = [self.form.counts(block.counts) for block in blocks if block.first < end]
+        return float(np.median(np.concatenate(counts))) if counts else 0.0
+
+    def _readings(self, first: int, end: int, flags: int = 0) -> tuple[Reading, ...]:
+        heard = since_last_gap(self._blocks.since(first - self._samples(_CLOCK_SECONDS)), first, self.form)
+        self._check_rate(heard)
+        take = [block for block in heard if block.first < end and block.first + self.form.block > first]
+        return readings(take, heard, self.form, flags)
+
+    def _check_rate(self, heard: list[Block]) -> None:
+        seconds = heard[-1].arrived - heard[0].arrived
+        if seconds < _RATE_SECONDS or any(block.flags for block in heard):
+            return
+        rate = (heard[-1].first - heard[0].first) / seconds
+        if abs(rate / self.form.rate - 1.0) > max(RATE_TOLERANCE, self.form.block / self.form.rate / seconds):
+            raise BenchFault(
+                f"{self.name}: {self._device!r} delivers {rate:.0f} samples a second and "
+                f"{self.form.rate} were asked for; set a rate that the device has itself"
+            )

@@ -1,0 +1,119 @@
+"""Readings made of a microphone's blocks: counts, flags, callback times and the fitted clock."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drivers.microphone_blocks import Block, Format
+from drivers.microphone_clock import SampleClock, fit_clock, largest_step
+from harness.arrays import AnyArray, FloatArray
+from harness.microphone_take import BAD, CALLBACK, CLOCK, COUNT_BROKEN, FLAGS, OVERLOAD, PRESSURE
+from harness.reading import Channel, Reading
+
+SETTLE = 0.2
+"""s of blocks on either side of a place at which samples may be missing."""
+
+_LONGEST_AGE = 2.0
+_SMALLEST_STEP = 2e-3
+_OVERLOAD_RUN = 3
+
+
+def starts(blocks: Sequence[Block], form: Format) -> FloatArray:
+    """When each block's first sample was converted, s on the bench clock, ``(n,)``, as measured.
+
+    The callback's time less the age that PortAudio states. Some back ends state none or a
+    wrong one (PortAudio issues 850 and 94); where one block's age is not between half a block
+    and two seconds, none is believed, and a block is taken to arrive as it is full.
+    """
+    arrived = np.array([block.arrived for block in blocks])
+    ages = np.array([block.age for block in blocks])
+    return arrived - (ages if states_ages(blocks, form) else form.block / form.rate)
+
+
+def states_ages(blocks: Sequence[Block], form: Format) -> bool:
+    """Whether PortAudio's times of conversion can be believed for these blocks."""
+    shortest = 0.5 * form.block / form.rate
+    return all(shortest <= block.age <= _LONGEST_AGE for block in blocks)
+
+
+def clock_of(blocks: Sequence[Block], form: Format) -> SampleClock:
+    """The line from sample number to bench clock through these blocks, of which there is one at least."""
+    return fit_clock(firsts(blocks), starts(blocks, form), form.rate)
+
+
+def since_last_gap(blocks: Sequence[Block], first: int, form: Format) -> list[Block]:
+    """Those after the last bad block that ends before sample number ``first``: one unbroken count."""
+    broken = [
+        number
+        for number, block in enumerate(blocks)
+        if block.flags & BAD and block.first + form.block <= first
+    ]
+    return list(blocks[broken[-1] + 1 if broken else 0 :])
+
+
+def firsts(blocks: Sequence[Block]) -> FloatArray:
+    """``(n,)`` number of each block's first sample."""
+    return np.array([block.first for block in blocks], np.float64)
+
+
+def count_is_broken(blocks: Sequence[Block], form: Format) -> bool:
+    """Whether samples are missing or made up somewhere in these blocks, by the clock alone.
+
+    A step is one of at least a quarter of a block and `_SMALLEST_STEP`; shorter losses are
+    below what hand-over times can show.
+    """
+    limit = max(_SMALLEST_STEP, 0.25 * form.block / form.rate)
+    settle = int(np.ceil(SETTLE * form.rate / form.block))
+    step = largest_step(firsts(blocks), starts(blocks, form), form.rate, settle)
+    return abs(step) > limit
+
+
+def overloaded(counts: AnyArray, form: Format) -> bool:
+    """Whether three or more neighbouring samples stand at one end of the converter's scale."""
+    for end in (form.full_scale, -form.full_scale - 1):
+        at_end = (counts == end).astype(np.int64)
+        if (
+            len(at_end) >= _OVERLOAD_RUN
+            and np.convolve(at_end, np.ones(_OVERLOAD_RUN)).max() >= _OVERLOAD_RUN
+        ):
+            return True
+    return False
+
+
+def readings(
+    take: Sequence[Block], heard: Sequence[Block], form: Format, flags: int = 0
+) -> tuple[Reading, ...]:
+    """What was recorded, and what is known of it.
+
+    Args:
+        take: the blocks of the recording, consecutive, at least one.
+        heard: blocks for the clock: those of the take and others of the same stream.
+        form: of their bytes.
+        flags: raised for every block of the take.
+
+    Returns:
+        ``microphone.pressure`` counts ``(n, block)``; ``microphone.flags`` ``(n,)``, of
+        `harness.microphone_take`; ``microphone.callback`` ``(n, 2)`` s, arrival on the bench
+        clock and age of the first sample as PortAudio states it, 0 where it states none;
+        ``microphone.clock`` ``(1, 4)``, number of a sample, its bench time in s, samples a
+        second, residual in s. All but the last have the fitted times of the blocks' first samples.
+    """
+    clock = clock_of(heard, form)
+    times = clock.times(firsts(take))
+    counts = np.stack([form.counts(block.counts) for block in take])
+    flags |= COUNT_BROKEN if count_is_broken(heard, form) else 0
+    flags |= OVERLOAD if overloaded(counts.ravel(), form) else 0
+    raised = np.array([block.flags | flags for block in take])
+    callback = np.array([(block.arrived, block.age) for block in take])
+    line = np.array([[clock.index, clock.time, clock.rate, clock.residual]])
+    return (
+        Reading(_channel(PRESSURE, "count", (form.block,), "int32", form), times, counts),
+        Reading(_channel(FLAGS, "1", (), "uint8", form), times, raised),
+        Reading(_channel(CALLBACK, "s", (2,), "float64", form), times, callback),
+        Reading(_channel(CLOCK, "1", (4,), "float64", form), times[:1], line),
+    )
+
+
+def _channel(name: str, unit: str, shape: tuple[int, ...], dtype: str, form: Format) -> Channel:
+    """A channel of a microphone; its nominal rate is that of its samples, not of its blocks."""
+    return Channel(name, unit, shape, dtype, "", float(form.rate))
