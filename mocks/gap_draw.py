@@ -97,7 +97,7 @@ class GapDraw:
     def run(self) -> RunDraw:
         """The draws that hold for the whole run."""
         thing, sensor = self.gap.object, self.gap.sensor
-        of_object, of_sensor, of_gel = self._random(_OBJECT), self._random(_SENSOR), self._random(_GEL)
+        of_object, of_sensor, of_gel = self.random(_OBJECT), self.random(_SENSOR), self.random(_GEL)
         return RunDraw(
             position=read_only(thing.position * of_object.standard_normal(3)),
             yaw=thing.yaw * of_object.standard_normal(),
@@ -106,36 +106,36 @@ class GapDraw:
             image_yaw=sensor.image_yaw * of_sensor.standard_normal(),
             gel_centre=read_only(sensor.gel_centre * of_sensor.standard_normal(3)),
             height_gain=1.0 + self.gap.gel.height_gain * of_gel.standard_normal(),
-            scale=1.0 + self.gap.shape.scale * self._random(_SHAPE, 0).standard_normal(),
+            scale=1.0 + self.gap.shape.scale * self.random(_SHAPE, 0).standard_normal(),
         )
 
     def contact(self, step: int) -> ContactDraw:
         """The draws of one contact."""
         if step not in self._contacts:
-            arm, sensor = self._random(_ARM, step), self.gap.sensor
-            tilt = sensor.tilt_per_contact * self._random(_TILT, step).standard_normal(2)
+            arm, sensor = self.random(_ARM, step), self.gap.sensor
+            tilt = sensor.tilt_per_contact * self.random(_TILT, step).standard_normal(2)
             self._contacts[step] = ContactDraw(
                 arm_error=read_only(self.gap.arm.translation * arm.standard_normal(3)),
                 along_tool=self.gap.arm.along_tool * arm.standard_normal(),
                 gel_rotation=read_only(rotation_from_vector(np.array([*tilt, 0.0]))),
-                height_offset=self.gap.gel.height_offset * self._random(_OFFSET, step).standard_normal(),
+                height_offset=self.gap.gel.height_offset * self.random(_OFFSET, step).standard_normal(),
             )
         return self._contacts[step]
 
     def deviation(self, centre: FloatArray) -> ShapeDeviation:
         """How the object's shape differs; scaling leaves ``centre``, ``(3,)`` metres, in place."""
-        shape, random = self.gap.shape, self._random(_SHAPE, 1)
+        shape, random = self.gap.shape, self.random(_SHAPE, 1)
         return ShapeDeviation.draw(self.run.scale, centre, shape.deviation, shape.deviation_length, random)
 
     def shading(self, rows: int, columns: int) -> FloatArray:
         """``(rows, columns)`` metres of indentation, smooth, the same in every picture of a run."""
-        rough = self._random(_SHADING).standard_normal((rows, columns))
+        rough = self.random(_SHADING).standard_normal((rows, columns))
         smooth = gaussian_filter(rough, _SHADING_SHARE * columns, mode="wrap")
         return read_only(self.gap.gel.shading * (smooth - smooth.mean()) / smooth.std())
 
     def pixel_noise(self, rows: int, columns: int, step: int, sample: int) -> FloatArray:
         """``(rows, columns)`` metres of indentation, independent from pixel to pixel and sample to sample."""
-        noise = self._random(_PIXELS, step, sample).standard_normal((rows, columns))
+        noise = self.random(_PIXELS, step, sample).standard_normal((rows, columns))
         return read_only(self.gap.gel.pixel_noise * noise)
 
     def summary(self) -> Mapping[str, Any]:
@@ -156,7 +156,12 @@ class GapDraw:
             "calibration": self.gap.gel.calibration,
         }
 
-    def _random(self, purpose: int, *key: int) -> np.random.Generator:
-        """The stream of numbers of one purpose; steps and samples count from -1."""
+    def random(self, purpose: int, *key: int) -> np.random.Generator:
+        """The stream of numbers of one purpose (sound's own are in ``mocks.sound_draw``).
+
+        Args:
+            purpose: what the numbers are for.
+            key: what they belong to; steps and samples count from -1.
+        """
         spawn_key = (purpose, *(number + 1 for number in key))
         return np.random.Generator(np.random.Philox(np.random.SeedSequence(self._seed, spawn_key=spawn_key)))

@@ -8,6 +8,7 @@ it again, without locks that a killed writer could hold for ever.
 import mmap
 import struct
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,23 @@ class Mark:
     """
 
     number: int
+    step: int
+    sample: int
+
+
+@dataclass(frozen=True, eq=False)
+class Firing:
+    """The last time that the striker's output was switched on.
+
+    Attributes:
+        number: counts firings; zero before the first.
+        base_from_flange: ``(4, 4)``, where the flange was.
+        step: of the run.
+        sample: of the step.
+    """
+
+    number: int
+    base_from_flange: FloatArray
     step: int
     sample: int
 
@@ -57,7 +75,7 @@ class _Cell:
 
 
 class SharedPose:
-    """Pose of the flange (written by the controller) and mark (written by the lab).
+    """Pose of the flange and firings (written by the controller), and mark (written by the lab).
 
     Args:
         base_from_flange: ``(4, 4)`` before the controller's first cycle.
@@ -65,12 +83,14 @@ class SharedPose:
     """
 
     def __init__(self, base_from_flange: FloatArray, viewers: int = 2) -> None:
-        memory = mmap.mmap(-1, _SLOT * (2 + viewers))
+        memory = mmap.mmap(-1, _SLOT * (3 + viewers))
         self._pose = _Cell(memory, 0, "<12d")
         self._mark = _Cell(memory, 1, "<3q")
-        self._shown = [_Cell(memory, 2 + viewer, "<q") for viewer in range(viewers)]
+        self._firing = _Cell(memory, 2, "<12d3q")
+        self._shown = [_Cell(memory, 3 + viewer, "<q") for viewer in range(viewers)]
         self.set_pose(base_from_flange)
         self.set_mark(Mark(0, -1, -1))
+        self._firing.write(*base_from_flange[:3].ravel(), 0, -1, -1)
         for viewer in range(viewers):
             self.set_shown(viewer, 0)
 
@@ -81,9 +101,18 @@ class SharedPose:
     @property
     def base_from_flange(self) -> FloatArray:
         """``(4, 4)``, newest."""
-        pose = np.eye(4)
-        pose[:3] = np.reshape(self._pose.read(), (3, 4))
-        return pose
+        return _matrix(self._pose.read())
+
+    def fire(self) -> None:
+        """The striker's output was switched on, with the flange where it is now."""
+        mark, number = self.mark, self.firing.number + 1
+        self._firing.write(*self._pose.read(), number, mark.step, mark.sample)
+
+    @property
+    def firing(self) -> Firing:
+        """The newest firing."""
+        *pose, number, step, sample = self._firing.read()
+        return Firing(int(number), _matrix(pose), int(step), int(sample))
 
     def set_mark(self, mark: Mark) -> None:
         """Which step and sample the run is at."""
@@ -102,3 +131,9 @@ class SharedPose:
     def shown(self, viewer: int) -> int:
         """The newest mark of which this camera has sent a frame."""
         return int(self._shown[viewer].read()[0])
+
+
+def _matrix(rows: Sequence[float]) -> FloatArray:
+    pose = np.eye(4)
+    pose[:3] = np.reshape(rows, (3, 4))
+    return pose

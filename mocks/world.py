@@ -79,6 +79,19 @@ class NominalBench:
     furniture: Furniture = Furniture()
 
 
+@dataclass(frozen=True, eq=False)
+class Met:
+    """Where something meets the true object.
+
+    Attributes:
+        point: ``(3,)`` m in the object's frame, on the true surface.
+        nominal: ``(3,)`` m, the same material point on the nominal surface.
+    """
+
+    point: FloatArray
+    nominal: FloatArray
+
+
 class World:
     """The truth of one run.
 
@@ -150,17 +163,32 @@ class World:
         It is the point first met by the line through the gel's centre along the gel's z axis; where
         that line meets nothing within the gel's thickness, the surface point nearest to the centre.
         """
-        gel_from_object = inverse(self._object_from_gel(base_from_flange, step))
-        met = depth_image(
-            self._raster, gel_from_object, 1e-6, 1, 1, near=-BESIDE, far=self.sensor.gel_thickness
-        )
-        face = int(met.face[0, 0])
-        in_gel = np.array([0.0, 0.0, met.depth[0, 0]]) if face >= 0 else np.zeros(3)
-        in_object = apply(inverse(gel_from_object), in_gel[None])[0]
-        if face < 0:
-            face, in_object = nearest_face(self.mesh, in_object)
-        point: FloatArray = shares_of_corners(self.mesh, face, in_object) @ self._nominal.corners[face]
-        return point
+        object_from_gel = self._object_from_gel(base_from_flange, step)
+        met = self._first_met(object_from_gel, -BESIDE, self.sensor.gel_thickness)
+        if met is not None:
+            return met.nominal
+        face, in_object = nearest_face(self.mesh, object_from_gel[:3, 3])
+        return self._nominal_point(face, in_object)
+
+    def met_by(
+        self, base_from_flange: FloatArray, flange_from_tip: FloatArray, step: int, stroke: float
+    ) -> Met | None:
+        """Where a tip that comes out along its z axis by ``stroke`` m meets the object, if it does.
+
+        Args:
+            base_from_flange: ``(4, 4)``, as the controller reports it.
+            flange_from_tip: ``(4, 4)``, where the tip really is on the flange.
+            step: of the run.
+            stroke: m.
+        """
+        return self._first_met(self._object_from_tip(base_from_flange, flange_from_tip, step), 0.0, stroke)
+
+    def direction_in_object(
+        self, base_from_flange: FloatArray, flange_from_tip: FloatArray, step: int
+    ) -> FloatArray:
+        """``(3,)`` unit: the z axis of the tip of ``met_by``, in the object's frame."""
+        direction: FloatArray = self._object_from_tip(base_from_flange, flange_from_tip, step)[:3, 2]
+        return direction
 
     def differences(self) -> Mapping[str, Any]:
         """What the world does differently from the nominal bench, for the report."""
@@ -226,6 +254,27 @@ class World:
         base_from_gel = self._true_base_from_flange(base_from_flange, step) @ self._true_flange_from_gel(step)
         object_from_gel: FloatArray = self._object_from_base @ base_from_gel
         return object_from_gel
+
+    def _object_from_tip(
+        self, base_from_flange: FloatArray, flange_from_tip: FloatArray, step: int
+    ) -> FloatArray:
+        true = self._true_base_from_flange(base_from_flange, step)
+        object_from_tip: FloatArray = self._object_from_base @ true @ flange_from_tip
+        return object_from_tip
+
+    def _first_met(self, object_from_tool: FloatArray, near: float, far: float) -> Met | None:
+        """What the line along a tool's z axis meets first between two depths, in m."""
+        met = depth_image(self._raster, inverse(object_from_tool), 1e-6, 1, 1, near=near, far=far)
+        face = int(met.face[0, 0])
+        if face < 0:
+            return None
+        point = apply(object_from_tool, np.array([[0.0, 0.0, met.depth[0, 0]]]))[0]
+        return Met(point, self._nominal_point(face, point))
+
+    def _nominal_point(self, face: int, point: FloatArray) -> FloatArray:
+        """Where a material point of a true face is on the nominal surface."""
+        nominal: FloatArray = shares_of_corners(self.mesh, face, point) @ self._nominal.corners[face]
+        return nominal
 
     def _indentation(self, base_from_flange: FloatArray, step: int) -> FloatArray:
         gel_from_object = inverse(self._object_from_gel(base_from_flange, step))

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from mocks.ur.force_sensor import NO_WRENCH
 from mocks.ur.geometry_functions import FUNCTIONS
-from mocks.ur.hooks import CYCLE, ContactModel, ControllerConfig, OnCycle
+from mocks.ur.hooks import CYCLE, ContactModel, ControllerConfig, OnCycle, OnOutputs
 from mocks.ur.move_functions import MoveFunctions
 from mocks.ur.mover import MotionFault
 from mocks.ur.player import Player, RuntimeState
@@ -26,6 +26,7 @@ class Controller:
         contact: what the tool feels; nothing where None.
         on_cycle: is told where the arm is, once a cycle.
         step: of the run, asked where a motion starts; keys the force sensor's noise.
+        on_outputs: is told when a digital output changes.
 
     Attributes:
         robot: its state.
@@ -38,6 +39,7 @@ class Controller:
         contact: ContactModel | None = None,
         on_cycle: OnCycle | None = None,
         step: Callable[[], int] = lambda: 0,
+        on_outputs: OnOutputs | None = None,
     ) -> None:
         self.robot = Robot(config)
         builtins = {
@@ -49,6 +51,8 @@ class Controller:
         self.player = Player(self.robot, builtins, self.complain)
         self._contact = contact
         self._on_cycle = on_cycle
+        self._on_outputs = on_outputs
+        self._outputs = self.robot.outputs.digital
         self._step = step
         self._motions = 0
         self._feel()
@@ -63,6 +67,10 @@ class Controller:
         self._feel()
         if self._on_cycle is not None:
             self._on_cycle(robot.time, robot.mover.joints, robot.mover.base_from_flange)
+        if robot.outputs.digital != self._outputs:
+            self._outputs = robot.outputs.digital
+            if self._on_outputs is not None:
+                self._on_outputs(self._outputs)
 
     def complain(self, text: str) -> None:
         """Into the log, and to whoever started the mock."""

@@ -35,6 +35,13 @@ class OnCycle(Protocol):
         """Time on the controller's clock in s, ``(6,)`` rad, ``(4, 4)`` nested."""
 
 
+class OnOutputs(Protocol):
+    """Is told of every change of the digital outputs."""
+
+    def __call__(self, bits: int, /) -> None:
+        """All of them, as RTDE numbers them: standard 0 to 7, configurable 8 to 15, tool 16 and 17."""
+
+
 class Cue(Protocol):
     """A fault to begin; ``mocks.ur.faults`` lists the kinds."""
 

@@ -11,6 +11,7 @@ give it a process of its own. ::
         step=lambda: shared.mark.step,        # keys the force noise; asked when a motion starts
         cues=line.fault,                      # the next fault, or None; asked every 10 ms
         on_ready=line.ready,                  # once, when all ports listen
+        on_outputs=switched,                  # (bits) whenever a digital output changes
     )
 
 The controller's cycles keep an absolute schedule of 2 ms; those that are a little late are made up
@@ -27,7 +28,7 @@ from typing import Final
 from mocks.ur.controller import Controller
 from mocks.ur.dashboard import Dashboard, DashboardConnection
 from mocks.ur.faults import Faults
-from mocks.ur.hooks import CYCLE, ContactModel, ControllerConfig, Cue, OnCycle
+from mocks.ur.hooks import CYCLE, ContactModel, ControllerConfig, Cue, OnCycle, OnOutputs
 from mocks.ur.rtde_server import RtdeConnection, RtdeServer
 from mocks.ur.script_server import ScriptConnection, ScriptServer
 
@@ -58,6 +59,7 @@ def serve(
     cues: Callable[[], Cue | None] = lambda: None,
     on_ready: Callable[[], None] = lambda: None,
     answer: Callable[[str], None] = lambda _: None,
+    on_outputs: OnOutputs | None = None,
 ) -> None:
     """Serve until ``should_stop``; every port is closed on return.
 
@@ -70,13 +72,14 @@ def serve(
         cues: faults to begin (``mocks.ur.faults``).
         on_ready: is called once, when all ports listen.
         answer: is told what became of each cue.
+        on_outputs: is told when a digital output changes.
 
     Raises:
         OSError: an address or port that cannot be bound.
         harness.errors.WrongUse: a model that is not known.
     """
     sys.setswitchinterval(_SWITCH_INTERVAL)
-    controller = Controller(config, contact, on_cycle, step)
+    controller = Controller(config, contact, on_cycle, step, on_outputs)
     # The default selector's timers are a millisecond coarse, half a cycle.
     loop = asyncio.SelectorEventLoop(selectors.SelectSelector())
     try:
