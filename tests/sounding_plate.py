@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.contact_localization.sound_likelihood import GainTable, gain_table
+from experiments.contact_localization.sound_gains import GainTable, gain_table
 from experiments.contact_localization.surface import Surface, sample_surface
 from harness.acquisition import Strike
 from harness.arrays import AnyArray, FloatArray

@@ -184,7 +184,7 @@ def _spectra(strikes: Sequence[Strike], settings: Analysis) -> _Spectra:
     forces = np.array(force)
     strength = np.abs(forces)
     excited = strength >= settings.force_floor * strength.max(axis=1, keepdims=True)
-    excited &= frequencies >= settings.lowest
+    excited &= (strength > 0.0) & (frequencies >= settings.lowest)
     safe = np.where(excited, forces, 1.0)
     transfer = np.where(excited, np.array(pressure) / safe, 0.0)
     return _Spectra(frequencies, transfer, excited, np.array(noise)[:, None] / np.abs(safe))
@@ -263,16 +263,18 @@ def _spread(values: _Values, where: IntArray, count: int) -> _Values:
 
 
 def _resonance(frequencies: FloatArray, wave: ComplexArray, decay: float) -> tuple[float, float]:
-    """Frequency in Hz and damping in 1/s of ``r / (2 pi i (f - f0) + d)``: its inverse is a line in f."""
+    """Frequency in Hz and damping in 1/s of ``r / (f - z) + a``: ``f v = z v + (r - a z) + a f``.
+
+    The constant ``a`` is the skirts of the neighbours; ``z`` is ``f0 + i d / (2 pi)``.
+    """
     middle = float(frequencies[len(frequencies) // 2])
-    strength = np.abs(wave) ** 2
-    design = np.column_stack([frequencies - middle, np.ones(len(frequencies))]) * strength[:, None]
-    slope, offset = np.linalg.lstsq(design.astype(np.complex128), strength / wave, rcond=None)[0]
-    root = -offset / slope
-    frequency = middle + float(root.real)
+    offsets = frequencies - middle
+    design = np.column_stack([wave, np.ones(len(wave)), offsets.astype(np.complex128)])
+    pole = np.linalg.lstsq(design, offsets * wave, rcond=None)[0][0]
+    frequency = middle + float(pole.real)
     if not frequencies[0] <= frequency <= frequencies[-1]:
-        frequency = float(frequencies[int(np.argmax(strength))])
-    return frequency, float(2.0 * np.pi * root.imag - decay)
+        frequency = float(frequencies[int(np.argmax(np.abs(wave)))])
+    return frequency, float(2.0 * np.pi * pole.imag - decay)
 
 
 def _sorted_out(peaks: list[Peak], settings: Analysis) -> tuple[tuple[Peak, ...], tuple[Peak, ...]]:

@@ -12,19 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.sound_analysis import Peak, SoundEvidence
-from experiments.contact_localization.sound_kernels import (
-    MOST_RANK,
-    nearest_in_table,
-    sound_scores,
-)
+from experiments.contact_localization.sound_gains import GainTable
+from experiments.contact_localization.sound_kernels import MOST_RANK, sound_scores
 from experiments.contact_localization.sound_matching import (
     Scales,
     SoundNoise,
     group_starts,
     likely_scales,
 )
-from experiments.contact_localization.surface import Surface
-from harness.arrays import AnyArray, FloatArray, IntArray, read_only
+from harness.arrays import FloatArray, IntArray
 from harness.errors import WrongUse
 from harness.materials import Material
 from harness.sim.modes import Modes, dampings
@@ -34,33 +30,6 @@ _FAR = 4.0
 
 _LEAST_DENSITY = 0.05
 """Of modes at a peak, in units of one mode right at it: with fewer about, clutter gains."""
-
-
-@dataclass(frozen=True, eq=False)
-class GainTable:
-    """The modes at a surface's samples, made once an object.
-
-    Attributes:
-        surface: whose samples; gives the sample nearest to any place.
-        shapes: ``(samples, m, 3)`` 1/sqrt(kg), float32.
-    """
-
-    surface: Surface
-    shapes: AnyArray
-
-    def nearest(self, points: FloatArray) -> IntArray:
-        """``(n,)`` sample nearest to each of ``(n, 3)`` points in metres, however far."""
-        table = self.surface.table
-        found = nearest_in_table(np.ascontiguousarray(points), table.nearest, table.origin, table.pitch)
-        far = np.nonzero(found < 0)[0]
-        if len(far):
-            found[far] = self.surface.tree.query(points[far])[1]
-        return found
-
-
-def gain_table(modes: Modes, surface: Surface) -> GainTable:
-    """Tabulate the modes at a surface's samples."""
-    return GainTable(surface, read_only(modes.at(surface.points).astype(np.float32)))
 
 
 @dataclass(frozen=True)
@@ -73,7 +42,7 @@ class ModeRow:
         residual: share of the peak's band that is not one waveform.
         level: dB against the strongest peak.
         modes: numbers of the matched group's modes, from 0; empty for a peak that no mode explains.
-        model_frequency: Hz, of the matched modes, under the scale; NaN-free: 0 where there is none.
+        model_frequency: Hz, of the matched modes, under the scale; 0 where there is none.
         model_damping: 1/s, of the matched modes; 0 where there is none.
         probability: of the match.
         nats: that the peak adds at the given places, over a peak that says nothing.

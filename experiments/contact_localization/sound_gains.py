@@ -1,0 +1,37 @@
+"""How loudly each mode sounds from each place of an object, as a table that a search reads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.sound_kernels import nearest_in_table
+from experiments.contact_localization.surface import Surface
+from harness.arrays import AnyArray, FloatArray, IntArray, read_only
+from harness.sim.modes import Modes
+
+
+@dataclass(frozen=True, eq=False)
+class GainTable:
+    """The modes at a surface's samples, made once an object.
+
+    Attributes:
+        surface: whose samples; gives the sample nearest to any place.
+        shapes: ``(samples, m, 3)`` 1/sqrt(kg), float32.
+    """
+
+    surface: Surface
+    shapes: AnyArray
+
+    def nearest(self, points: FloatArray) -> IntArray:
+        """``(n,)`` sample nearest to each of ``(n, 3)`` points in metres, however far."""
+        table = self.surface.table
+        found = nearest_in_table(np.ascontiguousarray(points), table.nearest, table.origin, table.pitch)
+        far = np.nonzero(found < 0)[0]
+        if len(far):
+            found[far] = self.surface.tree.query(points[far])[1]
+        return found
+
+
+def gain_table(modes: Modes, surface: Surface) -> GainTable:
+    """Tabulate the modes at a surface's samples."""
+    return GainTable(surface, read_only(modes.at(surface.points).astype(np.float32)))
