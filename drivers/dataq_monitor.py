@@ -1,0 +1,135 @@
+"""Whether a stream without framing is still whole: nothing missing, every word in its channel.
+
+Two witnesses. The clock: samples that are missing make all later ones late for good, while a
+host or a cable that was merely slow catches up. And the rest: each channel rests at an offset of
+its own, so a lost byte or word puts the wrong numbers into a channel.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.dataq_protocol import BoxModel, counts, likely_loss
+from harness.arrays import AnyArray, FloatArray
+from harness.clock_fit import ArrivalClock, ClockFit
+
+PROMPT = 1e-3
+"""s of lateness up to which an arrival proves that nothing is missing before it."""
+
+PATIENCE = 1.0
+"""s for which nothing may arrive promptly from an emptied port before samples count as lost."""
+
+SETTLED = 1.0
+"""s of arrivals after which their own rate is believed rather than the nominal one."""
+
+REST_WINDOW = 0.05
+"""s over which a rest is measured."""
+
+_REFIT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Rests:
+    """What the channels rest at, as calibrated.
+
+    Attributes:
+        offsets: ``(channels,)`` counts; the force's first.
+        tolerance: counts.
+    """
+
+    offsets: FloatArray
+    tolerance: float
+
+    @property
+    def distinct(self) -> bool:
+        """Whether swapped channels would be seen."""
+        return bool(np.ptp(self.offsets) > 2.0 * self.tolerance)
+
+
+class StreamMonitor:
+    """Watches one uninterrupted stream.
+
+    Args:
+        nominal_rate: Hz, scans a second.
+        model: of the box.
+        rests: what its channels rest at.
+
+    Attributes:
+        clock: of the scans, from prompt arrivals.
+        prompt: scans that a prompt arrival has shown to be complete.
+        ordered: scans up to which the channels have been seen in their order.
+        fault: what went wrong, in words; empty while all is well.
+    """
+
+    def __init__(self, nominal_rate: float, model: BoxModel, rests: Rests) -> None:
+        self.clock = ArrivalClock(nominal_rate)
+        self.prompt = 0
+        self.ordered = 0
+        self.fault = ""
+        self._model = model
+        self._rests = rests
+        self._rate = nominal_rate
+        self._fit: ClockFit | None = None
+        self._fitted_at = 0.0
+        self._earliest = np.inf
+        self._late_since: float | None = None
+        self._window: list[AnyArray] = []
+        self._windowed = 0
+        self._astray = 0
+
+    def take(self, scans: AnyArray, total: int, time: float, emptied: bool) -> None:
+        """Look at what arrived.
+
+        Args:
+            scans: ``(n, channels)`` int16 words, new ones.
+            total: scans of this stream, with these.
+            time: s on the bench clock, of their arrival.
+            emptied: whether the port held nothing more.
+        """
+        if emptied:
+            self._see_time(total, time)
+        self._window.append(scans)
+        self._windowed += len(scans)
+        if self._windowed >= REST_WINDOW * self._rate:
+            self._see_rest(np.concatenate(self._window), total)
+            self._window, self._windowed = [], 0
+
+    def lateness(self, total: int, time: float) -> float:
+        """Seconds by which an arrival is later than the quickest ones."""
+        if self._fit is not None:
+            return time - self._fit.time(total - 1)
+        nominal = time - (total - 1) / self._rate
+        self._earliest = min(self._earliest, nominal)
+        return nominal - self._earliest
+
+    def _see_time(self, total: int, time: float) -> None:
+        late = self.lateness(total, time)
+        if late <= PROMPT:
+            self.prompt, self._late_since = total, None
+            self.clock.arrived(total - 1, time)
+            self._refit(time)
+            return
+        self._late_since = time if self._late_since is None else self._late_since
+        if time - self._late_since > PATIENCE:
+            self.fault = (
+                f"about {late * self._rate:.0f} samples of each channel are missing: this computer did not "
+                "fetch them in time and the box's memory overflowed; close what else runs on it"
+            )
+
+    def _refit(self, time: float) -> None:
+        if self.clock.span >= SETTLED and time - self._fitted_at > _REFIT:
+            self._fit, self._fitted_at = self.clock.fit(), time
+
+    def _see_rest(self, words: AnyArray, total: int) -> None:
+        rest = float(np.median(counts(words[:, 0], self._model)))
+        if abs(rest - self._rests.offsets[0]) <= self._rests.tolerance:
+            self.ordered, self._astray = total, 0
+            return
+        missing = likely_loss(words, self._rests.offsets, self._rests.tolerance, self._model)
+        self._astray = self._astray + 1 if missing else 0
+        if missing and self._astray > 1:
+            lost = "a byte" if missing % 2 else f"{missing // 2} word(s)"
+            self.fault = (
+                f"{lost} of the stream was lost on the way and the channels changed places; check the USB "
+                "cable and any hub in between"
+            )

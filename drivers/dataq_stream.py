@@ -1,0 +1,267 @@
+"""The stream of a scanning DATAQ box: a thread that fetches, keeps, watches and, where it must, restarts."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.dataq_link import DataqLink
+from drivers.dataq_monitor import SETTLED, Rests, StreamMonitor
+from drivers.dataq_protocol import END, START, STOP, BoxModel, counts
+from harness.arrays import AnyArray, BoolArray
+from harness.clock import now
+from harness.clock_fit import ClockFit
+from harness.errors import BenchFault
+
+STALL = 0.5
+"""s without a byte after which the box counts as stalled."""
+
+_PROOF_TIMEOUT = 5.0
+_LOOK_PERIOD = 0.1
+_SETTLE_TIMEOUT = SETTLED + 3.0
+
+
+@dataclass(frozen=True)
+class Position:
+    """A scan of one uninterrupted stretch of the stream.
+
+    Attributes:
+        stretch: 0 for the first, one more after every restart.
+        scan: from 0 within the stretch.
+    """
+
+    stretch: int
+    scan: int
+
+
+class ScanStream:
+    """Two channels, sampled until closed.
+
+    Args:
+        link: open, to a box that is set up and does not scan.
+        model: of the box.
+        nominal_rate: Hz, scans a second.
+        rests: what the channels rest at.
+        memory: s of samples kept.
+
+    Attributes:
+        losses: what went wrong since the beginning, in words.
+        drops: scans that were lost, or not taken while the box was being restarted.
+    """
+
+    def __init__(
+        self, link: DataqLink, model: BoxModel, nominal_rate: float, rests: Rests, memory: float
+    ) -> None:
+        self.losses: list[str] = []
+        self.drops = 0
+        self._link = link
+        self._model = model
+        self._rate = nominal_rate
+        self._rests = rests
+        self._ring = np.zeros((int(memory * nominal_rate), len(rests.offsets)), np.int16)
+        self._changed = threading.Condition()
+        self._closing = threading.Event()
+        self._dead = ""
+        self._stretch = 0
+        self._total = 0
+        self._monitor = StreamMonitor(nominal_rate, model, rests)
+        self._partial = b""
+        self._heard = now()
+        self._fresh = True
+        self._thread = threading.Thread(target=self._run, name=f"{link.name} stream", daemon=True)
+
+    def start(self) -> None:
+        """Begin to scan and to fetch."""
+        self._begin()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End fetching and scanning; silent where the box is gone."""
+        self._closing.set()
+        self._thread.join()
+        if not self._dead:
+            self._link.send(STOP)
+
+    @property
+    def dead(self) -> str:
+        """Why nothing will come any more; empty while something may."""
+        return self._dead
+
+    def clock(self) -> ClockFit | None:
+        """The clock of the present stretch; None before it has settled."""
+        with self._changed:
+            return self._monitor.clock.fit() if self._monitor.clock.span >= SETTLED else None
+
+    def settle(self) -> Position:
+        """Wait until the clock can be fitted; the newest scan then.
+
+        Raises:
+            BenchFault: it does not settle, or the box is gone.
+        """
+
+        def settled() -> bool:
+            return bool(self._dead) or self._monitor.clock.span >= SETTLED
+
+        with self._changed:
+            done = self._changed.wait_for(settled, _SETTLE_TIMEOUT)
+            if self._dead:
+                raise BenchFault(self._dead)
+            if not done:
+                raise BenchFault(
+                    f"{self._link.name}: the box sent no steady stream within {_SETTLE_TIMEOUT:g} s; "
+                    + (self.losses[-1] if self.losses else "check its USB cable")
+                )
+            return Position(self._stretch, self._total)
+
+    def find(
+        self, since: Position, wanted: Callable[[AnyArray], BoolArray], deadline: float
+    ) -> Position | None:
+        """The first scan at or after ``since`` for which ``wanted`` holds; None by ``deadline``.
+
+        Args:
+            since: where to begin.
+            wanted: from ``(n, channels)`` counts to ``(n,)`` truths.
+            deadline: s on the bench clock.
+
+        Raises:
+            BenchFault: the stretch ended, or the box is gone.
+        """
+        seen = since.scan
+        while True:
+            with self._changed:
+                self._changed.wait(_LOOK_PERIOD)
+                self._raise_if_over(since)
+                seen = max(seen, self._total - len(self._ring))
+                new = self._kept(seen, self._total)
+            found = np.flatnonzero(wanted(new))
+            if len(found):
+                return Position(since.stretch, seen + int(found[0]))
+            seen += len(new)
+            if now() > deadline:
+                return None
+
+    def take(self, first: Position, count: int) -> tuple[AnyArray, ClockFit]:
+        """``(count, channels)`` counts from ``first``, proven whole and in order, and their clock.
+
+        Waits until they are there, until a prompt arrival has shown that none is missing, and until
+        the channels were seen in their order after them.
+
+        Raises:
+            BenchFault: the stretch ended, the box is gone, they are no longer kept, or there is no proof.
+        """
+        end = first.scan + count
+
+        def proven() -> bool:
+            return self._over(first) or min(self._monitor.prompt, self._monitor.ordered) >= end
+
+        with self._changed:
+            timeout = max(0, end - self._total) / self._rate + _PROOF_TIMEOUT
+            done = self._changed.wait_for(proven, timeout)
+            self._raise_if_over(first)
+            if not done:
+                raise BenchFault(self._unproven(end))
+            if first.scan < max(0, self._total - len(self._ring)):
+                raise BenchFault(
+                    f"{self._link.name}: the oldest of the {count} samples asked for is no longer kept; "
+                    f"the newest {len(self._ring)} are"
+                )
+            return self._kept(first.scan, end).copy(), self._monitor.clock.fit()
+
+    def rest(self, seconds: float) -> AnyArray:
+        """``(n, channels)`` counts of the newest ``seconds``."""
+        with self._changed:
+            return self._kept(max(0, self._total - int(seconds * self._rate)), self._total).copy()
+
+    def restart(self) -> None:
+        """Ask the thread to begin anew, for a channel order that is certain."""
+        with self._changed:
+            self._monitor.fault = self._monitor.fault or "restarted on request"
+
+    def _unproven(self, end: int) -> str:
+        if self._monitor.ordered < end <= self._monitor.prompt:
+            rest = np.median(self.rest(0.05), axis=0)
+            return (
+                f"{self._link.name}: after the strike the force rests at {rest[0]:.0f} counts, calibrated "
+                f"{self._rests.offsets[0]:.0f} within {self._rests.tolerance:.0f}: the channels' order is not "
+                "certain; check what leans on the hammer, its conditioner and its cable"
+            )
+        return f"{self._link.name}: samples arrive late for {_PROOF_TIMEOUT:g} s; close what else runs here"
+
+    def _over(self, position: Position) -> bool:
+        return bool(self._dead) or self._stretch != position.stretch
+
+    def _raise_if_over(self, position: Position) -> None:
+        if self._dead:
+            raise BenchFault(self._dead)
+        if self._stretch != position.stretch:
+            raise BenchFault(f"{self._link.name}: {self.losses[-1]}. It was started again: repeat the strike")
+
+    def _kept(self, first: int, end: int) -> AnyArray:
+        numbers = np.arange(first, end) % len(self._ring)
+        kept: AnyArray = counts(self._ring[numbers], self._model)
+        return kept
+
+    def _begin(self) -> None:
+        self._partial, self._fresh, self._heard = b"", True, now()
+        self._monitor = StreamMonitor(self._rate, self._model, self._rests)
+        self._total = 0
+        self._link.send(START)
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            try:
+                data, emptied = self._link.read()
+                arrived = now()
+                if data:
+                    self._take(data, arrived, emptied)
+                elif arrived - self._heard > STALL:
+                    self._monitor.fault = f"the box sent nothing for {STALL:g} s"
+                if self._monitor.fault:
+                    self._recover()
+            except BenchFault as fault:
+                self._die(str(fault))
+                return
+
+    def _take(self, data: bytes, arrived: float, emptied: bool) -> None:
+        self._heard = arrived
+        data = self._partial + data
+        if self._fresh:
+            data = self._without_echo(data)
+        channels = self._ring.shape[1]
+        whole = len(data) // (2 * channels) * (2 * channels)
+        scans = np.frombuffer(data[:whole], "<i2").reshape(-1, channels)
+        self._partial = data[whole:]
+        with self._changed:
+            self._ring[np.arange(self._total, self._total + len(scans)) % len(self._ring)] = scans
+            self._total += len(scans)
+            self._monitor.take(scans, self._total, arrived, emptied)
+            self._changed.notify_all()
+
+    def _without_echo(self, data: bytes) -> bytes:
+        """The data without an echo of the start in front, which some firmwares send."""
+        echo = START.encode() + END
+        if len(data) <= len(echo) and echo.startswith(data[: len(echo)]):
+            return data
+        self._fresh = False
+        return data[len(echo) :].removeprefix(b"\0") if data.startswith(echo) else data
+
+    def _recover(self) -> None:
+        """Stop, drain, start: the only way back to a known order."""
+        with self._changed:
+            self.losses.append(self._monitor.fault)
+            missed_from = self._monitor.prompt
+            fit = self._monitor.clock.fit() if self._monitor.clock.span >= SETTLED else None
+            last = fit.time(missed_from) if fit else self._heard
+        self._link.send(STOP)
+        self._link.drain()
+        with self._changed:
+            self._begin()
+            self._stretch += 1
+            self.drops += max(1, round((now() - last) * self._rate))
+            self._changed.notify_all()
+
+    def _die(self, reason: str) -> None:
+        with self._changed:
+            self._dead = reason
+            self._changed.notify_all()

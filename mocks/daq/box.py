@@ -1,0 +1,208 @@
+"""An acquisition box behind a pseudo-terminal: samples when they are due, on a crystal of its own.
+
+A pseudo-terminal would block where the instrument overflows, so its master is non-blocking: what
+the host does not fetch stays in the box's own memory, and what does not fit there is lost and
+counted. A box that is served late catches up in steps smaller than its memory, so that only a
+host that does not read makes it overflow.
+"""
+
+import contextlib
+import errno
+import math
+import multiprocessing
+import os
+import pty
+import select
+import tty
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from harness.arrays import AnyArray
+from harness.clock import now
+from mocks.daq.instrument import MODELS, Instrument
+from mocks.daq.memory import Fifo
+from mocks.faults import ActiveFault, Fault
+
+FAULT_KINDS = ("none", "stall", "overflow", "lost_byte", "lost_word", "unplug")
+"""stall: no samples and no answers. overflow: nothing leaves while samples go on. lost_byte, lost_word:
+one is missing from the stream. unplug: the cable is pulled, for good."""
+
+MEMORY = 4096
+"""Bytes of the instrument's own."""
+
+_PERIOD = 2e-3
+_COMMAND_BYTES = 4096
+_LOSSES = {"lost_byte": 1, "lost_word": 2}
+
+Source = Callable[[int, int], AnyArray]
+"""Counts of inputs 0 and 1, ``(count, 2)`` int16, of ``count`` scans from the one numbered first. Scans are
+asked for once each and in order, numbered from when the box was made, however often it is started.
+Input 1 is converted ``1 / aggregate rate`` after input 0 of the same scan: the source says what each
+was at its own moment."""
+
+
+class Cues(Protocol):
+    """What ``mocks.lab_processes.Line`` is."""
+
+    def ready(self) -> None:
+        """Say that the instrument answers."""
+
+    def fault(self) -> Fault | None:
+        """The next fault to begin."""
+
+    def should_stop(self) -> bool:
+        """Whether the lab is gone."""
+
+
+class DaqBox:
+    """One box, from the moment it is plugged in.
+
+    The process that makes it may give it to a child (``serve`` there) and then must ``leave`` it.
+
+    Args:
+        source: what its inputs are at.
+        model: of ``mocks.daq.instrument.MODELS``.
+        serial: as it states it.
+        drift_ppm: how much faster than nominal its crystal runs, parts in a million.
+        memory: bytes of its own.
+        echoes_start: whether the echo of ``start`` comes in front of the data.
+
+    Attributes:
+        port: path of the device file that a driver opens.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        model: str = "DI-2108",
+        serial: str = "mock-2108",
+        drift_ppm: float = 0.0,
+        memory: int = MEMORY,
+        echoes_start: bool = False,
+    ) -> None:
+        self._model = MODELS[model]
+        self._instrument = Instrument(self._model, serial, echoes_start)
+        self._source = source
+        self._speed = 1.0 + 1e-6 * drift_ppm
+        self._memory = Fifo(memory)
+        self._fault = ActiveFault()
+        self._lost = multiprocessing.get_context("fork").Value("q", 0)
+        self._began = 0.0
+        self._taken = 0
+        self._numbered = 0
+        self._answers = b""
+        self._leaving = b""
+        self._losing = 0
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
+
+    @property
+    def lost(self) -> int:
+        """Bytes that did not fit into the memory so far; readable in every process that has the box."""
+        return int(self._lost.value)
+
+    def leave(self) -> None:
+        """Close this process's ends of the cable; does nothing if they are closed."""
+        for end in (self._master, self._slave):
+            with contextlib.suppress(OSError):
+                os.close(end)
+        self._master = self._slave = -1
+
+    def serve(self, line: Cues) -> None:
+        """Be the instrument until the lab is gone or the cable is pulled."""
+        line.ready()
+        while not line.should_stop() and self._master >= 0:
+            fault = line.fault()
+            if fault is not None:
+                self._begin(fault)
+            if self._fault.kind == "stall":
+                self._began = now() - self._taken / self._scan_rate
+                select.select([], [], [], _PERIOD)
+            elif self._master >= 0:
+                self._obey()
+                self._sample()
+                select.select([self._master], [], [], _PERIOD)
+
+    @property
+    def _scan_rate(self) -> float:
+        return self._speed * self._instrument.aggregate_rate / len(self._instrument.scan_list)
+
+    def _begin(self, fault: Fault) -> None:
+        if fault.kind == "unplug":
+            self.leave()
+        elif fault.kind in _LOSSES:
+            self._losing += _LOSSES[fault.kind]
+        else:
+            self._fault.set(fault)
+
+    def _obey(self) -> None:
+        """Answer what the cable has brought."""
+        try:
+            data = os.read(self._master, _COMMAND_BYTES)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            if error.errno != errno.EIO:
+                raise
+            return
+        was_scanning = self._instrument.scanning
+        answers = self._instrument.take(data)
+        if self._instrument.scanning and not was_scanning:
+            self._began, self._taken = now(), 0
+            self._memory.clear()
+        self._answers += answers
+
+    def _sample(self) -> None:
+        """Take the scans that are due, in steps, and let them out as the cable takes them."""
+        due = math.floor((now() - self._began) * self._scan_rate) if self._instrument.scanning else 0
+        step = max(1, self._memory_scans() // 4)
+        while self._instrument.scanning and self._taken < due:
+            count = min(step, due - self._taken)
+            self._memory.push(self._words(count))
+            self._taken += count
+            self._numbered += count
+            self._let_out()
+        self._let_out()
+        self._lost.value = self._memory.lost
+
+    def _memory_scans(self) -> int:
+        return MEMORY // (2 * len(self._instrument.scan_list))
+
+    def _words(self, count: int) -> bytes:
+        """``count`` scans as the instrument sends them."""
+        counts = self._source(self._numbered, count)
+        words = np.zeros((count, len(self._instrument.scan_list)), "<i2")
+        for slot, wired in enumerate(self._instrument.scan_list):
+            if wired < counts.shape[1]:
+                words[:, slot] = counts[:, wired]
+        limit = 1 << (self._model.bits - 1)
+        if words.min() < -limit or words.max() >= limit:
+            raise ValueError(f"the source gave counts that a {self._model.bits}-bit converter cannot say")
+        return (words << (16 - self._model.bits)).astype("<i2").tobytes()
+
+    def _let_out(self) -> None:
+        """Write whole packets, and the last answers behind the data."""
+        if self._fault.kind == "overflow":
+            return
+        while self._leaving or self._next_packet():
+            try:
+                self._leaving = self._leaving[os.write(self._master, self._leaving) :]
+            except BlockingIOError:
+                return
+
+    def _next_packet(self) -> bool:
+        packet = self._instrument.packet
+        if not self._instrument.scanning and self._answers:
+            self._leaving, self._answers = self._memory.peek(len(self._memory)) + self._answers, b""
+            self._memory.clear()
+        elif self._answers:
+            self._leaving, self._answers = self._answers, b""
+        elif self._instrument.scanning and len(self._memory) >= packet:
+            self._leaving = self._memory.peek(packet)[self._losing :]
+            self._memory.drop(packet)
+            self._losing = 0
+        return bool(self._leaving)

@@ -1,0 +1,88 @@
+"""A mocked acquisition box in a process of its own, with every count of it known beforehand."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.hammer import DataqHammer
+from harness.acquisition import AcquisitionCalibration, shipped_acquisition
+from harness.arrays import AnyArray
+from mocks.daq.box import DaqBox, Source
+from mocks.daq.source import Played
+from mocks.faults import Fault
+from mocks.lab_processes import Child
+
+CALIBRATION: AcquisitionCalibration = shipped_acquisition("acquisition_bench")
+OFFSETS = (120, -180)
+
+
+@dataclass
+class Bench:
+    """A box, its process, and what fires its next record."""
+
+    box: DaqBox
+    child: Child
+    striker: int
+
+    def fire(self) -> None:
+        os.write(self.striker, b"1")
+
+    def cue(self, kind: str, seconds: float | None = None) -> None:
+        self.child.cue(Fault("hammer", kind, seconds))
+
+
+def idle_counts(seed: int = 0, scans: int = 49_999, noise: tuple[float, float] = (2.0, 30.0)) -> AnyArray:
+    """``(scans, 2)`` int16 at rest; a period that no block divides."""
+    drawn = np.random.default_rng(seed).normal(size=(scans, 2)) * noise + OFFSETS
+    counts: AnyArray = np.rint(drawn).astype(np.int16)
+    return counts
+
+
+@contextmanager
+def mocked_box(source: Callable[[Callable[[], bool]], Source], **options: object) -> Iterator[Bench]:
+    """A box on ``source``, which is given the question whether the striker was fired since it last asked."""
+    reading, writing = os.pipe()
+    os.set_blocking(reading, False)
+
+    def fired() -> bool:
+        try:
+            return bool(os.read(reading, 1))
+        except BlockingIOError:
+            return False
+
+    box = DaqBox(source(fired), **options)  # type: ignore[arg-type]
+    child = Child("hammer", box.serve)
+    box.leave()
+    try:
+        child.wait_ready(10.0)
+        yield Bench(box, child, writing)
+    finally:
+        child.kill()
+        os.close(reading)
+        os.close(writing)
+
+
+def played(records: list[AnyArray], idle: AnyArray | None = None) -> Callable[[Callable[[], bool]], Source]:
+    """Plays the next of ``records`` whenever the striker is fired."""
+
+    def source(fired: Callable[[], bool]) -> Source:
+        left = list(records)
+        return Played(
+            idle_counts() if idle is None else idle, lambda: left.pop(0) if fired() and left else None
+        )
+
+    return source
+
+
+@contextmanager
+def opened(bench: Bench, **options: object) -> Iterator[DataqHammer]:
+    """The driver, open on the bench's box."""
+    hammer = DataqHammer(**{"calibration": CALIBRATION, "port": bench.box.port, **options})  # type: ignore[arg-type]
+    hammer.open()
+    try:
+        yield hammer
+    finally:
+        hammer.close()
