@@ -22,8 +22,8 @@ from harness.twin.ways import connect
 HOME = np.radians([0.0, -90.0, 60.0, -60.0, -90.0, 0.0])
 """rad: the gel above and behind the object, pointing down; where the first travel starts."""
 
-_SPARE = 3
-"""Times as many sites as contacts are drawn before the object is called out of reach."""
+_IN_VAIN = 6
+"""Searches for a way that may fail, each after seconds, before only the natural ways are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,25 +81,55 @@ def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> RunPl
         seed: of the choice of sites.
 
     Raises:
-        WrongUse: too few places that the arm can reach.
+        WrongUse: too few places that the arm can reach on a free way.
         MotionRefused: the rehearsal found a motion that must not be made.
     """
     bench = twin_of(scene, station, mesh)
     wanted = scene.localization
+    itinerary = Itinerary(bench, seed)
     sites = plan_sites(
         RasterMesh(mesh),
         station.gel.sensor,
         bench.base_from_object,
-        wanted.contacts * (_SPARE if wanted.spacing == "spread" else 1),
+        wanted.contacts,
         wanted.spacing,
         seed,
         reachable=partial(reachable, bench),
         presses=Presses(wanted.step, wanted.tilt, wanted.depth),
+        visit=itinerary.visit,
     )
-    chosen, contacts = _ways(bench, sites, wanted.contacts, seed)
-    plan = RunPlan(bench, chosen, contacts, RehearsalReport(0, (), (), ()))
+    contacts = tuple(itinerary.contacts)
+    plan = RunPlan(bench, sites, contacts, RehearsalReport(0, (), (), ()))
     rehearsal = rehearse(bench, plan.segments()).require()
-    return RunPlan(bench, chosen, contacts, rehearsal)
+    return RunPlan(bench, sites, contacts, rehearsal)
+
+
+class Itinerary:
+    """How the arm goes from site to site, made as the sites are chosen.
+
+    Args:
+        bench: the twin.
+        seed: of the searches for ways.
+    """
+
+    def __init__(self, bench: TwinBench, seed: int) -> None:
+        self.contacts: list[PlannedContact] = []
+        self._bench = bench
+        self._seed = seed
+        self._in_vain = 0
+
+    def visit(self, before: int, base_from_gel: FloatArray, patient: bool) -> bool:
+        """Go on to there after the first ``before`` contacts, giving up the others; False where no way is."""
+        del self.contacts[before:]
+        joints = self.contacts[-1].stand_off_joints if self.contacts else HOME
+        patient = patient and self._in_vain < _IN_VAIN
+        searched = 1 if patient else 0
+        planned = plan_contact(self._bench, base_from_gel, joints, seed=self._seed, searched=searched)
+        if planned is None:
+            self._in_vain += patient
+            return False
+        self.contacts.append(planned)
+        return True
 
 
 def way_between(bench: TwinBench, start: FloatArray, end: FloatArray) -> FloatArray:
@@ -115,23 +145,3 @@ def way_between(bench: TwinBench, start: FloatArray, end: FloatArray) -> FloatAr
             "the object, clear of the table, and start again"
         )
     return way
-
-
-def _ways(
-    bench: TwinBench, sites: tuple[Site, ...], count: int, seed: int
-) -> tuple[tuple[Site, ...], tuple[PlannedContact, ...]]:
-    chosen: list[Site] = []
-    contacts: list[PlannedContact] = []
-    joints = HOME
-    for site in sites:
-        planned = plan_contact(bench, site.base_from_gel, joints, seed=seed)
-        if planned is not None and len(contacts) < count:
-            chosen.append(site)
-            contacts.append(planned)
-            joints = planned.stand_off_joints
-    if len(contacts) < count:
-        raise WrongUse(
-            f"the arm has a free way to only {len(contacts)} of {count} contacts; ask for fewer contacts, "
-            "another seed, or another pose of the object"
-        )
-    return tuple(chosen), tuple(contacts)

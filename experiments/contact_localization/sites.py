@@ -1,8 +1,8 @@
 """Where a flat sensor can be pressed on an object, and which of these places a run visits."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -25,7 +25,10 @@ TOUCH_VOLUME = 8.0e-9
 _LEAST_PRESS = 0.1e-3
 _PITCH = 0.5e-3
 _LOWEST_TOOL = 0.25
+_DRAWN_AT_ONCE = 256
 _PATIENCE = 6000
+"""Places drawn in vain before a chain is at a dead end."""
+_DEAD_ENDS = 20
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,19 @@ class Site:
     tilt: float
 
 
+class Visit(Protocol):
+    """Asks for a way to a site, and keeps it: the motions of a chain are made as it grows."""
+
+    def __call__(self, before: int, base_from_gel: FloatArray, patient: bool) -> bool:
+        """Whether there is a way there from site ``before``, which the chain now ends with.
+
+        Args:
+            before: sites that stay in front of this one; a chain that was cut back asks again.
+            base_from_gel: ``(4, 4)``, fully pressed.
+            patient: whether to search long; asked for after a first dead end.
+        """
+
+
 def from_above_or_aside(base_from_gel: FloatArray) -> bool:
     """Whether the tool points down, level, or at most 14 degrees up: what an arm beside an object can do."""
     return bool(base_from_gel[2, 2] < _LOWEST_TOOL)
@@ -77,8 +93,12 @@ def plan_sites(
     seed: int,
     reachable: Reachable = from_above_or_aside,
     presses: Presses = Presses(),
+    visit: Visit | None = None,
 ) -> tuple[Site, ...]:
     """Contacts to make, drawn at random among those that the sensor's housing allows.
+
+    Where a chain of them cannot be gone on with, its last sites are given up, more at every dead
+    end, until it is begun anew.
 
     Args:
         raster: the object, in metres.
@@ -89,46 +109,98 @@ def plan_sites(
         seed: of the draws; the same seed gives the same sites.
         reachable: whether the arm can take the gel there without a collision.
         presses: how far apart, how tilted, how deep.
+        visit: whether there is a way to it from the site before; asked last. None: a gel that flies.
 
     Raises:
-        WrongUse: the object has no such places.
+        WrongUse: no such contacts were found; the message says what the places drawn lacked.
     """
+    search = _Search(raster, sensor, base_from_object, steps, reachable, presses, visit)
     rng = np.random.default_rng(seed)
-    for _ in range(20):
-        sites = _chain(raster, sensor, base_from_object, count, steps, rng, reachable, presses)
-        if len(sites) == count:
-            return tuple(sites)
-    raise WrongUse(
-        f"no {count} places with {steps} steps were found where a flat housing of "
-        f"{sensor.housing[0] * 1e3:g} x {sensor.housing[1] * 1e3:g} mm fits; "
-        "ask for fewer contacts, spread steps, or another pose of the object"
+    given_up, longest = 1, 0
+    for dead_ends in range(_DEAD_ENDS):
+        search.grow(count, rng, patient=dead_ends > 0)
+        if len(search.sites) == count:
+            return tuple(search.sites)
+        longest = max(longest, len(search.sites))
+        if dead_ends > 0 and not search.sites:
+            break
+        del search.sites[-given_up:]
+        given_up = 2 * given_up if search.sites else 1
+    raise WrongUse(_none_found(search, count, longest))
+
+
+@dataclass
+class _Tally:
+    """How many of the places drawn passed each question so far."""
+
+    drawn: int = 0
+    near: int = 0
+    fitting: int = 0
+    reached: int = 0
+    visited: int = 0
+
+
+@dataclass
+class _Search:
+    """A chain of sites, and what it is made from."""
+
+    raster: RasterMesh
+    sensor: TactileSensor
+    base_from_object: FloatArray
+    steps: Steps
+    reachable: Reachable
+    presses: Presses
+    visit: Visit | None
+    sites: list[Site] = field(default_factory=list)
+    tally: _Tally = field(default_factory=_Tally)
+
+    def grow(self, count: int, rng: np.random.Generator, patient: bool) -> None:
+        """Add sites until there are ``count``, or none of many places drawn can be the next."""
+        fruitless = 0
+        while len(self.sites) < count and fruitless < _PATIENCE:
+            points, faces = random_points(self.raster.mesh, _DRAWN_AT_ONCE, rng)
+            before = len(self.sites)
+            for point, normal in zip(points, self.raster.mesh.face_normals[faces], strict=True):
+                if len(self.sites) == count:
+                    break
+                site = self._next(point, normal, rng, patient)
+                if site is not None:
+                    self.sites.append(site)
+            fruitless = 0 if len(self.sites) > before else fruitless + len(points)
+
+    def _next(
+        self, point: FloatArray, normal: FloatArray, rng: np.random.Generator, patient: bool
+    ) -> Site | None:
+        """The place as the chain's next site; None where it cannot be. The cheap questions come first."""
+        self.tally.drawn += 1
+        if not _may_follow(point, self.sites, self.steps, self.presses.longest_step):
+            return None
+        self.tally.near += 1
+        site = try_site(self.raster, self.sensor, self.base_from_object, point, normal, rng, self.presses)
+        if site is None:
+            return None
+        self.tally.fitting += 1
+        if not self.reachable(site.base_from_gel):
+            return None
+        self.tally.reached += 1
+        if self.visit is not None and not self.visit(len(self.sites), site.base_from_gel, patient):
+            return None
+        self.tally.visited += 1
+        return site
+
+
+def _none_found(search: _Search, count: int, longest: int) -> str:
+    tally, step = search.tally, 1e3 * search.presses.longest_step
+    housing = " x ".join(f"{1e3 * side:g}" for side in search.sensor.housing)
+    near = f"within {step:g} mm of the contact before" if search.steps == "close" else "apart from the others"
+    return (
+        f"only {longest} of {count} contacts with {search.steps} steps were found: of {tally.drawn} places "
+        f"drawn on the object {tally.near} were {near}, at {tally.fitting} of these the flat housing of "
+        f"{housing} mm fitted, to {tally.reached} of these the arm could take the gel without a collision, "
+        f"and to {tally.visited} it had a free way; ask for fewer contacts, "
+        + (f"longer steps than {step:g} mm, spread ones, " if search.steps == "close" else "")
+        + "or another pose of the object"
     )
-
-
-def _chain(
-    raster: RasterMesh,
-    sensor: TactileSensor,
-    base_from_object: FloatArray,
-    count: int,
-    steps: Steps,
-    rng: np.random.Generator,
-    reachable: Reachable,
-    presses: Presses,
-) -> list[Site]:
-    sites: list[Site] = []
-    tries = 0
-    while len(sites) < count and tries < _PATIENCE:
-        points, faces = random_points(raster.mesh, 256, rng)
-        tries += len(points)
-        for point, normal in zip(points, raster.mesh.face_normals[faces], strict=True):
-            if len(sites) == count:
-                break
-            if not _may_follow(point, sites, steps, presses.longest_step):
-                continue
-            site = try_site(raster, sensor, base_from_object, point, normal, rng, presses)
-            if site is not None and reachable(site.base_from_gel):
-                sites.append(site)
-    return sites
 
 
 def _may_follow(point: FloatArray, sites: list[Site], steps: Steps, longest_step: float) -> bool:

@@ -95,6 +95,7 @@ def plan_contact(
     seed_joints: FloatArray,
     stand_off: float = STAND_OFF,
     seed: int = 0,
+    searched: int = SEARCHED,
 ) -> PlannedContact | None:
     """Travel, approach and retreat for one contact; None where no branch has a free way.
 
@@ -104,6 +105,7 @@ def plan_contact(
         seed_joints: ``(6,)`` rad, where the arm is.
         stand_off: m back along the gel's axis.
         seed: of the search, should one be needed.
+        searched: branches for which a way is searched where no natural one is free; the nearest first.
     """
     candidates = [
         approach
@@ -112,7 +114,7 @@ def plan_contact(
     ]
     candidates.sort(key=lambda approach: float(np.abs(approach.stand_off_joints - seed_joints).max()))
     for thorough in (False, True):
-        for approach in candidates[: SEARCHED if thorough else None]:
+        for approach in candidates[: searched if thorough else None]:
             travel = connect(bench, seed_joints, approach.stand_off_joints, seed, thorough)
             if travel is not None:
                 return _planned(bench, approach, seed_joints, travel, stand_off)
