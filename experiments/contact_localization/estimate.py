@@ -135,7 +135,7 @@ def locate(
         found = _solve(search, k, levels, seed, seconds)
         # The paper's filter has no measure of fit to be refused by.
         if k == count and levels.method == "grid":
-            refuse_bad_fit(found.members, found.fits)
+            refuse_bad_fit(search, found.members, found.fits)
             top = int(np.argmax(found.hypotheses.log_weights))
             best = found.hypotheses.gels[top], float(found.hypotheses.yaws[top])
             refuse_inside_out(search, *best, found.members)
@@ -155,7 +155,7 @@ class _Solution:
 def _solve(search: Search, count: int, levels: Levels, seed: int, seconds: dict[str, float]) -> _Solution:
     members = search.members(count)
     if len(members) == 0:
-        refuse_bad_fit(members, np.empty(0))
+        refuse_bad_fit(search, members, np.empty(0))
     if levels.method == "particle":
         return _by_particles(search, count, members, levels, seed, seconds)
     best: _Solution | None = None

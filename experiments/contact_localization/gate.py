@@ -8,11 +8,20 @@ from experiments.contact_localization.search import SAME_AXIS, SAME_PLACE, Searc
 from harness.arrays import FloatArray, IntArray
 from harness.errors import FitRefused
 
-REFUSE_BELOW = -10.0
-"""Nats a contact, mean over the contacts, at the best hypothesis."""
+REFUSE_BELOW = -9.0
+"""Nats: the median of the contacts' fits at the best hypothesis. Calibration runs: -7.2 to -0.5."""
 
-SLIPPED_BELOW = -12.0
+REFUSE_QUARTILE_BELOW = -14.0
+"""Nats: the lower quartile, of four contacts or more. Calibration runs: -12.4 to -0.8."""
+
+REFUSE_FEW_BELOW = -20.0
+"""Nats: the median of fewer than four contacts, of which a single odd one may be half."""
+
+SLIPPED_BELOW = -10.0
 """Nats of one contact where the others fit."""
+
+_ENOUGH = 4
+_FAR_BELOW = -1000.0
 
 
 @dataclass(frozen=True)
@@ -47,10 +56,11 @@ def gates(search: Search, count: int, members: IntArray, fits: FloatArray) -> tu
     )
 
 
-def refuse_bad_fit(members: IntArray, fits: FloatArray) -> None:
+def refuse_bad_fit(search: Search, members: IntArray, fits: FloatArray) -> None:
     """Raise where the contacts taken together cannot be of this object.
 
-    One bad contact is flagged, not refused: the median asks whether most of them fit.
+    One bad contact is flagged, not refused: the median asks whether half of them fit, and the
+    quartile whether all but one in four do.
 
     Raises:
         FitRefused: naming the worst contact.
@@ -60,15 +70,22 @@ def refuse_bad_fit(members: IntArray, fits: FloatArray) -> None:
             "no tactile image shows a contact, so there is nothing to localize; "
             "check that the gel touches (press deeper) and that the background is of this sensor"
         )
-    typical = float(np.median(fits))
-    if typical < REFUSE_BELOW:
-        worst = int(np.argmin(fits))
-        raise FitRefused(
-            f"no place on this object explains the contacts: their median fit is {typical:.1f} nats, "
-            f"the limit {REFUSE_BELOW:g}, and the worst is contact {int(members[worst]) + 1} with "
-            f"{fits[worst]:.1f}; check that it is this object, its units, that its normals point outward, "
-            "and that the tactile image is not mirrored"
-        )
+    # A press repeated at one place is one witness, however often it is heard.
+    heard = np.array([_repeated(search, int(k)) is None for k in members])
+    # Floored: the quantile's interpolation must not subtract one infinity from another.
+    floored = np.maximum(fits[heard], _FAR_BELOW)
+    typical, quartile = float(np.median(floored)), float(np.quantile(floored, 0.25))
+    many = int(heard.sum()) >= _ENOUGH
+    limit = REFUSE_BELOW if many else REFUSE_FEW_BELOW
+    if typical >= limit and (not many or quartile >= REFUSE_QUARTILE_BELOW):
+        return
+    worst = int(np.argmin(fits))
+    raise FitRefused(
+        f"no place on this object explains the contacts: the median of their fits is {typical:.1f} nats "
+        f"(limit {limit:g}) and the lower quartile {quartile:.1f} (limit {REFUSE_QUARTILE_BELOW:g}); "
+        f"the worst is contact {int(members[worst]) + 1} with {fits[worst]:.1f}. Check that it is this "
+        "object, its units, that its normals point outward, and that the tactile image is not mirrored"
+    )
 
 
 def refuse_inside_out(search: Search, gel: FloatArray, yaw: float, members: IntArray) -> None:

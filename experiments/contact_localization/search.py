@@ -149,7 +149,7 @@ class Search:
     ) -> Iterator[tuple[IntArray, View, FloatArray]]:
         """Hypotheses by the picture that serves them, with the gel's centre in view coordinates."""
         places_in_object = self.gel_centres(contact, gels, yaws)
-        pictures = self.pictures(yaws)
+        pictures = self.pictures(yaws, coarse)
         for picture in (0,) if self.prior.yaw == "known" else np.unique(pictures):
             chosen = np.nonzero(pictures == picture)[0].astype(np.int64)
             view = self.view(contact, int(picture), coarse)
@@ -231,8 +231,11 @@ class Search:
         alike = (gaps < SAME_PLACE) & (self.axes[members] @ self.axes[members].T > np.cos(SAME_AXIS))
         return np.asarray(self.noise.temperature / alike.sum(axis=1))
 
-    def pictures(self, yaws: FloatArray) -> IntArray:
-        """``(n,)`` number of the picture whose yaw is nearest."""
+    def pictures(self, yaws: FloatArray, coarse: bool = False) -> IntArray:
+        """``(n,)`` number of the picture whose yaw is nearest; a coarse look shares each among two yaws."""
         if self.prior.yaw == "known":
             return np.zeros(len(yaws), dtype=np.int64)
-        return np.asarray(np.round(np.degrees(yaws) / 2.0).astype(np.int64) % len(_ALL_YAWS))
+        share = 2 if coarse else 1
+        return np.asarray(
+            share * np.round(np.degrees(yaws) / (2.0 * share)).astype(np.int64) % len(_ALL_YAWS)
+        )
