@@ -24,16 +24,21 @@ from harness.acquisition import Strike
 from harness.arrays import FloatArray
 from harness.errors import WrongUse
 from harness.geometry import frame_facing, transform
-from harness.materials import MATERIALS
+from harness.materials import Material
 from harness.sensor import GELSIGHT_R15
 from harness.sim.tactile_calibration import shipped_calibration
 
 SETTINGS = Mfcc()
 MODES = plate.plate_modes()
 SPACING = 3.0e-3
-MODEL = Model(plate.box(plate.LENGTH, plate.WIDTH, plate.THICKNESS), GELSIGHT_R15, shipped_calibration("taxim-r15-a"))
+MODEL = Model(
+    plate.box(plate.LENGTH, plate.WIDTH, plate.THICKNESS),
+    GELSIGHT_R15,
+    shipped_calibration("gelsight_r15_bench"),
+)
 SURFACE = MODEL.surface(SPACING)
-TABLE = MfccTable(gain_table(MODES, SURFACE), MODES, MATERIALS["glass"], plate.RATE)
+DAMPED = Material("as the strikes are made", 2500.0, 6e10, 0.2, alpha=50.0, beta=0.0)
+TABLE = MfccTable(gain_table(MODES, SURFACE), MODES, DAMPED, plate.RATE)
 
 
 def _heard_at(point: FloatArray, seed: int = 0) -> Strike:
@@ -74,7 +79,7 @@ def test_a_tone_falls_into_the_bands_around_it() -> None:
 
 def test_bands_narrower_than_lines_are_refused() -> None:
     with pytest.raises(WrongUse, match="fewer bands"):
-        mel_weights(plate.RATE, 500, SETTINGS)
+        mel_weights(plate.RATE, 300, SETTINGS)
 
 
 def test_the_struck_place_is_among_the_most_alike() -> None:
@@ -130,5 +135,7 @@ def test_the_filter_follows_the_sound_where_nothing_is_in_its_way() -> None:
         points = plate.places(5, np.random.default_rng(seed))
         strikes = [_heard_at(point) for point in points]
         found = mfcc_filter(_search(points), TABLE, strikes, 600, seed)
-        errors.append(np.linalg.norm(found.candidates().mean(axis=0) - points[-1]))
-    assert np.median(errors) < 0.03
+        # The plate is its own mirror image thrice, and its two faces sound alike.
+        best = np.abs(found.points[np.argmax(found.log_weights)])
+        errors.append(np.linalg.norm(best - np.abs(points[-1])))
+    assert np.median(errors) < 0.015
