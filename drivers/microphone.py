@@ -121,7 +121,7 @@ class PortAudioMicrophone:
         self._require(seconds)
         first = self._heard()
         end = first + self._samples(seconds)
-        self._hear(end)
+        self._hear(end, STALL)
         return self._readings(first, end)
 
     def capture(
@@ -145,15 +145,16 @@ class PortAudioMicrophone:
             BenchFault: the microphone is not open, is gone, or runs at another rate than asked.
         """
         self._require(before + after)
-        self._hear(self._samples(before))
+        self._hear(self._samples(before), STALL)
         start = self._heard()
         trigger = Trigger(self._blocks, self.form, start, self._baseline(start), self._threshold)
+        total = self._blocks.total
         fire()
-        if not self._hear_trigger(trigger, timeout):
+        if not self._hear_trigger(trigger, total, timeout):
             end = self._heard()
             return self._readings(end - self._samples(before + after), end, UNTRIGGERED)
         end = trigger.index + self._samples(after)
-        self._hear(end)
+        self._hear(end, STALL)
         return self._readings(trigger.index - self._samples(before), end)
 
     def health(self) -> Health:
@@ -240,7 +241,7 @@ class PortAudioMicrophone:
         newest = self._blocks.newest()
         return 0 if newest is None else newest.first + self.form.block
 
-    def _hear(self, end: int, stall: float = STALL) -> None:
+    def _hear(self, end: int, stall: float) -> None:
         """Wait until sample number ``end`` is there; a fault where blocks cease for ``stall`` s."""
         while True:
             total = self._blocks.total
@@ -249,13 +250,14 @@ class PortAudioMicrophone:
             if self._blocks.total == total:
                 raise self._gone(stall)
 
-    def _hear_trigger(self, trigger: Trigger, timeout: float) -> bool:
-        """Whether it came within ``timeout`` s; a fault where no block came at all."""
-        total = self._blocks.total
-        found = self._blocks.wait(trigger.look, timeout)
-        if self._blocks.total == total:
-            raise self._gone(timeout)
-        return found
+    def _hear_trigger(self, trigger: Trigger, total: int, timeout: float) -> bool:
+        """Whether it comes within ``timeout`` s; a fault where blocks have ceased since the ``total``-th."""
+        if self._blocks.wait(trigger.look, timeout):
+            return True
+        newest = self._blocks.total
+        if newest == total or not self._blocks.wait(lambda: self._blocks.total > newest, STALL):
+            raise self._gone(STALL)
+        return False
 
     def _gone(self, seconds: float) -> BenchFault:
         return BenchFault(
