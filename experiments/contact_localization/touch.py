@@ -9,7 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.touch_kernels import Reading, fill_scores, similarities_at, terms_at
+from experiments.contact_localization.touch_kernels import (
+    Reading,
+    Sigmas,
+    fill_scores,
+    similarities_at,
+    terms_at,
+)
 from harness.arrays import BoolArray, FloatArray, IntArray, read_only
 
 LEVEL_SLOPE = 0.06
@@ -38,6 +44,11 @@ class TouchNoise:
     shift: float = 0.6e-3
     depth: float = 0.6e-3
     cap: float = 12.0
+
+    @property
+    def sigmas(self) -> Sigmas:
+        """As the loops take them."""
+        return float(self.rms), float(self.tilt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +158,7 @@ def view_scores(view: View, touch: TouchMap, noise: TouchNoise, pixels: IntArray
         view.score,
         view.gel_depth,
         touch.reading,
-        noise.rms,
-        noise.tilt,
+        noise.sigmas,
         pixels,
     )
 
@@ -190,8 +200,7 @@ def touch_terms(
         view.score,
         view.gel_depth,
         touch.reading,
-        noise.rms,
-        noise.tilt,
+        noise.sigmas,
         places,
         step,
         rings,

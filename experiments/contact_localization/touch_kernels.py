@@ -1,7 +1,7 @@
 """The touch term's loops: crop, press, hang, compare.
 
 Shapes: ``reading`` is the tuple ``(heights, pitch, touched, flat, skirt, edge)`` of a ``TouchMap``;
-``scratch`` is ``(2, rows, columns)``, overwritten.
+``sigmas`` is ``(rms, tilt)`` of a ``TouchNoise``; ``scratch`` is ``(2, rows, columns)``, overwritten.
 """
 
 import numpy as np
@@ -10,6 +10,7 @@ from harness.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from harness.sim.compiled import compiled
 
 Reading = tuple[FloatArray, float, IntArray, BoolArray, FloatArray, FloatArray]
+Sigmas = tuple[float, float]
 
 POOL = 4
 """Pixels of a view, each way, that share the limits on where the gel can be."""
@@ -82,7 +83,7 @@ def _crop(depth: FloatArray, row: int, column: int, crop: FloatArray) -> float:
 
 
 @compiled
-def _solve3(a: FloatArray, b: FloatArray, plane: FloatArray, ridge: float, change: FloatArray) -> None:
+def _solve3(a: FloatArray, b: FloatArray, plane: FloatArray, ridge: float) -> None:
     """Add the least-squares plane to ``plane``, its total tilt held to zero by ``ridge``.
 
     Cramer's rule on the symmetric normal equations, whose upper half is given.
@@ -92,10 +93,9 @@ def _solve3(a: FloatArray, b: FloatArray, plane: FloatArray, ridge: float, chang
     b0, b1, b2 = b[0], b[1] - ridge * plane[1], b[2] - ridge * plane[2]
     c00, c01, c02 = a11 * a22 - a12 * a12, a01 * a22 - a12 * a02, a01 * a12 - a11 * a02
     det = a[0, 0] * c00 - a01 * c01 + a02 * c02
-    change[0] = (b0 * c00 - a01 * (b1 * a22 - a12 * b2) + a02 * (b1 * a12 - a11 * b2)) / det
-    change[1] = (a[0, 0] * (b1 * a22 - a12 * b2) - b0 * c01 + a02 * (a01 * b2 - b1 * a02)) / det
-    change[2] = (a[0, 0] * (a11 * b2 - b1 * a12) - a01 * (a01 * b2 - b1 * a02) + b0 * c02) / det
-    plane += change
+    plane[0] += (b0 * c00 - a01 * (b1 * a22 - a12 * b2) + a02 * (b1 * a12 - a11 * b2)) / det
+    plane[1] += (a[0, 0] * (b1 * a22 - a12 * b2) - b0 * c01 + a02 * (a01 * b2 - b1 * a02)) / det
+    plane[2] += (a[0, 0] * (a11 * b2 - b1 * a12) - a01 * (a01 * b2 - b1 * a02) + b0 * c02) / det
 
 
 @compiled
@@ -104,33 +104,31 @@ def score_at(
     row: int,
     column: int,
     reading: Reading,
-    rms: float,
-    tilt: float,
+    sigmas: Sigmas,
     crop: FloatArray,
     pressed: FloatArray,
     scratch: FloatArray,
 ) -> tuple[float, float]:
     """The term at one pixel of a view, and the depth along it of the gel's centre.
 
-    ``pressed`` is left as the predicted reading.
+    ``pressed`` is left as the predicted reading, ``scratch[1]`` as the object's part in it.
     """
-    heights, pitch, touched, flat, skirt, edge = reading
+    heights, pitch, touched, _, skirt, edge = reading
     rows, columns = heights.shape
-    kept = scratch[1]
     reference = _crop(depth, row, column, crop)
     if not np.isfinite(reference):
         return -np.inf, np.nan
     # One tilt sigma weighs as much as one rms sigma of the whole map.
-    ridge = (rms / tilt) ** 2
-    a, b, plane, change = np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.empty(3)
+    ridge = (sigmas[0] / sigmas[1]) ** 2
+    a, b, plane = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     for n in range(len(touched)):
         i, j = touched[n, 0], touched[n, 1]
         x, y = (j + 0.5 - 0.5 * columns) * pitch, (i + 0.5 - 0.5 * rows) * pitch
         _add(a, b, x, y, crop[i, j] - heights[i, j])
-    _solve3(a, b, plane, len(touched) * ridge, change)
+    _solve3(a, b, plane, len(touched) * ridge)
     _press(crop, plane, pitch, pressed)
     _hang(pressed, skirt, edge, scratch)
-    cost = _misfit(pressed, heights, flat, plane, len(touched), rms, tilt)
+    cost = _misfit(pressed, reading, plane, sigmas)
     # A place that fits this badly is capped whatever a second look would find.
     if cost < _HOPELESS:
         # The gel hangs over edges, so the first fit, to the object's own shape, sinks too deep
@@ -138,27 +136,20 @@ def score_at(
         a[:], b[:] = 0.0, 0.0
         for i in range(rows):
             for j in range(columns):
-                if kept[i, j] > 0.0:
+                if scratch[1, i, j] > 0.0:
                     x, y = (j + 0.5 - 0.5 * columns) * pitch, (i + 0.5 - 0.5 * rows) * pitch
                     _add(a, b, x, y, pressed[i, j] - heights[i, j])
         if a[0, 0] > 0.0:
-            _solve3(a, b, plane, a[0, 0] * ridge, change)
+            _solve3(a, b, plane, a[0, 0] * ridge)
             _press(crop, plane, pitch, pressed)
             _hang(pressed, skirt, edge, scratch)
-            cost = _misfit(pressed, heights, flat, plane, len(touched), rms, tilt)
+            cost = _misfit(pressed, reading, plane, sigmas)
     return -0.5 * cost, reference - plane[0]
 
 
 @compiled
-def _misfit(
-    pressed: FloatArray,
-    heights: FloatArray,
-    flat: BoolArray,
-    plane: FloatArray,
-    count: int,
-    rms: float,
-    tilt: float,
-) -> float:
+def _misfit(pressed: FloatArray, reading: Reading, plane: FloatArray, sigmas: Sigmas) -> float:
+    heights, flat, count = reading[0], reading[3], len(reading[2])
     total = 0.0
     for i in range(heights.shape[0]):
         for j in range(heights.shape[1]):
@@ -166,7 +157,7 @@ def _misfit(
             if flat[i, j]:
                 gap = min(np.abs(gap), pressed[i, j])
             total += gap * gap
-    return float(total / (count * rms * rms) + (plane[1] ** 2 + plane[2] ** 2) / (tilt * tilt))
+    return float(total / (count * sigmas[0] ** 2) + (plane[1] ** 2 + plane[2] ** 2) / sigmas[1] ** 2)
 
 
 @compiled
@@ -230,8 +221,7 @@ def fill_scores(
     score: FloatArray,
     gel_depth: FloatArray,
     reading: Reading,
-    rms: float,
-    tilt: float,
+    sigmas: Sigmas,
     pixels: AnyArray,
 ) -> None:
     """Fill in ``score`` and ``gel_depth`` at ``(n, 2)`` pixels."""
@@ -240,7 +230,7 @@ def fill_scores(
     for n in range(len(pixels)):
         r, c = pixels[n, 0], pixels[n, 1]
         if np.isnan(score[r, c]):
-            score[r, c], gel_depth[r, c] = score_at(depth, r, c, reading, rms, tilt, crop, pressed, scratch)
+            score[r, c], gel_depth[r, c] = score_at(depth, r, c, reading, sigmas, crop, pressed, scratch)
 
 
 @compiled
@@ -263,8 +253,7 @@ def terms_at(
     score: FloatArray,
     gel_depth: FloatArray,
     reading: Reading,
-    rms: float,
-    tilt: float,
+    sigmas: Sigmas,
     places: FloatArray,
     step: int,
     rings: int,
@@ -293,7 +282,7 @@ def terms_at(
                     continue
                 if np.isnan(score[r, c]):
                     score[r, c], gel_depth[r, c] = score_at(
-                        depth, r, c, reading, rms, tilt, crop, pressed, scratch
+                        depth, r, c, reading, sigmas, crop, pressed, scratch
                     )
                 if score[r, c] == -np.inf:
                     continue
