@@ -128,7 +128,7 @@ class StreamMonitor:
         missing = likely_loss(words, self._rests.offsets, self._rests.tolerance, self._model)
         self._astray = self._astray + 1 if missing else 0
         if missing and self._astray > 1:
-            lost = "a byte" if missing % 2 else f"{missing // 2} word(s)"
+            lost = "a byte" if missing % 2 else "a word"
             self.fault = (
                 f"{lost} of the stream was lost on the way and the channels changed places; check the USB "
                 "cable and any hub in between"

@@ -183,7 +183,7 @@ class ScanStream:
             rest = np.median(self.rest(0.05), axis=0)
             return (
                 f"{self._link.name}: after the strike the force rests at {rest[0]:.0f} counts, calibrated "
-                f"{self._rests.offsets[0]:.0f} within {self._rests.tolerance:.0f}: the channels' order is not "
+                f"{self._rests.offsets[0]:.0f} within {self._rests.tolerance:.0f}: the channel order is not "
                 "certain; check what leans on the hammer, its conditioner and its cable"
             )
         return f"{self._link.name}: samples arrive late for {_PROOF_TIMEOUT:g} s; close what else runs here"

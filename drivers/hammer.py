@@ -16,25 +16,13 @@ from drivers.dataq_monitor import REST_WINDOW, Rests
 from drivers.dataq_protocol import DIVIDEND, MODEL, SERIAL, divisor, known_model, packet_exponent
 from drivers.dataq_stream import Position, ScanStream
 from harness.acquisition import AcquisitionCalibration
-from harness.acquisition_channels import (
-    CLOCK,
-    CLOCK_FIELDS,
-    FLAG_FIELDS,
-    FLAGS,
-    FORCE,
-    PRESSURE,
-    block_channel,
-    judge,
-)
+from harness.acquisition_channels import BLOCK, CaptureForm, readings_of_capture
 from harness.arrays import AnyArray
 from harness.clock import now
 from harness.clock_fit import ClockFit
 from harness.device import Health
 from harness.errors import BenchFault, WrongUse
-from harness.reading import Channel, Reading
-
-BLOCK = 500
-"""Samples in a recorded block."""
+from harness.reading import Reading
 
 _CHANNELS = 2
 _CLOCK_PAIRS = 64
@@ -215,36 +203,9 @@ class DataqHammer:
         return position, rest
 
     def _readings(self, words: AnyArray, first: Position, clock: ClockFit) -> tuple[Reading, ...]:
-        full_scale = self._model.full_scale
-        flags = judge(words[:, 0], words[:, 1], self._threshold, full_scale, full_scale)
-        onset = -1 if flags.silent else flags.onset
-        said = {
-            "onset": onset,
-            "overload": flags.overload,
-            "double_hit": flags.double_hit,
-            "silent": flags.silent,
-            "threshold": self._threshold,
-        }
-        values = [[float(said[field]) for field in FLAG_FIELDS]]
-        at = [clock.time(first.scan + max(0, onset))]
-        return (
-            self._blocks(FORCE, words, 0, first.scan, clock),
-            self._blocks(PRESSURE, words, 1, first.scan, clock),
-            _clock_reading(clock, first.scan),
-            Reading(Channel(FLAGS, "1", (len(FLAG_FIELDS),), "float64"), np.array(at), np.array(values)),
-        )
-
-    def _blocks(self, name: str, words: AnyArray, slot: int, first: int, clock: ClockFit) -> Reading:
-        """One channel's counts with its own times: slot ``k`` is converted ``k`` words after slot 0."""
-        begins = first + slot / _CHANNELS + np.arange(0, len(words), BLOCK)
-        times = np.array([clock.time(float(begin)) for begin in begins])
-        return Reading(block_channel(name, BLOCK, self._rate), times, words[:, slot].reshape(-1, BLOCK))
-
-
-def _clock_reading(clock: ClockFit, first: int) -> Reading:
-    """The arrivals that the clock was fitted to, thinned."""
-    kept = np.unique(np.linspace(0, len(clock.samples) - 1, _CLOCK_PAIRS).round().astype(np.int64))
-    samples, arrivals = clock.samples[kept], clock.arrivals[kept]
-    residuals = arrivals - clock.start - samples / clock.rate
-    values = np.stack([samples - first, residuals], axis=1)
-    return Reading(Channel(CLOCK, "1", (len(CLOCK_FIELDS),), "float64"), arrivals, values)
+        starts = clock.time(first.scan), clock.time(first.scan + 1.0 / _CHANNELS)
+        kept = np.unique(np.linspace(0, len(clock.samples) - 1, _CLOCK_PAIRS).round().astype(np.int64))
+        arrivals = np.stack([clock.samples[kept], clock.arrivals[kept]], axis=1)
+        late = arrivals[:, 1] - clock.start - arrivals[:, 0] / clock.rate
+        form = CaptureForm(self._rate, self._threshold, self._model.full_scale)
+        return readings_of_capture(words, starts, clock.rate, form, arrivals - (first.scan, 0.0), late)

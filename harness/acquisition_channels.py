@@ -1,11 +1,11 @@
 """The channels that a captured strike is recorded in, and what their counts say by themselves."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
-from harness.reading import Channel
+from harness.reading import Channel, Reading
 
 FORCE = "hammer.force"
 PRESSURE = "microphone.pressure"
@@ -29,6 +29,25 @@ GUARD = 8
 _SIGMA_PER_DEVIATION = 1.4826
 
 
+BLOCK = 500
+"""Samples in a recorded block."""
+
+
+@dataclass(frozen=True)
+class CaptureForm:
+    """What is known of a box besides its counts.
+
+    Attributes:
+        nominal_rate: Hz, of each channel.
+        threshold: counts above rest, at which a strike begins.
+        full_scale: greatest count.
+    """
+
+    nominal_rate: float
+    threshold: float
+    full_scale: int
+
+
 def block_channel(name: str, block: int, nominal_rate: float) -> Channel:
     """The channel of raw blocks of ``block`` counts; ``nominal_rate`` in Hz, of one channel."""
     return Channel(name, "count", (block,), "int32", "", nominal_rate)
@@ -49,6 +68,49 @@ class Flags:
     overload: bool
     double_hit: bool
     silent: bool
+
+
+def readings_of_capture(
+    counts: AnyArray,
+    starts: tuple[float, float],
+    rate: float,
+    form: CaptureForm,
+    arrivals: AnyArray,
+    residuals: AnyArray,
+) -> tuple[Reading, ...]:
+    """The recorded form of a capture.
+
+    Args:
+        counts: ``(t, 2)`` of force and pressure, ``t`` a multiple of ``BLOCK``.
+        starts: s on the bench clock, of the first sample of each.
+        rate: Hz on the bench clock, of each.
+        form: what is known of the box.
+        arrivals: ``(n, 2)`` number of a sample (counted from the first of ``counts``), and s on the bench
+            clock at which it arrived, of what the clock was fitted to.
+        residuals: ``(n,)`` s by which those were later than the fit.
+    """
+    flags = judge(counts[:, 0], counts[:, 1], form.threshold, form.full_scale, form.full_scale)
+    onset = -1 if flags.silent else flags.onset
+    said = {**asdict(flags), "onset": onset, "threshold": form.threshold}
+    return (
+        _blocks(FORCE, counts[:, 0], starts[0], rate, form.nominal_rate),
+        _blocks(PRESSURE, counts[:, 1], starts[1], rate, form.nominal_rate),
+        Reading(
+            Channel(CLOCK, "1", (len(CLOCK_FIELDS),), "float64"),
+            arrivals[:, 1],
+            np.stack([arrivals[:, 0], residuals], axis=1),
+        ),
+        Reading(
+            Channel(FLAGS, "1", (len(FLAG_FIELDS),), "float64"),
+            np.array([starts[0] + max(0, onset) / rate]),
+            np.array([[float(said[field]) for field in FLAG_FIELDS]]),
+        ),
+    )
+
+
+def _blocks(name: str, counts: AnyArray, start: float, rate: float, nominal_rate: float) -> Reading:
+    times = start + np.arange(0, len(counts), BLOCK) / rate
+    return Reading(block_channel(name, BLOCK, nominal_rate), times, counts.reshape(-1, BLOCK))
 
 
 def judge(

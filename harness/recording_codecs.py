@@ -13,10 +13,12 @@ import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from foxglove_schemas_protobuf.RawAudio_pb2 import RawAudio
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 from mcap_protobuf.schema import build_file_descriptor_set
 
+from harness.acquisition_channels import FORCE, PRESSURE
 from harness.arrays import AnyArray
 from harness.errors import RecordingDamaged
 from harness.reading import Channel, Reading
@@ -129,6 +131,26 @@ def _decode_pose(data: bytes, _: Channel) -> tuple[AnyArray, bytes]:
     return np.array([t.x, t.y, t.z, q.w, q.x, q.y, q.z]), b""
 
 
+def _encode_audio(reading: Reading, index: int, wall_ns: int) -> Message:
+    """A block of raw counts; in 16 bits where they fit, which is what viewers play."""
+    counts = reading.values[index]
+    name = "pcm-s16" if np.array_equal(counts, counts.astype(np.int16)) else "pcm-s32"
+    return RawAudio(
+        timestamp=_stamp(wall_ns),
+        data=counts.astype(_SAMPLES[name]).tobytes(),
+        format=name,
+        sample_rate=round(reading.channel.nominal_rate or 0.0),
+        number_of_channels=1,
+    )
+
+
+def _decode_audio(data: bytes, channel: Channel) -> tuple[AnyArray, bytes]:
+    message = RawAudio.FromString(data)
+    if message.format not in _SAMPLES:
+        raise RecordingDamaged(f"{channel.name}: a block of the unknown format {message.format!r}")
+    return np.frombuffer(message.data, _SAMPLES[message.format]).astype(channel.dtype), b""
+
+
 def _encode_numbers(reading: Reading, index: int, wall_ns: int) -> bytes:
     sample = np.asarray(reading.values[index], dtype=np.float64).ravel().tolist()
     stamp = {"sec": wall_ns // 10**9, "nsec": wall_ns % 10**9}
@@ -140,6 +162,9 @@ def _decode_numbers(data: bytes, channel: Channel) -> tuple[AnyArray, bytes]:
     return values.reshape(channel.shape), b""
 
 
+_SAMPLES = {"pcm-s16": "<i2", "pcm-s32": "<i4"}
+"""Formats of the RawAudio schema, little-endian; the second goes beyond what it names."""
+
 _IMAGE = _protobuf(CompressedImage, _encode_image, _decode_image)
 _NUMBERS = Codec(
     ("touchstone.Numbers", "jsonschema", json.dumps(_JSON_SCHEMA).encode()),
@@ -147,7 +172,10 @@ _NUMBERS = Codec(
     _encode_numbers,
     _decode_numbers,
 )
+_AUDIO = _protobuf(RawAudio, _encode_audio, _decode_audio)
 _BY_NAME = {
+    FORCE: _AUDIO,
+    PRESSURE: _AUDIO,
     "arm.joints": _protobuf(JointStates, _encode_joints, _decode_joints),
     "arm.base_from_flange": _protobuf(FrameTransform, _encode_pose, _decode_pose),
 }

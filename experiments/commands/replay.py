@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from experiments.commands import options
-from experiments.commands.output import CONSOLE
+from experiments.commands.output import CONSOLE, warn
 from experiments.commands.run import show
 
 
@@ -15,6 +15,12 @@ def replay(
     level: options.LevelOption = None,
     out: Annotated[
         Path | None, typer.Option(help="Where the result and the report go; beside the run if left out.")
+    ] = None,
+    wav: Annotated[
+        Path | None,
+        typer.Option(
+            help="Also write the force and sound of every strike there, as WAV files.", metavar="FOLDER"
+        ),
     ] = None,
     json: options.Json = False,
 ) -> int:
@@ -28,8 +34,12 @@ def replay(
     from experiments.contact_localization import session_of
     from experiments.contact_localization.dials import chosen
     from harness.recording import Recording
+    from harness.wav_export import export_wav
 
     recording = Recording(run)
+    if wav is not None:
+        files = export_wav(recording, wav)
+        warn(f"{len(files)} WAV files in {wav}; counts, rates and times in wav.json beside them")
     folder = out or run.with_name(f"{run.name}-replay")
     folder.mkdir(parents=True, exist_ok=True)
     with CONSOLE.status("estimating from the recording"):
