@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.contact_point import nearest_point
 from experiments.contact_localization.hypotheses import Contact, Noise
 from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.nearest import nearest_point
 from experiments.contact_localization.posterior import best_point
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.surface import random_points

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.contact_point import contact_point, nearest_point
 from experiments.contact_localization.gate import Gate, gates, refuse_bad_fit, refuse_inside_out
 from experiments.contact_localization.grid import on_samples, refine
 from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.nearest import nearest_point
 from experiments.contact_localization.observation import Observation, read_contacts
 from experiments.contact_localization.particle import particle_filter
 from experiments.contact_localization.posterior import (
@@ -236,13 +236,6 @@ def _answer(search: Search, count: int, found: _Solution, seconds: dict[str, flo
     )
     _lap(seconds, "answer", start)
     return result
-
-
-def exact_contact(search: Search, contact: int, gel: FloatArray, yaw: float) -> FloatArray:
-    """``(3,)`` metres: the contact under one hypothesis, on the mesh itself."""
-    centre = search.gel_centres(contact, gel[None], np.array([yaw]))[0]
-    axis = search.prior.object_from_base(np.array([yaw]))[0] @ search.axes[contact]
-    return contact_point(search.model.mesh, centre, axis)
 
 
 def _lap(seconds: dict[str, float], stage: str, start: float) -> None:

@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial import cKDTree
 from synthetic_press import box, solid
 
-from experiments.contact_localization.contact_point import nearest_point
+from experiments.contact_localization.nearest import nearest_point
 from experiments.contact_localization.surface import (
     NEIGHBOURS,
     Surface,
