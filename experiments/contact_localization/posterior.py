@@ -11,6 +11,7 @@ _GROSS = 20.0e-3
 _MODE_RADIUS = 12.0e-3
 _SMALLEST_MODE = 0.05
 _MOST_POINTS = 400
+_MOST_IN_REGION = 4000
 _CORE = 6.0e-3
 _SETTLING = 8
 _GOLDEN = 0.6180339887498949
@@ -79,19 +80,21 @@ def _settled(points: FloatArray, weights: FloatArray, start: FloatArray) -> Floa
     return np.asarray(centre)
 
 
-def thinned(points: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """At most 400 points standing for all, each weight drawn evenly.
+def thinned(
+    points: FloatArray, weights: FloatArray, most: int = _MOST_POINTS
+) -> tuple[FloatArray, FloatArray]:
+    """At most so many points standing for all, each weight drawn evenly.
 
-    One draw falls in each four-hundredth of the weight, at a place in it that differs from one to
-    the next, so that an order with a rhythm of its own does not favour some points.
+    One draw falls in each equal part of the weight, at a place in it that differs from one to the
+    next, so that an order with a rhythm of its own does not favour some points.
     """
-    if len(points) <= _MOST_POINTS:
+    if len(points) <= most:
         return points, weights / weights.sum()
-    numbers = np.arange(_MOST_POINTS)
-    marks = (numbers + np.mod((numbers + 0.5) * _GOLDEN, 1.0)) / _MOST_POINTS
+    numbers = np.arange(most)
+    marks = (numbers + np.mod((numbers + 0.5) * _GOLDEN, 1.0)) / most
     chosen = np.minimum(np.searchsorted(np.cumsum(weights / weights.sum()), marks), len(points) - 1)
     unique, counts = np.unique(chosen, return_counts=True)
-    return points[unique], counts / _MOST_POINTS
+    return points[unique], counts / most
 
 
 def modes(points: FloatArray, weights: FloatArray) -> tuple[Mode, ...]:
@@ -128,16 +131,9 @@ def credible_region(
             hypotheses therefore do not show; fitted to calibration runs.
         share: of the posterior.
     """
-    points, weights = thinned(points, weights)
-    mass = np.zeros(len(surface.points))
-    tree = surface.tree
-    for point, weight, near in zip(points, weights, tree.query_ball_point(points, 4.0 * floor), strict=True):
-        index = np.asarray(near, dtype=np.int64)
-        if len(index) == 0:
-            index = np.array([tree.query(point)[1]])
-        gaps = np.sum((surface.points[index] - point) ** 2, axis=1)
-        kernel = surface.areas[index] * np.exp(-0.5 * gaps / floor**2) + 1e-300
-        mass[index] += weight * kernel / kernel.sum()
+    # A posterior along a whole rim needs many points: each fills only a few square millimetres.
+    points, weights = thinned(points, weights, _MOST_IN_REGION)
+    mass = _spread_over(surface, points, weights, floor)
     density = mass / np.maximum(surface.areas, 1e-12)
     order = np.argsort(-density, kind="stable")
     count = int(np.searchsorted(np.cumsum(mass[order]), share * mass.sum())) + 1
@@ -145,6 +141,20 @@ def credible_region(
     inside[order[:count]] = True
     area = float(surface.areas[inside].sum())
     return Region(share, read_only(surface.points[inside]), area, surface, read_only(inside))
+
+
+def _spread_over(surface: Surface, points: FloatArray, weights: FloatArray, width: float) -> FloatArray:
+    """``(samples,)``: the points' weights, each shared by the samples around it as a Gaussian of the area."""
+    near = [np.asarray(found, dtype=np.int64) for found in surface.tree.query_ball_point(points, 4.0 * width)]
+    counts = np.array([len(found) for found in near])
+    far = np.nonzero(counts == 0)[0]
+    owners = np.concatenate([np.repeat(np.arange(len(points)), counts), far])
+    samples = np.concatenate([*near, surface.tree.query(points[far])[1]]).astype(np.int64)
+    gaps = np.sum((surface.points[samples] - points[owners]) ** 2, axis=1)
+    kernel = surface.areas[samples] * np.exp(-0.5 * gaps / width**2) + 1e-300
+    whole = np.bincount(owners, kernel, minlength=len(points))
+    shares = weights[owners] * kernel / whole[owners]
+    return np.asarray(np.bincount(samples, shares, minlength=len(surface.points)))
 
 
 def credible_radius(
