@@ -23,6 +23,9 @@ _TOLERANCE = 1e-9
 _BEYOND = 1e-2
 """The same for the first mode beyond the limit, which only has to be known to be beyond."""
 
+_SAME = 1e-4
+"""Relative distance of squared frequencies below which two modes are taken as a pair."""
+
 
 @dataclass(frozen=True, eq=False)
 class EigenPairs:
@@ -41,13 +44,17 @@ class EigenPairs:
     certified: bool
 
 
-def modes_below(system: ModalSystem, limit: float, certify: bool = True) -> EigenPairs:
-    """Every elastic mode up to ``limit`` Hz.
+def modes_below(
+    system: ModalSystem, limit: float, most: int | None = None, certify: bool = True
+) -> tuple[EigenPairs, float]:
+    """Every elastic mode up to ``limit`` Hz, or the lowest ``most`` of them.
+
+    Returns:
+        The modes, and up to which frequency in Hz they are all.
 
     Raises:
         MeshRefused: the stiffness cannot be factorised, or modes were missed twice.
     """
-    ceiling = (2.0 * np.pi * limit) ** 2
     factor = factorised(system.shifted(system.shift))
     lowest = float(factor.U.diagonal().min())
     if lowest <= 0.0:
@@ -55,17 +62,16 @@ def modes_below(system: ModalSystem, limit: float, certify: bool = True) -> Eige
             f"the stiffness of the object has a pivot of {lowest:.2g}, which must be above 0; its "
             "volume mesh has an inverted element: mesh the object again"
         )
-    expected = _count_below(system, ceiling) if certify else None
-    pairs = _Lanczos(system, factor, seed=1).run(ceiling)
-    if expected is not None and len(pairs[0]) < expected:
-        pairs = _Lanczos(system, factor, seed=2, block=2 * _BLOCK).run(ceiling)
-    if expected is not None and len(pairs[0]) < expected:
-        raise MeshRefused(
-            f"{len(pairs[0])} modes were found below {limit:g} Hz where the inertia of the system says "
-            f"{expected}; the volume mesh is too poor to be trusted: mesh it with another element size"
-        )
-    values, vectors = pairs
-    return EigenPairs(values, vectors, _residual(system, values, vectors), len(values) == expected)
+    for seed, block in ((1, _BLOCK), (2, 2 * _BLOCK)):
+        values, vectors, ceiling = _Lanczos(system, factor, seed, block).run((2 * np.pi * limit) ** 2, most)
+        expected = _count_below(system, ceiling) if certify else None
+        if expected is None or len(values) >= expected:
+            pairs = EigenPairs(values, vectors, _residual(system, values, vectors), len(values) == expected)
+            return pairs, float(np.sqrt(ceiling) / (2.0 * np.pi))
+    raise MeshRefused(
+        f"{len(values)} modes were found below {limit:g} Hz where the inertia of the system says "
+        f"{expected}; the volume mesh is too poor to be trusted: mesh it with another element size"
+    )
 
 
 def _count_below(system: ModalSystem, ceiling: float) -> int | None:
@@ -97,8 +103,11 @@ class _Lanczos:
         self.projected = np.zeros((0, 0))
         self.random = np.random.default_rng(seed)
 
-    def run(self, ceiling: float) -> tuple[FloatArray, FloatArray]:
-        """Values and vectors of every mode up to ``ceiling`` (rad/s)^2."""
+    def run(self, ceiling: float, most: int | None) -> tuple[FloatArray, FloatArray, float]:
+        """Values and vectors of every mode up to ``ceiling`` (rad/s)^2, or the lowest ``most``.
+
+        Also returns the ceiling below which these are all.
+        """
         start = self._cleared(self.random.standard_normal((self.basis.shape[0], self.block)))
         current, _ = self._normalised(start)
         check_at = 6 * self.block
@@ -107,7 +116,7 @@ class _Lanczos:
             last = self.used + self.block > self.most
             step, coupling = self._step(current)
             if self.used >= check_at or last:
-                found = self._converged(coupling, ceiling, last)
+                found = self._converged(coupling, ceiling, most, last)
                 if found is not None:
                     return found
                 check_at = int(1.15 * self.used) + self.block
@@ -185,19 +194,30 @@ class _Lanczos:
         return unit, combination
 
     def _converged(
-        self, coupling: FloatArray, ceiling: float, last: bool
-    ) -> tuple[FloatArray, FloatArray] | None:
-        """The modes up to the ceiling if all are known, and the first beyond it well enough."""
+        self, coupling: FloatArray, ceiling: float, most: int | None, last: bool
+    ) -> tuple[FloatArray, FloatArray, float] | None:
+        """The wanted modes if all are known, and the first beyond them well enough."""
         inverse, ritz = eigh(self.projected[: self.used, : self.used])
         inverse, ritz = inverse[::-1], ritz[:, ::-1]
         error = np.linalg.norm(coupling @ ritz[-self.block :], axis=0)
-        threshold = 1.0 / (ceiling + self.system.shift)
-        wanted = inverse >= threshold
-        number = int(wanted.sum())
+        number = int((inverse >= 1.0 / (ceiling + self.system.shift)).sum())
+        if most is not None and number > most:
+            number = _whole_group(inverse, most)
+            between = 0.5 * (inverse[number - 1] + inverse[number])
+            ceiling = 1.0 / between - self.system.shift
         if not last:
-            if number == self.used or (error[wanted] > _TOLERANCE * inverse[wanted]).any():
+            if number == self.used or (error[:number] > _TOLERANCE * inverse[:number]).any():
                 return None
-            if error[number] > _BEYOND * inverse[number] or inverse[number] + error[number] >= threshold:
+            beyond = inverse[number] + error[number] >= 1.0 / (ceiling + self.system.shift)
+            if beyond or error[number] > _BEYOND * inverse[number]:
                 return None
         vectors = self.basis[:, : self.used] @ ritz[:, :number]
-        return 1.0 / inverse[:number] - self.system.shift, vectors
+        return 1.0 / inverse[:number] - self.system.shift, vectors, ceiling
+
+
+def _whole_group(descending: FloatArray, most: int) -> int:
+    """At most ``most``, and fewer where that would part modes of one frequency."""
+    for number in range(most, 0, -1):
+        if descending[number] < (1.0 - _SAME) * descending[number - 1]:
+            return number
+    return most

@@ -75,6 +75,13 @@ def _surface(cells: IntArray, edges: IntArray, corners: int) -> IntArray:
     return np.concatenate([faces, middles], axis=1)
 
 
+def middles_of(nodes: FloatArray, cells: IntArray, count: int) -> FloatArray:
+    """``(count, 3)``: at the index of a middle node the middle of its edge, elsewhere zero."""
+    middles = np.zeros((count, 3))
+    middles[cells[:, 4:]] = nodes[cells[:, EDGES]].mean(axis=2)
+    return middles
+
+
 def least_determinant(mesh: QuadraticMesh) -> FloatArray:
     """``(c,)`` m^3: six times the volume that each cell would have if it were everywhere as at its worst."""
     least: FloatArray = determinants(mesh.nodes, mesh.cells, shape_slopes(_CHECKED_AT)).min(axis=1)

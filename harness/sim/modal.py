@@ -1,0 +1,230 @@
+"""From a surface and a material to the modes of the object."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from harness.arrays import AnyArray, FloatArray
+from harness.errors import WrongUse
+from harness.materials import Material
+from harness.mesh import Mesh
+from harness.sim.modal_lanczos import EigenPairs, modes_below
+from harness.sim.modal_mesh import QuadraticMesh, quadratic_mesh
+from harness.sim.modal_snap import snapped
+from harness.sim.modal_system import ModalSystem, modal_system
+from harness.sim.modes import Modes
+from harness.sim.surface_measure import thin_wall
+from harness.sim.tetrahedra import Tetrahedra, tetrahedralize
+from harness.store import Store, digest
+
+VERSION = 1
+"""Raised with every change of what is computed here, so that stored modes are dropped."""
+
+HEARING = 20e3
+"""Hz: the limit where nobody asks for another."""
+
+ELEMENT_SHARE = 0.35
+"""Of the shortest wave of the object below the limit, the default edge of an element."""
+
+
+@dataclass(frozen=True, eq=False)
+class Elasticity:
+    """What each cell is made of.
+
+    Attributes:
+        young: ``(c,)`` Pa.
+        poisson: ``(c,)``.
+        density: ``(c,)`` kg/m^3.
+    """
+
+    young: FloatArray
+    poisson: FloatArray
+    density: FloatArray
+
+    @classmethod
+    def uniform(cls, material: Material, cells: int) -> "Elasticity":
+        """The same everywhere."""
+        one = np.ones(cells)
+        return cls(material.young * one, material.poisson * one, material.density * one)
+
+    @property
+    def lame(self) -> FloatArray:
+        """``(c, 2)`` Pa: Lame's lambda and mu."""
+        young, poisson = self.young, self.poisson
+        first = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
+        return np.stack([first, young / (2.0 * (1.0 + poisson))], axis=1)
+
+
+def modes_of(
+    mesh: Mesh,
+    material: Material,
+    limit: float = HEARING,
+    edge: float | None = None,
+    most: int | None = None,
+    store: Store | None = None,
+) -> Modes:
+    """The modes of an object given by its closed surface.
+
+    Args:
+        mesh: closed, outward, in metres.
+        material: of all of it.
+        limit: Hz, above zero.
+        edge: m, longest edge of an element; None for ``default_edge``.
+        most: modes at most, the lowest; None for all up to the limit.
+        store: where results are kept; None to compute.
+
+    Raises:
+        WrongUse: a limit, an edge or a count that cannot be.
+        MeshRefused: a surface that cannot be filled, or a volume mesh that cannot be solved.
+    """
+    edge = default_edge(mesh, material, limit, most) if edge is None else edge
+    key = digest(["modes", VERSION, mesh.vertices, mesh.faces, material, float(limit), float(edge), most])
+    kept = store.get(key) if store is not None else None
+    if isinstance(kept, Mapping):
+        return from_arrays(kept)
+    begun = time.perf_counter()
+    filled = tetrahedralize(mesh, edge)
+    meshed = time.perf_counter() - begun
+    solved = solve_modes(filled, material, limit, mesh, most=most, meshed=meshed)
+    if store is not None:
+        store.put(key, to_arrays(solved))
+    return solved
+
+
+def default_edge(
+    mesh: Mesh, material: Material, limit: float, most: int | None = None, share: float = ELEMENT_SHARE
+) -> float:
+    """Metres: an element's edge as a share of the shortest wave in the object below the limit.
+
+    The wave is that of bending in a wall of the object's thickness or, if shorter, of shear.
+    With ``most`` modes the limit is no higher than where a plate of that area and wall has as
+    many (its modal density is ``sqrt(3) area / (wall speed)``; Cremer, Heckl and Petersson,
+    Structure-Borne Sound, 3rd edition, 2005).
+    """
+    _check_limit(limit, most)
+    wall = thin_wall(mesh, 0.5)
+    speed = np.sqrt(material.young / (material.density * (1.0 - material.poisson**2)))
+    if most is not None:
+        middle = 0.5 * float(mesh.face_areas.sum())
+        limit = min(limit, 1.5 * most * wall * speed / (np.sqrt(3.0) * middle))
+    bending = np.sqrt(np.pi * wall * speed / (np.sqrt(3.0) * limit))
+    shear = np.sqrt(0.5 * material.young / ((1.0 + material.poisson) * material.density)) / limit
+    return float(min(share * min(bending, shear), 0.2 * mesh.diagonal))
+
+
+def solve_modes(
+    tetrahedra: Tetrahedra,
+    material: Material | Elasticity,
+    limit: float = HEARING,
+    surface: Mesh | None = None,
+    most: int | None = None,
+    meshed: float = 0.0,
+) -> Modes:
+    """The modes of a volume mesh.
+
+    Args:
+        tetrahedra: of the object.
+        material: of all of it, or cell by cell.
+        limit: Hz, above zero.
+        surface: onto which the nodes of the volume mesh's surface are moved; None for as it is.
+        most: modes at most, the lowest; None for all up to the limit.
+        meshed: s that the volume mesh took, to be listed.
+
+    Raises:
+        WrongUse: a limit or a count that cannot be, or elasticity that is not one.
+        MeshRefused: the system cannot be solved.
+    """
+    _check_limit(limit, most)
+    cells = len(tetrahedra.cells)
+    elasticity = Elasticity.uniform(material, cells) if isinstance(material, Material) else material
+    _check_elasticity(elasticity, cells)
+    with threadpool_limits(limits=1, user_api="blas"):
+        begun = time.perf_counter()
+        mesh = quadratic_mesh(tetrahedra.nodes, tetrahedra.cells)
+        mesh = mesh if surface is None else snapped(mesh, surface)
+        system = modal_system(mesh, elasticity.lame, elasticity.density)
+        assembled = time.perf_counter()
+        pairs, reached = modes_below(system, limit, most)
+        solved = time.perf_counter()
+    seconds = {"tetrahedra": meshed, "assembly": assembled - begun, "solve": solved - assembled}
+    return _modes(mesh, system, pairs, reached, seconds)
+
+
+def _modes(
+    mesh: QuadraticMesh, system: ModalSystem, pairs: EigenPairs, limit: float, seconds: Mapping[str, float]
+) -> Modes:
+    used, triangles = np.unique(mesh.triangles, return_inverse=True)
+    outer = Mesh(mesh.nodes[used], triangles.reshape(-1, 3))
+    vectors = pairs.vectors.reshape(len(mesh.nodes), 3, -1)[used]
+    return Modes(
+        frequencies=np.sqrt(pairs.values) / (2.0 * np.pi),
+        points=outer.vertices,
+        normals=outer.vertex_normals,
+        faces=outer.faces,
+        shapes=np.ascontiguousarray(vectors.transpose(0, 2, 1)),
+        limit=limit,
+        mass=system.total,
+        rigid=system.rigid.shape[1],
+        nodes=len(mesh.nodes),
+        elements=len(mesh.cells),
+        residual=pairs.residual,
+        seconds=dict(seconds),
+    )
+
+
+def to_arrays(modes: Modes) -> dict[str, AnyArray]:
+    """What a store can keep."""
+    numbers = ("limit", "mass", "rigid", "nodes", "elements", "residual")
+    arrays = ("frequencies", "points", "normals", "faces", "shapes")
+    kept: dict[str, Any] = {name: vars(modes)[name] for name in arrays}
+    kept |= {name: np.array(vars(modes)[name]) for name in numbers}
+    return kept | {f"seconds.{stage}": np.array(took) for stage, took in modes.seconds.items()}
+
+
+def from_arrays(kept: Mapping[str, AnyArray]) -> Modes:
+    """What ``to_arrays`` made, again."""
+    seconds = {
+        name.removeprefix("seconds."): float(took)
+        for name, took in kept.items()
+        if name.startswith("seconds.")
+    }
+    return Modes(
+        frequencies=kept["frequencies"],
+        points=kept["points"],
+        normals=kept["normals"],
+        faces=kept["faces"],
+        shapes=kept["shapes"],
+        limit=float(kept["limit"]),
+        mass=float(kept["mass"]),
+        rigid=int(kept["rigid"]),
+        nodes=int(kept["nodes"]),
+        elements=int(kept["elements"]),
+        residual=float(kept["residual"]),
+        seconds=seconds,
+    )
+
+
+def _check_limit(limit: float, most: int | None) -> None:
+    if not (np.isfinite(limit) and limit > 0.0):
+        raise WrongUse(f"modes up to {limit:g} Hz cannot be found; say a frequency above 0")
+    if most is not None and most < 1:
+        raise WrongUse(f"{most} modes are none; say 1 or more, or leave the number out")
+
+
+def _check_elasticity(elasticity: Elasticity, cells: int) -> None:
+    for name, field in vars(elasticity).items():
+        if field.shape != (cells,) or not np.isfinite(field).all():
+            raise WrongUse(
+                f"{name} of shape {field.shape} must be one finite number for each of {cells} cells"
+            )
+    if elasticity.young.min() <= 0.0 or elasticity.density.min() <= 0.0:
+        raise WrongUse("Young's modulus and density must be above 0 in every cell")
+    if elasticity.poisson.max() >= 0.5 or elasticity.poisson.min() <= -1.0:
+        worst = elasticity.poisson[np.argmax(np.abs(elasticity.poisson - 0.0))]
+        raise WrongUse(
+            f"a Poisson's ratio of {worst:g} is outside -1 to 0.5; an incompressible solid is 0.49"
+        )
