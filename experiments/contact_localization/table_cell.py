@@ -70,8 +70,13 @@ class PerformedRun:
     observations: tuple[Observation, ...]
     model: Model
     base_from_object: FloatArray
-    true: FloatArray
+    true_points: FloatArray
     seed: int
+
+    @property
+    def true(self) -> FloatArray:
+        """``(3,)`` metres: the last contact."""
+        return np.asarray(self.true_points[-1])
 
 
 def scene_of(cell: Cell, scene: SceneFile) -> SceneFile:
@@ -106,14 +111,15 @@ def perform_cell(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> 
             step = Step(index, "press", parameters)
             readings = {r.channel.name: r for r in experiment.perform(step, bench)}
             observations.append(observe_step(StepRecord(step, readings, 0.0), station.flange_from_gel))
-        true = _last_truth(context.truth)
+        true = _truth(context.truth)
     model = Model(mesh, station.gel.sensor, station_calibration(station))
     return PerformedRun(tuple(observations), model, scene.base_from_object(mesh), true, cell.seed)
 
 
-def _last_truth(path: Path) -> FloatArray:
+def _truth(path: Path) -> FloatArray:
+    """``(contacts, 3)`` metres, in the object's frame."""
     contacts = json.loads(path.read_text(encoding="utf-8"))["contacts"]
-    return np.array(contacts[-1]["point_in_object_m"])
+    return np.array([contact["point_in_object_m"] for contact in contacts])
 
 
 def believed(run: PerformedRun, yaw: str) -> Prior:
