@@ -30,8 +30,11 @@ class Prior:
 
     def __post_init__(self) -> None:
         rotation = np.asarray(self.base_from_object, dtype=np.float64)
-        if rotation.shape != (3, 3) or not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6):
-            raise WrongUse("the prior's base_from_object must be a (3, 3) rotation; pass pose[:3, :3]")
+        orthonormal = rotation.shape == (3, 3) and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
+        if not orthonormal or np.linalg.det(rotation) < 0.0:
+            raise WrongUse(
+                "the prior's base_from_object must be a right-handed (3, 3) rotation; pass pose[:3, :3]"
+            )
         object.__setattr__(self, "base_from_object", read_only(rotation.copy()))
 
     def object_from_base(self, yaws: FloatArray) -> FloatArray:

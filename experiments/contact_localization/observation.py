@@ -10,13 +10,7 @@ from experiments.contact_localization.model import Model
 from experiments.contact_localization.touch import TouchNoise, touch_map
 from harness.arrays import ByteArray, FloatArray, read_only
 from harness.errors import DataRefused
-from harness.geometry import rotation_from_quaternion, transform
-from harness.reading import Reading
 from harness.sim.inverse import invert
-
-IMAGE = "gel.image"
-POSE = "arm.base_from_flange"
-_PACKET = 0.05
 
 CONTACT_THRESHOLD = 0.12e-3
 """Metres of indentation, averaged over a compared pixel, below which no contact is seen."""
@@ -85,38 +79,3 @@ def height_map(observation: Observation, model: Model) -> FloatArray:
     """
     mean = np.rint(observation.images.mean(axis=0)).astype(np.uint8)
     return np.asarray(invert(mean[None], model.calibration).height[0])
-
-
-def from_readings(readings: Sequence[Reading], flange_from_gel: FloatArray) -> Observation:
-    """One recorded contact as the estimator takes it.
-
-    Args:
-        readings: of one step: ``gel.image`` and ``arm.base_from_flange`` among them.
-        flange_from_gel: ``(4, 4)`` of the station.
-
-    Raises:
-        DataRefused: a channel is missing, or no arm pose was recorded while the frames arrived.
-    """
-    by_name = {reading.channel.name: reading for reading in readings}
-    missing = {IMAGE, POSE} - by_name.keys()
-    if missing:
-        raise DataRefused(
-            f"a contact was recorded without {' and '.join(sorted(missing))}; "
-            "the step is not of a localization run"
-        )
-    image, poses = by_name[IMAGE], by_name[POSE]
-    # The arm rests while frames are taken: every packet between the first and the last is of one pose.
-    taken = (poses.times >= image.times[0] - _PACKET) & (poses.times <= image.times[-1] + _PACKET)
-    if not taken.any():
-        raise DataRefused(
-            f"no arm pose was recorded between {image.times[0]:.3f} s and {image.times[-1]:.3f} s, "
-            "when the tactile frames were taken; record the arm until the last frame"
-        )
-    base_from_flange = _resting(poses.values[taken])
-    return Observation(base_from_flange @ flange_from_gel, image.values)
-
-
-def _resting(packets: FloatArray) -> FloatArray:
-    """``(4, 4)``: the mean place, and the attitude of the packet in the middle."""
-    middle = packets[len(packets) // 2]
-    return transform(rotation_from_quaternion(middle[3:]), packets[:, :3].mean(axis=0))
