@@ -34,6 +34,7 @@ SCHEMA = 1
 
 _SHIPPED = Path(__file__).parent / "data"
 _STEADY = 1e-4
+_FAR = 6.0
 _TEXTS = ("model", "serial", "hammer_serial", "microphone_serial", "date", "made_from")
 _SIGNED = ("hammer_offset", "microphone_offset")
 _FULL_SCALES = (2**11 - 1, 2**15 - 1, 2**23 - 1, 2**31 - 1)
@@ -211,10 +212,13 @@ def strike_from_readings(readings: Mapping[str, Reading], calibration: Acquisiti
     _check_counts(pressure, scales[1])
     flags = judge(force.counts, pressure.counts, threshold, *scales)
     tolerance = calibration.offset_tolerance
-    onset_time = force.start + (flags.onset - GUARD) / force.rate
-    quiet_until = None if flags.silent else onset_time
-    force_rest = _rest(force, quiet_until, calibration.hammer_offset, tolerance)
-    pressure_rest = _rest(pressure, quiet_until, calibration.microphone_offset, tolerance)
+    before = force.counts[: max(0, flags.onset - GUARD)]
+    quiet = force.counts if flags.silent else before
+    force_rest = calibration.hammer_offset
+    if len(quiet) >= SHORTEST_REST:
+        force_rest = _rest(FORCE, float(np.median(quiet)), calibration.hammer_offset, tolerance)
+    # Sound swings about its rest; all of it tells the rest better than the short, rumbling time before.
+    pressure_rest = _rest(PRESSURE, _middle(pressure.counts), calibration.microphone_offset, tolerance)
     newtons = (force.counts - force_rest) * calibration.newtons_per_count
     pascals = (pressure.counts - pressure_rest) * calibration.pascals_per_count
     times = force.start + np.arange(len(newtons)) / force.rate
@@ -284,16 +288,17 @@ def _check_counts(record: _Record, full_scale: int) -> None:
         )
 
 
-def _rest(record: _Record, quiet_until: float | None, offset: float, tolerance: float) -> float:
-    """Counts at rest: measured before the strike, and checked against the calibrated offset."""
-    count = (quiet_until - record.start) * record.rate if quiet_until is not None else len(record.counts)
-    quiet = record.counts[: max(0, int(count))]
-    if len(quiet) < SHORTEST_REST:
-        return offset
-    rest = float(np.median(quiet))
+def _middle(counts: FloatArray) -> float:
+    """The mean of what is not far out: neither a loud beginning nor a full scale moves it."""
+    away = np.abs(counts - np.median(counts))
+    return float(counts[away <= _FAR * max(1.0, float(np.median(away)))].mean())
+
+
+def _rest(name: str, rest: float, offset: float, tolerance: float) -> float:
+    """Counts at rest as measured, checked against the calibrated offset."""
     if abs(rest - offset) > tolerance:
         raise DataRefused(
-            f"{record.name} rests at {rest:.0f} counts; it was calibrated at {offset:.0f}, within "
+            f"{name} rests at {rest:.0f} counts; it was calibrated at {offset:.0f}, within "
             f"{tolerance:.0f}: check that the channels are not swapped, or calibrate again"
         )
     return rest
