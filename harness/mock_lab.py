@@ -9,7 +9,6 @@ import os
 import selectors
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ import numpy as np
 from harness.clock import now
 from harness.errors import BenchFault
 from harness.mesh import Mesh
+from harness.owned_folder import OwnedFolder
 from harness.scene import SceneFile
 from harness.station_file import Station
 
@@ -75,7 +75,7 @@ class MockLab:
         self._options = ["--seed", str(seed), "--gap", str(gap), "--truth", str(truth)]
         self._command = [*(command or (sys.executable, "-m", "mocks.lab"))]
         self._process: subprocess.Popen[bytes] | None = None
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._folder: OwnedFolder | None = None
         self._waiting = b""
         self._busy = threading.Lock()
 
@@ -87,8 +87,8 @@ class MockLab:
         """
         if self._process is not None:
             raise ValueError("this lab is running already; make another")
-        self._folder = tempfile.TemporaryDirectory(prefix="touchstone-lab-")
-        arguments = ["--scene", str(self._described(Path(self._folder.name))), *self._options]
+        self._folder = OwnedFolder("touchstone-lab-")
+        arguments = ["--scene", str(self._described(self._folder.path)), *self._options]
         with self._log.open("wb") as log:
             self._process = subprocess.Popen(
                 [*self._command, *arguments],
@@ -138,7 +138,7 @@ class MockLab:
         if process is not None:
             _end(process)
         if self._folder is not None:
-            self._folder.cleanup()
+            self._folder.close()
             self._folder = None
 
     def __enter__(self) -> "MockLab":
@@ -157,7 +157,7 @@ class MockLab:
     @property
     def _log(self) -> Path:
         assert self._folder is not None
-        return Path(self._folder.name) / "lab.log"
+        return self._folder.path / "lab.log"
 
     def _described(self, folder: Path) -> Path:
         """The file that tells the lab what it is a mock of."""

@@ -1,0 +1,127 @@
+"""What a killed program leaves in the temporary folder is removed at the next start; what lives is left."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers import arm_lock
+from harness.errors import BenchFault
+from harness.owned_folder import OwnedFolder
+
+ADDRESS = "127.9.8.7"
+OWNER = """
+import sys, time
+from pathlib import Path
+from drivers import arm_lock
+from harness.owned_folder import OwnedFolder
+parent = Path(sys.argv[1])
+folder = OwnedFolder("touchstone-lab-", parent)
+(folder.path / "lab.log").write_text("ready")
+lock = arm_lock.take(sys.argv[2], parent)
+print(folder.path, flush=True)
+time.sleep(600)
+"""
+
+Kill = Callable[[], None]
+
+
+@pytest.fixture
+def owner(tmp_path: Path) -> Iterator[tuple[Path, Kill]]:
+    """A program with a folder and an arm: the folder, and what kills it with -9."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", OWNER, str(tmp_path), ADDRESS],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+    def kill() -> None:
+        process.kill()
+        process.wait()
+
+    assert process.stdout is not None
+    yield Path(process.stdout.readline().strip()), kill
+    kill()
+    process.stdout.close()
+
+
+def test_the_folder_of_a_killed_program_is_removed_at_the_next_start(
+    owner: tuple[Path, Kill], tmp_path: Path
+) -> None:
+    folder, kill = owner
+    kill()
+    assert (folder / "lab.log").exists()
+    mine = OwnedFolder("touchstone-lab-", tmp_path)
+    assert not folder.exists()
+    assert mine.path.is_dir()
+    mine.close()
+    mine.close()
+    assert not mine.path.exists()
+
+
+def test_the_folder_of_a_living_program_stays(owner: tuple[Path, Kill], tmp_path: Path) -> None:
+    OwnedFolder("touchstone-lab-", tmp_path).close()
+    assert (owner[0] / "lab.log").read_text() == "ready"
+
+
+def test_what_is_not_a_held_folder_stays(tmp_path: Path) -> None:
+    """One that is just being made, one of another kind, a file, a link to elsewhere."""
+    being_made = tmp_path / "touchstone-lab-new"
+    other = tmp_path / "touchstone-other"
+    elsewhere = tmp_path / "elsewhere"
+    for folder in (being_made, other, elsewhere):
+        folder.mkdir()
+    for folder in (other, elsewhere):
+        (folder / "owner.lock").touch()
+    (tmp_path / "touchstone-lab-file").touch()
+    (tmp_path / "touchstone-lab-link").symlink_to(elsewhere)
+    before = sorted(tmp_path.rglob("*"))
+    OwnedFolder("touchstone-lab-", tmp_path).close()
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_lock_keeps_others_out_until_its_owner_is_killed(owner: tuple[Path, Kill], tmp_path: Path) -> None:
+    _, kill = owner
+    with pytest.raises(BenchFault, match=r"owned by another program \(process \d+, lock .*127\.9\.8\.7"):
+        arm_lock.take(ADDRESS, tmp_path)
+    kill()
+    descriptor = arm_lock.take(ADDRESS, tmp_path)
+    with pytest.raises(BenchFault, match="owned by another program"):
+        arm_lock.take(ADDRESS, tmp_path)
+    os.close(descriptor)
+    os.close(arm_lock.take(ADDRESS, tmp_path))
+
+
+def test_lock_files_of_the_dead_are_removed_and_those_of_the_living_stay(
+    owner: tuple[Path, Kill], tmp_path: Path
+) -> None:
+    _, kill = owner
+    arm_lock.remove_ownerless(tmp_path)
+    assert arm_lock.lock_path(ADDRESS, tmp_path).exists()
+    kill()
+    assert arm_lock.lock_path(ADDRESS, tmp_path).exists()
+    other = arm_lock.lock_path("127.9.8.6", tmp_path)
+    descriptor = arm_lock.take("127.9.8.6", tmp_path)
+    os.close(descriptor)
+    assert sorted(tmp_path.glob("*.lock")) == [other]
+
+
+def test_a_lock_taken_while_its_file_is_removed_is_taken_on_the_new_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = arm_lock.lock_path(ADDRESS, tmp_path)
+    locked, left = arm_lock._locked, [path]
+
+    def locked_once_removed(descriptor: int, times: int = 1) -> bool:
+        if left:
+            left.pop().unlink()
+        return locked(descriptor, times)
+
+    monkeypatch.setattr(arm_lock, "_locked", locked_once_removed)
+    descriptor = arm_lock.take(ADDRESS, tmp_path)
+    with pytest.raises(BenchFault, match="owned by another program"):
+        arm_lock.take(ADDRESS, tmp_path)
+    os.close(descriptor)
