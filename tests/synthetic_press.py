@@ -80,3 +80,20 @@ def contact(raster: RasterMesh, press: Press, base_from_object: FloatArray = BAS
         BLOCK,
         TouchNoise(),
     )
+
+
+def tilted(axis: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The unit vector along an axis."""
+    unit = np.array(axis) / np.linalg.norm(axis)
+    return float(unit[0]), float(unit[1]), float(unit[2])
+
+
+PRESSES = (
+    Press((-0.018, 0.0135, 0.0255), tilted((0.05, -0.03, -1.0)), yaw=0.4),
+    Press((0.008, -0.005, 0.025), (0.0, 0.0, -1.0), yaw=2.0, depth=0.6e-3),
+    Press((0.035, 0.021, 0.012), tilted((-1.0, -0.04, -0.05)), yaw=1.0, depth=1.0e-3),
+    Press((-0.03, -0.025, 0.004), (0.0, 1.0, 0.0), yaw=-1.3, depth=0.5e-3),
+    Press((-0.035, 0.018, -0.009), tilted((1.0, -0.06, 0.05)), yaw=0.1, depth=0.9e-3),
+    Press((0.033, -0.024, 0.025), tilted((0.06, 0.08, -1.0)), yaw=-0.8, depth=0.7e-3),
+)
+"""On the stepped block: peg, edges, sides and a corner; the last is the one asked about."""
