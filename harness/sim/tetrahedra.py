@@ -17,7 +17,7 @@ from harness.sim.surface_measure import enclosed_volume, thin_wall
 ENVELOPE_OF_WALL = 0.2
 """Of the thinnest wall, how far the tetrahedra may leave the surface; a wall survives half of it."""
 
-_ENVELOPE_OF_SIZE = 2e-3
+_ENVELOPE_OF_SIZE = 5e-3
 _FLATTEST = 1e-8
 """Least volume of a cell as a share of its edges' root mean square cubed: below it, stiffness
 grows so large that the eigenvalues lose their digits."""
@@ -95,7 +95,7 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
         mesh: closed, outward; parts that overlap count once.
         edge: m, longest edge aimed at; where the surface bends or is thin they are shorter.
         envelope: m, how far the cells may leave the surface; None for a fifth of the thinnest
-            wall, and no more than 0.2 % of the mesh's diagonal.
+            wall, and no more than 0.5 % of the mesh's diagonal.
 
     Raises:
         WrongUse: an edge or an envelope that cannot be.
