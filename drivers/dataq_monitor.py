@@ -13,8 +13,10 @@ from drivers.dataq_protocol import BoxModel, counts, likely_loss
 from harness.arrays import AnyArray, FloatArray
 from harness.clock_fit import ArrivalClock, ClockFit
 
-PROMPT = 1e-3
-"""s of lateness up to which an arrival proves that nothing is missing before it."""
+PROMPT = 0.5e-3
+"""s of lateness up to which an arrival proves that nothing is missing before it: 25 samples at 50 kHz."""
+
+_PROMPT_RESIDUALS = 6.0
 
 PATIENCE = 1.0
 """s for which nothing may arrive promptly from an emptied port before samples count as lost."""
@@ -104,7 +106,8 @@ class StreamMonitor:
 
     def _see_time(self, total: int, time: float) -> None:
         late = self.lateness(total, time)
-        if late <= PROMPT:
+        residual = 0.0 if self._fit is None else self._fit.residual
+        if late <= max(PROMPT, _PROMPT_RESIDUALS * residual):
             self.prompt, self._late_since = total, None
             self.clock.arrived(total - 1, time)
             self._refit(time)

@@ -1,0 +1,91 @@
+"""The box's commands, as the maker's manual has them, byte by byte."""
+
+import pytest
+
+from mocks.daq.instrument import MODELS, Instrument
+from mocks.daq.memory import Fifo
+
+
+def box(model: str = "DI-2108", echoes_start: bool = False) -> Instrument:
+    return Instrument(MODELS[model], "5C8A0711", echoes_start)
+
+
+@pytest.mark.parametrize(
+    ("command", "answer"),
+    [
+        (b"info 0\r", b"info 0 DATAQ\r\0"),
+        (b"info 1\r", b"info 1 2108\r\0"),
+        (b"info 6\r", b"info 6 5C8A0711\r\0"),
+        (b"info 9\r", b"info 9 60000000\r\0"),
+        (b"slist 0 1\r", b"slist 0 1\r\0"),
+        (b"srate 600\r", b"srate 600\r\0"),
+        (b"ps 5\r", b"ps 5\r\0"),
+        (b"led 2\r", b"led 2\r\0"),
+        (b"stop\r", b"stop\r\0"),
+    ],
+)
+def test_a_command_is_answered_by_itself_and_its_value(command: bytes, answer: bytes) -> None:
+    assert box().take(command) == answer
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        b"INFO 0\r",
+        b"srate 374\r",
+        b"srate 65536\r",
+        b"srate\r",
+        b"ps 8\r",
+        b"slist 2 0\r",
+        b"slist 0 11\r",
+        b"x\r",
+    ],
+)
+def test_what_the_box_does_not_know_is_not_answered(command: bytes) -> None:
+    assert box().take(command) == b""
+
+
+def test_a_command_may_come_in_pieces() -> None:
+    instrument = box()
+    assert instrument.take(b"info") == b""
+    assert instrument.take(b" 1\rinf") == b"info 1 2108\r\0"
+    assert instrument.take(b"o 0\r") == b"info 0 DATAQ\r\0"
+
+
+def test_nothing_is_echoed_while_scanning_until_it_stops() -> None:
+    instrument = box()
+    assert instrument.take(b"start 0\r") == b""
+    assert instrument.scanning
+    assert instrument.take(b"info 0\rslist 0 3\r") == b""
+    assert instrument.scan_list == [0]
+    assert instrument.take(b"stop\r") == b"stop\r\0"
+    assert not instrument.scanning
+
+
+def test_some_firmwares_echo_the_start() -> None:
+    assert box(echoes_start=True).take(b"start 0\r") == b"start 0\r\0"
+
+
+def test_an_input_is_in_the_scan_list_once() -> None:
+    instrument = box()
+    instrument.take(b"slist 0 0\rslist 1 1\r")
+    assert instrument.take(b"slist 2 1\r") == b""
+    assert instrument.scan_list == [0, 1]
+    instrument.take(b"slist 0 5\r")
+    assert instrument.scan_list == [5]
+
+
+def test_the_rate_is_the_dividend_over_the_divisor() -> None:
+    instrument = box("DI-1110")
+    instrument.take(b"srate 375\r")
+    assert instrument.aggregate_rate == 160_000.0
+
+
+def test_what_does_not_fit_is_lost_and_counted() -> None:
+    memory = Fifo(10)
+    memory.push(b"0123456")
+    memory.push(b"abcdef")
+    assert (memory.peek(99), memory.lost) == (b"0123456abc", 3)
+    memory.drop(4)
+    memory.push(b"xy")
+    assert memory.peek(8) == b"456abcxy"
