@@ -1,4 +1,4 @@
-"""Refinement by importance sampling: it gives the posterior asked for, whatever the seed, at the usual rate."""
+"""Refinement by importance sampling: the posterior asked for, whatever the seed, at the usual rate."""
 
 from typing import Literal, cast
 
