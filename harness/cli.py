@@ -60,9 +60,16 @@ COMMANDS = {
         "experiments.commands.tables:localization",
         "Localization error over objects, seeds and methods; stops and resumes at will.",
     ),
+    "cost contact-localization": Command(
+        "experiments.commands.cost:contact_localization",
+        "Error against seconds of the estimate; `run --budget` and `run --error` go by it.",
+    ),
 }
 
-GROUPS = {"tables": "The tables a paper would print, measured on the mocked bench."}
+GROUPS = {
+    "tables": "The tables a paper would print, measured on the mocked bench.",
+    "cost": "What accuracy costs in seconds, measured on this machine.",
+}
 
 EPILOG = (
     "Start with `touchstone demo`. Exit codes: 0 answered; 1 a named failure of the bench or the data; "

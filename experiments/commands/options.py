@@ -52,6 +52,23 @@ LevelOption = Annotated[
         "--level", help="Turn one dial, as localization.rounds=1; may be given again.", metavar="D=L"
     ),
 ]
+Budget = Annotated[
+    str | None,
+    typer.Option(
+        "--budget",
+        help="Seconds for the estimate, as 2s or 50ms, from readings to answer: the best levels that "
+        "keep it. Motion, the object's own preparation and the report are not counted.",
+        metavar="TIME",
+    ),
+]
+ErrorWanted = Annotated[
+    str | None,
+    typer.Option(
+        "--error",
+        help="How far off the answer may be in 19 of 20 runs, as 5mm: the cheapest levels that promise it.",
+        metavar="LENGTH",
+    ),
+]
 Json = Annotated[
     bool, typer.Option("--json", help="One JSON object on standard output; the rest on standard error.")
 ]

@@ -47,6 +47,8 @@ def run(
     ] = None,
     yaw: Annotated[Yaw | None, typer.Option(help="Whether the estimator is told the object's yaw.")] = None,
     level: options.LevelOption = None,
+    budget: options.Budget = None,
+    error: options.ErrorWanted = None,
     out: Annotated[
         Path | None, typer.Option(help="The run's folder; a dated one under runs/ if left out.")
     ] = None,
@@ -70,6 +72,7 @@ def run(
 
     assert experiment is Experiment.CONTACT_LOCALIZATION
     accuracy = chosen(level or [])
+    target = _target(budget, error, level)
     if resume is not None:
         _refuse_with_resume(
             station=station,
@@ -89,16 +92,83 @@ def run(
     else:
         wanted = resolve(scene, object_, material, units, wall, contacts, spacing, yaw)
         bench = load_station(station_path(station or "mock"))
+        if target is not None:
+            _foresee(target, wanted)
         begun = session_of.start(wanted, bench, wanted.localization.seed if seed is None else seed, gap, out)
         recording = begun.recording
         _describe(begun)
     complete, health = _perform(recording)
     if not complete:
         return _stopped(recording, json)
+    cost = None
+    if target is not None:
+        with CONSOLE.status("estimating as asked, then at the finest levels"):
+            cost = _answered(recording, target)
+        accuracy = accuracy.with_(cost["levels"])
     with CONSOLE.status("estimating, comparing, drawing the report"):
         result = session_of.finish(recording, accuracy, health)
+    if cost is not None:
+        result = _with_cost(result, cost, recording)
     show(result, json)
     return 0
+
+
+def _target(budget: str | None, error: str | None, level: list[str] | None) -> Any:
+    """What was asked of the estimate; None where nothing was."""
+    if budget is None and error is None:
+        return None
+    from experiments.contact_localization.within import Target
+    from harness.quantities import LENGTH, TIME
+
+    if budget is not None and error is not None:
+        raise WrongUse("--budget and --error each choose the levels; give one of them")
+    if level:
+        raise WrongUse("--budget and --error choose the levels; leave --level out, or choose all with it")
+    option, given, kind = ("--budget", budget, TIME) if budget is not None else ("--error", error, LENGTH)
+    try:
+        value = kind.parse(given)
+    except ValueError as refused:
+        raise WrongUse(f"{option}: {refused}") from None
+    if value <= 0.0:
+        raise WrongUse(f"{option} {given}: it must be above zero")
+    return Target(seconds=value) if budget is not None else Target(error=value)
+
+
+def _foresee(target: Any, scene: Any) -> None:
+    """What will be tried, before anything moves; a budget that cannot be kept ends here."""
+    from experiments.contact_localization.solving import object_key
+    from experiments.contact_localization.within import foresee, front_for
+    from harness.sim.scene_object import known_object
+
+    front = front_for(scene, scene.localization.contacts)
+    name = object_key(scene.object.name, known_object(scene).mesh)
+    CONSOLE.print(foresee(front, target, name), markup=False)
+
+
+def _answered(recording: Any, target: Any) -> dict[str, Any]:
+    """The estimate as it was asked for, timed, and what the finest levels would have said."""
+    from experiments.contact_localization.within import answer_within, front_for
+    from experiments.contact_localization.within_words import as_json, staleness
+    from harness.run_folder import RunFiles
+
+    front = front_for(RunFiles(recording).scene, recording.committed)
+    if not front.trusted:
+        warn(staleness(front))
+    return as_json(answer_within(recording, front, target), front, target, recording)
+
+
+def _with_cost(result: dict[str, Any], cost: dict[str, Any], recording: Any) -> dict[str, Any]:
+    """The result, here and on the disk, with what was asked and what it took; said in two lines."""
+    from json import dumps
+
+    from experiments.contact_localization.within_words import sentences
+    from harness.recording import write_text_whole
+
+    whole = {**result, "cost": cost}
+    write_text_whole(recording.folder / "result.json", dumps(whole, indent=1, allow_nan=False) + "\n")
+    for sentence in sentences(cost):
+        CONSOLE.print(sentence, markup=False)
+    return whole
 
 
 def show(result: dict[str, Any], as_json: bool) -> None:

@@ -3,7 +3,6 @@
 import datetime as dt
 import json
 import os
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,122 +12,26 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.baselines import mean_random_error
-from experiments.contact_localization.dials import KNOBS, levels_of, setting_name
-from experiments.contact_localization.estimate import Estimate, locate
-from experiments.contact_localization.hypotheses import Contact, Noise
-from experiments.contact_localization.levels import Levels
-from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation, contact_of, height_map
+from experiments.contact_localization.dials import setting_name
+from experiments.contact_localization.solving import (
+    ESTIMATOR,
+    PROGRAM,
+    Readings,
+    Setting,
+    object_key,
+    prepare,
+    read,
+    solve,
+)
 from experiments.contact_localization.table_cell import Cell, PerformedRun, believed, perform_cell, scene_of
-from harness.accuracy import Accuracy, Level
-from harness.arrays import FloatArray
 from harness.cost import Curve, Point, Sample
 from harness.cost_file import sample_from, sample_json
 from harness.cost_provenance import code, machine
-from harness.errors import FitRefused, TouchstoneError
-from harness.mesh import Mesh
+from harness.errors import TouchstoneError
 from harness.recording import write_text_whole
 from harness.scene import SceneFile
 from harness.sim.scene_object import known_object
 from harness.station_file import Station
-from harness.store import digest
-
-PROGRAM = "contact-localization"
-ESTIMATOR = "experiments.contact_localization.estimate"
-"""The module whose sources, with all they import, decide whether a curve still holds."""
-
-Setting = Mapping[str, Level]
-
-
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """A run's readings, brought as far as every setting shares: the height maps of its images.
-
-    Attributes:
-        observations: of the contacts.
-        heights: a height map for each.
-        model: the object and the sensor.
-        prior: of its orientation.
-        seed: of the draws.
-        shared: s of CPU time and on the clock that the height maps took.
-    """
-
-    observations: tuple[Observation, ...]
-    heights: tuple[FloatArray, ...]
-    model: Model
-    prior: Prior
-    seed: int
-    shared: tuple[float, float]
-
-    def first(self, count: int) -> "Readings":
-        """Those of the first contacts alone."""
-        share = count / len(self.observations)
-        return replace(
-            self,
-            observations=self.observations[:count],
-            heights=self.heights[:count],
-            shared=(share * self.shared[0], share * self.shared[1]),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """An answer and what it took beyond what is shared.
-
-    Attributes:
-        estimate: None where the fit was refused.
-        cpu: s of CPU time.
-        wall: s on the clock.
-        refusal: why, where it was refused.
-    """
-
-    estimate: Estimate | None
-    cpu: float
-    wall: float
-    refusal: str | None = None
-
-
-def read(observations: Sequence[Observation], model: Model, prior: Prior, seed: int) -> Readings:
-    """Do, and time, what all settings share."""
-    cpu, wall = time.process_time(), time.perf_counter()
-    heights = tuple(height_map(observation, model) for observation in observations)
-    taken = time.process_time() - cpu, time.perf_counter() - wall
-    return Readings(tuple(observations), heights, model, prior, seed, taken)
-
-
-def prepare(model: Model, setting: Setting) -> None:
-    """Make what depends on the object alone, before any reading is needed: its samples."""
-    _ = model.surface(_levels(setting).spacing).tree
-
-
-def solve(readings: Readings, setting: Setting) -> Solved:
-    """Answer at one setting, timed; call ``prepare`` before."""
-    levels, noise = _levels(setting), Noise()
-    cpu, wall = time.process_time(), time.perf_counter()
-    estimate, refusal = None, None
-    try:
-        contacts = _contacts(readings, levels, noise)
-        estimate = locate(contacts, readings.model, readings.prior, levels, noise, seed=readings.seed)[-1]
-    except FitRefused as error:
-        refusal = str(error)
-    return Solved(estimate, time.process_time() - cpu, time.perf_counter() - wall, refusal)
-
-
-def _levels(setting: Setting) -> Levels:
-    return levels_of(Accuracy.default(KNOBS).with_(setting))
-
-
-def _contacts(readings: Readings, levels: Levels, noise: Noise) -> list[Contact]:
-    pitch = readings.model.sensor.pitch
-    return [
-        contact_of(observation.base_from_gel, heights, pitch, levels.block, noise.touch)
-        for observation, heights in zip(readings.observations, readings.heights, strict=True)
-    ]
-
-
-def object_key(name: str, mesh: Mesh) -> str:
-    """A name that two different objects do not share."""
-    return f"{name}-{digest([mesh.vertices, mesh.faces])[:8]}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,115 @@
+"""One recorded run, answered at any setting of the dials, with the seconds each answer takes."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from experiments.contact_localization.dials import KNOBS, levels_of
+from experiments.contact_localization.estimate import Estimate, locate
+from experiments.contact_localization.hypotheses import Contact, Noise
+from experiments.contact_localization.levels import Levels
+from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.observation import Observation, contact_of, height_map
+from harness.accuracy import Accuracy, Level
+from harness.arrays import FloatArray
+from harness.errors import FitRefused
+from harness.mesh import Mesh
+from harness.store import digest
+
+PROGRAM = "contact-localization"
+ESTIMATOR = "experiments.contact_localization.estimate"
+"""The module whose sources, with all they import, decide whether a curve still holds."""
+
+Setting = Mapping[str, Level]
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """A run's readings, brought as far as every setting shares: the height maps of its images.
+
+    Attributes:
+        observations: of the contacts.
+        heights: a height map for each.
+        model: the object and the sensor.
+        prior: of its orientation.
+        seed: of the draws.
+        shared: s of CPU time and on the clock that the height maps took.
+    """
+
+    observations: tuple[Observation, ...]
+    heights: tuple[FloatArray, ...]
+    model: Model
+    prior: Prior
+    seed: int
+    shared: tuple[float, float]
+
+    def first(self, count: int) -> "Readings":
+        """Those of the first contacts alone."""
+        share = count / len(self.observations)
+        return replace(
+            self,
+            observations=self.observations[:count],
+            heights=self.heights[:count],
+            shared=(share * self.shared[0], share * self.shared[1]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """An answer and what it took beyond what is shared.
+
+    Attributes:
+        estimate: None where the fit was refused.
+        cpu: s of CPU time.
+        wall: s on the clock.
+        refusal: why, where it was refused.
+    """
+
+    estimate: Estimate | None
+    cpu: float
+    wall: float
+    refusal: str | None = None
+
+
+def read(observations: Sequence[Observation], model: Model, prior: Prior, seed: int) -> Readings:
+    """Do, and time, what all settings share."""
+    cpu, wall = time.process_time(), time.perf_counter()
+    heights = tuple(height_map(observation, model) for observation in observations)
+    taken = time.process_time() - cpu, time.perf_counter() - wall
+    return Readings(tuple(observations), heights, model, prior, seed, taken)
+
+
+def prepare(model: Model, setting: Setting) -> None:
+    """Make what depends on the object alone, before any reading is needed: its samples."""
+    _ = model.surface(levels_at(setting).spacing).tree
+
+
+def solve(readings: Readings, setting: Setting) -> Solved:
+    """Answer at one setting, timed; call ``prepare`` before."""
+    levels, noise = levels_at(setting), Noise()
+    cpu, wall = time.process_time(), time.perf_counter()
+    estimate, refusal = None, None
+    try:
+        contacts = _contacts(readings, levels, noise)
+        estimate = locate(contacts, readings.model, readings.prior, levels, noise, seed=readings.seed)[-1]
+    except FitRefused as error:
+        refusal = str(error)
+    return Solved(estimate, time.process_time() - cpu, time.perf_counter() - wall, refusal)
+
+
+def levels_at(setting: Setting) -> Levels:
+    """What the estimator takes at a setting; what it leaves open is at its default."""
+    return levels_of(Accuracy.default(KNOBS).with_(setting))
+
+
+def _contacts(readings: Readings, levels: Levels, noise: Noise) -> list[Contact]:
+    pitch = readings.model.sensor.pitch
+    return [
+        contact_of(observation.base_from_gel, heights, pitch, levels.block, noise.touch)
+        for observation, heights in zip(readings.observations, readings.heights, strict=True)
+    ]
+
+
+def object_key(name: str, mesh: Mesh) -> str:
+    """A name that two different objects do not share."""
+    return f"{name}-{digest([mesh.vertices, mesh.faces])[:8]}"

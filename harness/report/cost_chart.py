@@ -1,0 +1,134 @@
+"""Error against seconds of every setting, the front marked; and error against the number of contacts."""
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from harness.cost import Point, front
+from harness.report.style import SOFT, blank, styled
+
+_COLOURS = ("#1b3fae", "#c2410c", "#0f766e", "#8a2d79", "#9d6b00")
+_DOMINATED = 0.45
+
+
+def cost_chart(points: Sequence[Point], family: str, title: str, stale: bool) -> Figure:
+    """Every setting with its 90 % intervals; dominated ones pale, the front joined and numbered.
+
+    Args:
+        points: of one condition, at least one.
+        family: the dial whose levels get a colour each.
+        title: over the drawing.
+        stale: whether the curve no longer holds; written across it.
+    """
+    best = front(points)
+    with styled():
+        figure = blank(8.2, 4.9)
+        figure.set_layout_engine("constrained")
+        axes = figure.add_subplot()
+        for number, name in enumerate(dict.fromkeys(str(p.levels[family]) for p in points)):
+            mine = [point for point in points if str(point.levels[family]) == name]
+            _marks(
+                axes,
+                [p for p in mine if p not in best],
+                _COLOURS[number % 5],
+                f"{name}, dominated",
+                pale=True,
+            )
+            _marks(
+                axes,
+                [p for p in mine if p in best],
+                _COLOURS[number % 5],
+                f"{name}, on the front",
+                pale=False,
+            )
+        axes.plot(
+            [p.seconds.value for p in best], [1e3 * p.error.value for p in best], color=SOFT, lw=1.0, zorder=1
+        )
+        for number, point in enumerate(best, start=1):
+            at = (point.seconds.value, 1e3 * point.error.value)
+            axes.annotate(str(number), at, (6, 6), textcoords="offset points", fontsize=9, fontweight="bold")
+        if stale:
+            axes.text(
+                0.5, 0.5, "STALE", transform=axes.transAxes, fontsize=64, color="#c2410c", alpha=0.16,
+                ha="center", va="center", rotation=18, fontweight="bold",
+            )  # fmt: skip
+        axes.set_title(title, fontsize=11)
+        axes.set_xlabel("seconds of CPU time, from readings to answer (geometric mean, 90 % interval)")
+        axes.set_ylabel("error in mm (geometric mean, 90 % interval)")
+        _logarithmic(axes)
+        axes.legend(frameon=False, fontsize=9)
+    return figure
+
+
+def contacts_chart(curves: Sequence[tuple[str, Sequence[tuple[int, Point]]]]) -> Figure:
+    """Error and seconds of some settings against the number of contacts.
+
+    Args:
+        curves: by name of the setting: the number of contacts and the point measured with them.
+    """
+    with styled():
+        figure = blank(8.2, 3.6)
+        figure.set_layout_engine("constrained")
+        left, right = figure.subplots(1, 2)
+        for number, (name, points) in enumerate(curves):
+            colour, counts = _COLOURS[number % 5], [count for count, _ in points]
+            for axes, values, scale in (
+                (left, [p.error for _, p in points], 1e3),
+                (right, [p.seconds for _, p in points], 1.0),
+            ):
+                middle = [scale * v.value for v in values]
+                below = [scale * (v.value - v.low) for v in values]
+                above = [scale * (v.high - v.value) for v in values]
+                axes.errorbar(
+                    counts, middle, yerr=(below, above), marker="o", color=colour, capsize=2, label=name
+                )
+        for axes, said in ((left, "error in mm"), (right, "seconds of CPU time")):
+            axes.set_yscale("log")
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axes.yaxis.set_minor_formatter(NullFormatter())
+            axes.set_xticks(sorted({count for _, points in curves for count, _ in points}))
+            axes.set_xlabel("contacts")
+            axes.set_ylabel(said)
+            axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)
+        left.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def _marks(axes: Axes, points: Sequence[Point], colour: str, label: str, pale: bool) -> None:
+    if not points:
+        return
+    x, y = [p.seconds.value for p in points], [1e3 * p.error.value for p in points]
+    axes.errorbar(
+        x,
+        y,
+        xerr=(
+            [p.seconds.value - p.seconds.low for p in points],
+            [p.seconds.high - p.seconds.value for p in points],
+        ),
+        yerr=(
+            [1e3 * (p.error.value - p.error.low) for p in points],
+            [1e3 * (p.error.high - p.error.value) for p in points],
+        ),
+        fmt="o",
+        ms=4 if pale else 8,
+        mfc="white" if pale else colour,
+        color=colour,
+        alpha=_DOMINATED if pale else 1.0,
+        elinewidth=0.7,
+        label=label,
+        zorder=2 if pale else 3,
+    )
+
+
+def _logarithmic(axes: Axes) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+    axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)
+    axes.set_axisbelow(True)
