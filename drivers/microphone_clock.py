@@ -87,8 +87,8 @@ def _line(x: FloatArray, y: FloatArray, weights: FloatArray, noise: float) -> tu
     return float(mean_y - slope * mean_x), slope
 
 
-def largest_step(indices: FloatArray, times: FloatArray, nominal_rate: float, settle: int) -> float:
-    """How far the samples' numbers and the clock have come apart, in s, at the worst place.
+def steps(indices: FloatArray, times: FloatArray, nominal_rate: float, settle: int) -> FloatArray:
+    """How far the samples' numbers and the clock come apart, in s, place by place.
 
     Samples lost without a word make every later block late; samples made up make every later
     block early. One late block does neither. The earliest of the ``settle`` blocks before a
@@ -102,12 +102,11 @@ def largest_step(indices: FloatArray, times: FloatArray, nominal_rate: float, se
         settle: blocks on either side of a place, above zero.
 
     Returns:
-        Positive where samples are missing, negative where there are too many, 0 where fewer than
-        ``2 settle`` blocks are given.
+        ``(n + 1 - 2 settle,)``, the k-th for the place before block ``k + settle``: positive
+        where samples are missing, negative where there are too many. Empty for fewer blocks.
     """
     if len(indices) < 2 * settle:
-        return 0.0
+        return np.zeros(0)
     lateness = times - times[0] - (indices - indices[0]) / nominal_rate
     earliest = np.lib.stride_tricks.sliding_window_view(lateness, settle).min(axis=1)
-    steps = earliest[settle:] - earliest[:-settle]
-    return float(steps[np.argmax(np.abs(steps))])
+    return np.asarray(earliest[settle:] - earliest[:-settle], np.float64)

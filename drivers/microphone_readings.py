@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivers.microphone_blocks import Block, Format
-from drivers.microphone_clock import SampleClock, fit_clock, largest_step
-from harness.arrays import AnyArray, FloatArray
+from drivers.microphone_clock import SampleClock, fit_clock, steps
+from harness.arrays import AnyArray, BoolArray, FloatArray
 from harness.microphone_take import BAD, CALLBACK, CLOCK, COUNT_BROKEN, FLAGS, OVERLOAD, PRESSURE
 from harness.reading import Channel, Reading
 
@@ -41,31 +41,45 @@ def clock_of(blocks: Sequence[Block], form: Format) -> SampleClock:
     return fit_clock(firsts(blocks), starts(blocks, form), form.rate)
 
 
-def since_last_gap(blocks: Sequence[Block], first: int, form: Format) -> list[Block]:
-    """Those after the last bad block that ends before sample number ``first``: one unbroken count."""
-    broken = [
-        number
-        for number, block in enumerate(blocks)
-        if block.flags & BAD and block.first + form.block <= first
-    ]
-    return list(blocks[broken[-1] + 1 if broken else 0 :])
-
-
 def firsts(blocks: Sequence[Block]) -> FloatArray:
     """``(n,)`` number of each block's first sample."""
     return np.array([block.first for block in blocks], np.float64)
 
 
-def count_is_broken(blocks: Sequence[Block], form: Format) -> bool:
-    """Whether samples are missing or made up somewhere in these blocks, by the clock alone.
+def places_of_doubt(blocks: Sequence[Block], form: Format) -> BoolArray:
+    """``(n,)`` whether samples may be missing or made up near a block, by the clock alone.
 
     A step is one of at least a quarter of a block and `_SMALLEST_STEP`; shorter losses are
-    below what hand-over times can show.
+    below what hand-over times can show, as are those within `SETTLE` of either end. A step is
+    seen from all of the twice `SETTLE` that show it, so up to 0.4 s about it are in doubt.
     """
-    limit = max(_SMALLEST_STEP, 0.25 * form.block / form.rate)
     settle = int(np.ceil(SETTLE * form.rate / form.block))
-    step = largest_step(firsts(blocks), starts(blocks, form), form.rate, settle)
-    return abs(step) > limit
+    limit = max(_SMALLEST_STEP, 0.25 * form.block / form.rate)
+    found = np.abs(steps(firsts(blocks), starts(blocks, form), form.rate, settle)) > limit
+    doubtful = np.zeros(len(blocks), np.bool_)
+    for place in np.flatnonzero(found):
+        doubtful[place + 1 : place + 2 * settle] = True
+    return doubtful
+
+
+def _unbroken(blocks: Sequence[Block], doubtful: BoolArray, first: int, form: Format) -> Sequence[Block]:
+    """Those after the last gap that ends before sample number ``first``; a clock fits to no others."""
+    bad = np.array([bool(block.flags & BAD) for block in blocks])
+    before = np.array([block.first + form.block <= first for block in blocks])
+    gaps = np.flatnonzero((doubtful | bad) & before)
+    return blocks[gaps[-1] + 1 :] if len(gaps) else blocks
+
+
+def usual_rate(blocks: Sequence[Block], form: Format) -> float:
+    """Samples a bench-clock second, the median over spans of 0.2 s: single losses do not change it.
+
+    The nominal rate where fewer than five such spans are given.
+    """
+    span = int(np.ceil(SETTLE * form.rate / form.block))
+    if len(blocks) < 5 * span:
+        return float(form.rate)
+    number, time = firsts(blocks), starts(blocks, form)
+    return float(np.median((number[span:] - number[:-span]) / (time[span:] - time[:-span])))
 
 
 def overloaded(counts: AnyArray, form: Format) -> bool:
@@ -81,13 +95,14 @@ def overloaded(counts: AnyArray, form: Format) -> bool:
 
 
 def readings(
-    take: Sequence[Block], heard: Sequence[Block], form: Format, flags: int = 0
+    blocks: Sequence[Block], first: int, end: int, form: Format, flags: int = 0
 ) -> tuple[Reading, ...]:
     """What was recorded, and what is known of it.
 
     Args:
-        take: the blocks of the recording, consecutive, at least one.
-        heard: blocks for the clock: those of the take and others of the same stream.
+        blocks: consecutive; those of the take, some that came before it and `SETTLE` s after it.
+        first: number of the take's first sample.
+        end: number of the sample after its last.
         form: of their bytes.
         flags: raised for every block of the take.
 
@@ -98,10 +113,13 @@ def readings(
         ``microphone.clock`` ``(1, 4)``, number of a sample, its bench time in s, samples a
         second, residual in s. All but the last have the fitted times of the blocks' first samples.
     """
-    clock = clock_of(heard, form)
+    doubtful = places_of_doubt(blocks, form)
+    inside = [block.first < end and block.first + form.block > first for block in blocks]
+    take = [block for block, is_inside in zip(blocks, inside, strict=True) if is_inside]
+    clock = clock_of(_unbroken(blocks, doubtful, first, form), form)
     times = clock.times(firsts(take))
     counts = np.stack([form.counts(block.counts) for block in take])
-    flags |= COUNT_BROKEN if count_is_broken(heard, form) else 0
+    flags |= COUNT_BROKEN if np.any(doubtful[inside]) else 0
     flags |= OVERLOAD if overloaded(counts.ravel(), form) else 0
     raised = np.array([block.flags | flags for block in take])
     callback = np.array([(block.arrived, block.age) for block in take])

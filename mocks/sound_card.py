@@ -39,6 +39,7 @@ _START_TIMEOUT = 15.0
 _END_TIMEOUT = 2.0
 _LOOK_PERIOD = 0.05
 _PR_SET_PDEATHSIG = 1
+_PUNCTUAL = -10
 _LIBC = ctypes.CDLL(None)
 
 
@@ -63,7 +64,7 @@ class SoundCard:
     Args:
         rate: samples a second.
         channels: 1 or 2.
-        quantum: samples that PipeWire hands over at a time.
+        quantum: samples that PipeWire hands over at a time; a busy computer is late for small ones.
 
     Attributes:
         microphone: its name among PortAudio's devices.
@@ -72,7 +73,7 @@ class SoundCard:
 
     microphone = MICROPHONE
 
-    def __init__(self, rate: int = 48000, channels: int = 1, quantum: int = 512) -> None:
+    def __init__(self, rate: int = 48000, channels: int = 1, quantum: int = 2048) -> None:
         if channels not in (1, 2):
             raise ValueError(f"a mocked sound card has 1 or 2 channels, not {channels}")
         self.rate = rate
@@ -231,5 +232,7 @@ def _policy_only() -> tuple[str, str]:
 
 
 def _die_with_parent() -> None:
-    """In the child: ask Linux for an end when the parent ends."""
+    """In the child: ask Linux for an end when the parent ends, and to be served before others."""
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, _PUNCTUAL)

@@ -33,7 +33,7 @@ def library(monkeypatch: pytest.MonkeyPatch) -> FakePortAudio:
     library = FakePortAudio()
     monkeypatch.setitem(sys.modules, "sounddevice", library)
     monkeypatch.setattr(drivers.microphone, "now", lambda: library.time)
-    monkeypatch.setattr(drivers.microphone, "STALL", 0.2)
+    monkeypatch.setattr(drivers.microphone, "STALL", 2.0)  # this computer may be busy
     return library
 
 
@@ -57,10 +57,17 @@ def ramp(first: int = 0) -> AnyArray:
     return np.arange(first, first + BLOCK, dtype=np.int32)
 
 
+def settle(stream: FakeStream, age: float | None = None) -> None:
+    """The blocks after a take that show whether its count is whole."""
+    for _ in range(25):
+        stream.deliver(age=age)
+
+
 def delivering(stream: FakeStream, *blocks: AnyArray | None) -> Callable[[], None]:
     def run() -> None:
         for block in blocks:
             stream.deliver(block)
+        settle(stream)
 
     return run
 
@@ -71,6 +78,7 @@ def deliver_soon(stream: FakeStream, blocks: int, every: float = 0.0) -> threadi
         for _ in range(blocks):
             stream.deliver()
             time.sleep(every)
+        settle(stream)
 
     thread = threading.Thread(target=run)
     thread.start()
@@ -118,10 +126,11 @@ def test_an_xrun_marks_the_take(
         stream.deliver(status=status, elapsed=0.05)
         for _ in range(4):
             stream.deliver()
+        settle(stream)
 
     take = microphone.capture(fire, 0.0, 0.05, 1.0)
     assert flags_of(take) & flag
-    assert list(np.flatnonzero(take[1].values)) == [1]
+    assert list(np.flatnonzero(take[1].values & flag)) == [1]
     assert microphone.health().drops == 1
 
 
@@ -146,6 +155,7 @@ def test_samples_lost_without_a_word_are_noticed(microphone: PortAudioMicrophone
         stream.deliver(elapsed=0.02)  # one block has gone nowhere
         for _ in range(40):
             stream.deliver()
+        settle(stream)
 
     assert flags_of(microphone.capture(fire, 0.1, 0.4, 1.0)) == COUNT_BROKEN
 
@@ -156,6 +166,7 @@ def test_one_late_callback_is_no_fault(microphone: PortAudioMicrophone, stream: 
         stream.deliver(late=0.1, age=0.01)  # PortAudio does not know of the lateness
         for _ in range(40):
             stream.deliver()
+        settle(stream)
 
     take = microphone.capture(fire, 0.1, 0.4, 1.0)
     assert flags_of(take) == 0
@@ -171,6 +182,7 @@ def test_a_back_end_without_times_is_read_by_arrival(
         stream.deliver(ramp(2000), age=0.0)
         for _ in range(20):
             stream.deliver(age=0.0)
+        settle(stream, age=0.0)
 
     take = microphone.capture(fire, 0.0, 0.2, 1.0)
     assert take[0].times[0] == pytest.approx(began, abs=1e-6)
@@ -180,7 +192,7 @@ def test_a_back_end_without_times_is_read_by_arrival(
 
 
 def test_no_sound_is_flagged_not_raised(microphone: PortAudioMicrophone, stream: FakeStream) -> None:
-    thread = deliver_soon(stream, 8, every=0.05)
+    thread = deliver_soon(stream, 12, every=0.05)
     take = microphone.capture(lambda: None, 0.1, 0.1, 0.2)
     thread.join()
     assert flags_of(take) == UNTRIGGERED
@@ -191,7 +203,7 @@ def test_a_sound_before_the_call_is_no_trigger(microphone: PortAudioMicrophone, 
     stream.deliver(ramp(5000))
     for _ in range(30):
         stream.deliver()
-    thread = deliver_soon(stream, 8, every=0.05)
+    thread = deliver_soon(stream, 12, every=0.05)
     take = microphone.capture(lambda: None, 0.1, 0.1, 0.2)
     thread.join()
     assert flags_of(take) & UNTRIGGERED
@@ -206,7 +218,7 @@ def test_a_constant_offset_does_not_trigger(microphone: PortAudioMicrophone, str
         for _ in range(3):
             stream.deliver(offset)
         stream.deliver(offset - ramp(600) * 2)
-        stream.deliver(offset)
+        settle(stream)
 
     take = microphone.capture(fire, 0.01, 0.01, 1.0)
     assert flags_of(take) == 0
@@ -220,7 +232,10 @@ def test_an_overloaded_converter_is_flagged(microphone: PortAudioMicrophone, str
     assert flags_of(take) == OVERLOAD
 
 
-def test_a_device_that_falls_silent_is_named(microphone: PortAudioMicrophone, stream: FakeStream) -> None:
+def test_a_device_that_falls_silent_is_named(
+    monkeypatch: pytest.MonkeyPatch, microphone: PortAudioMicrophone, stream: FakeStream
+) -> None:
+    monkeypatch.setattr(drivers.microphone, "STALL", 0.2)
     with pytest.raises(BenchFault, match=r"hw:2,0.*has sent nothing for 0.2 s.*check its cable"):
         microphone.record(0.1)
     with pytest.raises(BenchFault, match="device is gone"):

@@ -1,19 +1,22 @@
 """Laws of the fitted clock, of lost samples and of how counts are read."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.microphone_blocks import Block, Blocks, Format
-from drivers.microphone_clock import fit_clock, largest_step
-from drivers.microphone_readings import count_is_broken, overloaded
+from drivers.microphone_clock import fit_clock, steps
+from drivers.microphone_readings import overloaded, places_of_doubt, readings, usual_rate
 from harness.arrays import FloatArray
 from harness.errors import DataRefused
-from harness.microphone_take import BAD, words
+from harness.microphone_take import BAD, COUNT_BROKEN, flags_of, words
 
 RATE, BLOCK = 48000.0, 512
 FORM = Format(48000, 24, 1, 0, BLOCK)
+SETTLED = 19  # blocks in the 0.2 s that a step needs on either side
 drifts = st.floats(-100e-6, 100e-6)
 starts = st.floats(0.0, 1e6)
 seeds = st.integers(0, 2**32 - 1)
@@ -76,15 +79,17 @@ def test_a_step_is_what_was_lost_or_made_up(place: int, lost: int, seed: int, dr
     indices = blocks(100)
     taken = indices + np.where(np.arange(100) >= place, lost, 0)
     times = taken / (RATE * (1.0 + drift)) + 1e-4 * np.random.default_rng(seed).random(100)
-    step = largest_step(indices, times, RATE, 20)
-    assert step == pytest.approx(lost / RATE, abs=2.5e-4)
+    found = steps(indices, times, RATE, 20)
+    assert found[place - 20] == pytest.approx(lost / RATE, abs=2.5e-4)
+    assert np.abs(found).max() == pytest.approx(abs(lost) / RATE, abs=2.5e-4)
 
 
 @given(st.integers(0, 99), st.floats(0.0, 1.0))
 def test_one_late_block_is_no_step(place: int, late: float) -> None:
     times = blocks(100) / RATE
     times[place] += late
-    assert largest_step(blocks(100), times, RATE, 20) == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(steps(blocks(100), times, RATE, 20)).max() < 1e-9
+    assert len(steps(blocks(39), times[:39], RATE, 20)) == 0
 
 
 def heard(samples_before: dict[int, int]) -> list[Block]:
@@ -99,12 +104,31 @@ def heard(samples_before: dict[int, int]) -> list[Block]:
 
 @given(st.integers(25, 115), st.integers(128, 4096), st.sampled_from([-1, 1]))
 def test_a_quarter_of_a_block_lost_or_made_up_is_noticed(place: int, samples: int, sign: int) -> None:
-    assert count_is_broken(heard({place: sign * (samples + 1)}), FORM)
+    assert places_of_doubt(heard({place: sign * (samples + 1)}), FORM)[place]
 
 
 @given(st.integers(25, 115), st.integers(0, 90))
 def test_an_unbroken_count_is_left_alone(place: int, samples: int) -> None:
-    assert not count_is_broken(heard({place: samples}), FORM)
+    assert not np.any(places_of_doubt(heard({place: samples}), FORM))
+
+
+def test_the_usual_rate_is_not_changed_by_a_loss_but_by_another_rate() -> None:
+    assert usual_rate(heard({70: 4000}), FORM) == pytest.approx(RATE, rel=1e-9)
+    other = [replace(block, arrived=block.arrived * 48000 / 44100) for block in heard({})]
+    assert usual_rate(other, FORM) == pytest.approx(44100, rel=1e-3)
+
+
+@given(st.integers(25, 75), st.integers(-18, 36))
+def test_a_take_about_a_gap_is_bad_and_one_well_after_it_has_a_clock_of_its_own(gap: int, begin: int) -> None:
+    told = [replace(block, counts=bytes(3 * BLOCK)) for block in heard({gap: 2000})]
+    first = gap + begin
+    near = readings(told, first * BLOCK, (first + 3) * BLOCK, FORM)
+    assert flags_of(near) == COUNT_BROKEN
+    first = gap + 2 * SETTLED + 1
+    after = readings(told, first * BLOCK, (first + 3) * BLOCK, FORM)
+    assert flags_of(after) == 0
+    true = told[first].arrived - told[first].age
+    assert after[0].times[0] == pytest.approx(true, abs=1e-6)
 
 
 @given(st.lists(st.integers(-(2**23), 2**23 - 1), min_size=1, max_size=64))
