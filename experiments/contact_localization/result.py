@@ -117,12 +117,17 @@ def flags_of(gate: Gate) -> list[str]:
     return said
 
 
+def fit_of(gate: Gate) -> float | None:
+    """Nats; None where there is no image or, as JSON has no infinity, where the contact fits nowhere near."""
+    return gate.fit if gate.fit is not None and np.isfinite(gate.fit) else None
+
+
 def _contact(index: int, point: FloatArray, gate: Gate, error: float | None) -> dict[str, Any]:
     return {
         "contact": index + 1,
         "position_m": point.tolist(),
         "error_m": error,
-        "fit_nats": gate.fit,
+        "fit_nats": fit_of(gate),
         "flags": flags_of(gate),
     }
 

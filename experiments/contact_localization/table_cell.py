@@ -21,6 +21,7 @@ from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.planning import plan_run, way_between
+from experiments.contact_localization.result import fit_of
 from harness.arrays import FloatArray
 from harness.clock import now
 from harness.errors import FitRefused
@@ -173,7 +174,7 @@ def _sureness(found: Estimate, true: FloatArray) -> dict[str, Any]:
         "credible90_m": found.credible90,
         "modes": len(found.modes),
         "error_top10_m": float(np.linalg.norm(found.candidates - true, axis=1).mean()),
-        "fits_nats": [gate.fit for gate in found.gates],
+        "fits_nats": [fit_of(gate) for gate in found.gates],
     }
 
 

@@ -93,7 +93,7 @@ def test_a_contact_that_fits_nowhere_is_counted_and_not_passed_on_as_no_number(s
 
 def test_the_refusal_names_the_worst_contact_as_an_operator_counts(six: Search) -> None:
     members = np.array([0, 2, 3, 5])
-    with pytest.raises(FitRefused, match="the worst is contact 4 with -90.0"):
+    with pytest.raises(FitRefused, match=r"the worst is contact 4 with -90\.0"):
         refuse_bad_fit(six, members, np.array([BAD, BAD, -90.0, BAD]))
 
 
@@ -103,7 +103,7 @@ def test_a_run_without_a_touch_is_refused_with_what_to_do(six: Search) -> None:
 
 
 def test_a_press_repeated_is_one_witness(block: Model, prior: Prior) -> None:
-    """Three presses at one bad place among four good ones are one of five; three places are three of seven."""
+    """Three bad presses at one place among four good ones are one of five; apart they are three of seven."""
     apart = 0.02 * np.arange(21.0).reshape(7, 3)
     together = apart.copy()
     together[5:] = together[4]
