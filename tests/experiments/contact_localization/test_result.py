@@ -1,4 +1,4 @@
-"""What is written of an answer: JSON whatever the contacts did, scores only against a truth, flags in words."""
+"""What is written of an answer: JSON whatever the contacts did, scores only against a truth."""
 
 import json
 from dataclasses import replace

@@ -1,0 +1,54 @@
+"""The estimator's dials: what an operator may choose, and that the choice is what is run."""
+
+from dataclasses import fields
+
+import pytest
+
+from experiments.contact_localization.dials import KNOBS, chosen, levels_of
+from experiments.contact_localization.levels import Levels
+from harness.accuracy import Accuracy, Knob
+from harness.errors import WrongUse
+
+OURS = [knob for knob in KNOBS if knob.name.startswith("localization.")]
+
+
+def test_choosing_nothing_is_the_estimators_own_default() -> None:
+    assert levels_of(chosen([])) == Levels()
+
+
+def test_every_field_of_the_levels_has_its_dial() -> None:
+    assert {knob.name.removeprefix("localization.") for knob in OURS} == {f.name for f in fields(Levels)}
+
+
+@pytest.mark.parametrize("knob", OURS, ids=lambda knob: knob.name)
+def test_turning_one_dial_changes_that_level_and_no_other(knob: Knob) -> None:
+    name = knob.name.removeprefix("localization.")
+    for level in knob.levels:
+        found = levels_of(chosen([f"{knob.name}={level}"]))
+        before = Levels()
+        for field in fields(Levels):
+            value = vars(found)[field.name]
+            assert value == (level if field.name == name else vars(before)[field.name])
+            assert type(value) is type(vars(before)[field.name])
+
+
+def test_dials_go_from_cheap_to_exact() -> None:
+    coarse, fine = levels_of(Accuracy.coarsest(KNOBS)), levels_of(Accuracy.finest(KNOBS))
+    assert coarse.spacing > fine.spacing
+    assert coarse.particles < fine.particles
+    assert coarse.samples < fine.samples
+    assert coarse.rounds < fine.rounds
+    assert coarse.block > fine.block
+
+
+@pytest.mark.parametrize(
+    "text", ["localization.spacin=0.002", "localization.spacing=0.0021", "localization.spacing"]
+)
+def test_a_mistyped_choice_is_refused(text: str) -> None:
+    with pytest.raises(WrongUse):
+        chosen([text])
+
+
+def test_names_are_unique() -> None:
+    names = [knob.name for knob in KNOBS]
+    assert len(names) == len(set(names))
