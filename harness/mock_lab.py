@@ -41,11 +41,13 @@ class LabAddresses:
         arm: address of the controller.
         gel: URL of the stream.
         camera: URL of the stream, None without.
+        hammer: path of its box's serial port, None where the scene asks for no sound.
     """
 
     arm: str
     gel: str
     camera: str | None
+    hammer: str | None
 
 
 class MockLab:
@@ -202,7 +204,7 @@ class MockLab:
 def _addresses(ready: Mapping[str, Any]) -> LabAddresses:
     if ready.get("ready") is not True:
         raise BenchFault(f"the mocked lab did not start: {ready.get('error', ready)}")
-    return LabAddresses(ready["arm"], ready["gel"], ready["camera"])
+    return LabAddresses(ready["arm"], ready["gel"], ready["camera"], ready["hammer"])
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -14,12 +14,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol
 
-import numpy as np
-
-from harness.device import Arm, TactileCamera
-from harness.errors import BenchFault, SafetyStop, TouchstoneError
+from harness.device import Arm, ImpactHammer, TactileCamera
+from harness.errors import BenchFault, SafetyStop, TouchstoneError, WrongUse
 from harness.gap import gap_path
-from harness.geometry import apply
 from harness.mesh import Mesh
 from harness.mock_lab import LabAddresses, MockLab
 from harness.scene import SceneFile
@@ -29,6 +26,7 @@ INSTRUMENTS = {
     "ur": "drivers.ur_arm:UrArm",
     "gelsight-http": "drivers.gelsight:GelSight",
     "camera-http": "drivers.camera:SceneCamera",
+    "dataq": "drivers.hammer:DataqHammer",
 }
 """Instrument kind to driver."""
 
@@ -36,6 +34,10 @@ LIMITS = {"ur": "drivers.safety:SafetyLimits"}
 """Arm kind to the form in which its driver takes the station's limits."""
 
 _LOG = logging.getLogger(__name__)
+
+
+PRESS, STRIKE = 0, 1
+"""The samples of a contact: the gel pressed on the object, the hammer fired before it."""
 
 
 class Mark(Protocol):
@@ -57,6 +59,7 @@ class Bench:
         arm: that moves.
         gel: on its flange.
         camera: that looks on; None without.
+        hammer: that strikes, with the microphone that hears it; None where the scene asks for no sound.
         station: they belong to.
         mark: see ``Mark``.
         pause: waits for so many seconds of the bench's own time.
@@ -67,6 +70,7 @@ class Bench:
     gel: TactileCamera
     camera: TactileCamera | None
     station: Station
+    hammer: ImpactHammer | None = None
     mark: Mark = _ignore_mark
     pause: Callable[[float], None] = time.sleep
     lab: MockLab | None = None
@@ -114,10 +118,11 @@ def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterato
         arm = make_arm(where)
         gel = make_gel(where)
         camera = make_camera(where) if scene.sensors.camera else None
-        _open_all(stack, {"arm": arm, "gel": gel, "camera": camera})
+        hammer = make_hammer(where) if scene.sensors.sound else None
+        _open_all(stack, {"arm": arm, "gel": gel, "camera": camera, "hammer": hammer})
         stack.push(_Closing("arm, stopping", arm.stop))
         mark = _ignore_mark if lab is None else lab.mark
-        yield Bench(arm, gel, camera, station, mark, lab=lab)
+        yield Bench(arm, gel, camera, station, hammer, mark, lab=lab)
 
 
 def addressed(station: Station, where: LabAddresses) -> Station:
@@ -125,23 +130,23 @@ def addressed(station: Station, where: LabAddresses) -> Station:
     camera = station.camera
     if camera is not None:
         camera = camera.model_copy(update={"url": where.camera})
+    hammer = station.hammer
+    if hammer is not None:
+        hammer = hammer.model_copy(update={"port": where.hammer})
     arm = station.arm.model_copy(update={"address": where.arm})
     gel = station.gel.model_copy(update={"url": where.gel})
-    return station.model_copy(update={"arm": arm, "gel": gel, "camera": camera})
+    return station.model_copy(update={"arm": arm, "gel": gel, "camera": camera, "hammer": hammer})
 
 
 def make_arm(station: Station) -> Arm:
-    """The arm's driver, not yet open; its limits hold for the flange and the gel's housing."""
+    """The arm's driver, not yet open; its limits hold for the flange, the gel's housing and the hammer."""
     section = station.arm
-    width, height = (0.5 * side for side in station.gel.sensor.housing)
-    corners = [(x, y, 0.0) for x in (-width, width) for y in (-height, height)]
-    on_tool = apply(station.flange_from_gel, np.array(corners))
     made: Arm = _load(INSTRUMENTS[section.kind])(
         address=section.address,
         model=section.model,
         limits=_load(LIMITS[section.kind])(**section.safety.model_dump()),
         rate=section.rate,
-        tool_points=[(0.0, 0.0, 0.0), *on_tool.tolist()],
+        tool_points=station.tool_points.tolist(),
     )
     return made
 
@@ -166,7 +171,32 @@ def make_camera(station: Station) -> TactileCamera | None:
     return made
 
 
-def _open_all(stack: ExitStack, instruments: dict[str, Arm | TactileCamera | None]) -> None:
+def make_hammer(station: Station) -> ImpactHammer:
+    """The hammer's driver, not yet open.
+
+    Raises:
+        WrongUse: the station has no hammer.
+        CalibrationRefused: of the box.
+    """
+    section = station.hammer
+    if section is None:
+        raise WrongUse(
+            f"the scene asks for sound, and the station {station.title!r} has no [hammer]; add one, or set "
+            "sensors.sound = false in the scene"
+        )
+    calibration = section.acquisition
+    made: ImpactHammer = _load(INSTRUMENTS[section.kind])(
+        calibration=calibration,
+        port=section.port or "",
+        serial=section.serial,
+        model=section.model,
+        rate=section.rate,
+        threshold_counts=round(section.threshold / calibration.newtons_per_count),
+    )
+    return made
+
+
+def _open_all(stack: ExitStack, instruments: dict[str, Arm | TactileCamera | ImpactHammer | None]) -> None:
     failures: dict[str, TouchstoneError] = {}
     for name, instrument in instruments.items():
         if instrument is None:

@@ -18,7 +18,11 @@ CAMERA_KINDS = ("none", "stall", "truncate", "drop", "freeze", "saturate")
 """stall: nothing is sent. truncate: half of each JPEG is sent. drop: connections are reset and
 refused. freeze: the last frame again and again. saturate: an overexposed picture."""
 
-KINDS = {"gel": CAMERA_KINDS, "camera": CAMERA_KINDS, "arm": ARM_KINDS}
+HAMMER_KINDS = ("none", "stall", "overflow", "lost_byte", "lost_word", "unplug")
+"""Of the hammer's box. stall: no samples and no answers. overflow: nothing leaves while samples go on.
+lost_byte, lost_word: one is missing from the stream. unplug: the cable is pulled, for good."""
+
+KINDS = {"gel": CAMERA_KINDS, "camera": CAMERA_KINDS, "arm": ARM_KINDS, "hammer": HAMMER_KINDS}
 
 _KEYS = ("instrument", "kind", "seconds")
 
@@ -28,7 +32,7 @@ class Fault:
     """One cue.
 
     Attributes:
-        instrument: ``"gel"``, ``"camera"`` or ``"arm"``.
+        instrument: ``"gel"``, ``"camera"``, ``"arm"`` or ``"hammer"``.
         kind: of the instrument's ``KINDS``.
         seconds: how long; None until it is cleared.
     """
@@ -60,7 +64,7 @@ def parse(cue: Mapping[str, object]) -> Fault:
 
 
 class ActiveFault:
-    """The fault a camera has at present."""
+    """The fault an instrument has at present."""
 
     def __init__(self) -> None:
         self._kind = "none"

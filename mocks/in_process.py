@@ -4,10 +4,12 @@ The same world, the same pictures and the same JPEG bytes as on the wires. Time 
 simulated bench clock, from zero.
 """
 
+from typing import TYPE_CHECKING
+
 import cv2
 import numpy as np
 
-from harness.device import Health
+from harness.device import Health, ImpactHammer
 from harness.errors import BenchFault, WrongUse
 from harness.gap import load_gap
 from harness.reading import Channel, Reading
@@ -18,9 +20,13 @@ from mocks.gelsight_stream import encode
 from mocks.in_process_arm import InProcessArm
 from mocks.lab_scene import nominal_bench
 from mocks.simulated_motion import Stage
+from mocks.sound_of_run import strikes_of
 from mocks.truth import TruthFile
 from mocks.ur.hooks import HOME
 from mocks.world import World
+
+if TYPE_CHECKING:
+    from mocks.strike_counts import StrikeCounts
 
 PACKET_RATE = 25.0
 """Hz of the arm's history: one packet for each frame of the gel is all that an estimate reads."""
@@ -87,8 +93,10 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
         )
     mesh = None if scene.object.builtin is not None else run.mesh
     nominal = nominal_bench(scene, station, mesh, scene.base_from_object(run.mesh))
-    world = World(nominal, load_gap(run.gap or station.mock.gap), run.seed)
-    truth = TruthFile(run.truth, world, run.seed)
+    gap = load_gap(run.gap or station.mock.gap)
+    world = World(nominal, gap, run.seed)
+    strikes = strikes_of(world, scene, station, gap, run.seed)
+    truth = TruthFile(run.truth, world, run.seed, None if strikes is None else strikes.sound)
     stage = Stage()
     arm = InProcessArm(station.arm.model, np.array(HOME), world, stage, PACKET_RATE)
 
@@ -97,4 +105,13 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
         if sample >= 0:
             truth.append(arm.state().base_from_flange, step, sample)
 
-    return Bench(arm, InProcessGel(world, arm, stage), None, station, mark, stage.pause)
+    hammer = None if strikes is None else _hammer(strikes, arm, station, stage)
+    return Bench(arm, InProcessGel(world, arm, stage), None, station, hammer, mark, stage.pause)
+
+
+def _hammer(strikes: "StrikeCounts", arm: InProcessArm, station: Station, stage: Stage) -> ImpactHammer:
+    from mocks.in_process_hammer import InProcessHammer  # by runs that are to be heard, and by no others
+
+    assert station.hammer is not None
+    assert station.arm.striker_output is not None  # nobody strikes by hand at a mocked bench
+    return InProcessHammer(strikes, arm, station.arm.striker_output, stage, station.hammer)

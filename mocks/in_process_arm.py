@@ -33,6 +33,19 @@ class _Piece:
     joints_at: Callable[[float], FloatArray]
 
 
+@dataclass(frozen=True, eq=False)
+class Rise:
+    """A tool digital output that was switched on.
+
+    Attributes:
+        output: 0 or 1.
+        base_from_flange: ``(4, 4)``, where the flange was.
+    """
+
+    output: int
+    base_from_flange: FloatArray
+
+
 class InProcessArm:
     """An ``Arm`` that is where it was sent.
 
@@ -42,6 +55,10 @@ class InProcessArm:
         world: pushes back.
         stage: simulated time, and the step whose errors apply.
         rate: packets a second of the history.
+
+    Attributes:
+        outputs: of the tool.
+        rises: outputs switched on so far, in order.
     """
 
     def __init__(
@@ -53,6 +70,7 @@ class InProcessArm:
         self._rate = rate
         self._zero = np.zeros(6)
         self.outputs: dict[int, bool] = {}
+        self.rises: list[Rise] = []
         resting = np.array(joints, dtype=np.float64)
         self._pieces = [_Piece(stage.time, stage.time, lambda _: resting)]
 
@@ -131,6 +149,8 @@ class InProcessArm:
         """Switch a tool digital output: 0 or 1."""
         if index not in (0, 1):
             raise LimitExceeded(f"tool digital output {index} does not exist; a UR tool has 0 and 1")
+        if on and not self.outputs.get(index, False):
+            self.rises.append(Rise(index, self.state().base_from_flange))
         self.outputs[index] = on
 
     def health(self) -> Health:

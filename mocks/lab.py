@@ -3,12 +3,14 @@
 It answers JSON lines on standard output with one for each on standard input:
 
 ``{"mark": {"step": 3, "sample": 0}}``
-    The run is at this step and sample. From sample 0 on, the truth of the step is written.
+    The run is at this step and sample. From sample 0 on, the truth of the step is written: of the
+    press at sample 0, of a strike from where the arm is at sample 1.
 ``{"fault": {"instrument": "gel", "kind": "stall", "seconds": 2}}``
     Something goes wrong (``mocks.faults``).
 
 The first line out says where the instruments are: ``{"ready": true, "arm": ADDRESS, "gel": URL,
-"camera": URL or null}``, or ``{"ready": false, "error": ...}``. End of file ends everything.
+"camera": URL or null, "hammer": PATH of its box's port or null}``, or ``{"ready": false, "error": ...}``.
+End of file ends everything.
 """
 
 import argparse
@@ -20,7 +22,7 @@ import sys
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -31,20 +33,30 @@ from harness.errors import TouchstoneError, WrongUse
 from harness.gap import load_gap
 from harness.geometry import frame_facing, inverse, transform
 from harness.kinematics import forward
+from harness.station_sections import ArmSection
 from mocks.faults import parse
 from mocks.gelsight_stream import MjpegServer
 from mocks.lab_processes import CAMERA_PORT, GEL_PORT, Child, Line, free_address, keep_time
 from mocks.lab_scene import read_lab_scene
 from mocks.shared_pose import Mark, SharedPose
+from mocks.sound_of_run import strikes_of
 from mocks.truth import TruthFile
 from mocks.ur.hooks import HOME, ControllerConfig
 from mocks.ur.serve import serve
 from mocks.world import NominalBench, World
 
+if TYPE_CHECKING:
+    from mocks.strike_counts import StrikeCounts
+
 READY_TIMEOUT = 30.0
+DRIFT_PPM = 40.0
+"""Parts in a million by which the hammer's box samples faster than nominal: a common crystal."""
 GEL_RATE = 25.0
 CAMERA_RATE = 10.0
 SHOWN_TIMEOUT = 0.5
+TOOL_OUTPUTS = 16
+"""The first of the tool's digital outputs among all of them."""
+
 _GEL, _CAMERA = 0, 1
 _ORPHAN_CHECK = 0.5
 
@@ -86,6 +98,7 @@ class Lab:
         truth: where the truth is written.
         address: loopback, of all the instruments.
         camera: whether there is a scene camera.
+        strikes: of the hammer; None where the scene asks for no sound.
     """
 
     def __init__(
@@ -96,6 +109,7 @@ class Lab:
         truth: TruthFile,
         address: str,
         camera: bool,
+        strikes: "StrikeCounts | None",
     ) -> None:
         self._shared = shared
         self._truth = truth
@@ -109,6 +123,9 @@ class Lab:
             self._children["camera"] = Child(
                 "camera", lambda line: _stream(address, CAMERA_PORT, seen, CAMERA_RATE, line)
             )
+        self._hammer_port: str | None = None
+        if strikes is not None:
+            self._plug_in(strikes)
 
     def wait_ready(self) -> Mapping[str, Any]:
         """Where the instruments are, once all of them answer; ``BenchFault`` where one does not."""
@@ -116,7 +133,8 @@ class Lab:
             child.wait_ready(READY_TIMEOUT)
         camera = f"http://{self._address}:{CAMERA_PORT}/?action=stream" if self._has_camera else None
         gel = f"http://{self._address}:{GEL_PORT}/?action=stream"
-        return {"ready": True, "arm": self._address, "gel": gel, "camera": camera}
+        where = {"arm": self._address, "gel": gel, "camera": camera, "hammer": self._hammer_port}
+        return {"ready": True, **where}
 
     def answer(self, line: str) -> Mapping[str, Any]:
         """Do what one line of JSON asks; an answer with the key ``error`` where it cannot be done."""
@@ -137,6 +155,18 @@ class Lab:
         """End every process."""
         for child in self._children.values():
             child.kill()
+
+    def _plug_in(self, strikes: "StrikeCounts") -> None:
+        """Begin the hammer's box: the last child, so that nobody else holds its end of the cable."""
+        from mocks.daq.box import DaqBox  # by runs that are to be heard, and by no others
+        from mocks.daq.source import Played
+        from mocks.strike_counts import Striker
+
+        striker = Striker(strikes, lambda: self._shared.firing)
+        box = DaqBox(Played(strikes.idle(), striker.next_record), drift_ppm=DRIFT_PPM)
+        self._hammer_port = box.port
+        self._children["hammer"] = Child("hammer", box.serve)
+        box.leave()
 
     def _mark(self, step: int, sample: int) -> Mapping[str, int]:
         """Set the step and sample, and wait until the gel has shown them."""
@@ -200,8 +230,10 @@ def _compile(world: World, bench: NominalBench, away: FloatArray) -> None:
         world.true_contact(pose, 0)
 
 
-def _controller(world: World, model: str, shared: SharedPose, seed: int) -> Callable[[str, Line], None]:
+def _controller(world: World, arm: ArmSection, shared: SharedPose, seed: int) -> Callable[[str, Line], None]:
     """What the arm's process does."""
+    striker = 0 if arm.striker_output is None else 1 << (TOOL_OUTPUTS + arm.striker_output)
+    switched = 0
 
     class Push:
         def wrench(self, base_from_flange: Sequence[Sequence[float]], _time: float) -> Sequence[float]:
@@ -211,16 +243,23 @@ def _controller(world: World, model: str, shared: SharedPose, seed: int) -> Call
     def publish(_time: float, _joints: Sequence[float], base_from_flange: Sequence[Sequence[float]]) -> None:
         shared.set_pose(np.array(base_from_flange))
 
+    def outputs(bits: int) -> None:
+        nonlocal switched
+        if bits & ~switched & striker:
+            shared.fire()
+        switched = bits
+
     def run(address: str, line: Line) -> None:
         keep_time()
         serve(
-            ControllerConfig(host=address, model=model, seed=seed),
+            ControllerConfig(host=address, model=arm.model, seed=seed),
             Push(),
             publish,
             line.should_stop,
             step=lambda: shared.mark.step,
             cues=line.fault,
             on_ready=line.ready,
+            on_outputs=outputs,
         )
 
     return run
@@ -229,18 +268,20 @@ def _controller(world: World, model: str, shared: SharedPose, seed: int) -> Call
 def _begin(arguments: argparse.Namespace) -> Lab:
     """Build the world, and begin a process for each instrument."""
     cv2.setNumThreads(0)  # threads of the parent are lost in a fork
-    bench, model = read_lab_scene(arguments.scene)
-    world = World(bench, load_gap(arguments.gap), arguments.seed)
-    start = forward(model, np.array(HOME))
-    _compile(world, bench, start)
+    told, gap = read_lab_scene(arguments.scene), load_gap(arguments.gap)
+    world = World(told.bench, gap, arguments.seed)
+    strikes = strikes_of(world, told.scene, told.station, gap, arguments.seed)
+    start = forward(told.station.arm.model, np.array(HOME))
+    _compile(world, told.bench, start)
     shared = SharedPose(start)
     return Lab(
         world,
-        _controller(world, model, shared, arguments.seed),
+        _controller(world, told.station.arm, shared, arguments.seed),
         shared,
-        TruthFile(arguments.truth, world, arguments.seed),
+        TruthFile(arguments.truth, world, arguments.seed, None if strikes is None else strikes.sound),
         free_address(),
-        bench.camera is not None,
+        told.bench.camera is not None,
+        strikes,
     )
 
 

@@ -7,6 +7,7 @@ repaired mesh.
 """
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +25,27 @@ SCHEMA = 1
 EDGE = 2.2e-3
 """Metres between the vertices of built-in objects: no other part of the program uses this one."""
 
+
+@dataclass(frozen=True, eq=False)
+class LabScene:
+    """What a lab is told.
+
+    Attributes:
+        bench: nominal.
+        scene: what is on the table.
+        station: whose instruments are mocked.
+    """
+
+    bench: NominalBench
+    scene: SceneFile
+    station: Station
+
+
 _KEYS = {"schema", "scene", "station", "mesh", "base_from_object"}
 
 
-def read_lab_scene(path: Path) -> tuple[NominalBench, str]:
-    """The bench of a file, and the model of its arm.
+def read_lab_scene(path: Path) -> LabScene:
+    """The bench of a file.
 
     Raises:
         WrongUse: it cannot be read, or is not what a lab is told.
@@ -44,7 +61,7 @@ def read_lab_scene(path: Path) -> tuple[NominalBench, str]:
     scene = scene_from_json(told["scene"], str(path))
     station = station_from_json(told["station"], str(path))
     mesh = None if told["mesh"] is None else _read_mesh(Path(told["mesh"]))
-    return nominal_bench(scene, station, mesh, np.array(told["base_from_object"])), station.arm.model
+    return LabScene(nominal_bench(scene, station, mesh, np.array(told["base_from_object"])), scene, station)
 
 
 def nominal_bench(

@@ -2,11 +2,15 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from harness.arrays import FloatArray
 from harness.recording import write_text_whole
+from harness.station import STRIKE
 from mocks.world import World
+
+if TYPE_CHECKING:
+    from mocks.world_sound import WorldSound
 
 SCHEMA = 1
 
@@ -20,30 +24,50 @@ class TruthFile:
         path: of the file; contacts already in it are kept if it is of the same world.
         world: whose truth it is.
         seed: of the run.
+        sound: of the run; None where the scene asks for none.
     """
 
-    def __init__(self, path: Path, world: World, seed: int) -> None:
+    def __init__(self, path: Path, world: World, seed: int, sound: "WorldSound | None" = None) -> None:
         self._path = path
         self._world = world
+        self._sound = sound
         self._head = {
             "schema": SCHEMA,
             "seed": seed,
             "base_from_object": world.base_from_object.tolist(),
-            "differences": world.differences(),
+            "differences": {
+                **world.differences(),
+                **({} if sound is None else {"sound": sound.differences()}),
+            },
         }
         self._contacts: dict[int, dict[str, Any]] = self._resumed()
 
     def append(self, base_from_flange: FloatArray, step: int, sample: int) -> None:
-        """Write where the contact of ``step`` is, with the flange reported at this pose."""
-        self._contacts[step] = {
-            "step": step,
-            "sample": sample,
-            "point_in_object_m": self._world.true_contact(base_from_flange, step).tolist(),
-            "penetration_m": self._world.penetration(base_from_flange, step),
-            "base_from_flange": base_from_flange.tolist(),
-        }
+        """Write where the press or the strike of ``step`` is, with the flange reported at this pose."""
+        if sample == STRIKE and self._sound is not None:
+            self._contacts.setdefault(step, {"step": step})["strike"] = self._strike(
+                self._sound, base_from_flange, step
+            )
+        else:
+            self._contacts[step] = {
+                "step": step,
+                "sample": sample,
+                "point_in_object_m": self._world.true_contact(base_from_flange, step).tolist(),
+                "penetration_m": self._world.penetration(base_from_flange, step),
+                "base_from_flange": base_from_flange.tolist(),
+            }
         contacts = [self._contacts[index] for index in sorted(self._contacts)]
         write_text_whole(self._path, json.dumps({**self._head, "contacts": contacts}, indent=1) + "\n")
+
+    def _strike(self, sound: "WorldSound", base_from_flange: FloatArray, step: int) -> dict[str, Any]:
+        aim = sound.aim(base_from_flange, step, STRIKE)
+        return {
+            "point_in_object_m": None if aim.met is None else aim.met.nominal.tolist(),
+            "direction_in_object": aim.direction_in_object.tolist(),
+            "pulse_s": aim.blow.pulse,
+            "impulse_n_s": aim.blow.impulse,
+            "base_from_flange": base_from_flange.tolist(),
+        }
 
     def _resumed(self) -> dict[int, dict[str, Any]]:
         if not self._path.exists():

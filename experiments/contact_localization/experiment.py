@@ -1,4 +1,4 @@
-"""The steps of a localization run: travel, touch, press, read, retreat.
+"""The steps of a localization run: travel, touch, press, read, retreat; strike where sound is asked for.
 
 Everything a step needs is in its parameters, planned and rehearsed before the first one moves.
 """
@@ -11,13 +11,14 @@ import numpy as np
 
 from experiments.contact_localization.first_touch import first_touch
 from experiments.contact_localization.pace import joint_speed
+from experiments.contact_localization.strike import Ask, StrikeMotion, strike, strike_by_hand
 from harness.arrays import FloatArray
 from harness.device import Arm
 from harness.errors import BenchFault, NotTouched
 from harness.geometry import transform
 from harness.reading import Reading
 from harness.recording import Recording
-from harness.station import Bench
+from harness.station import PRESS, Bench
 from harness.step_file import Step
 from harness.twin.motion import PlannedContact
 
@@ -57,11 +58,6 @@ class ContactMotion:
         axis = (contact.base_from_stand_off @ flange_from_gel)[:3, 2]
         search = contact.stand_off - press
         return cls(contact.start, contact.travel, contact.base_from_stand_off, axis, search, press)
-
-    @property
-    def end(self) -> FloatArray:
-        """``(6,)`` rad at the stand-off."""
-        return self.travel[-1] if len(self.travel) else self.start
 
     def to_parameters(self) -> dict[str, Any]:
         """As JSON values, with the unit in each key."""
@@ -130,11 +126,13 @@ class ContactLocalization:
         way: used where the arm is not where a step's travel was planned from: at the start of a
             session, and when a run is resumed.
         speeds: of the motions.
+        ask: shows a person what to do, where the station has one strike; None where nobody is there.
     """
 
-    def __init__(self, way: Way, speeds: Speeds | None = None) -> None:
+    def __init__(self, way: Way, speeds: Speeds | None = None, ask: Ask | None = None) -> None:
         self.way = way
         self.speeds = speeds or Speeds()
+        self.ask = ask
 
     def steps(self, recording: Recording) -> Iterator[Step]:
         """The planned contacts that are not yet on the disk."""
@@ -143,32 +141,48 @@ class ContactLocalization:
                 yield Step(index, "press", parameters)
 
     def perform(self, step: Step, bench: Bench) -> Sequence[Reading]:
-        """One contact; the arm ends at the stand-off it approached from."""
+        """One contact; the arm ends at the stand-off it approached from, or where its strike began."""
         motion = ContactMotion.from_parameters(step.parameters)
         arm = bench.arm
         bench.mark(step.index, -1)
-        self._travel(motion, bench)
+        self._travel(motion.start, motion.travel, bench)
         arm.zero_force()
         began = arm.state().time
         self._touch(step, motion, arm)
-        self._press(motion, arm, began)
+        moved = self._press(motion, arm, began)
         bench.pause(SETTLE)
-        bench.mark(step.index, 0)
+        bench.mark(step.index, PRESS)
         image = self._read(bench, motion)
         history = arm.history(arm.state().time - began)
         self._line(arm, motion.base_from_stand_off, "retreat")
-        return (image, *history)
+        return (image, *history, *self._strike(step, moved, bench))
 
-    def _travel(self, motion: ContactMotion, bench: Bench) -> None:
+    def _strike(self, step: Step, moved: float, bench: Bench) -> tuple[Reading, ...]:
+        """The hammer where the gel was; nothing where the scene asks for no sound."""
+        if bench.hammer is None:
+            return ()
+        if "strike" not in step.parameters:
+            return strike_by_hand(step.index, bench, self.ask)
+        motion = StrikeMotion.from_parameters(step.parameters["strike"])
+        self._travel(motion.start, motion.travel, bench)
+        return strike(motion, step.index, moved, bench)
+
+    def _travel(self, start: FloatArray, travel: FloatArray, bench: Bench) -> None:
+        """Along the planned way points; from elsewhere than planned, by another way to the last of them."""
         here = bench.arm.state().joints
-        planned = np.abs(here - motion.start).max() < WHERE_PLANNED
-        for joints in motion.travel if planned else self.way(here, motion.end):
+        planned = np.abs(here - start).max() < WHERE_PLANNED
+        end = travel[-1] if len(travel) else start
+        for joints in travel if planned else self.way(here, end):
             speed = joint_speed(bench.station, here, joints, self.speeds.travel)
             bench.arm.move_joints(joints, speed, self.speeds.travel_acceleration)
             here = joints
 
-    def _press(self, motion: ContactMotion, arm: Arm, began: float) -> None:
-        """On to the planned depth behind the first touch, wherever the search came to rest."""
+    def _press(self, motion: ContactMotion, arm: Arm, began: float) -> float:
+        """On to the planned depth behind the first touch, wherever the search came to rest.
+
+        Returns:
+            m by which the touch was farther than planned.
+        """
         state = arm.state()
         search = arm.history(state.time - began)
         touched = first_touch(search, motion.axis, 0.5 * self.speeds.touch_force)
@@ -176,6 +190,7 @@ class ContactLocalization:
         self._line(
             arm, _moved(motion.base_from_stand_off, state.base_from_flange, further * motion.axis), "press"
         )
+        return touched - float(motion.base_from_stand_off[:3, 3] @ motion.axis) - motion.search
 
     def _read(self, bench: Bench, motion: ContactMotion) -> Reading:
         """The frames; where the camera fails the arm is well, and does not stay pressed on the object."""

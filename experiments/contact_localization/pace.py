@@ -16,7 +16,7 @@ def joint_speed(station: Station, start: FloatArray, end: FloatArray, most: floa
     """rad/s of the joint that turns most, for a straight motion of the joints.
 
     Args:
-        station: whose limits hold for the flange and the corners of the gel's housing.
+        station: whose limits hold for every point of ``tool_points``.
         start: ``(6,)`` rad.
         end: ``(6,)`` rad.
         most: rad/s, never more than this.
@@ -25,14 +25,9 @@ def joint_speed(station: Station, start: FloatArray, end: FloatArray, most: floa
     if turn == 0.0:
         return most
     shares = np.linspace(0.0, 1.0, _SAMPLES)
+    points = station.tool_points
     poses = kinematics.forward(station.arm.model, start + shares[:, None] * (end - start))
-    places = np.array([apply(pose, _tool_points(station)) for pose in poses])
+    places = np.array([apply(pose, points) for pose in poses])
     farthest = float(np.linalg.norm(np.diff(places, axis=0), axis=-1).max()) * (_SAMPLES - 1)
     limit = _SHARE * station.arm.safety.speed
     return min(most, limit * turn / farthest) if farthest > 0.0 else most
-
-
-def _tool_points(station: Station) -> FloatArray:
-    width, height = (0.5 * side for side in station.gel.sensor.housing)
-    corners = np.array([(x, y, 0.0) for x in (-width, width) for y in (-height, height)])
-    return np.vstack([np.zeros((1, 3)), apply(station.flange_from_gel, corners)])

@@ -1,6 +1,6 @@
 """A run, planned and rehearsed before anything moves."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from experiments.contact_localization.experiment import ContactMotion
 from experiments.contact_localization.sites import Presses, Site, plan_sites
+from experiments.contact_localization.strike import StrikeMotion, planner
 from harness.arrays import FloatArray
 from harness.errors import WrongUse
 from harness.mesh import Mesh
@@ -17,6 +18,7 @@ from harness.station_file import Station
 from harness.twin.bench import TwinBench
 from harness.twin.motion import PlannedContact, plan_contact, reachable
 from harness.twin.rehearsal import RehearsalReport, Segment, rehearse
+from harness.twin.strike_motion import PlannedStrike, StrikePlanner
 from harness.twin.ways import connect
 
 HOME = np.radians([0.0, -90.0, 60.0, -60.0, -90.0, 0.0])
@@ -34,6 +36,7 @@ class RunPlan:
         bench: the twin it was rehearsed in.
         sites: where the gel is to go.
         contacts: how it gets there.
+        strikes: how the hammer gets there after each; empty where the arm makes none.
         rehearsal: what the twin found.
         seconds: by stage of the planning.
     """
@@ -41,19 +44,27 @@ class RunPlan:
     bench: TwinBench
     sites: tuple[Site, ...]
     contacts: tuple[PlannedContact, ...]
+    strikes: tuple[PlannedStrike, ...]
     rehearsal: RehearsalReport
     seconds: dict[str, float] = field(default_factory=dict)
 
     def parameters(self) -> list[dict[str, Any]]:
         """The steps, as JSON values."""
-        return [
+        steps = [
             ContactMotion.planned(contact, self.bench.flange_from_gel, site.press).to_parameters()
             for contact, site in zip(self.contacts, self.sites, strict=True)
         ]
+        for step, strike in zip(steps, self.strikes, strict=False):
+            step["strike"] = StrikeMotion.planned(strike).to_parameters()
+        return steps
 
     def segments(self) -> list[Segment]:
         """Every motion in order."""
-        return [segment for k, contact in enumerate(self.contacts) for segment in contact.segments(k)]
+        motions: list[Segment] = []
+        for k, contact in enumerate(self.contacts):
+            motions += contact.segments(k)
+            motions += self.strikes[k].segments(k) if self.strikes else ()
+        return motions
 
 
 def twin_of(scene: SceneFile, station: Station, mesh: Mesh) -> TwinBench:
@@ -68,6 +79,7 @@ def twin_of(scene: SceneFile, station: Station, mesh: Mesh) -> TwinBench:
         table_height=scene.table.height,
         pedestal_radius=0.5 * scene.support.width,
         joint_range=np.array([safety.joint_low, safety.joint_high]),
+        flange_from_hammer=station.flange_from_hammer,
     )
 
 
@@ -86,7 +98,7 @@ def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> RunPl
     """
     bench = twin_of(scene, station, mesh)
     wanted = scene.localization
-    itinerary = Itinerary(bench, seed)
+    itinerary = Itinerary(bench, seed, planner(scene, station, bench))
     sites = plan_sites(
         RasterMesh(mesh),
         station.gel.sensor,
@@ -98,10 +110,9 @@ def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> RunPl
         presses=Presses(wanted.step, wanted.tilt, wanted.depth),
         visit=itinerary.visit,
     )
-    contacts = tuple(itinerary.contacts)
-    plan = RunPlan(bench, sites, contacts, RehearsalReport(0, (), (), ()))
-    rehearsal = rehearse(bench, plan.segments()).require()
-    return RunPlan(bench, sites, contacts, rehearsal)
+    contacts, strikes = tuple(itinerary.contacts), tuple(itinerary.strikes)
+    plan = RunPlan(bench, sites, contacts, strikes, RehearsalReport(0, (), (), ()))
+    return replace(plan, rehearsal=rehearse(bench, plan.segments()).require())
 
 
 class Itinerary:
@@ -110,26 +121,44 @@ class Itinerary:
     Args:
         bench: the twin.
         seed: of the searches for ways.
+        planner: of the strikes; None where the arm makes none.
     """
 
-    def __init__(self, bench: TwinBench, seed: int) -> None:
+    def __init__(self, bench: TwinBench, seed: int, planner: StrikePlanner | None = None) -> None:
         self.contacts: list[PlannedContact] = []
+        self.strikes: list[PlannedStrike] = []
         self._bench = bench
         self._seed = seed
+        self._planner = planner
         self._in_vain = 0
 
     def visit(self, before: int, base_from_gel: FloatArray, patient: bool) -> bool:
         """Go on to there after the first ``before`` contacts, giving up the others; False where no way is."""
-        del self.contacts[before:]
-        joints = self.contacts[-1].stand_off_joints if self.contacts else HOME
+        del self.contacts[before:], self.strikes[before:]
         patient = patient and self._in_vain < _IN_VAIN
-        searched = 1 if patient else 0
-        planned = plan_contact(self._bench, base_from_gel, joints, seed=self._seed, searched=searched)
-        if planned is None:
+        if not self._visit(base_from_gel, 1 if patient else 0):
             self._in_vain += patient
             return False
-        self.contacts.append(planned)
         return True
+
+    def _visit(self, base_from_gel: FloatArray, searched: int) -> bool:
+        contact = plan_contact(self._bench, base_from_gel, self._joints, seed=self._seed, searched=searched)
+        if contact is None:
+            return False
+        if self._planner is not None:
+            strike = self._planner.plan(base_from_gel, contact.stand_off_joints, self._seed, searched)
+            if strike is None:
+                return False
+            self.strikes.append(strike)
+        self.contacts.append(contact)
+        return True
+
+    @property
+    def _joints(self) -> FloatArray:
+        """``(6,)`` rad, where the arm is after all contacts so far."""
+        if not self.contacts:
+            return HOME
+        return self.strikes[-1].ready_joints if self.strikes else self.contacts[-1].stand_off_joints
 
 
 def way_between(bench: TwinBench, start: FloatArray, end: FloatArray) -> FloatArray:

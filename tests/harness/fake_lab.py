@@ -28,7 +28,8 @@ def main() -> None:
     if arguments.seed == "3":
         time.sleep(600)
     told = json.loads(Path(arguments.scene).read_text(encoding="utf-8"))
-    say({"ready": True, "arm": "127.7.7.7", "gel": "http://127.7.7.7:8080/?action=stream", "camera": None})
+    gel = "http://127.7.7.7:8080/?action=stream"
+    say({"ready": True, "arm": "127.7.7.7", "gel": gel, "camera": None, "hammer": None})
     for line in sys.stdin:
         request = json.loads(line)
         if "told" in request:

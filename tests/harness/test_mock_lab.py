@@ -45,7 +45,8 @@ def alive(process_id: int) -> bool:
 
 def test_a_lab_says_where_its_instruments_are_and_takes_marks_and_faults(tmp_path: Path) -> None:
     with lab(tmp_path) as made:
-        assert made.start() == LabAddresses("127.7.7.7", "http://127.7.7.7:8080/?action=stream", None)
+        where = LabAddresses("127.7.7.7", "http://127.7.7.7:8080/?action=stream", None, None)
+        assert made.start() == where
         made.mark(3, -1)
         made.fault("gel", "stall", 2.0)
         assert made.ask({"mark": {"step": 1, "sample": 0}}) == {"marked": {"step": 1, "sample": 0}}

@@ -28,7 +28,8 @@ class Instrument:
 
     def __init__(self, **options: Any) -> None:
         self.options = options
-        self.name = "arm" if "limits" in options else "camera" if "rows" in options else "gel"
+        marks = {"limits": "arm", "rows": "camera", "threshold_counts": "hammer"}
+        self.name = next((name for option, name in marks.items() if option in options), "gel")
 
     def open(self) -> None:
         self._do("open")
@@ -54,13 +55,21 @@ def instruments(monkeypatch: pytest.MonkeyPatch) -> type[Instrument]:
     return Instrument
 
 
-def opened(folder: Path, camera: bool = True) -> Any:
-    return open_station(load_station(REAL), scene(camera), RunContext(folder / "truth.json", MESH))
+def real() -> Station:
+    """The example bench, with a calibration of its box that exists."""
+    station = load_station(REAL)
+    assert station.hammer is not None
+    hammer = station.hammer.model_copy(update={"calibration": "acquisition_bench"})
+    return station.model_copy(update={"hammer": hammer})
 
 
-def scene(camera: bool = True) -> SceneFile:
+def opened(folder: Path, camera: bool = True, sound: bool = False) -> Any:
+    return open_station(real(), scene(camera, sound), RunContext(folder / "truth.json", MESH))
+
+
+def scene(camera: bool = True, sound: bool = False) -> SceneFile:
     made = scene_from_options("builtin:mug")
-    return made.model_copy(update={"sensors": Sensors(camera=camera)})
+    return made.model_copy(update={"sensors": Sensors(camera=camera, sound=sound)})
 
 
 @pytest.mark.parametrize("path", STATIONS, ids=lambda p: p.stem)
@@ -85,13 +94,27 @@ def test_a_station_makes_the_real_drivers_without_opening_them(path: Path) -> No
     assert station_module.make_camera(station) is not None
 
 
-def test_the_tool_s_corners_are_under_the_limits(instruments: type[Instrument]) -> None:
+def test_the_hammer_s_threshold_is_in_counts_of_its_calibration(instruments: type[Instrument]) -> None:
+    hammer: Any = station_module.make_hammer(load_station(station_path("mock")))
+    calibration = hammer.options["calibration"]
+    assert hammer.options["threshold_counts"] * calibration.newtons_per_count == pytest.approx(2.0, rel=0.01)
+    assert (hammer.options["serial"], hammer.options["port"]) == ("mock-2108", "")
+
+
+def test_a_scene_with_sound_needs_a_hammer(tmp_path: Path) -> None:
+    deaf = load_station(station_path("mock")).model_copy(update={"hammer": None, "microphone": None})
+    with pytest.raises(WrongUse, match=r"asks for sound, and the station 'mocked bench' has no \[hammer\]"):
+        station_module.make_hammer(deaf)
+
+
+def test_the_tool_s_corners_and_the_hammer_s_tip_are_under_the_limits(instruments: type[Instrument]) -> None:
     arm: Any = make_arm(load_station(REAL))
     points = np.array(arm.options["tool_points"])
-    assert points.shape == (5, 3)
+    assert points.shape == (6, 3)
     centre = load_station(REAL).flange_from_gel[:3, 3]
-    assert points[1:].mean(axis=0) == pytest.approx(centre)
-    assert np.linalg.norm(points[1:] - centre, axis=1) == pytest.approx(np.hypot(0.017, 0.015))
+    assert points[1:5].mean(axis=0) == pytest.approx(centre)
+    assert np.linalg.norm(points[1:5] - centre, axis=1) == pytest.approx(np.hypot(0.017, 0.015))
+    assert points[5] == pytest.approx([0.1039, 0.0, 0.06])
 
 
 def test_instruments_open_and_the_arm_is_stopped_before_anything_closes(
@@ -110,6 +133,22 @@ def test_a_camera_that_the_scene_does_not_call_for_is_not_opened(
     with opened(tmp_path, camera=False) as bench:
         assert bench.camera is None
     assert "camera open" not in instruments.log
+
+
+def test_the_hammer_is_opened_only_where_the_scene_asks_for_sound(
+    tmp_path: Path, instruments: type[Instrument]
+) -> None:
+    with opened(tmp_path) as bench:
+        assert bench.hammer is None
+    assert not any(line.startswith("hammer") for line in instruments.log)
+    instruments.log.clear()
+    with opened(tmp_path, sound=True) as bench:
+        assert bench.hammer is not None
+    assert instruments.log == [
+        *(f"{name} open" for name in ("arm", "gel", "camera", "hammer")),
+        "arm stop",
+        *(f"{name} close" for name in ("hammer", "camera", "gel", "arm")),
+    ]
 
 
 def test_every_failure_is_reported_and_what_was_opened_is_closed(
@@ -182,11 +221,57 @@ def changed(old: str, new: str, folder: Path, name: str = "mock") -> Station:
         ("mock", 'rate = "500 Hz"', 'address = "127.0.0.1"', "a mocked bench takes an address of its own"),
         ("mock", "[mock]\ngap", "# gap", "'arm.address' is missing; only a station with"),
         ("example_bench", 'url = "http://gsr', '# url = "', "'gel.url' is missing"),
+        ("example_bench", 'serial = "5D3F21A0"', "# serial", "'hammer.port' is missing"),
+        ("mock", "striker_output", "striker_outputs", "did you mean 'striker_output'"),
+        ("mock", "striker_output = 0 ", "# ", "'arm.striker_output' is missing; hammer.strike = 'arm'"),
+        ("mock", "striker_output = 0", "striker_output = 2", "'arm.striker_output' = 2"),
+        ("mock", 'stand_off = "6 mm"', 'standoff = "6 mm"', "did you mean 'stand_off'"),
+        ("mock", 'strike = "arm"', 'strike = "operator"', "nobody is at a mocked bench"),
+        ("mock", 'model = "DI-2108"', 'model = "2108"', "did you mean 'DI-2108'"),
+        (
+            "mock",
+            'serial = "mock-2108"',
+            'port = "/dev/ttyACM0"',
+            "a mocked bench takes an address of its own",
+        ),
+        ("mock", "[microphone]", "[microphon]", "did you mean 'microphone'"),
+        ("mock", 'kind = "dataq"\nserial = "mock-378B02"', 'kind = "portaudio"', "'device' is missing"),
+        ("mock", 'serial = "mock-378B02"', 'device = "hw:0"', "'device' belongs to kind = 'portaudio'"),
+        ("mock", "[frames.flange_from_hammer]", "[frames.flange_from_hamer]", "mean 'flange_from_hammer'"),
     ],
 )
 def test_a_mistake_in_a_station_is_named(tmp_path: Path, name: str, old: str, new: str, said: str) -> None:
     with pytest.raises(WrongUse, match=said):
         changed(old, new, tmp_path, name)
+
+
+@pytest.mark.parametrize(
+    ("left_out", "said"),
+    [
+        (("hammer", "microphone"), r"'frames.flange_from_hammer' without a \[hammer\]"),
+        (("hammer", "flange_from_hammer"), r"a \[microphone\] without a \[hammer\]"),
+        (("microphone",), r"\[microphone\] is missing"),
+        (("flange_from_hammer",), "'frames.flange_from_hammer' is missing"),
+    ],
+)
+def test_a_hammer_is_whole_or_not_there(left_out: tuple[str, ...], said: str) -> None:
+    tree = json.loads(load_station(station_path("mock")).model_dump_json(by_alias=True))
+    for key in left_out:
+        del (tree["frames"] if key in tree["frames"] else tree)[key]
+    with pytest.raises(WrongUse, match=said):
+        station_from_json(tree, "the test")
+
+
+def test_a_station_from_before_there_were_hammers_still_reads() -> None:
+    tree = json.loads(load_station(station_path("mock")).model_dump_json(by_alias=True))
+    del (
+        tree["hammer"],
+        tree["microphone"],
+        tree["frames"]["flange_from_hammer"],
+        tree["arm"]["striker_output"],
+    )
+    station = station_from_json(tree, "an old recording")
+    assert (station.hammer, station.flange_from_hammer, len(station.tool_points)) == (None, None, 5)
 
 
 def test_a_calibration_beside_the_station_is_found(tmp_path: Path) -> None:

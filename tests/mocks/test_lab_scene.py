@@ -59,7 +59,8 @@ def test_a_file_is_cut_up_and_keeps_its_surface(tmp_path: Path, scene: SceneFile
     file = tmp_path / "scene.json"
     ball_scene = of_file(scene, tmp_path / "ball.stl")
     file.write_text(json.dumps(told(ball_scene, station, tmp_path / "mesh.npz")))
-    bench, model = read_lab_scene(file)
+    read = read_lab_scene(file)
+    bench, model = read.bench, read.station.arm.model
     assert model == "ur5e"
     assert np.array_equal(bench.mesh.vertices, ball.vertices)
     world = World(bench, load_gap("none"), 0)
