@@ -1,0 +1,280 @@
+"""What accuracy costs: the front, the choices made from it, and curves that say when they are stale."""
+
+import itertools
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harness.accuracy import Level
+from harness.code_version import closure, content_hash
+from harness.cost import Curve, Point, Sample, best_within, cheapest_within, front
+from harness.cost_bounds import predicted_at_most, promise_share, stretch
+from harness.cost_choice import for_budget, for_error, nearest_condition
+from harness.cost_file import curve_path, from_json, load, save, to_json
+from harness.cost_provenance import machine, stale
+from harness.errors import DataRefused, WrongUse
+
+CONDITION: dict[str, Level] = {"yaw": "known", "contacts": 6}
+HERE = {"cpu": "a processor", "cores": "2"}
+NOW = {"sha256": "ab", "git": "1234"}
+
+
+def sample(
+    run: str = "a", error: float = 1e-3, cpu: float = 0.1, radius: float | None = 2e-3, of: str = "mug"
+) -> Sample:
+    return Sample(run, of, error, radius, 0.05, cpu, 1.1 * cpu)
+
+
+def point(
+    name: str, cpu: float, error: float, runs: int = 5, radius: float = 2e-3, jitter: float = 0.0
+) -> Point:
+    spread = np.exp(jitter * np.linspace(-1.0, 1.0, runs))
+    samples = tuple(sample(f"run {k}", error, cpu * float(spread[k]), radius) for k in range(runs))
+    return Point(name, {"level": name}, CONDITION, samples)
+
+
+costs = st.floats(1e-3, 1e2)
+errors = st.floats(1e-4, 1e-1)
+clouds = st.lists(st.tuples(costs, errors), min_size=1, max_size=12).map(
+    lambda pairs: [point(f"p{k}", cost, error, runs=2) for k, (cost, error) in enumerate(pairs)]
+)
+
+
+def dominates(a: Point, b: Point) -> bool:
+    better = a.seconds.value <= b.seconds.value and a.error.value <= b.error.value
+    return better and (a.seconds.value < b.seconds.value or a.error.value < b.error.value)
+
+
+@given(clouds)
+def test_no_point_dominates_one_of_the_front_and_each_other_is_dominated_or_equalled(
+    cloud: list[Point],
+) -> None:
+    best = front(cloud)
+    assert not any(dominates(a, b) for a in cloud for b in best)
+    for other in set(cloud) - set(best):
+        assert any(
+            p.seconds.value <= other.seconds.value and p.error.value <= other.error.value for p in best
+        )
+
+
+@given(clouds)
+def test_the_front_falls_in_error_as_it_rises_in_seconds(cloud: list[Point]) -> None:
+    best = front(cloud)
+    for cheap, dear in itertools.pairwise(best):
+        assert cheap.seconds.value < dear.seconds.value
+        assert cheap.error.value > dear.error.value
+
+
+@given(clouds, costs, costs)
+def test_a_larger_budget_never_buys_a_larger_error(cloud: list[Point], a: float, b: float) -> None:
+    less, more = best_within(cloud, min(a, b)), best_within(cloud, max(a, b))
+    if less is not None:
+        assert more is not None
+        assert more.error.value <= less.error.value
+        assert less.seconds.value <= min(a, b)
+
+
+@given(clouds, errors, errors)
+def test_a_larger_error_never_costs_more(cloud: list[Point], a: float, b: float) -> None:
+    strict, loose = cheapest_within(cloud, min(a, b)), cheapest_within(cloud, max(a, b))
+    if strict is not None:
+        assert loose is not None
+        assert loose.seconds.value <= strict.seconds.value
+        assert strict.error.value <= min(a, b)
+
+
+@given(clouds, costs)
+def test_what_a_budget_buys_lies_on_the_front(cloud: list[Point], budget: float) -> None:
+    bought = best_within(cloud, budget)
+    if bought is not None:
+        assert any(
+            bought.error.value == p.error.value and bought.seconds.value >= p.seconds.value
+            for p in front(cloud)
+        )
+
+
+@pytest.mark.parametrize("odd", [math.nan, math.inf, -1.0])
+@pytest.mark.parametrize("name", ["error", "radius", "shared", "cpu", "wall"])
+def test_a_number_that_cannot_be_is_refused(name: str, odd: float) -> None:
+    with pytest.raises(WrongUse, match="finite and not negative"):
+        replace(sample(), **{name: odd})  # type: ignore[arg-type]  # the point of the test
+
+
+def test_an_answer_in_no_time_was_not_measured() -> None:
+    with pytest.raises(WrongUse, match="0 s"):
+        replace(sample(), cpu=0.0)
+
+
+@pytest.mark.parametrize("odd", [0.0, -1.0, math.nan, math.inf])
+def test_a_budget_or_error_that_cannot_be_kept_is_refused(odd: float) -> None:
+    with pytest.raises(WrongUse, match="above zero"):
+        best_within([point("p", 1.0, 1e-3)], odd)
+    with pytest.raises(WrongUse, match="above zero"):
+        cheapest_within([point("p", 1.0, 1e-3)], odd)
+
+
+def test_a_run_is_counted_once_at_each_setting() -> None:
+    with pytest.raises(WrongUse, match="each run once"):
+        Point("p", {}, CONDITION, (sample("a"), sample("a")))
+    with pytest.raises(WrongUse, match="each run once"):
+        Point("p", {}, CONDITION, ())
+
+
+def test_the_bound_on_the_next_run_holds_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(5)
+    draws = np.exp(0.4 * rng.standard_normal((4000, 6)))
+    held = np.mean([draw[5] <= predicted_at_most(draw[:5], 0.95) for draw in draws])
+    assert held == pytest.approx(0.95, abs=0.012)  # 3.5 standard errors of 4000 draws
+
+
+def test_a_bound_needs_more_than_one_run() -> None:
+    with pytest.raises(WrongUse, match="two or more"):
+        predicted_at_most(np.array([1.0]))
+
+
+def claiming(errors_: np.ndarray, radius: float = 1.0) -> Point:
+    return Point(
+        "p", {}, CONDITION, tuple(sample(str(k), float(e), radius=radius) for k, e in enumerate(errors_))
+    )
+
+
+def test_a_stretched_radius_holds_the_truth_as_often_as_it_says_whatever_the_tail() -> None:
+    rng = np.random.default_rng(3)
+    held = []
+    for _ in range(1500):
+        errors_ = np.abs(rng.standard_cauchy(40)) + 1e-6
+        held.append(errors_[-1] <= stretch(claiming(errors_[:-1]), 0.95))
+    assert np.mean(held) >= 0.95 - 0.02
+    assert np.mean(held) <= 1.0 - 0.02
+
+
+def test_too_few_runs_promise_nothing() -> None:
+    assert stretch(claiming(np.full(18, 1e-3))) == math.inf
+    assert stretch(claiming(np.full(19, 0.5))) == pytest.approx(0.5)
+    assert promise_share(claiming(np.full(18, 1e-3)), "mug", 1.0) == 0.0
+
+
+def test_a_budget_takes_the_best_that_keeps_it_in_nearly_every_run() -> None:
+    steady, wild = point("steady", 0.5, 2e-3, jitter=0.02), point("wild", 0.5, 1e-3, jitter=1.0)
+    assert for_budget([steady, wild], 1.0, None).point is steady
+    assert for_budget([steady, wild], 1e4, None).point is wild
+
+
+def test_a_slower_machine_buys_less_and_time_already_spent_counts() -> None:
+    cheap, dear = point("cheap", 0.1, 2e-3, jitter=0.01), point("dear", 0.4, 1e-3, jitter=0.01)
+    assert for_budget([cheap, dear], 0.6, None).point is dear
+    assert for_budget([cheap, dear], 0.6, None, speed=2.0).point is cheap
+    assert for_budget([cheap, dear], 0.6, None, spent=0.4).point is cheap
+
+
+def test_a_budget_below_everything_takes_the_cheapest_and_says_that_it_does_not_fit() -> None:
+    found = for_budget([point("cheap", 0.1, 2e-3), point("dear", 0.4, 1e-3)], 1e-3, None)
+    assert found.point.name == "cheap"
+    assert not found.fits
+    assert found.seconds > 1e-3
+
+
+def test_an_object_that_was_measured_goes_by_its_own_seconds() -> None:
+    mixed = tuple(sample(f"m{k}", cpu=0.1 + 1e-3 * k) for k in range(5)) + tuple(
+        sample(f"p{k}", cpu=2.0 + 1e-2 * k, of="plate") for k in range(5)
+    )
+    one = Point("p", {}, CONDITION, mixed)
+    assert for_budget([one], 0.3, "mug").fits
+    assert not for_budget([one], 0.3, "plate").fits
+    assert not for_budget([one], 0.3, "something else").fits
+
+
+def test_an_error_is_tried_cheaply_first_where_that_pays() -> None:
+    coarse = point("coarse", 0.1, 2e-3, runs=40, radius=3e-3)
+    fine = point("fine", 2.0, 0.5e-3, runs=40, radius=1e-3)
+    assert for_error([coarse, fine], 5e-3, None)[0] is coarse
+    assert [p.name for p in for_error([coarse, fine], 1e-3, None)] == ["fine"]
+
+
+def test_an_error_that_nothing_promises_takes_what_promises_most() -> None:
+    coarse = point("coarse", 0.1, 2e-3, runs=40)
+    fine = point("fine", 2.0, 0.5e-3, runs=40, radius=1e-3)
+    assert [p.name for p in for_error([coarse, fine], 1e-5, None)] == ["fine"]
+
+
+def test_fewer_contacts_than_the_run_has_are_gone_by_and_seconds_grow_with_them() -> None:
+    measured = [{**CONDITION, "contacts": count} for count in (2, 4, 6)]
+    assert nearest_condition(measured, {**CONDITION, "contacts": 5}, "contacts") == (measured[1], 1.25)
+    assert nearest_condition(measured, {**CONDITION, "contacts": 12}, "contacts") == (measured[2], 2.0)
+    assert nearest_condition(measured, {**CONDITION, "contacts": 1}, "contacts") == (measured[0], 0.5)
+    with pytest.raises(WrongUse, match="yaw unknown"):
+        nearest_condition(measured, {"yaw": "unknown", "contacts": 6}, "contacts")
+
+
+def curve() -> Curve:
+    return Curve(
+        "test", (point("a", 0.1, 2e-3), point("b", 0.3, 1e-3)), HERE, NOW, "2026-01-01T00:00:00+00:00", "T"
+    )
+
+
+def test_a_curve_is_stale_when_the_machine_or_the_code_changes_and_only_then() -> None:
+    assert stale(curve(), HERE, NOW) == ()
+    assert stale(curve(), HERE, {**NOW, "git": "another commit"}) == ()
+    assert any("cores was 2, is 4" in reason for reason in stale(curve(), {**HERE, "cores": "4"}, NOW))
+    assert any(
+        "code has changed since 1234" in reason for reason in stale(curve(), HERE, {**NOW, "sha256": "cd"})
+    )
+
+
+def test_a_curve_comes_back_from_the_disk_as_it_was(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "curve.json"
+    save(curve(), path)
+    again = load(path)
+    assert to_json(again) == to_json(curve())
+    assert [p.samples for p in again.points] == [p.samples for p in curve().points]
+
+
+def test_curves_are_kept_where_the_cache_is_by_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TOUCHSTONE_CACHE", str(tmp_path))
+    assert curve_path("p", HERE).is_relative_to(tmp_path)
+    assert curve_path("p", HERE) != curve_path("p", {**HERE, "cores": "4"})
+    assert curve_path("p") == curve_path("p", machine())
+
+
+def broken(change: str) -> str:
+    tree = to_json(curve())
+    one = tree["points"][0]["samples"][0]
+    if change == "nan":
+        one["error_m"] = math.nan
+    elif change == "negative":
+        one["cpu_s"] = -1.0
+    elif change == "key":
+        one["errors_m"] = one.pop("error_m")
+    elif change == "schema":
+        tree["schema"] = 99
+    elif change == "list":
+        return "[]"
+    return json.dumps(tree)[: -40 if change == "cut" else None]
+
+
+@pytest.mark.parametrize("change", ["nan", "negative", "key", "schema", "list", "cut"])
+def test_a_damaged_curve_is_refused_by_name(tmp_path: Path, change: str) -> None:
+    path = tmp_path / "curve.json"
+    path.write_text(broken(change))
+    with pytest.raises(DataRefused, match=r"curve\.json is not a cost curve"):
+        load(path)
+
+
+def test_an_untouched_curve_is_not_refused() -> None:
+    assert from_json(json.loads(broken("nothing"))).program == "test"
+
+
+def test_the_code_of_a_module_is_all_that_it_imports_of_ours() -> None:
+    found = closure("harness.cost_choice")
+    assert {"harness.cost", "harness.cost_bounds", "harness.accuracy", "harness.metrics"} <= found
+    assert not any(name.startswith("numpy") for name in found)
+    assert content_hash("harness.cost") != content_hash("harness.cost_bounds")
+    assert content_hash("harness.cost") == content_hash("harness.cost")
