@@ -2,7 +2,8 @@
 
 A sound card counts its own seconds, 10 to 100 ppm away from the computer's, and says of each
 block only when the block was handed over. Hand-over comes late now and then, never early by
-more than the card's own jitter, so late blocks are given little weight.
+more than the card's own jitter, so late blocks are given little weight. Unlike `harness.clock_fit`, which
+fits to arrivals of a whole run, this serves for the few tenths of a second since a gap.
 """
 
 from dataclasses import dataclass

@@ -6,8 +6,9 @@ import numpy as np
 
 from drivers.microphone_blocks import Block, Format
 from drivers.microphone_clock import SampleClock, fit_clock, steps
+from harness.acquisition_channels import PRESSURE, block_channel
 from harness.arrays import AnyArray, BoolArray, FloatArray
-from harness.microphone_take import BAD, CALLBACK, CLOCK, COUNT_BROKEN, FLAGS, OVERLOAD, PRESSURE
+from harness.microphone_take import BAD, CALLBACK, CLOCK, COUNT_BROKEN, FLAGS, OVERLOAD
 from harness.reading import Channel, Reading
 
 SETTLE = 0.2
@@ -125,7 +126,7 @@ def readings(
     callback = np.array([(block.arrived, block.age) for block in take])
     line = np.array([[clock.index, clock.time, clock.rate, clock.residual]])
     return (
-        Reading(_channel(PRESSURE, "count", (form.block,), "int32", form), times, counts),
+        Reading(block_channel(PRESSURE, form.block, form.rate), times, counts),
         Reading(_channel(FLAGS, "1", (), "uint8", form), times, raised),
         Reading(_channel(CALLBACK, "s", (2,), "float64", form), times, callback),
         Reading(_channel(CLOCK, "1", (4,), "float64", form), times[:1], line),

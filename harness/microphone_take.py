@@ -7,7 +7,6 @@ import numpy as np
 from harness.errors import DataRefused
 from harness.reading import Reading
 
-PRESSURE = "microphone.pressure"
 FLAGS = "microphone.flags"
 CLOCK = "microphone.clock"
 CALLBACK = "microphone.callback"

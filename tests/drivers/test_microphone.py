@@ -13,6 +13,7 @@ from fake_portaudio import FakePortAudio, FakeStream, Status
 import drivers.microphone
 from drivers.microphone import PortAudioMicrophone
 from harness.arrays import AnyArray
+from harness.device import Microphone
 from harness.errors import BenchFault
 from harness.microphone_take import (
     COUNT_BROKEN,
@@ -83,6 +84,13 @@ def deliver_soon(stream: FakeStream, blocks: int, every: float = 0.0) -> threadi
     thread = threading.Thread(target=run)
     thread.start()
     return thread
+
+
+def test_it_is_a_microphone_as_experiments_know_it(
+    microphone: PortAudioMicrophone, stream: FakeStream
+) -> None:
+    known: Microphone = microphone  # the type checker compares the methods
+    assert known.health().rate == pytest.approx(RATE, rel=1e-6)
 
 
 def test_counts_come_as_they_were_sampled(microphone: PortAudioMicrophone, stream: FakeStream) -> None:
