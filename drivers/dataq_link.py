@@ -22,6 +22,10 @@ _DRAIN_STEP = 0.005
 _LARGEST_READ = 1 << 16
 
 
+class LinkCut(BenchFault):
+    """The port itself is gone: the cable was pulled or the power cut."""
+
+
 class DataqLink:
     """One open serial port.
 
@@ -139,8 +143,8 @@ class DataqLink:
             raise BenchFault(f"{self.name} was used before it was opened; open the bench first")
         return self._serial
 
-    def _cut(self, error: OSError) -> BenchFault:
-        return BenchFault(
+    def _cut(self, error: OSError) -> LinkCut:
+        return LinkCut(
             f"{self.name}: the box at {self.port} went away ({_reason(error)}); check its USB cable and its "
             "power, then open the bench again"
         )

@@ -89,6 +89,18 @@ def answer_to(command: str, reply: bytes) -> str:
     return text[len(command) :].strip()
 
 
+def without_start_echo(data: bytes) -> tuple[bool, bytes]:
+    """The first bytes of a stream without an echo of the start in front, which some firmwares send.
+
+    Returns:
+        Whether more bytes are needed to tell, and the data.
+    """
+    echo = START.encode() + END
+    if len(data) <= len(echo) and echo.startswith(data):
+        return True, data
+    return False, data[len(echo) :].removeprefix(b"\0") if data.startswith(echo) else data
+
+
 def counts(words: AnyArray, model: BoxModel) -> AnyArray:
     """Counts of int16 ``words`` as the box left-justified them; volts are ``counts * volts / 2^(bits-1)``."""
     shifted: AnyArray = words >> (16 - model.bits)

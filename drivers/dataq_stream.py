@@ -1,23 +1,25 @@
 """The stream of a scanning DATAQ box: a thread that fetches, keeps, watches and, where it must, restarts."""
 
+import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.dataq_link import DataqLink
+from drivers.dataq_link import DataqLink, LinkCut
 from drivers.dataq_monitor import SETTLED, Rests, StreamMonitor
-from drivers.dataq_protocol import END, START, STOP, BoxModel, counts
+from drivers.dataq_protocol import MODEL, START, STOP, BoxModel, counts, without_start_echo
 from harness.arrays import AnyArray, BoolArray
 from harness.clock import now
 from harness.clock_fit import ClockFit
 from harness.errors import BenchFault
 
-STALL = 0.5
+STALL = 1.0
 """s without a byte after which the box counts as stalled."""
 
-_PROOF_TIMEOUT = 5.0
+_PROOF_TIMEOUT = 2.5
+_DEAF_TIMEOUT = 10.0
 _LOOK_PERIOD = 0.1
 _SETTLE_TIMEOUT = SETTLED + 3.0
 
@@ -63,6 +65,8 @@ class ScanStream:
         self._changed = threading.Condition()
         self._closing = threading.Event()
         self._dead = ""
+        self._ended = ""
+        self._asked = False
         self._stretch = 0
         self._total = 0
         self._monitor = StreamMonitor(nominal_rate, model, rests)
@@ -80,7 +84,7 @@ class ScanStream:
         """End fetching and scanning; silent where the box is gone."""
         self._closing.set()
         self._thread.join()
-        if not self._dead:
+        with contextlib.suppress(BenchFault):
             self._link.send(STOP)
 
     @property
@@ -174,9 +178,18 @@ class ScanStream:
             return self._kept(max(0, self._total - int(seconds * self._rate)), self._total).copy()
 
     def restart(self) -> None:
-        """Ask the thread to begin anew, for a channel order that is certain."""
+        """Begin anew, for a channel order that is certain.
+
+        Raises:
+            BenchFault: the box is gone, or does not begin.
+        """
         with self._changed:
-            self._monitor.fault = self._monitor.fault or "restarted on request"
+            before, self._asked = self._stretch, True
+            done = self._changed.wait_for(lambda: self._dead or self._stretch != before, _SETTLE_TIMEOUT)
+            if self._dead or not done:
+                raise BenchFault(
+                    self._dead or f"{self._link.name}: the box did not begin anew; check its cable"
+                )
 
     def _unproven(self, end: int) -> str:
         if self._monitor.ordered < end <= self._monitor.prompt:
@@ -195,7 +208,7 @@ class ScanStream:
         if self._dead:
             raise BenchFault(self._dead)
         if self._stretch != position.stretch:
-            raise BenchFault(f"{self._link.name}: {self.losses[-1]}. It was started again: repeat the strike")
+            raise BenchFault(f"{self._link.name}: {self._ended}. It was started again: repeat the strike")
 
     def _kept(self, first: int, end: int) -> AnyArray:
         numbers = np.arange(first, end) % len(self._ring)
@@ -217,8 +230,8 @@ class ScanStream:
                     self._take(data, arrived, emptied)
                 elif arrived - self._heard > STALL:
                     self._monitor.fault = f"the box sent nothing for {STALL:g} s"
-                if self._monitor.fault:
-                    self._recover()
+                if self._monitor.fault or self._asked:
+                    self._recover(self._monitor.fault or "begun anew", bool(self._monitor.fault))
             except BenchFault as fault:
                 self._die(str(fault))
                 return
@@ -227,7 +240,7 @@ class ScanStream:
         self._heard = arrived
         data = self._partial + data
         if self._fresh:
-            data = self._without_echo(data)
+            self._fresh, data = without_start_echo(data)
         channels = self._ring.shape[1]
         whole = len(data) // (2 * channels) * (2 * channels)
         scans = np.frombuffer(data[:whole], "<i2").reshape(-1, channels)
@@ -238,28 +251,46 @@ class ScanStream:
             self._monitor.take(scans, self._total, arrived, emptied)
             self._changed.notify_all()
 
-    def _without_echo(self, data: bytes) -> bytes:
-        """The data without an echo of the start in front, which some firmwares send."""
-        echo = START.encode() + END
-        if len(data) <= len(echo) and echo.startswith(data[: len(echo)]):
-            return data
-        self._fresh = False
-        return data[len(echo) :].removeprefix(b"\0") if data.startswith(echo) else data
-
-    def _recover(self) -> None:
+    def _recover(self, reason: str, lost: bool) -> None:
         """Stop, drain, start: the only way back to a known order."""
         with self._changed:
-            self.losses.append(self._monitor.fault)
-            missed_from = self._monitor.prompt
-            fit = self._monitor.clock.fit() if self._monitor.clock.span >= SETTLED else None
-            last = fit.time(missed_from) if fit else self._heard
-        self._link.send(STOP)
-        self._link.drain()
+            last = self._last_proven()
+            if lost:
+                self.losses.append(reason)
+        self._silence()
         with self._changed:
             self._begin()
             self._stretch += 1
-            self.drops += max(1, round((now() - last) * self._rate))
+            self._ended, self._asked = reason, False
+            self.drops += max(1, round((now() - last) * self._rate)) if lost else 0
             self._changed.notify_all()
+
+    def _last_proven(self) -> float:
+        """Bench-clock seconds of the newest scan up to which none is missing."""
+        if self._monitor.clock.span < SETTLED:
+            return self._heard
+        return self._monitor.clock.fit().time(self._monitor.prompt)
+
+    def _silence(self) -> None:
+        """Have the box stop, and answer: one that is deaf would later obey all it was told at once.
+
+        Raises:
+            BenchFault: it stays deaf, or the link is cut.
+        """
+        deadline = now() + _DEAF_TIMEOUT
+        while True:
+            self._link.send(STOP)
+            self._link.drain()
+            try:
+                self._link.ask(f"info {MODEL}")
+            except LinkCut:
+                raise
+            except BenchFault:
+                if now() > deadline or self._closing.is_set():
+                    raise
+            else:
+                self._link.drain()
+                return
 
     def _die(self, reason: str) -> None:
         with self._changed:

@@ -1,9 +1,9 @@
 """An acquisition box behind a pseudo-terminal: samples when they are due, on a crystal of its own.
 
-A pseudo-terminal would block where the instrument overflows, so its master is non-blocking: what
-the host does not fetch stays in the box's own memory, and what does not fit there is lost and
-counted. A box that is served late catches up in steps smaller than its memory, so that only a
-host that does not read makes it overflow.
+A pseudo-terminal would block where the instrument overflows, so its master is non-blocking: what the
+program does not fetch stays in the host's memory, what the host does not fetch stays in the box's own,
+and what does not fit there is lost and counted. A box that is served late catches up in steps smaller
+than its memory, so that only a host that does not fetch makes it overflow.
 """
 
 import contextlib
@@ -32,6 +32,10 @@ one is missing from the stream. unplug: the cable is pulled, for good."""
 MEMORY = 4096
 """Bytes of the instrument's own."""
 
+HOST_MEMORY = 640 << 10
+"""Bytes that Linux keeps of a serial port for its program (TTYB_DEFAULT_MEM_LIMIT in tty_buffer.c)."""
+
+_WRITE = 4096
 _PERIOD = 2e-3
 _COMMAND_BYTES = 4096
 _LOSSES = {"lost_byte": 1, "lost_word": 2}
@@ -67,6 +71,7 @@ class DaqBox:
         serial: as it states it.
         drift_ppm: how much faster than nominal its crystal runs, parts in a million.
         memory: bytes of its own.
+        host_memory: bytes that the host's system keeps for a program that does not fetch them.
         echoes_start: whether the echo of ``start`` comes in front of the data.
 
     Attributes:
@@ -80,6 +85,7 @@ class DaqBox:
         serial: str = "mock-2108",
         drift_ppm: float = 0.0,
         memory: int = MEMORY,
+        host_memory: int = HOST_MEMORY,
         echoes_start: bool = False,
     ) -> None:
         self._model = MODELS[model]
@@ -93,7 +99,8 @@ class DaqBox:
         self._taken = 0
         self._numbered = 0
         self._answers = b""
-        self._leaving = b""
+        self._host = bytearray()
+        self._host_memory = host_memory
         self._losing = 0
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
@@ -185,24 +192,30 @@ class DaqBox:
         return (words << (16 - self._model.bits)).astype("<i2").tobytes()
 
     def _let_out(self) -> None:
-        """Write whole packets, and the last answers behind the data."""
-        if self._fault.kind == "overflow":
-            return
-        while self._leaving or self._next_packet():
-            try:
-                self._leaving = self._leaving[os.write(self._master, self._leaving) :]
-            except BlockingIOError:
-                return
+        """Let the host fetch whole packets, and the last answers behind the data; deliver what it has."""
+        while self._fault.kind != "overflow" and len(self._host) < self._host_memory and self._packet():
+            self._deliver()
+        self._deliver()
 
-    def _next_packet(self) -> bool:
-        packet = self._instrument.packet
+    def _packet(self) -> bool:
+        """Move the next packet to the host; whether there was one."""
+        size = self._instrument.packet
         if not self._instrument.scanning and self._answers:
-            self._leaving, self._answers = self._memory.peek(len(self._memory)) + self._answers, b""
-            self._memory.clear()
-        elif self._answers:
-            self._leaving, self._answers = self._answers, b""
-        elif self._instrument.scanning and len(self._memory) >= packet:
-            self._leaving = self._memory.peek(packet)[self._losing :]
-            self._memory.drop(packet)
+            size = len(self._memory)
+        elif not self._answers and (not self._instrument.scanning or len(self._memory) < size):
+            return False
+        if self._answers and self._instrument.scanning:
+            data = b""
+        else:
+            data = self._memory.peek(size)[self._losing :]
+            self._memory.drop(size)
             self._losing = 0
-        return bool(self._leaving)
+        self._host += data + self._answers
+        self._answers = b""
+        return True
+
+    def _deliver(self) -> None:
+        """Write to the program at the other end what it takes."""
+        with contextlib.suppress(BlockingIOError):
+            while self._host:
+                del self._host[: os.write(self._master, self._host[:_WRITE])]

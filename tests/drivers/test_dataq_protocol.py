@@ -13,6 +13,7 @@ from drivers.dataq_protocol import (
     known_model,
     likely_loss,
     packet_exponent,
+    without_start_echo,
 )
 from harness.arrays import AnyArray
 from harness.errors import WrongUse
@@ -56,6 +57,17 @@ def test_twelve_bits_are_left_justified() -> None:
     words = np.array([0x7FF0, -0x8000, 0x0010, -0x0010], np.int16)
     assert counts(words, MODELS["DI-1110"]).tolist() == [2047, -2048, 1, -1]
     assert counts(words, MODELS["DI-2108"]).tolist() == words.tolist()
+
+
+@pytest.mark.parametrize("after", [b"", b"\0"])
+def test_an_echo_in_front_of_the_data_is_none_of_it(after: bytes) -> None:
+    assert without_start_echo(b"start 0\r" + after + b"\x78\x00\x4c\xff") == (False, b"\x78\x00\x4c\xff")
+    assert without_start_echo(b"\x78\x00\x4c\xff") == (False, b"\x78\x00\x4c\xff")
+
+
+@pytest.mark.parametrize("begun", [b"", b"s", b"start 0", b"start 0\r"])
+def test_what_may_become_an_echo_is_waited_for(begun: bytes) -> None:
+    assert without_start_echo(begun) == (True, begun)
 
 
 def test_an_unknown_model_is_named_with_those_there_are() -> None:
