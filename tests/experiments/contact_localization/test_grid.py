@@ -25,6 +25,7 @@ class Known:
     ) -> None:
         self.prior = Prior(np.eye(3), yaw)
         self.shares = shares
+        self.yaw_observable = True
 
     def weigh(
         self, gels: FloatArray, yaws: FloatArray, members: IntArray, step: int, rings: int
