@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import drivers.microphone
 from drivers.microphone import PortAudioMicrophone
 from harness.arrays import AnyArray
 from harness.clock import now
@@ -112,6 +114,24 @@ def test_the_clock_is_fitted_to_the_bench_clock(card: SoundCard, microphone: Por
     assert np.diff(pressure.times) == pytest.approx(512 / rate, rel=1e-9)
     assert np.all(pressure.times + 512 / rate < callback.values[:, 0] + 2e-3)
     assert pressure.times[-1] > asked
+
+
+def test_a_computer_late_for_a_second_is_noticed(
+    monkeypatch: pytest.MonkeyPatch, microphone: PortAudioMicrophone
+) -> None:
+    pauses = [1.0]
+
+    def late_clock() -> float:
+        if pauses and threading.current_thread() is not threading.main_thread():
+            time.sleep(pauses.pop())
+        return now()
+
+    monkeypatch.setattr(drivers.microphone, "STALL", 3.0)
+    microphone.record(0.5)
+    monkeypatch.setattr(drivers.microphone, "now", late_clock)
+    take = microphone.record(1.5)
+    assert not pauses
+    assert flags_of(take) & BAD
 
 
 def test_silence_is_said_to_be_silent(microphone: PortAudioMicrophone) -> None:
