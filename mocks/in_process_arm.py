@@ -11,7 +11,8 @@ from harness.errors import BenchFault, LimitExceeded
 from harness.geometry import quaternion_from_rotation, vector_from_rotation
 from harness.kinematics import forward, nearest_branch
 from harness.reading import Channel, Reading
-from mocks.simulated_motion import Stage, between, profile
+from mocks.simulated_motion import Stage, between
+from mocks.ur.profiles import trapezoid
 from mocks.world import World
 
 CYCLE = 2e-3
@@ -110,8 +111,8 @@ class InProcessArm:
         start, goal = self._joints(self._stage.time), np.array(joints, dtype=np.float64)
         _require_finite(goal, speed, acceleration)
         furthest = float(np.abs(goal - start).max())
-        share = profile(furthest, speed, acceleration)
-        self._append(share.duration, lambda time: start + share.at(time) * (goal - start))
+        way = trapezoid(furthest, speed, acceleration)
+        self._append(way.duration, lambda time: start + way.share(time) * (goal - start))
 
     def move_line(self, base_from_flange: FloatArray, speed: float, acceleration: float) -> None:
         """Move in a straight line, turning evenly on the way."""
@@ -120,8 +121,8 @@ class InProcessArm:
         self._require_reachable(base_from_flange)
         length = float(np.linalg.norm(base_from_flange[:3, 3] - start[:3, 3]))
         turn = vector_from_rotation(start[:3, :3].T @ base_from_flange[:3, :3])
-        share = profile(max(length, 0.1 * float(np.linalg.norm(turn))), speed, acceleration)
-        self._append_line(share.duration, lambda time: between(start, base_from_flange, turn, share.at(time)))
+        way = trapezoid(max(length, 0.1 * float(np.linalg.norm(turn))), speed, acceleration)
+        self._append_line(way.duration, lambda time: between(start, base_from_flange, turn, way.share(time)))
 
     def move_until_contact(self, direction: FloatArray, speed: float, force: float, travel: float) -> bool:
         """Move along a unit direction until ``force`` N resist; False after ``travel`` m without."""
@@ -137,8 +138,8 @@ class InProcessArm:
         met = self._first_resistance(lambda k: at(k * step), direction, force, int(travel / step), step)
         distance = travel if met is None else (met + NOTICED_AFTER) * step
         self._require_reachable(at(distance))
-        share = profile(distance, speed, np.inf)
-        self._append_line(share.duration, lambda time: at(share.at(time) * distance))
+        way = trapezoid(distance, speed, np.inf)
+        self._append_line(way.duration, lambda time: at(way.share(time) * distance))
         return met is not None
 
     def zero_force(self) -> None:

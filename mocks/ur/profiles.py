@@ -30,11 +30,15 @@ class Trapezoid:
 
 
 def trapezoid(length: float, speed: float, acceleration: float) -> Trapezoid:
-    """The fastest at no more than ``speed`` and ``acceleration``; without a cruise where the way is short."""
+    """The fastest at no more than ``speed`` and ``acceleration``; without a cruise where the way is short.
+
+    An infinite acceleration is at full speed all the way.
+    """
     if length <= 0.0:
         return Trapezoid(0.0, 0.0)
     ramp = min(speed / acceleration, math.sqrt(length / acceleration))
-    return Trapezoid(length / (acceleration * ramp) + ramp, ramp)
+    peak = min(speed, acceleration * ramp) if ramp > 0.0 else speed
+    return Trapezoid(length / peak + ramp, ramp)
 
 
 def lasting(duration: float, ramp_share: float = 0.25) -> Trapezoid:

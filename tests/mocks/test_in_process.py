@@ -16,7 +16,7 @@ from harness.kinematics import forward, nearest_branch
 from mocks.gelsight_stream import encode
 from mocks.in_process import InProcessGel
 from mocks.in_process_arm import CYCLE, NOTICED_AFTER, InProcessArm
-from mocks.simulated_motion import Stage, profile
+from mocks.simulated_motion import Stage
 from mocks.truth import TruthFile
 from mocks.ur.hooks import HOME
 from mocks.world import NominalBench, World
@@ -153,21 +153,6 @@ def test_nothing_infinite_is_obeyed(bench: Bench) -> None:
         bench.arm.move_line(bench.start, -1.0, 1.0)
     with pytest.raises(BenchFault, match="no joints of the ur5e reach"):
         bench.arm.move_line(bench.start @ translation(np.array([0.0, 0.0, 3.0])), 0.1, 0.1)
-
-
-@pytest.mark.parametrize(
-    ("length", "speed", "acceleration"), [(0.1, 0.05, 0.2), (1e-3, 0.5, 0.2), (0.02, 0.01, np.inf), (0, 1, 1)]
-)
-def test_a_profile_runs_from_rest_to_rest(length: float, speed: float, acceleration: float) -> None:
-    way = profile(length, speed, acceleration)
-    times = np.linspace(0.0, max(way.duration, 1e-9), 2001)
-    places = length * np.array([way.at(float(time)) for time in times])
-    assert places[-1] == pytest.approx(length)
-    speeds = np.diff(places) / np.diff(times)
-    assert speeds.max(initial=0.0) <= speed * (1 + 1e-6)
-    assert speeds.min(initial=0.0) >= -1e-12
-    if np.isfinite(acceleration) and length:
-        assert np.abs(np.diff(speeds) / np.diff(times)[1:]).max() <= acceleration * 1.01
 
 
 def test_the_truth_of_a_step_performed_again_replaces_the_old(

@@ -52,7 +52,8 @@ def _run_until_stopped(controller: Controller) -> int:
 
 
 @pytest.mark.parametrize(
-    ("length", "speed", "acceleration"), [(1.0, 0.5, 2.0), (0.01, 0.5, 2.0), (2.0, 3.0, 1.0)]
+    ("length", "speed", "acceleration"),
+    [(1.0, 0.5, 2.0), (0.01, 0.5, 2.0), (2.0, 3.0, 1.0), (1e-3, 0.5, 0.2), (0.02, 0.01, np.inf)],
 )
 def test_a_trapezoid_keeps_its_limits(length: float, speed: float, acceleration: float) -> None:
     profile = trapezoid(length, speed, acceleration)
@@ -62,7 +63,14 @@ def test_a_trapezoid_keeps_its_limits(length: float, speed: float, acceleration:
     assert way[0] == 0.0
     assert way[-1] == length
     assert rate.max() <= speed * (1 + 1e-6)
+    assert rate.min() >= 0.0
     assert np.abs(np.diff(rate) / times[1]).max() <= acceleration * (1 + 1e-3)
+
+
+def test_no_way_takes_no_time_and_is_done() -> None:
+    nowhere = trapezoid(0.0, 1.0, 1.0)
+    assert nowhere.duration == 0.0
+    assert nowhere.share(0.0) == 1.0
 
 
 def test_a_move_ends_exactly_at_its_goal_after_its_trapezoid() -> None:
