@@ -165,7 +165,12 @@ class Lab:
         striker = Striker(strikes, lambda: self._shared.firing)
         box = DaqBox(Played(strikes.idle(), striker.next_record), drift_ppm=DRIFT_PPM)
         self._hammer_port = box.port
-        self._children["hammer"] = Child("hammer", box.serve)
+
+        def serve(line: Line) -> None:
+            keep_time()
+            box.serve(line)
+
+        self._children["hammer"] = Child("hammer", serve)
         box.leave()
 
     def _mark(self, step: int, sample: int) -> Mapping[str, int]:

@@ -4,6 +4,7 @@ The arm stays clear of the object; only the striker's tip crosses the last milli
 press has found the surface a little nearer or farther than planned, the strike follows it.
 """
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +21,8 @@ from harness.station_file import Station
 from harness.twin.bench import TwinBench
 from harness.twin.strike_motion import PlannedStrike, StrikePlanner
 
+_LOG = logging.getLogger(__name__)
+
 POSE = "hammer.base_from_flange"
 """Channel of the flange's pose when the striker was fired: x, y, z in m, then the quaternion."""
 
@@ -31,6 +34,9 @@ ON = 0.05
 
 TIMEOUT = 1.0
 TIMEOUT_BY_HAND = 60.0
+
+ATTEMPTS = 3
+"""Times that a strike is made where samples of it were lost: the next one is as good."""
 
 FARTHEST = 0.01
 """m between the planned and the touched surface that a strike follows; beyond it nothing was rehearsed."""
@@ -153,7 +159,7 @@ def strike(
     try:
         bench.mark(step, STRIKE)
         pose = _pose(bench)
-        heard = _capture(bench, fire, TIMEOUT)
+        heard = _captured(bench, fire)
     finally:
         bench.arm.move_line(motion.base_from_ready, speeds.approach, speeds.acceleration)
     return (pose, *heard)
@@ -179,6 +185,15 @@ def strike_by_hand(step: int, bench: Bench, ask: Ask | None) -> tuple[Reading, .
     bench.mark(step, STRIKE)
     what = f"contact {step + 1}: strike the place that was touched, along the way of the gel, within"
     return _capture(bench, lambda: ask(f"{what} {TIMEOUT_BY_HAND:.0f} s"), TIMEOUT_BY_HAND)
+
+
+def _captured(bench: Bench, fire: Callable[[], None]) -> tuple[Reading, ...]:
+    for _ in range(ATTEMPTS - 1):
+        try:
+            return _capture(bench, fire, TIMEOUT)
+        except BenchFault as fault:
+            _LOG.warning("the strike is repeated: %s", fault)
+    return _capture(bench, fire, TIMEOUT)
 
 
 def _capture(bench: Bench, fire: Callable[[], None], timeout: float) -> tuple[Reading, ...]:
