@@ -24,8 +24,8 @@ from harness.station_file import Station
 
 INSTRUMENTS = {
     "ur": "drivers.ur_arm:UrArm",
-    "gelsight-http": "drivers.gelsight:GelSight",
-    "camera-http": "drivers.camera:SceneCamera",
+    "gelsight-http": "drivers.http_camera:gelsight",
+    "camera-http": "drivers.http_camera:scene_camera",
     "dataq": "drivers.hammer:DataqHammer",
 }
 """Instrument kind to driver."""

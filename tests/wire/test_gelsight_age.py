@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.gelsight import GelSight
+from drivers.http_camera import HttpCamera, gelsight
 from harness.arrays import ByteArray
 from harness.clock import now
 from harness.errors import BenchFault
@@ -68,14 +68,14 @@ def camera() -> Iterator[tuple[Child, str]]:
 
 
 @pytest.fixture
-def gel(camera: tuple[Child, str]) -> Iterator[GelSight]:
-    gel = GelSight(camera[1], SENSOR)
+def gel(camera: tuple[Child, str]) -> Iterator[HttpCamera]:
+    gel = gelsight(camera[1], SENSOR)
     gel.open()
     yield gel
     gel.close()
 
 
-def test_the_stated_rate_arrives(gel: GelSight) -> None:
+def test_the_stated_rate_arrives(gel: HttpCamera) -> None:
     reading = gel.read(50, 4.0)
     drawn = np.array([shown_time(image) for image in reading.values])
     assert np.all(np.diff(drawn) > 0.0)
@@ -85,7 +85,7 @@ def test_the_stated_rate_arrives(gel: GelSight) -> None:
     assert gel.health().rate == pytest.approx(25.0, rel=0.15)
 
 
-def test_the_newest_frame_is_new_however_slow_the_consumer(gel: GelSight) -> None:
+def test_the_newest_frame_is_new_however_slow_the_consumer(gel: HttpCamera) -> None:
     ages = []
     for _ in range(8):
         time.sleep(0.15)  # the stream sends four frames meanwhile
@@ -98,7 +98,7 @@ def test_the_newest_frame_is_new_however_slow_the_consumer(gel: GelSight) -> Non
     assert np.median(ages) < 0.02
 
 
-def test_a_stalled_camera_is_named_and_read_again(camera: tuple[Child, str], gel: GelSight) -> None:
+def test_a_stalled_camera_is_named_and_read_again(camera: tuple[Child, str], gel: HttpCamera) -> None:
     camera[0].cue(Fault("gel", "stall", 1.0))
     with pytest.raises(BenchFault) as stalled:
         gel.read(10, 0.5)

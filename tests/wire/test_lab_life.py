@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.gelsight import GelSight
+from drivers.http_camera import gelsight
 from harness.errors import BenchFault
 from harness.gap import gap_path
 from harness.mock_lab import LabAddresses, MockLab
@@ -122,7 +122,7 @@ def test_a_request_it_does_not_know_is_refused(
 
 def test_a_fault_reaches_the_instrument(lab: tuple[MockLab, LabAddresses]) -> None:
     program, where = lab
-    gel = GelSight(where.gel, GELSIGHT_R15)
+    gel = gelsight(where.gel, GELSIGHT_R15)
     gel.open()
     program.fault("gel", "stall", 0.8)
     with pytest.raises(BenchFault, match="stalled"):
@@ -132,7 +132,7 @@ def test_a_fault_reaches_the_instrument(lab: tuple[MockLab, LabAddresses]) -> No
 
 
 def test_the_gel_shows_the_untouched_gel_at_home(lab: tuple[MockLab, LabAddresses]) -> None:
-    gel = GelSight(lab[1].gel, GELSIGHT_R15)
+    gel = gelsight(lab[1].gel, GELSIGHT_R15)
     gel.open()
     first, second = gel.read(2, 2.0).encoded
     gel.close()

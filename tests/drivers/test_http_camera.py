@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from drivers.camera import SceneCamera
-from drivers.gelsight import GelSight
+from drivers.http_camera import HttpCamera, gelsight, scene_camera
 from harness.arrays import ByteArray
 from harness.clock import now
 from harness.errors import BenchFault
@@ -59,14 +58,14 @@ def bench() -> Iterator[Bench]:
 
 
 @pytest.fixture
-def gel(bench: Bench) -> Iterator[GelSight]:
-    gel = GelSight(bench.url, SMALL)
+def gel(bench: Bench) -> Iterator[HttpCamera]:
+    gel = gelsight(bench.url, SMALL)
     gel.open()
     yield gel
     gel.close()
 
 
-def test_frames_are_rgb_with_the_bytes_they_came_as(bench: Bench, gel: GelSight) -> None:
+def test_frames_are_rgb_with_the_bytes_they_came_as(bench: Bench, gel: HttpCamera) -> None:
     reading = gel.read(3, 2.0)
     assert reading.channel.name == "gel.image"
     assert reading.values.shape == (3, 12, 16, 3)
@@ -74,21 +73,21 @@ def test_frames_are_rgb_with_the_bytes_they_came_as(bench: Bench, gel: GelSight)
     assert reading.encoded == (encode(bench.view.picture()),) * 3
 
 
-def test_only_frames_that_arrive_after_the_call_are_read(gel: GelSight) -> None:
+def test_only_frames_that_arrive_after_the_call_are_read(gel: HttpCamera) -> None:
     asked = now()
     reading = gel.read(4, 2.0)
     assert np.all(reading.times > asked)
     assert np.all(np.diff(reading.times) > 0.0)
 
 
-def test_a_slow_consumer_still_gets_the_newest_frame(bench: Bench, gel: GelSight) -> None:
+def test_a_slow_consumer_still_gets_the_newest_frame(bench: Bench, gel: HttpCamera) -> None:
     gel.read(20, 2.0)  # twenty frames have piled up behind the capture in the meantime
     bench.view.colour = (200, 30, 60)
     gel.read(2, 2.0)  # a frame already on its way may be the old one; the one after it is not
     assert np.abs(gel.read(1, 2.0).values[0, 0, 0].astype(int) - [200, 30, 60]).max() <= 2
 
 
-def test_the_rate_is_measured(gel: GelSight) -> None:
+def test_the_rate_is_measured(gel: HttpCamera) -> None:
     gel.read(50, 3.0)
     health = gel.health()
     assert health.rate == pytest.approx(50.0, rel=0.2)
@@ -96,7 +95,7 @@ def test_the_rate_is_measured(gel: GelSight) -> None:
     assert "GelSight R1.5" in health.identity
 
 
-def test_opening_and_closing_twice_does_nothing_more(bench: Bench, gel: GelSight) -> None:
+def test_opening_and_closing_twice_does_nothing_more(bench: Bench, gel: HttpCamera) -> None:
     gel.open()
     gel.read(1, 2.0)
     gel.close()
@@ -110,7 +109,7 @@ def test_opening_and_closing_twice_does_nothing_more(bench: Bench, gel: GelSight
 def test_a_wrong_port_is_one_sentence_naming_the_address() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-    gel = GelSight(f"http://127.0.0.1:{port}/?action=stream", SMALL)
+    gel = gelsight(f"http://127.0.0.1:{port}/?action=stream", SMALL)
     with pytest.raises(BenchFault, match=f"gel: no video stream at http://127.0.0.1:{port}/") as refused:
         gel.open()
     assert "\n" not in str(refused.value)
@@ -118,13 +117,13 @@ def test_a_wrong_port_is_one_sentence_naming_the_address() -> None:
 
 
 def test_pictures_of_another_size_are_refused(bench: Bench) -> None:
-    gel = GelSight(bench.url, GELSIGHT_R15)
+    gel = gelsight(bench.url, GELSIGHT_R15)
     with pytest.raises(BenchFault, match="sends 16 x 12 pixels and the station expects 160 x 120"):
         gel.open()
     assert "gel" not in [thread.name for thread in threading.enumerate()]
 
 
-def test_a_stall_is_a_fault_and_then_heals(bench: Bench, gel: GelSight) -> None:
+def test_a_stall_is_a_fault_and_then_heals(bench: Bench, gel: HttpCamera) -> None:
     gel.read(10, 2.0)
     bench.server.fault.set(Fault("gel", "stall", 0.8))
     with pytest.raises(BenchFault, match=r"sent [012] of 3 frames in 0.3 s; the stream at .* has stalled"):
@@ -134,20 +133,20 @@ def test_a_stall_is_a_fault_and_then_heals(bench: Bench, gel: GelSight) -> None:
     assert gel.health().drops >= 20
 
 
-def test_half_a_picture_is_never_read(bench: Bench, gel: GelSight) -> None:
+def test_half_a_picture_is_never_read(bench: Bench, gel: HttpCamera) -> None:
     bench.server.fault.set(Fault("gel", "truncate", 0.3))
     reading = gel.read(10, 3.0)
     assert np.abs(reading.values.astype(int) - np.array(bench.view.colour)).max() <= 2
     assert gel.health().drops >= 10
 
 
-def test_a_dropped_connection_is_made_again(bench: Bench, gel: GelSight) -> None:
+def test_a_dropped_connection_is_made_again(bench: Bench, gel: HttpCamera) -> None:
     bench.server.fault.set(Fault("gel", "drop", 0.3))
     gel.read(20, 3.0)
     assert "opened again" in gel.health().detail
 
 
-def test_a_frozen_stream_goes_on_with_the_old_picture(bench: Bench, gel: GelSight) -> None:
+def test_a_frozen_stream_goes_on_with_the_old_picture(bench: Bench, gel: HttpCamera) -> None:
     before = gel.read(1, 2.0).encoded[0]
     bench.server.fault.set(Fault("gel", "freeze"))
     bench.view.colour = (0, 0, 0)
@@ -157,14 +156,14 @@ def test_a_frozen_stream_goes_on_with_the_old_picture(bench: Bench, gel: GelSigh
     assert gel.read(1, 2.0).encoded[0] != before
 
 
-def test_a_count_that_cannot_be_kept_is_a_programming_error(gel: GelSight) -> None:
+def test_a_count_that_cannot_be_kept_is_a_programming_error(gel: HttpCamera) -> None:
     for count in (0, 65):
         with pytest.raises(ValueError, match="frames asked for"):
             gel.read(count, 1.0)
 
 
 def test_the_scene_camera_reads_the_same_way(bench: Bench) -> None:
-    camera = SceneCamera(bench.url, rows=12, columns=16)
+    camera = scene_camera(bench.url, rows=12, columns=16)
     camera.open()
     reading = camera.read(2, 2.0)
     camera.close()
