@@ -44,8 +44,15 @@ class Analysis:
         lowest: Hz; below it are the room and the object rocking on its stand.
         prominence: dB that a peak stands above its surroundings.
         above_noise: dB that it stands above what was heard before the strikes.
+        above_floor: dB that it stands above the median about it: between resonances a room's echoes make
+            peaks out of what all modes together answer, seldom 10 dB above their median.
+        floor_reach: Hz to each side over which that median is taken.
         edge: share of a peak's power down to which its band reaches.
         residual: share of a band's energy that may differ from one waveform.
+        skirt: dB that a peak must stand above the skirts of stronger ones, on which a room's echoes make
+            peaks of their own.
+        shared_skirt: the same for a peak whose shares are those of the stronger ones.
+        shared: share of a peak's energy beyond which its shares are its own.
         most: peaks kept at most, strongest first.
     """
 
@@ -57,8 +64,13 @@ class Analysis:
     lowest: float = 150.0
     prominence: float = 6.0
     above_noise: float = 10.0
+    above_floor: float = 11.0
+    floor_reach: float = 250.0
     edge: float = 0.25
     residual: float = 0.12
+    skirt: float = 6.0
+    shared_skirt: float = 14.0
+    shared: float = 0.1
     most: int = 40
 
 
@@ -73,7 +85,7 @@ class Peak:
         sigma: ``(K,)`` standard deviation of ``y`` by the noise before the strikes.
         heard: ``(K,)`` whether the strike excited this frequency.
         residual: share of the band's energy that is not one waveform.
-        level: dB against the strongest peak.
+        level: dB of its top against the strongest peak's.
     """
 
     frequency: float
@@ -93,7 +105,8 @@ class SoundEvidence:
         used: ``(K,)`` whether each strike counts.
         reasons: why each does not; empty where it does.
         peaks: resonances that are one waveform, by ascending frequency.
-        rejected: peaks that are not: two modes at once, noise, or ripple of the room.
+        rejected: peaks that are not, being two modes at once or noise; and echoes' peaks on the skirts
+            of stronger ones.
         band: Hz, least and greatest frequency that at least two strikes excited; zeros where none.
     """
 
@@ -214,7 +227,9 @@ def _bands(spectra: _Spectra, settings: Analysis) -> list[tuple[int, int, int]]:
     loudest = float(level.max())
     tops, _ = find_peaks(np.maximum(level, loudest - 120.0), prominence=settings.prominence)
     loud = power[tops] > noise[tops] * 10.0 ** (settings.above_noise / 10.0)
-    tops = tops[loud & open_bins[tops]]
+    reach = round(settings.floor_reach / float(spectra.frequencies[1]))
+    floor = np.array([np.median(level[max(0, top - reach) : top + reach + 1]) for top in tops])
+    tops = tops[loud & open_bins[tops] & (level[tops] > floor + settings.above_floor)]
     tops = tops[np.argsort(-power[tops], kind="stable")][: 2 * settings.most]
     return [_reach(power, int(top), settings.edge) for top in tops]
 
@@ -252,7 +267,7 @@ def _peak(
         sigma=read_only(_spread(noise / (strengths[0] * length), everyone, len(used))),
         heard=read_only(np.isin(np.arange(len(used)), everyone)),
         residual=float(1.0 - strengths[0] ** 2 / np.sum(strengths**2)),
-        level=float(20.0 * np.log10(strengths[0] * length)),
+        level=float(10.0 * np.log10(np.mean(np.abs(spectra.transfer[heard, top]) ** 2))),
     )
 
 
@@ -278,12 +293,40 @@ def _resonance(frequencies: FloatArray, wave: ComplexArray, decay: float) -> tup
 
 
 def _sorted_out(peaks: list[Peak], settings: Analysis) -> tuple[tuple[Peak, ...], tuple[Peak, ...]]:
+    """Kept and rejected, by frequency; ``peaks`` come strongest first."""
+    standing: list[Peak] = []
+    kept: list[Peak] = []
+    rejected: list[Peak] = []
+    for peak in peaks:
+        if _is_ripple(peak, standing, settings):
+            rejected.append(peak)
+            continue
+        standing.append(peak)
+        clean = peak.residual < settings.residual and len(kept) < settings.most
+        (kept if clean else rejected).append(peak)
     loudest = max((peak.level for peak in peaks), default=0.0)
-    clean = [peak for peak in peaks if peak.residual < settings.residual][: settings.most]
-    mixed = [peak for peak in peaks if peak.residual >= settings.residual]
 
     def ascending(some: list[Peak]) -> tuple[Peak, ...]:
         relative = [replace(peak, level=peak.level - loudest) for peak in some]
         return tuple(sorted(relative, key=lambda peak: peak.frequency))
 
-    return ascending(clean), ascending(mixed)
+    return ascending(kept), ascending(rejected)
+
+
+def _is_ripple(peak: Peak, stronger: list[Peak], settings: Analysis) -> bool:
+    """Whether a peak is an echo's, on the skirts of stronger ones."""
+    if not stronger:
+        return False
+    gaps = peak.frequency - np.array([other.frequency for other in stronger])
+    widths = np.array([max(other.damping, 0.0) + settings.decay for other in stronger]) / (2.0 * np.pi)
+    powers = 10.0 ** (np.array([other.level for other in stronger]) / 10.0)
+    skirts = powers * widths**2 / (widths**2 + gaps**2)
+    above = peak.level - 10.0 * np.log10(float(skirts.sum()))
+    if above < settings.skirt:
+        return True
+    # Few enough that a mode of its own would still point elsewhere.
+    few = max(1, int(peak.heard.sum()) // 2)
+    leaking = [stronger[k].y for k in np.argsort(-skirts)[:few]]
+    basis = np.linalg.qr(np.array(leaking).T)[0]
+    own = 1.0 - float(np.linalg.norm(basis.conj().T @ peak.y) ** 2)
+    return above < settings.shared_skirt and own < settings.shared

@@ -1,0 +1,71 @@
+"""Where the strikes of a run fell under each hypothesis, and the posterior by sound alone."""
+
+import numpy as np
+
+from experiments.contact_localization.hypotheses import Hypotheses
+from experiments.contact_localization.search import Search
+from experiments.contact_localization.sound_likelihood import SoundTerm
+from harness.arrays import FloatArray, IntArray
+
+
+def strike_places(
+    search: Search, struck: IntArray, gels: FloatArray, yaws: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Where strikes fell and which way they went: the press's place, along the tool.
+
+    Args:
+        search: the run.
+        struck: ``(K,)`` indices of the contacts that were struck.
+        gels: ``(h, 3)`` metres, see ``Hypotheses``.
+        yaws: ``(h,)`` rad.
+
+    Returns:
+        ``(h, K, 3)`` metres and ``(h, K, 3)`` unit, in the object's frame. The places are as far off
+        the surface as the indentation is misread; a table of modes takes the nearest sample.
+    """
+    rotations = search.prior.object_from_base(yaws)
+    directions = np.einsum("hij,kj->hki", rotations, search.axes[struck])
+    indentations = np.array([search.contacts[k].indentation for k in struck])
+    moved = np.einsum("hij,kj->hki", rotations, search.positions[struck])
+    points: FloatArray = gels[:, None] + moved - indentations[:, None] * directions
+    return points, np.ascontiguousarray(directions)
+
+
+def sound_nats(
+    search: Search, term: SoundTerm, struck: IntArray, gels: FloatArray, yaws: FloatArray
+) -> FloatArray:
+    """``(h,)`` nats of hypotheses by a run's sounds, 0 for sounds that say nothing.
+
+    Args:
+        search: the run.
+        term: of its strikes, in the order of ``struck``.
+        struck: ``(K,)`` indices of the contacts that were struck.
+        gels: ``(h, 3)`` metres, see ``Hypotheses``.
+        yaws: ``(h,)`` rad.
+    """
+    if not term.says_something:
+        return np.zeros(len(gels))
+    return term.log_likelihood(*strike_places(search, struck, gels, yaws))
+
+
+def by_sound(
+    search: Search,
+    term: SoundTerm,
+    struck: IntArray,
+    members: IntArray,
+    anchor: int,
+    use_axis: bool = True,
+) -> Hypotheses:
+    """The posterior over surface samples and yaws by places, tool axes and sound, without any image.
+
+    Args:
+        search: the run.
+        term: of its strikes, in the order of ``struck``.
+        struck: ``(K,)`` indices of the contacts that were struck.
+        members: ``(m,)`` indices of the contacts whose place counts.
+        anchor: the one of them that a hypothesis puts on a sample.
+        use_axis: whether the tool's attitude counts, or only places.
+    """
+    start = search.grid(members, anchor, use_axis)
+    total = start.log_weights + sound_nats(search, term, struck, start.gels, start.yaws)
+    return Hypotheses(start.gels, start.yaws, total - total.max())

@@ -1,0 +1,202 @@
+"""What sound says of simulated objects: ``python tests/benchmarks/bench_sound_term.py [options]``.
+
+A run is struck six times in the mocks' world, gap and all, and answered by places and tool axes alone, by
+sound added to them, and by the paper's MFCC filter. No image is simulated. Printed for each object:
+errors of the last contact, nats that the sounds give the truth over the places that the arm's
+translations leave, and seconds.
+
+The true object's modes are computed for a few variants and shared between seeds; the shape, the frequencies,
+the microphone and everything else are each seed's own.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.baselines import geometry_and_axis, geometry_only
+from experiments.contact_localization.hypotheses import Contact, Noise
+from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.nearest import nearest_point
+from experiments.contact_localization.posterior import best_point
+from experiments.contact_localization.search import Search
+from experiments.contact_localization.sites import Steps, plan_sites
+from experiments.contact_localization.sound_analysis import Analysis, analyse
+from experiments.contact_localization.sound_gains import GainTable, gain_table
+from experiments.contact_localization.sound_likelihood import SoundTerm
+from experiments.contact_localization.sound_matching import SoundNoise
+from experiments.contact_localization.sound_mfcc import MfccTable, mfcc_filter
+from experiments.contact_localization.sound_places import by_sound, sound_nats
+from harness.acquisition import Strike
+from harness.arrays import FloatArray
+from harness.gap import Gap
+from harness.geometry import rotation_about, transform, translation
+from harness.materials import Material, material
+from harness.objects.household import MATERIALS, build
+from harness.sensor import GELSIGHT_R15
+from harness.sim.modes import Modes, dampings
+from harness.sim.tactile_calibration import shipped_calibration
+from mocks.world import NominalBench, World
+from mocks.world_sound import Instrument, WorldSound
+
+SPACING = 2.0e-3
+RATE = 50_000.0
+CALIBRATION = "gelsight_r15_bench"
+STAND_OFF = 5.0e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """An object as the estimator knows it."""
+
+    name: str
+    model: Model
+    material: Material
+    modes: Modes
+    table: GainTable
+    mfcc: MfccTable
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run as an estimator sees it, and its truth."""
+
+    poses: tuple[FloatArray, ...]
+    strikes: tuple[Strike, ...]
+    prior: Prior
+    true: FloatArray
+    struck: FloatArray
+    directions: FloatArray
+    frequencies: FloatArray
+
+
+def thing_of(name: str, modes: Modes) -> Thing:
+    """An object with what is made of it once."""
+    model = Model(build(name, 3e-3), GELSIGHT_R15, shipped_calibration(CALIBRATION))
+    made_of = material(MATERIALS[name])
+    table = gain_table(modes, model.surface(SPACING))
+    return Thing(name, model, made_of, modes, table, MfccTable(table, modes, made_of, RATE))
+
+
+def run_of(thing: Thing, true_modes: Modes, gap: Gap, seed: int, steps: Steps, count: int, yaw: str) -> Run:
+    """Perform a run in the mocks' world: presses and strikes, no pictures.
+
+    Args:
+        thing: the object as it is believed to be.
+        true_modes: as it is, but for what the gap's draw changes.
+        gap: of the world.
+        seed: of the run.
+        steps: between contacts.
+        count: of contacts.
+        yaw: ``"known"`` to the estimator or ``"unknown"``.
+    """
+    turned = np.random.default_rng((seed, 7)).uniform(0.0, 2.0 * np.pi)
+    base_from_object = transform(rotation_about(np.array([0.0, 0.0, 1.0]), turned), np.array([0.4, 0.1, 0.2]))
+    sites = plan_sites(thing.model.raster, GELSIGHT_R15, base_from_object, count, steps, seed)
+    flange_from_tool = translation(np.array([0.0, 0.0, 0.1]))
+    bench = NominalBench(
+        build(thing.name, 2.2e-3), base_from_object, flange_from_tool, GELSIGHT_R15, CALIBRATION
+    )
+    world = World(bench, gap, seed)
+    heard = Instrument(true_modes, _dampings(true_modes, thing.material), _levels(true_modes))
+    sound = WorldSound(world, heard, gap, seed, flange_from_tool, RATE)
+    back = translation(np.array([0.0, 0.0, -STAND_OFF]))
+    poses, strikes, struck, directions = [], [], [], []
+    for step, site in enumerate(sites):
+        base_from_flange = site.base_from_gel @ np.linalg.inv(flange_from_tool)
+        found = sound.strike(site.base_from_gel @ back @ np.linalg.inv(flange_from_tool), step, 0)
+        poses.append(site.base_from_gel)
+        strikes.append(_as_captured(found.force * sound.force_gain, found.pressure, found.aim.met is None))
+        true = world.true_contact(base_from_flange, step)
+        directions.append(found.aim.direction_in_object)
+        struck.append(true if found.aim.met is None else found.aim.met.nominal)
+    rotation = base_from_object[:3, :3]
+    if yaw == "known":
+        prior = Prior(rotation)
+    else:
+        angle = float(np.random.default_rng((seed, 11)).uniform(0.0, 2.0 * np.pi))
+        prior = Prior(rotation_about(np.array([0.0, 0.0, 1.0]), angle) @ rotation, "unknown")
+    return Run(
+        tuple(poses),
+        tuple(strikes),
+        prior,
+        true,
+        np.array(struck),
+        np.array(directions),
+        sound.frequencies,
+    )
+
+
+def _dampings(modes: Modes, made_of: Material) -> FloatArray:
+    return dampings(modes.frequencies, made_of)
+
+
+def _levels(modes: Modes) -> FloatArray:
+    """Pa of a mode for its gain: acceleration, as a small source radiates."""
+    return np.asarray(1e-6 * (2.0 * np.pi * modes.frequencies))
+
+
+def _as_captured(force: FloatArray, pressure: FloatArray, silent: bool) -> Strike:
+    onset = int(np.argmax(force > 1.0)) if not silent else 0
+    return Strike(RATE, force, pressure, onset, 0.0, overload=False, double_hit=False, silent=silent)
+
+
+@dataclass(frozen=True)
+class Score:
+    """What one run gave."""
+
+    geometry: float
+    geometry_axis: float
+    sound: float
+    sound_axis: float
+    mfcc: float
+    nats: float
+    peaks: int
+    rejected: int
+    seconds_analysis: float
+    seconds_weighing: float
+    hypotheses: int
+
+
+def score_of(thing: Thing, run: Run, settings: Analysis, noise: SoundNoise, seed: int) -> Score:
+    """Answer a run by every method without images."""
+    last, everyone = len(run.poses) - 1, np.arange(len(run.poses))
+    search = Search([Contact(pose) for pose in run.poses], thing.model, run.prior, SPACING, Noise())
+
+    def off(point: FloatArray) -> float:
+        return float(np.linalg.norm(nearest_point(thing.model.mesh, point) - run.true))
+
+    start = time.thread_time()
+    evidence = analyse(run.strikes, settings)
+    term = SoundTerm(evidence, thing.table, thing.modes, thing.material, noise)
+    analysed = time.thread_time()
+    answers = {}
+    for use_axis in (False, True):
+        found = by_sound(search, term, everyone, everyone, last, use_axis)
+        answers[use_axis] = off(best_point(search.contact_places(last, found), found.weights))
+    places = search.grid(everyone, last)
+    before = time.thread_time()
+    nats = sound_nats(search, term, everyone, places.gels, places.yaws)
+    weighed = time.thread_time() - before
+    points = search.contact_places(last, places)
+    near = np.linalg.norm(points - run.true, axis=1) < 4e-3
+    gained = np.nan
+    if near.any():
+        weights = places.weights
+        at_truth = np.log(weights[near] @ np.exp(nats[near]) / weights[near].sum())
+        gained = at_truth - np.log(weights @ np.exp(nats))
+    particles = mfcc_filter(search, thing.mfcc, run.strikes, 1000, seed)
+    poses = list(run.poses)
+    return Score(
+        off(geometry_only(poses, thing.model, run.prior, SPACING).position_in_object),
+        off(geometry_and_axis(poses, thing.model, run.prior, SPACING).position_in_object),
+        answers[False],
+        answers[True],
+        off(particles.candidates().mean(axis=0)),
+        float(gained),
+        len(evidence.peaks),
+        len(evidence.rejected),
+        analysed - start,
+        weighed,
+        len(places.gels),
+    )
