@@ -13,6 +13,7 @@ import numpy as np
 
 from experiments.contact_localization.baselines import mean_random_error
 from experiments.contact_localization.dials import setting_name
+from experiments.contact_localization.model import Model
 from experiments.contact_localization.solving import (
     ESTIMATOR,
     PROGRAM,
@@ -63,11 +64,20 @@ class Case:
         return Sample(self.cell.name, self.object, error, radius, readings.shared[0], solved.cpu, solved.wall)
 
 
-def perform(cell: Cell, scene: SceneFile, station: Station) -> Case:
-    """Plan and perform a run on the mocked bench in process."""
+def perform(cell: Cell, scene: SceneFile, station: Station, models: dict[str, Model]) -> Case:
+    """Plan and perform a run on the mocked bench in process.
+
+    Args:
+        cell: which run.
+        scene: of the object.
+        station: a mocked one.
+        models: by object, taken from and added to: an object's samples are made once for all its runs.
+    """
     turned = scene_of(cell, scene)
     mesh = known_object(turned).mesh
-    return Case(cell, perform_cell(cell, turned, station, mesh), object_key(cell.object, mesh))
+    name = object_key(cell.object, mesh)
+    run = perform_cell(cell, turned, station, mesh)
+    return Case(cell, replace(run, model=models.setdefault(name, run.model)), name)
 
 
 Say = Callable[[str], None]
@@ -109,13 +119,14 @@ def measure(
         Each run with its points, of one sample each.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    models: dict[str, Model] = {}
     stamp = {"machine": machine(), "sha256": code(ESTIMATOR)["sha256"]}
     for cell in work.cells:
         path = folder / f"{cell.name}.json"
         points = _kept(path, stamp, work)
         if points is None:
             try:
-                points = _measured(perform(cell, scenes[cell.object], station), work)
+                points = _measured(perform(cell, scenes[cell.object], station, models), work)
             except TouchstoneError as error:
                 say(f"{cell.name} was not performed: {error}")
                 points = []

@@ -2,9 +2,9 @@
 
 Run as ``python tests/benchmarks/budget_kept.py --spacing spread --seeds 4``. Runs on the built-in
 objects are performed in process and answered at every setting (kept in ``--out``, so a stopped
-measurement resumes). Then, for each seed in turn, the curve of the *other* seeds chooses for the
-runs of this one: what is chosen has never seen the run it is judged by. The best there was is the
-one fixed setting that does best on the very runs it is judged by. Seconds are of CPU time.
+measurement resumes). Then, for each run in turn, the curve of all *other* runs chooses for it:
+what is chosen has never seen the run it is judged by. The best there was is the one fixed setting
+that does best on the very runs it is judged by. Seconds are of CPU time.
 """
 
 import argparse
@@ -15,11 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from experiments.contact_localization.costing import Work, gathered, measure
-from experiments.contact_localization.dials import settings
+from experiments.contact_localization.dials import PARTICLES, settings
 from experiments.contact_localization.table import objects
 from experiments.contact_localization.table_cell import cells
 from harness.cost import LEAST_ERROR, Point, Sample
 from harness.cost_choice import for_budget, for_error, promised
+from harness.cost_file import save
 from harness.station_file import load_station, station_path
 
 SHARE = 0.95
@@ -39,21 +40,26 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--first-seed", type=int, default=3000)
     parser.add_argument("--only", action="append")
+    parser.add_argument("--most-particles", type=int, default=10_000)
+    parser.add_argument("--curve", type=Path, help="write the curve of all runs here too")
     parser.add_argument("--out", type=Path, default=Path("runs/cost/budget_kept"))
     given = parser.parse_args()
     scenes = objects(None)
     seeds = range(given.first_seed, given.first_seed + given.seeds)
     wanted = cells(given.only or list(scenes), seeds, [given.spacing], ["default"], [given.yaw])
-    work = Work(tuple(wanted), tuple(settings()), (6,))
-    found: list[tuple[int, Point]] = []
+    tried = [s for s in settings() if int(s.get(PARTICLES.name, 0)) <= given.most_particles]
+    work = Work(tuple(wanted), tuple(tried), (6,))
+    found: list[tuple[str, Point]] = []
     for cell, points in measure(work, scenes, load_station(station_path("mock")), given.out, say):
-        found += [(cell.seed, point) for point in points]
+        say(f"{cell.name}: {len(points)} answers")
+        found += [(cell.name, point) for point in points]
+    if given.curve is not None:
+        save(gathered([point for _, point in found], "What a contact's place costs"), given.curve)
     folds = []
-    for seed in seeds:
-        known = [point for at, point in found if at != seed]
-        held = [point for at, point in found if at == seed]
-        if known and held:
-            folds.append((gathered(known, "known").points, gathered(held, "held out").points))
+    for run in dict.fromkeys(name for name, _ in found):
+        known = [point for name, point in found if name != run]
+        held = [point for name, point in found if name == run]
+        folds.append((gathered(known, "known").points, gathered(held, "held out").points))
     say(f"{given.spacing}, yaw {given.yaw}, {sum(len(held[0].samples) for _, held in folds)} runs held out")
     for budget in (0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0):
         say(judged_budget(folds, budget))

@@ -1,0 +1,303 @@
+"""``run --budget`` and ``--error``, and ``touchstone cost``: levels from the measured front."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from whole_run import copied
+
+from experiments.commands import run as run_command
+from experiments.contact_localization import session_of
+from experiments.contact_localization.costing import Case, Work, gathered, joined, measure
+from experiments.contact_localization.dials import FINEST, KNOBS, METHOD, SPACING, setting_name, settings
+from experiments.contact_localization.solving import ESTIMATOR, PROGRAM, object_key
+from experiments.contact_localization.table import objects
+from experiments.contact_localization.table_cell import cells
+from experiments.contact_localization.within import (
+    Front,
+    Target,
+    answer_within,
+    foresee,
+    front_for,
+    shipped_curve,
+)
+from experiments.contact_localization.within_words import as_json, sentences, staleness
+from harness.accuracy import Accuracy, Level
+from harness.cli import invoke
+from harness.cost import Curve, Point, Sample
+from harness.cost_file import curve_path, load, save
+from harness.cost_provenance import code, machine
+from harness.errors import WrongUse
+from harness.recording import Recording
+from harness.run_folder import RunFiles
+from harness.station_file import load_station, station_path
+
+COARSE: dict[str, Level] = {
+    METHOD.name: "grid",
+    SPACING.name: 4e-3,
+    "localization.rounds": 0,
+    "localization.samples": 600,
+}
+DEFAULT: dict[str, Level] = {
+    METHOD.name: "grid",
+    SPACING.name: 2e-3,
+    "localization.rounds": 3,
+    "localization.samples": 600,
+}
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of the test's own: no curve of this machine is there."""
+    monkeypatch.setenv("TOUCHSTONE_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def curve_of(recording: Recording, coarse_cpu: float = 0.2, fine_cpu: float = 3.0) -> Curve:
+    """Measured, it says, on this machine with this code: a coarse and a finer setting, on 40 runs each."""
+    run = RunFiles(recording)
+    name = object_key(run.scene.object.name, run.mesh)
+    condition: dict[str, Level] = {
+        "spacing": "spread",
+        "gap": "default",
+        "yaw": "known",
+        "contacts": recording.committed,
+    }
+
+    def point(setting: dict[str, Level], cpu: float, error: float) -> Point:
+        samples = tuple(
+            Sample(f"r{k}", name, error, 0.8 * error, 0.05, cpu * (1.0 + 1e-3 * k), cpu) for k in range(40)
+        )
+        return Point(setting_name(setting), setting, condition, samples)
+
+    points = (point(COARSE, coarse_cpu, 4e-3), point(DEFAULT, fine_cpu, 1e-3))
+    return Curve(PROGRAM, points, machine(), code(ESTIMATOR), "2026-01-01T00:00:00+00:00", "T")
+
+
+def test_a_budget_takes_what_keeps_it_and_says_what_it_took(done: Recording, cache: Path) -> None:
+    save(curve_of(done), curve_path(PROGRAM))
+    front = front_for(RunFiles(done).scene, done.committed)
+    assert front.trusted
+    target = Target(seconds=30.0)
+    found = answer_within(done, front, target)
+    assert found.setting == DEFAULT
+    assert found.kept
+    assert found.cpu < 30.0
+    said = as_json(found, front, target, done)
+    assert said["kept"] is True
+    assert said["error_m"] < 20e-3
+    assert said["finest"]["error_m"] is not None
+    assert "kept" in sentences(said)[0]
+    assert "not counted" in sentences(said)[1]
+    json.dumps(said, allow_nan=False)
+
+
+def test_a_budget_too_small_for_the_finer_setting_takes_the_coarser(done: Recording, cache: Path) -> None:
+    save(curve_of(done, 0.01, 1e4), curve_path(PROGRAM))
+    front = front_for(RunFiles(done).scene, done.committed)
+    found = answer_within(done, front, Target(seconds=20.0))
+    assert found.setting == COARSE
+    assert found.tried == (setting_name(COARSE),)
+
+
+def test_the_answer_within_a_budget_is_the_run_s_answer_at_those_levels(
+    done: Recording, cache: Path, tmp_path: Path
+) -> None:
+    save(curve_of(done), curve_path(PROGRAM))
+    recording = copied(done, tmp_path / "copy")
+    front = front_for(RunFiles(recording).scene, recording.committed)
+    found = answer_within(recording, front, Target(seconds=30.0))
+    assert found.solved.estimate is not None
+    scored = session_of.score(recording, Accuracy.default(KNOBS).with_(found.setting))
+    np.testing.assert_array_equal(
+        scored.found.last.position_in_object, found.solved.estimate.position_in_object
+    )
+
+
+def test_an_error_is_promised_from_the_answer_s_own_radius_or_not_at_all(
+    done: Recording, cache: Path
+) -> None:
+    save(curve_of(done), curve_path(PROGRAM))
+    front = front_for(RunFiles(done).scene, done.committed)
+    generous = answer_within(done, front, Target(error=0.1))
+    assert generous.tried == (setting_name(COARSE),)
+    assert generous.kept
+    assert generous.promise <= 0.1
+    strict = answer_within(done, front, Target(error=1e-6))
+    assert not strict.kept
+    said = as_json(strict, front, Target(error=1e-6), done)
+    assert "cannot be promised" in sentences(said)[0]
+
+
+def test_a_budget_that_cannot_be_kept_is_refused_before_anything_moves(done: Recording, cache: Path) -> None:
+    save(curve_of(done), curve_path(PROGRAM))
+    run = RunFiles(done)
+    front = front_for(run.scene, done.committed)
+    name = object_key(run.scene.object.name, run.mesh)
+    with pytest.raises(WrongUse, match="the cheapest setting may take"):
+        foresee(front, Target(seconds=1e-3), name)
+    assert "at most" in foresee(front, Target(seconds=30.0), name)
+
+
+def test_without_a_curve_of_this_machine_the_one_that_came_along_is_gone_by_and_said_to_be_stale(
+    done: Recording, cache: Path
+) -> None:
+    front = front_for(RunFiles(done).scene, done.committed)
+    assert front.shipped
+    for point in shipped_curve().points:
+        Accuracy.default(KNOBS).with_(point.levels)  # levels that today's dials have
+    if not front.trusted:
+        assert "touchstone cost" in staleness(front)
+    assert not curve_path(PROGRAM).exists()
+
+
+def test_a_curve_of_other_code_is_used_but_not_trusted(done: Recording, cache: Path) -> None:
+    old = curve_of(done)
+    save(Curve(PROGRAM, old.points, old.machine, {**old.code, "sha256": "0"}, old.made), curve_path(PROGRAM))
+    front = front_for(RunFiles(done).scene, done.committed)
+    assert not front.trusted
+    assert not front.shipped
+    assert "code has changed" in staleness(front)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--budget", "2"], "has no unit"),
+        (["--budget", "2 mm"], "is not a time"),
+        (["--error", "5 s"], "is not a length"),
+        (["--budget", "-1 s"], "above zero"),
+        (["--budget", "0 s"], "above zero"),
+        (["--budget", "2s", "--error", "5mm"], "give one of them"),
+        (["--budget", "2s", "--level", "localization.rounds=1"], "leave --level out"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_before_a_folder_is_made(
+    options: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    arguments = [
+        "run",
+        "contact-localization",
+        "--object",
+        "builtin:mug",
+        *options,
+        "--out",
+        str(out),
+        "--json",
+    ]
+    assert invoke(arguments) == 2
+    assert said in json.loads(capsys.readouterr().out)["error"]
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("text", ["2s", "2 s", "2000ms", "2000 ms"])
+def test_a_budget_may_be_written_with_or_without_a_space(text: str) -> None:
+    target = run_command._target(text, None, None)
+    assert target.seconds == 2.0
+    assert run_command._target(None, "5mm", None).error == 5e-3
+
+
+def test_a_resumed_run_answers_within_a_budget(
+    done: Recording, cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save(curve_of(done), curve_path(PROGRAM))
+    recording = copied(done, tmp_path / "copy")
+    assert (
+        invoke(
+            ["run", "contact-localization", "--resume", str(recording.folder), "--budget", "30s", "--json"]
+        )
+        == 0
+    )
+    result = json.loads(capsys.readouterr().out)
+    assert result["cost"]["asked"] == {"budget_s": 30.0, "error_m": None}
+    assert result["cost"]["cpu_s"] < 30.0
+    assert result["cost"]["position_m"] == result["estimates"]["touch"]["position_m"]
+    assert result["accuracy"][SPACING.name] == 2e-3
+    assert json.loads((recording.folder / "result.json").read_text()) == result
+
+
+def test_settings_hold_the_default_and_the_finest_and_each_once() -> None:
+    for thorough in (False, True):
+        found = settings(thorough)
+        assert FINEST in found
+        assert all(found.count(setting) == 1 for setting in found)
+        assert any(all(setting.get(k, v) == v for k, v in DEFAULT.items()) for setting in found)
+        assert len({setting_name(setting) for setting in found}) == len(found)
+    assert all(setting in settings(True) for setting in settings(False))
+
+
+@pytest.fixture(scope="module")
+def two_settings() -> Work:
+    return Work(tuple(cells(["wrench"], [5], ["spread"], ["default"], ["known"])), (COARSE, DEFAULT), (2, 3))
+
+
+def test_a_measurement_performs_once_answers_everywhere_and_resumes(
+    two_settings: Work, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    station, scenes = load_station(station_path("mock")), objects(None)
+    ((_, points),) = measure(two_settings, scenes, station, tmp_path, pytest.fail)
+    assert len(points) == two_settings.each == 4
+    assert {int(point.condition["contacts"]) for point in points} == {2, 3}
+    assert all(point.samples[0].cpu > 0.0 and point.samples[0].error < 0.5 for point in points)
+
+    def again(*_: object) -> Case:
+        raise AssertionError("the run was performed again")
+
+    monkeypatch.setattr("experiments.contact_localization.costing.perform", again)
+    ((_, resumed),) = measure(two_settings, scenes, station, tmp_path, pytest.fail)
+    assert [point.samples for point in resumed] == [point.samples for point in points]
+    monkeypatch.setattr("experiments.contact_localization.costing.code", lambda _: {"sha256": "other"})
+    with pytest.raises(AssertionError, match="performed again"):
+        list(measure(two_settings, scenes, station, tmp_path, pytest.fail))
+    monkeypatch.undo()
+    curve = gathered(points, "T")
+    assert len(joined(curve, curve).points) == 4
+
+
+def test_the_command_measures_keeps_and_draws(
+    cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "experiments.contact_localization.dials.settings", lambda _thorough: [COARSE, DEFAULT]
+    )
+    arguments = ["cost", "contact-localization", "--only", "wrench", "--seeds", "1", "--spacing", "spread"]
+    arguments += ["--contacts", "2", "--out", str(tmp_path / "out"), "--json"]
+    assert invoke(arguments) == 0
+    result = json.loads(capsys.readouterr().out)
+    (condition,) = result["conditions"]
+    assert [set(s["levels"]) for s in condition["settings"]] == [set(COARSE), set(DEFAULT)]
+    assert any(setting["front"] for setting in condition["settings"])
+    assert load(Path(result["curve"])).machine == machine()
+    assert Path(result["curve"]).is_relative_to(cache)
+    page = Path(result["report"]).read_text()
+    assert "STALE" not in page
+    assert "http" not in page.replace("http://www.w3.org", "")  # nothing is loaded from elsewhere
+    assert (tmp_path / "out" / "cost_1.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    "option", [["--only", "mog"], ["--spacing", "wide"], ["--yaw", "any"], ["--gap", "big"]]
+)
+def test_a_mistyped_option_of_the_command_is_named(
+    option: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert invoke(["cost", "contact-localization", *option, "--out", str(tmp_path), "--json"]) == 2
+    assert option[1] in json.loads(capsys.readouterr().out)["error"]
+
+
+def test_a_stale_curve_is_drawn_as_stale(done: Recording, tmp_path: Path) -> None:
+    from harness.report.cost_page import write_cost_page
+
+    page = write_cost_page(curve_of(done), ("cores was 2, is 4",), METHOD.name, "contacts", tmp_path)
+    assert "STALE" in page.read_text()
+    assert "cores was 2, is 4" in page.read_text()
+
+
+def test_a_target_is_one_of_the_two() -> None:
+    with pytest.raises(WrongUse):
+        Target()
+    with pytest.raises(WrongUse):
+        Target(seconds=1.0, error=1e-3)
+    assert isinstance(Front((), 1.0, 6, (), "", shipped=False).trusted, bool)
