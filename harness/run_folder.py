@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from harness.acquisition import AcquisitionCalibration
 from harness.clock import ClockOffset
-from harness.errors import RecordingDamaged
+from harness.errors import RecordingDamaged, WrongUse
 from harness.mesh import Mesh
 from harness.recording import Recording, RunHeader, require_unused
 from harness.scene import SceneFile, scene_from_json
@@ -25,7 +26,7 @@ from harness.sim.tactile_calibration import (
 )
 from harness.station_file import Station, station_from_json
 
-OBJECT, CALIBRATION = "object.npz", "calibration.npz"
+OBJECT, CALIBRATION, ACQUISITION = "object.npz", "calibration.npz", "acquisition.json"
 
 _NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-python-headless", "mujoco", "touchstone-lab")
 
@@ -34,6 +35,23 @@ def station_calibration(station: Station) -> TactileCalibration:
     """The calibration of a station's gel: a file, or one that comes with the package."""
     named = station.gel.calibration
     return load_calibration(Path(named)) if named.endswith(".npz") else shipped_calibration(named)
+
+
+def station_acquisition(scene: SceneFile, station: Station) -> AcquisitionCalibration | None:
+    """The calibration of the hammer's box; None where the scene asks for no sound.
+
+    Raises:
+        WrongUse: the scene asks for sound and the station has no hammer.
+        CalibrationRefused: it is missing, damaged, or not one.
+    """
+    if not scene.sensors.sound:
+        return None
+    if station.hammer is None:
+        raise WrongUse(
+            f"the scene asks for sound, and the station {station.title!r} has no [hammer]; add one, or set "
+            "sensors.sound = false in the scene"
+        )
+    return station.hammer.acquisition
 
 
 def create_run(
@@ -46,6 +64,7 @@ def create_run(
     plan: Mapping[str, Any],
     seed: int,
     mock: Mapping[str, Any] | None,
+    acquisition: AcquisitionCalibration | None = None,
 ) -> Recording:
     """Make a run folder with everything an estimate will need; refuses one that holds a run.
 
@@ -59,17 +78,22 @@ def create_run(
         plan: of the experiment, JSON values.
         seed: of everything random.
         mock: how the mocked bench is started; None at a real one.
+        acquisition: of the hammer's box; None for a run without sound.
     """
     require_unused(folder)
     folder.mkdir(parents=True, exist_ok=True)
     np.savez(folder / OBJECT, vertices=mesh.vertices, faces=mesh.faces)
     save_calibration(calibration, folder / CALIBRATION)
+    carried = [OBJECT, CALIBRATION]
+    if acquisition is not None:
+        acquisition.save(folder / ACQUISITION)
+        carried.append(ACQUISITION)
     header = RunHeader(
         experiment=experiment,
         scene=scene.model_dump(mode="json", by_alias=True),
         station=station.model_dump(mode="json", by_alias=True),
         plan=plan,
-        files={name: _hash(folder / name) for name in (OBJECT, CALIBRATION)},
+        files={name: _hash(folder / name) for name in carried},
         versions=versions(),
         seed=seed,
         mock=mock,
@@ -105,6 +129,13 @@ class RunFiles:
     def calibration(self) -> TactileCalibration:
         """The gel's colours as the estimator knows them."""
         return load_calibration(self._checked(CALIBRATION))
+
+    @cached_property
+    def acquisition(self) -> AcquisitionCalibration | None:
+        """What the hammer's box says; None for a run without sound."""
+        if ACQUISITION not in self.recording.header.files:
+            return None
+        return AcquisitionCalibration.load(self._checked(ACQUISITION))
 
     def _checked(self, name: str) -> Path:
         path = self.recording.folder / name

@@ -97,7 +97,7 @@ def run(
         begun = session_of.start(wanted, bench, wanted.localization.seed if seed is None else seed, gap, out)
         recording = begun.recording
         _describe(begun)
-    complete, health = _perform(recording)
+    complete, health = _perform(recording, json)
     if not complete:
         return _stopped(recording, json)
     cost = None
@@ -218,7 +218,7 @@ def _stopped(recording: Any, as_json: bool) -> int:
     return 130
 
 
-def _perform(recording: Any) -> tuple[bool, Any]:
+def _perform(recording: Any, as_json: bool) -> tuple[bool, Any]:
     from experiments.contact_localization import session_of
 
     total = len(recording.header.plan["contacts"])
@@ -226,7 +226,12 @@ def _perform(recording: Any) -> tuple[bool, Any]:
         return True, None  # nothing is left to touch: no bench is opened
     CONSOLE.print(f"recording to {recording.folder}", markup=False)
     with step_progress(recording.committed, total) as progress:
-        return session_of.perform_on_bench(recording, progress)
+        return session_of.perform_on_bench(recording, progress, None if as_json else _ask)
+
+
+def _ask(what: str) -> None:
+    """Show the operator what to do now."""
+    CONSOLE.print(what, markup=False, style="bold")
 
 
 def _describe(begun: Any) -> None:

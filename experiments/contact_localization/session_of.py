@@ -19,6 +19,7 @@ from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.planning import RunPlan, plan_run, twin_of, way_between
 from experiments.contact_localization.report_of import report_of
 from experiments.contact_localization.result import Scored, result_of
+from experiments.contact_localization.strike import Ask, by_hand, somebody
 from experiments.contact_localization.trade import trade
 from experiments.contact_localization.truth import read_truth
 from harness.accuracy import Accuracy
@@ -28,7 +29,7 @@ from harness.errors import WrongUse
 from harness.gap import gap_path, load_gap
 from harness.recording import Recording, require_unused, write_text_whole
 from harness.report.page import write_report
-from harness.run_folder import RunFiles, create_run, station_calibration
+from harness.run_folder import RunFiles, create_run, station_acquisition, station_calibration
 from harness.scene import SceneFile
 from harness.session import Progress, perform
 from harness.sim.scene_object import KnownObject, known_object
@@ -63,21 +64,30 @@ def start(
     if gap is not None and mock is None:
         raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")
     known = known_object(scene)
-    calibration = station_calibration(station)
+    calibration, acquisition = station_calibration(station), station_acquisition(scene, station)
     plan = plan_run(scene, station, known.mesh, seed)
     described = {
         "contacts": plan.parameters(),
         "pressed": [site.base_from_gel.tolist() for site in plan.sites],
         "warnings": [*known.warnings, *plan.rehearsal.warnings],
     }
+    where = folder or _new_folder(scene)
     recording = create_run(
-        folder or _new_folder(scene), NAME, scene, station, known.mesh, calibration, described, seed, mock
+        where, NAME, scene, station, known.mesh, calibration, described, seed, mock, acquisition
     )
     return Started(recording, plan, known)
 
 
-def perform_on_bench(recording: Recording, progress: Progress) -> tuple[bool, dict[str, Health]]:
-    """Open the run's bench and perform what is left; False where Ctrl-C ended it early."""
+def perform_on_bench(
+    recording: Recording, progress: Progress, ask: Ask | None = None
+) -> tuple[bool, dict[str, Health]]:
+    """Open the run's bench and perform what is left; False where Ctrl-C ended it early.
+
+    Args:
+        recording: of the run.
+        progress: is told of each step.
+        ask: shows a person what to do, where the station has one strike; None where nobody is there.
+    """
     run = RunFiles(recording)
     mock = recording.header.mock
     context = RunContext(
@@ -86,17 +96,22 @@ def perform_on_bench(recording: Recording, progress: Progress) -> tuple[bool, di
         seed=recording.header.seed,
         gap=None if mock is None else mock["gap"],
     )
+    if by_hand(run.scene, run.station):
+        somebody(ask)
     with open_station(run.station, run.scene, context) as bench:
-        return perform_on(bench, recording, progress)
+        return perform_on(bench, recording, progress, ask)
 
 
-def perform_on(bench: Bench, recording: Recording, progress: Progress) -> tuple[bool, dict[str, Health]]:
+def perform_on(
+    bench: Bench, recording: Recording, progress: Progress, ask: Ask | None = None
+) -> tuple[bool, dict[str, Health]]:
     """Perform what is left of a run on an open bench; how its instruments did."""
     run = RunFiles(recording)
     twin = twin_of(run.scene, run.station, run.mesh)
-    experiment = ContactLocalization(partial(way_between, twin))
+    experiment = ContactLocalization(partial(way_between, twin), ask=ask)
     complete = perform(experiment, bench, recording, bench.arm.stop, progress)
-    return complete, {"arm": bench.arm.health(), "gel": bench.gel.health()}
+    health = {"arm": bench.arm.health(), "gel": bench.gel.health()}
+    return complete, health if bench.hammer is None else {**health, "hammer": bench.hammer.health()}
 
 
 def score(recording: Recording, accuracy: Accuracy) -> Scored:

@@ -177,14 +177,29 @@ def strike_by_hand(step: int, bench: Bench, ask: Ask | None) -> tuple[Reading, .
         WrongUse: nobody is there.
         BenchFault: the hammer failed.
     """
+    ask = somebody(ask)
+    bench.mark(step, STRIKE)
+    what = f"contact {step + 1}: strike the place that was touched, along the way of the gel, within"
+    return _capture(bench, lambda: ask(f"{what} {TIMEOUT_BY_HAND:.0f} s"), TIMEOUT_BY_HAND)
+
+
+def by_hand(scene: SceneFile, station: Station) -> bool:
+    """Whether a person is to strike."""
+    return scene.sensors.sound and station.hammer is not None and station.hammer.strike == "operator"
+
+
+def somebody(ask: Ask | None) -> Ask:
+    """``ask``.
+
+    Raises:
+        WrongUse: it is None: nobody is there to strike.
+    """
     if ask is None:
         raise WrongUse(
             "the station says hammer.strike = 'operator', and nobody can be asked here; run without --json "
             "at a terminal, or let the arm strike (strike = 'arm')"
         )
-    bench.mark(step, STRIKE)
-    what = f"contact {step + 1}: strike the place that was touched, along the way of the gel, within"
-    return _capture(bench, lambda: ask(f"{what} {TIMEOUT_BY_HAND:.0f} s"), TIMEOUT_BY_HAND)
+    return ask
 
 
 def _captured(bench: Bench, fire: Callable[[], None]) -> tuple[Reading, ...]:
