@@ -212,14 +212,14 @@ def _answer(search: Search, count: int, found: _Solution, seconds: dict[str, flo
     start = time.perf_counter()
     mesh, hypotheses = search.model.mesh, found.hypotheses
     weights = hypotheses.weights
-    clouds = [search.surface_points(k, hypotheses.gels, hypotheses.yaws) for k in range(count)]
+    clouds, yaws = _everywhere(search, count, hypotheses)
     answers = np.array([best_point(cloud, weights) for cloud in clouds])
     # A view's pixel is off the surface where that curves within it; the answer is not.
     answers[-1] = nearest_point(mesh, answers[-1])
     points = clouds[-1]
     ranked = np.argsort(-hypotheses.log_weights, kind="stable")[:_CANDIDATES]
     top = int(ranked[0])
-    turning = complex(np.exp(1j * hypotheses.yaws) @ weights)
+    turning = complex(np.exp(1j * yaws) @ weights)
     result = Estimate(
         position_in_object=read_only(answers[-1]),
         contacts=read_only(answers),
@@ -228,7 +228,7 @@ def _answer(search: Search, count: int, found: _Solution, seconds: dict[str, flo
         credible90=credible_radius(points, weights, answers[-1], FLOOR),
         candidates=read_only(points[ranked]),
         gates=gates(search, count, found.members, found.fits),
-        yaw=float(hypotheses.yaws[top]),
+        yaw=float(yaws[top]),
         yaw_sigma=float(np.sqrt(max(0.0, -2.0 * np.log(max(abs(turning), 1e-12))))),
         points=read_only(points),
         weights=read_only(weights),
@@ -236,6 +236,16 @@ def _answer(search: Search, count: int, found: _Solution, seconds: dict[str, flo
     )
     _lap(seconds, "answer", start)
     return result
+
+
+def _everywhere(search: Search, count: int, hypotheses: Hypotheses) -> tuple[list[FloatArray], FloatArray]:
+    """Each contact's points and the yaws, spread over the turns that the object does not show."""
+    clouds = [search.surface_points(k, hypotheses.gels, hypotheses.yaws) for k in range(count)]
+    if search.turning is None:
+        return clouds, hypotheses.yaws
+    turns = search.turning.spread(len(hypotheses.yaws))
+    # A point turned with the object is the same reading under a yaw turned the other way.
+    return [search.turning.turned(cloud, turns) for cloud in clouds], hypotheses.yaws - turns
 
 
 def _lap(seconds: dict[str, float], stage: str, start: float) -> None:

@@ -24,6 +24,7 @@ def on_samples(search: Search, members: IntArray, anchor: int) -> Hypotheses:
     """
     looked = search.look(search.grid(members, anchor), members, _DROPPED_AT)
     closer = looked.best(_WORTH_A_LOOK, _MOST_LOOKS)
+    search.settle(closer.yaws)
     log_weights = search.weigh(closer.gels, closer.yaws, members, step=2, rings=1)
     return Hypotheses(closer.gels, closer.yaws, log_weights - log_weights.max())
 
@@ -51,14 +52,14 @@ def refine(
     for attempt in range(rounds):
         draws = int(np.clip(_DRAWS_EACH * _perplexity(current.weights), samples, 5 * samples))
         width = np.array([0.8e-3, 0.8e-3, 0.6e-3]) * 0.65**attempt
-        turn = np.radians(0.8 if search.prior.yaw == "known" else 1.5) * 0.65**attempt
+        turn = _turn(search) * 0.65**attempt
         parents = _systematic(current.weights, draws, rng)
         gels = current.gels[parents] + rng.normal(size=(draws, 3)) * width
         yaws = current.yaws[parents] + rng.normal(size=draws) * turn
         unique, repeats = np.unique(parents, return_counts=True)
         log_density = _mixture(
-            np.column_stack([gels / width, yaws / turn]),
-            np.column_stack([current.gels[unique] / width, current.yaws[unique] / turn]),
+            _in_widths(gels, yaws, width, turn),
+            _in_widths(current.gels[unique], current.yaws[unique], width, turn),
             repeats / draws,
         )
         finest = attempt == rounds - 1
@@ -67,6 +68,17 @@ def refine(
         if 1.0 / np.sum(current.weights**2) > _FILLED * draws:
             break
     return current
+
+
+def _turn(search: Search) -> float:
+    """rad, one sigma of the first round's draws; a yaw that nothing shows is left alone."""
+    if not search.yaw_observable:
+        return 0.0
+    return float(np.radians(0.8 if search.prior.yaw == "known" else 1.5))
+
+
+def _in_widths(gels: FloatArray, yaws: FloatArray, width: FloatArray, turn: float) -> FloatArray:
+    return gels / width if turn == 0.0 else np.column_stack([gels / width, yaws / turn])
 
 
 def _perplexity(weights: FloatArray) -> float:

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from experiments.contact_localization.surface import Surface, sample_surface
+from experiments.contact_localization.turning import Turning, turning_of
 from harness.arrays import FloatArray, read_only
 from harness.errors import WrongUse
 from harness.mesh import Mesh
@@ -37,6 +38,11 @@ class Prior:
             )
         object.__setattr__(self, "base_from_object", read_only(rotation.copy()))
 
+    @property
+    def up(self) -> FloatArray:
+        """``(3,)`` unit, the vertical of the base in the object's frame; the same under any yaw."""
+        return np.asarray(self.base_from_object[2])
+
     def object_from_base(self, yaws: FloatArray) -> FloatArray:
         """``(n, 3, 3)`` rotations for ``(n,)`` yaws in rad away from the nominal one."""
         turned = np.zeros((len(yaws), 3, 3))
@@ -63,6 +69,8 @@ class Model:
     raster: RasterMesh = field(init=False, repr=False)
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
 
+    _turnings: dict[tuple[float, ...], Turning] = field(init=False, default_factory=dict, repr=False)
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "raster", RasterMesh(self.mesh))
 
@@ -71,3 +79,10 @@ class Model:
         if spacing not in self._surfaces:
             self._surfaces[spacing] = sample_surface(self.mesh, spacing)
         return self._surfaces[spacing]
+
+    def turning(self, up: FloatArray) -> Turning:
+        """The turns about ``(3,)`` ``up`` that the object does not show, found on first use."""
+        key = tuple(up.tolist())
+        if key not in self._turnings:
+            self._turnings[key] = turning_of(self.mesh, up)
+        return self._turnings[key]

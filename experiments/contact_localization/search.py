@@ -18,7 +18,12 @@ from experiments.contact_localization.view import view_along
 from harness.arrays import FloatArray, IntArray
 
 _KNOWN_YAWS = np.radians(np.arange(-5.0, 5.5, 1.0))
-_ALL_YAWS = np.radians(np.arange(0.0, 360.0, 2.0))
+_YAW_STEP = 2.0
+"""Degrees between the yaws of the grid, and between pictures, where the yaw is unknown."""
+
+_PICTURES = round(360.0 / _YAW_STEP)
+_SHARED_COARSELY = 3
+_MANY_PICTURES = 45
 _PRUNE = 30.0
 _MOST_HYPOTHESES = 20_000
 
@@ -40,7 +45,9 @@ class Search:
         self.prior = prior
         self.noise = noise
         self.surface: Surface = model.surface(spacing)
-        self.yaws = _KNOWN_YAWS if prior.yaw == "known" else _ALL_YAWS
+        self.turning = model.turning(prior.up) if prior.yaw == "unknown" else None
+        self.yaws = _KNOWN_YAWS if self.turning is None else _yaws_over(self.turning.period)
+        self._shared = 1
         self.positions = np.array([contact.base_from_gel[:3, 3] for contact in contacts])
         self.positions -= self.positions[0]
         self.axes = np.array([contact.axis for contact in contacts])
@@ -51,7 +58,7 @@ class Search:
         """The object along the tool at a contact, under the yaw of a numbered picture."""
         key = (contact, picture, coarse)
         if key not in self._views:
-            nominal = 0.0 if self.prior.yaw == "known" else _ALL_YAWS[picture]
+            nominal = np.radians(_YAW_STEP * picture)
             object_from_base = self.prior.object_from_base(np.array([nominal]))[0]
             object_from_gel = object_from_base @ self.contacts[contact].base_from_gel[:3, :3]
             pitch = self._pitch if coarse else 0.5 * self._pitch
@@ -231,11 +238,28 @@ class Search:
         alike = (gaps < SAME_PLACE) & (self.axes[members] @ self.axes[members].T > np.cos(SAME_AXIS))
         return np.asarray(self.noise.temperature / alike.sum(axis=1))
 
+    @property
+    def yaw_observable(self) -> bool:
+        """Whether any reading can depend on the yaw."""
+        return self.turning is None or self.turning.fold != 0
+
+    def settle(self, yaws: FloatArray) -> None:
+        """Look at the yaws that are left: where they are many, two share each fine picture from now on.
+
+        So many yaws are left only where they hardly matter.
+        """
+        self._shared = 1
+        self._shared = 2 if len(np.unique(self.pictures(yaws))) > _MANY_PICTURES else 1
+
     def pictures(self, yaws: FloatArray, coarse: bool = False) -> IntArray:
-        """``(n,)`` number of the picture whose yaw is nearest; a coarse look shares each among two yaws."""
+        """``(n,)`` number of the picture whose yaw is nearest; 0, the nominal one, where it is known."""
         if self.prior.yaw == "known":
             return np.zeros(len(yaws), dtype=np.int64)
-        share = 2 if coarse else 1
-        return np.asarray(
-            share * np.round(np.degrees(yaws) / (2.0 * share)).astype(np.int64) % len(_ALL_YAWS)
-        )
+        shared = _SHARED_COARSELY if coarse else self._shared
+        numbers = shared * np.round(np.degrees(yaws) / (_YAW_STEP * shared))
+        return np.asarray(numbers.astype(np.int64) % _PICTURES)
+
+
+def _yaws_over(period: float) -> FloatArray:
+    """The grid's yaws in rad over one period of the object; one where every yaw is alike."""
+    return np.radians(np.arange(0.0, max(np.degrees(period), 1e-9), _YAW_STEP))
