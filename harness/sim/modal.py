@@ -9,15 +9,16 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from harness.arrays import AnyArray, FloatArray
-from harness.errors import WrongUse
+from harness.errors import MeshRefused, WrongUse
 from harness.materials import Material
 from harness.mesh import Mesh
+from harness.sim.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
 from harness.sim.modal_lanczos import EigenPairs, modes_below
 from harness.sim.modal_mesh import QuadraticMesh, quadratic_mesh
 from harness.sim.modal_snap import snapped
 from harness.sim.modal_system import ModalSystem, modal_system
 from harness.sim.modes import Modes
-from harness.sim.surface_measure import thin_wall
+from harness.sim.surface_measure import enclosed_volume, thin_wall
 from harness.sim.tetrahedra import Tetrahedra, tetrahedralize
 from harness.store import Store, digest
 
@@ -29,6 +30,9 @@ HEARING = 20e3
 
 ELEMENT_SHARE = 0.35
 """Of the shortest wave of the object below the limit, the default edge of an element."""
+
+_VOLUME_GATE = 0.03
+"""Relative: frequencies of bending follow the wall, and so the volume."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,13 +149,26 @@ def solve_modes(
     with threadpool_limits(limits=1, user_api="blas"):
         begun = time.perf_counter()
         mesh = quadratic_mesh(tetrahedra.nodes, tetrahedra.cells)
-        mesh = mesh if surface is None else snapped(mesh, surface)
+        if surface is not None:
+            mesh = snapped(mesh, surface)
+            _check_volume(mesh, surface)
         system = modal_system(mesh, elasticity.lame, elasticity.density)
         assembled = time.perf_counter()
         pairs, reached = modes_below(system, limit, most)
         solved = time.perf_counter()
     seconds = {"tetrahedra": meshed, "assembly": assembled - begun, "solve": solved - assembled}
     return _modes(mesh, system, pairs, reached, seconds)
+
+
+def _check_volume(mesh: QuadraticMesh, surface: Mesh) -> None:
+    slopes = shape_slopes(MASS_POINTS)
+    got = float((determinants(mesh.nodes, mesh.cells, slopes) @ MASS_WEIGHTS).sum() / 6.0)
+    wanted = enclosed_volume(surface)
+    if not abs(got - wanted) <= _VOLUME_GATE * wanted:
+        raise MeshRefused(
+            f"the elements hold {got * 1e6:.4g} cm^3 where the surface encloses {wanted * 1e6:.4g}, more "
+            f"than {_VOLUME_GATE:.0%} apart; say a smaller element edge, or repair the surface"
+        )
 
 
 def _modes(

@@ -22,8 +22,9 @@ _FLATTEST = 1e-8
 """Least volume of a cell as a share of its edges' root mean square cubed: below it, stiffness
 grows so large that the eigenvalues lose their digits."""
 
-_VOLUME_GATE = 0.04
-"""Relative: what the envelope may take from or add to a thin wall, seen from its volume."""
+_VOLUME_GATE = 0.15
+"""Relative: what flat faces and the envelope may take from a thin wall before its nodes are moved
+onto the surface. A shell that was filled or lost is far beyond it."""
 
 _STOP_ENERGY = 20.0
 """At which fTetWild stops improving cells; 10 is its default, a regular tetrahedron has 3."""
