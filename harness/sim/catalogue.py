@@ -4,7 +4,7 @@ The functions here only take apart what the kernels take; the mathematics is the
 which the caller gives: ``object.mesh`` (``Mesh``), ``object.material`` (``Material``),
 ``contact.gel_from_object`` (``(n, 4, 4)``), ``sensor`` (``TactileSensor``),
 ``sensor.calibration`` (``TactileCalibration``), ``sensor.shadow_table`` (``ShadowTable``),
-``sensor.noise`` (grey levels), ``seed``.
+``sensor.noise`` (grey levels), ``seed``; for sound those of ``harness.sim.sound_effects``.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,6 +24,7 @@ from harness.sim.markers import draw_markers, marker_displacements
 from harness.sim.noise import with_camera_noise
 from harness.sim.optics import Optics
 from harness.sim.shadow_image import darkened, darkening
+from harness.sim.sound_effects import SOUND_EFFECTS
 from harness.sim.tactile_calibration import TactileCalibration
 
 Given = Mapping[str, Any]
@@ -128,8 +129,6 @@ SHADOW = Condition(
 )
 MARKERS = Condition(lambda f: f.sensor.markers is not None, "the gel has markers", "the gel has no markers")
 NOISE = Condition(lambda f: f.scene.sensors.noise, "sensors.noise is true", "sensors.noise is false")
-SOUND = Condition(lambda f: f.scene.sensors.sound, "sensors.sound is true", "sensors.sound is false")
-ROOM = Condition(lambda f: f.scene.room is not None, "the scene has a [room]", "the scene has no [room]")
 CAMERA = Condition(lambda f: f.scene.sensors.camera, "sensors.camera is true", "sensors.camera is false")
 LIGHTS = Condition(lambda f: bool(f.scene.lights), "the scene has [[lights]]", "the scene has no [[lights]]")
 
@@ -177,23 +176,7 @@ EFFECTS = (
         "touch.noise", ("touch.markers", "sensor.noise", "seed"), _noise, when=NOISE, bypass="touch.markers"
     ),
     Effect("touch.image", ("touch.noise",), _image, when=TOUCH),
-    Effect(
-        "object.modes", ("object.mesh", "object.material"), _later("object.modes"), when=SOUND, stored=True
-    ),
-    Effect("object.sound", ("object.modes", "strike"), _later("object.sound"), when=SOUND),
-    Effect(
-        "room.reverberation",
-        ("object.sound", "room"),
-        _later("room.reverberation"),
-        when=ROOM,
-        bypass="object.sound",
-    ),
-    Effect(
-        "microphone.pressure",
-        ("room.reverberation", "microphone"),
-        _later("microphone.pressure"),
-        when=SOUND,
-    ),
+    *SOUND_EFFECTS,
     Effect("camera.radiance", ("object.raster", "camera"), _later("camera.radiance"), when=CAMERA),
     Effect(
         "camera.shadow",

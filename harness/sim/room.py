@@ -1,5 +1,7 @@
 """A room around the bench: the direct sound, and a diffuse tail that dies away."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.signal import oaconvolve
 
@@ -8,6 +10,27 @@ from harness.errors import WrongUse
 
 _DECAY = 3.0 * np.log(10.0)
 """Of the amplitude's logarithm over one reverberation time: 60 dB."""
+
+
+@dataclass(frozen=True)
+class RoomField:
+    """What a room adds to a sound; ``room_response`` says what the numbers mean.
+
+    Attributes:
+        t60: s.
+        direct_to_reverberant_db: dB.
+        seed: of the tail.
+        length: s of response.
+    """
+
+    t60: float
+    direct_to_reverberant_db: float
+    seed: int
+    length: float = 0.5
+
+    def response(self, rate: float) -> FloatArray:
+        """``(t,)`` at a rate in samples per second."""
+        return room_response(rate, self.t60, self.direct_to_reverberant_db, self.seed, self.length)
 
 
 def room_response(

@@ -1,0 +1,96 @@
+"""The effects of sound, from the object's shape to the microphone's reading.
+
+Sources, beside those of the touch: ``object.wall`` (m, or None for a mesh of the material
+itself), ``strike`` (``Strikes``), ``room`` (``RoomField``), ``microphone``
+(``MicrophoneResponse``).
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from harness.accuracy import Knob, Level
+from harness.arrays import AnyArray, FloatArray
+from harness.effects import Condition, Effect
+from harness.mesh import Mesh
+from harness.sim.microphone_response import as_heard
+from harness.sim.modal import ELEMENT_SHARE, HEARING, VERSION, default_edge, from_arrays, modes_of, to_arrays
+from harness.sim.modal_radiation import RadiationLevel, radiation
+from harness.sim.modal_sound import ring
+from harness.sim.modes import dampings
+from harness.sim.room import reverberated
+from harness.sim.walls import walled
+
+Given = Mapping[str, Any]
+Levels = Mapping[str, Level]
+
+EDGE = Knob(
+    "sound.edge",
+    (0.7, 0.5, 0.35, 0.25, 0.18),
+    "waves",
+    "number",
+    ELEMENT_SHARE,
+    "an element in shortest waves",
+)
+MODES = Knob("sound.modes", (16, 32, 64, 128, 256), "modes", "number", 128, "the lowest ones that are kept")
+RADIATION = Knob(
+    "sound.radiation", ("bound", "monopoles"), "", "method", "monopoles", "how the surface moves the air"
+)
+
+SOUND = Condition(lambda f: f.scene.sensors.sound, "sensors.sound is true", "sensors.sound is false")
+ROOM = Condition(lambda f: f.scene.room is not None, "the scene has a [room]", "the scene has no [room]")
+
+
+def _solid(given: Given, _levels: Levels) -> Mesh:
+    return walled(given["object.mesh"], given["object.wall"])
+
+
+def _modes(given: Given, levels: Levels) -> dict[str, AnyArray]:
+    solid, material, most = given["object.solid"], given["object.material"], int(levels[MODES.name])
+    edge = default_edge(solid, material, HEARING, most, float(levels[EDGE.name]))
+    return to_arrays(modes_of(solid, material, HEARING, edge, most))
+
+
+def _sound(given: Given, levels: Levels) -> FloatArray:
+    modes, strike = from_arrays(given["object.modes"]), given["strike"]
+    how: RadiationLevel = "bound" if levels[RADIATION.name] == "bound" else "monopoles"
+    loudness = radiation(modes, given["microphone"].distance, how)
+    gains = modes.gains(strike.points, strike.directions)
+    decays = dampings(modes.frequencies, given["object.material"])
+    return ring(modes.frequencies, decays, gains * loudness, strike.force, strike.rate)
+
+
+def _reverberation(given: Given, _levels: Levels) -> FloatArray:
+    return reverberated(given["object.sound"], given["room"].response(given["strike"].rate))
+
+
+def _pressure(given: Given, _levels: Levels) -> FloatArray:
+    return as_heard(given["room.reverberation"], given["strike"].rate, given["microphone"])
+
+
+SOUND_EFFECTS = (
+    Effect("object.solid", ("object.mesh", "object.wall"), _solid, when=SOUND),
+    Effect(
+        "object.modes",
+        ("object.solid", "object.material"),
+        _modes,
+        when=SOUND,
+        knobs=(EDGE, MODES),
+        version=VERSION,
+        stored=True,
+    ),
+    Effect(
+        "object.sound",
+        ("object.modes", "object.material", "strike", "microphone"),
+        _sound,
+        when=SOUND,
+        knobs=(RADIATION,),
+    ),
+    Effect(
+        "room.reverberation",
+        ("object.sound", "room", "strike"),
+        _reverberation,
+        when=ROOM,
+        bypass="object.sound",
+    ),
+    Effect("microphone.pressure", ("room.reverberation", "microphone", "strike"), _pressure, when=SOUND),
+)
