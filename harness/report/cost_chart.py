@@ -11,6 +11,7 @@ from harness.report.style import SOFT, blank, styled
 
 _COLOURS = ("#1b3fae", "#c2410c", "#0f766e", "#8a2d79", "#9d6b00")
 _DOMINATED = 0.45
+_TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
 
 
 def cost_chart(points: Sequence[Point], family: str, title: str, stale: bool) -> Figure:
@@ -86,14 +87,16 @@ def contacts_chart(curves: Sequence[tuple[str, Sequence[tuple[int, Point]]]]) ->
                 )
         for axes, said in ((left, "error in mm"), (right, "seconds of CPU time")):
             axes.set_yscale("log")
-            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.yaxis.set_major_locator(LogLocator(subs=_TICKS))
             axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             axes.yaxis.set_minor_formatter(NullFormatter())
             axes.set_xticks(sorted({count for _, points in curves for count, _ in points}))
             axes.set_xlabel("contacts")
             axes.set_ylabel(said)
             axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)
-        left.legend(frameon=False, fontsize=8)
+        figure.legend(
+            *left.get_legend_handles_labels(), loc="outside lower center", frameon=False, fontsize=8
+        )
     return figure
 
 
@@ -127,7 +130,7 @@ def _logarithmic(axes: Axes) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_locator(LogLocator(subs=_TICKS))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())
     axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)
