@@ -24,6 +24,13 @@ class Spacing(StrEnum):
     SPREAD = "spread"
 
 
+class Sense(StrEnum):
+    """What is done at each place."""
+
+    TOUCH = "touch"
+    BOTH = "both"
+
+
 class Yaw(StrEnum):
     """Whether the estimator is told the object's yaw."""
 
@@ -46,6 +53,9 @@ def run(
         Spacing | None, typer.Option(help="close: within 25 mm of the last; spread: over the object.")
     ] = None,
     yaw: Annotated[Yaw | None, typer.Option(help="Whether the estimator is told the object's yaw.")] = None,
+    sense: Annotated[
+        Sense | None, typer.Option(help="touch: press only; both: strike each place too, and listen.")
+    ] = None,
     level: options.LevelOption = None,
     budget: options.Budget = None,
     error: options.ErrorWanted = None,
@@ -87,10 +97,11 @@ def run(
             contacts=contacts,
             spacing=spacing,
             yaw=yaw,
+            sense=sense,
         )
         recording = Recording(resume)
     else:
-        wanted = resolve(scene, object_, material, units, wall, contacts, spacing, yaw)
+        wanted = resolve(scene, object_, material, units, wall, contacts, spacing, yaw, sense)
         bench = load_station(station_path(station or "mock"))
         if target is not None:
             _foresee(target, wanted)

@@ -16,8 +16,9 @@ def resolve(
     contacts: int | None = None,
     spacing: str | None = None,
     yaw: str | None = None,
+    sense: str | None = None,
 ) -> SceneFile:
-    """The scene of a file or of ``--object``, with what the command line changes of its localization.
+    """The scene of a file or of ``--object``, with what the command line changes of it.
 
     Raises:
         WrongUse: neither or both are given, or something that the scene does not allow.
@@ -32,7 +33,8 @@ def resolve(
         assert object_ is not None
         found = scene_from_options(object_, material, units, wall)
     changes = {"contacts": contacts, "spacing": spacing, "yaw": yaw}
-    return _changed(found, {key: str_or_int(value) for key, value in changes.items() if value is not None})
+    asked = {key: str_or_int(value) for key, value in changes.items() if value is not None}
+    return _changed(found, asked, None if sense is None else {"touch": True, "sound": sense == "both"})
 
 
 def str_or_int(value: Any) -> Any:
@@ -40,9 +42,10 @@ def str_or_int(value: Any) -> Any:
     return value if isinstance(value, int) else str(value)
 
 
-def _changed(scene: SceneFile, changes: dict[str, Any]) -> SceneFile:
-    if not changes:
+def _changed(scene: SceneFile, localization: dict[str, Any], sensors: dict[str, Any] | None) -> SceneFile:
+    if not localization and sensors is None:
         return scene
     tree = scene.model_dump(mode="json", by_alias=True)
-    tree["localization"].update(changes)
+    tree["localization"].update(localization)
+    tree["sensors"].update(sensors or {})
     return scene_from_json(tree, "the options")
