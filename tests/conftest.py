@@ -5,6 +5,11 @@ from pathlib import Path
 import pytest
 from real_data import WHY_NOT, find_shared_data
 
+from harness.scene import SceneFile, load_scene
+from harness.station_file import Station, load_station
+
+ROOT = Path(__file__).parents[1]
+
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
@@ -13,3 +18,15 @@ def shared_data() -> Path:
     if folder is None:
         pytest.skip(WHY_NOT)
     return folder
+
+
+@pytest.fixture(scope="session")
+def scene() -> SceneFile:
+    """The mug to be touched, as the example says."""
+    return load_scene(ROOT / "scenes" / "mug_touch.toml")
+
+
+@pytest.fixture(scope="session")
+def station() -> Station:
+    """The mocked bench, as the example says."""
+    return load_station(ROOT / "stations" / "mock.toml")

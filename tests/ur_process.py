@@ -10,6 +10,17 @@ import time
 from collections.abc import Callable
 from typing import Any, Self
 
+import numpy as np
+
+HOME = np.array([0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0])
+"""rad: a pose from which every test may move."""
+
+TURN = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+"""Joints that may turn far without meeting anything."""
+
+PLANE = 0.40
+"""m: height of the surface that the controller's tool can touch."""
+
 PORTS = (29999, 30001, 30002, 30003, 30004)
 READY_WITHIN = 20.0
 

@@ -12,22 +12,10 @@ from harness.errors import WrongUse
 from harness.gap import load_gap
 from harness.mesh import Mesh
 from harness.objects.household import build
-from harness.scene import SceneFile, load_scene
-from harness.station_file import Station, load_station
+from harness.scene import SceneFile
+from harness.station_file import Station
 from mocks.lab_scene import nominal_bench, read_lab_scene
 from mocks.world import World
-
-ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def scene() -> SceneFile:
-    return load_scene(ROOT / "scenes" / "mug_touch.toml")
-
-
-@pytest.fixture(scope="module")
-def station() -> Station:
-    return load_station(ROOT / "stations" / "mock.toml")
 
 
 def told(scene: SceneFile, station: Station, mesh: Path | None) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -18,24 +19,14 @@ from harness.errors import BenchFault
 from harness.gap import gap_path
 from harness.mock_lab import LabAddresses, MockLab
 from harness.objects.household import build
-from harness.scene import SceneFile, load_scene
+from harness.scene import SceneFile
 from harness.sensor import GELSIGHT_R15
-from harness.station_file import Station, load_station
+from harness.station_file import Station
 
 ROOT = Path(__file__).parents[2]
 PORTS = (29999, 30001, 30002, 30003, 30004, 8080, 8081)
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux")
-
-
-@pytest.fixture(scope="module")
-def scene() -> SceneFile:
-    return load_scene(ROOT / "scenes" / "mug_touch.toml")
-
-
-@pytest.fixture(scope="module")
-def station() -> Station:
-    return load_station(ROOT / "stations" / "mock.toml")
 
 
 def make_lab(scene: SceneFile, station: Station, truth: Path, seed: int = 3) -> MockLab:
@@ -144,11 +135,12 @@ import sys, time
 sys.path.insert(0, {tests!r})
 from pathlib import Path
 import test_lab_life as t
-lab = t.make_lab(
-    t.load_scene(t.ROOT / "scenes" / "mug_touch.toml"), t.load_station(t.ROOT / "stations" / "mock.toml"),
-    Path({truth!r}))
+from harness.scene import load_scene
+from harness.station_file import load_station
+scene, station = load_scene(Path("scenes/mug_touch.toml")), load_station(Path("stations/mock.toml"))
+lab = t.make_lab(scene, station, Path({truth!r}))
 where = lab.start()
-print(lab.process_id, where.arm, lab._folder.name, flush=True)
+print(lab.process_id, where.arm, lab._folder.path, flush=True)
 time.sleep(60.0)
 """
 
@@ -168,9 +160,7 @@ def test_kill_leaves_no_process_and_no_port(tmp_path: Path, victim: str) -> None
         run.kill()
         run.wait()
         run.stdout.close()
-        for left in Path(folder).glob("*"):
-            left.unlink()
-        Path(folder).rmdir()
+        shutil.rmtree(folder)
 
 
 def test_two_labs_live_side_by_side_and_end_of_file_ends_one(

@@ -21,17 +21,16 @@ from harness.arrays import FloatArray
 from harness.gap import load_gap
 from harness.geometry import rotation_from_quaternion, transform
 from harness.reading import Reading
-from harness.scene import SceneFile, load_scene
+from harness.scene import SceneFile
 from harness.sim.scene_object import known_object
 from harness.station import Bench, RunContext, open_station
-from harness.station_file import Station, load_station
+from harness.station_file import Station
 from harness.step_file import Step
 from mocks.gelsight_stream import encode
 from mocks.in_process import in_process_bench
 from mocks.lab_scene import nominal_bench
 from mocks.world import World
 
-ROOT = Path(__file__).parents[2]
 SEED, GAP = 5, "default"
 STEP = 3
 
@@ -51,16 +50,6 @@ def performed(bench: Bench, plan: RunPlan, truth: Path) -> Run:
     step = Step(STEP, "press", plan.parameters()[0])
     read: Sequence[Reading] = experiment.perform(step, bench)
     return Run({reading.channel.name: reading for reading in read}, json.loads(truth.read_text()))
-
-
-@pytest.fixture(scope="module")
-def scene() -> SceneFile:
-    return load_scene(ROOT / "scenes" / "mug_touch.toml")
-
-
-@pytest.fixture(scope="module")
-def station() -> Station:
-    return load_station(ROOT / "stations" / "mock.toml")
 
 
 @pytest.fixture(scope="module")

@@ -3,49 +3,18 @@
 import math
 import threading
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
-from ur_process import UrProcess, wait_until
+from ur_process import HOME, TURN, UrProcess, wait_until
 
-HOME = np.array([0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0])
-PLANE = 0.40
-TURN = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 UNREACHABLE = [3.0, 0.0, 0.5, 0.0, 0.0, 0.0]
 
 
-@pytest.fixture(scope="module")
-def mock() -> Iterator[UrProcess]:
-    with UrProcess("--plane", str(PLANE), "--seed", "3") as process:
-        yield process
-
-
-@pytest.fixture(scope="module")
-def receive(mock: UrProcess) -> Iterator[Any]:
-    interface = RTDEReceiveInterface(mock.host, 500.0)
-    yield interface
-    interface.disconnect()
-
-
-@pytest.fixture(scope="module")
-def control(mock: UrProcess, receive: Any) -> Iterator[Any]:
-    interface = RTDEControlInterface(mock.host, 500.0)
-    yield interface
-    interface.stopScript()
-    interface.disconnect()
-
-
-@pytest.fixture(autouse=True)
-def _at_home(receive: Any, control: Any) -> None:
-    if not control.isProgramRunning():
-        assert control.reuploadScript()
-        wait_until(control.isProgramRunning, 2.0)
-    assert control.setTcp([0.0] * 6)
-    assert control.moveJ(HOME.tolist(), 2.0, 8.0)
+pytestmark = pytest.mark.usefixtures("at_home")
 
 
 def _stamps(interface: Any, seconds: float) -> np.ndarray[Any, Any]:

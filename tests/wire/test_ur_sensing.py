@@ -1,51 +1,15 @@
 """The real ur_rtde against the mocked controller: the force sensor, contact, outputs."""
 
-import math
 import time
-from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
-from rtde_control import RTDEControlInterface
 from rtde_io import RTDEIOInterface
-from rtde_receive import RTDEReceiveInterface
-from ur_process import UrProcess, wait_until
+from ur_process import HOME, PLANE, TURN, UrProcess, wait_until
 
-HOME = np.array([0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0])
-PLANE = 0.40
-TURN = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-
-
-@pytest.fixture(scope="module")
-def mock() -> Iterator[UrProcess]:
-    with UrProcess("--plane", str(PLANE), "--seed", "3") as process:
-        yield process
-
-
-@pytest.fixture(scope="module")
-def receive(mock: UrProcess) -> Iterator[Any]:
-    interface = RTDEReceiveInterface(mock.host, 500.0)
-    yield interface
-    interface.disconnect()
-
-
-@pytest.fixture(scope="module")
-def control(mock: UrProcess, receive: Any) -> Iterator[Any]:
-    interface = RTDEControlInterface(mock.host, 500.0)
-    yield interface
-    interface.stopScript()
-    interface.disconnect()
-
-
-@pytest.fixture(autouse=True)
-def _at_home(receive: Any, control: Any) -> None:
-    if not control.isProgramRunning():
-        assert control.reuploadScript()
-        wait_until(control.isProgramRunning, 2.0)
-    assert control.setTcp([0.0] * 6)
-    assert control.moveJ(HOME.tolist(), 2.0, 8.0)
+pytestmark = pytest.mark.usefixtures("at_home")
 
 
 def test_moving_until_contact_ends_at_the_surface(receive: Any, control: Any) -> None:
