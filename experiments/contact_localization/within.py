@@ -210,8 +210,11 @@ def answer_within(recording: Recording, front: Front, target: Target) -> Within:
 
 
 def _candidates(front: Front, target: Target, name: str) -> tuple[Point, ...]:
-    """What may be taken, to be prepared for: the tries for an error; for a budget what fits on a machine
-    as fast as the curve's and, should it prove slower now, cheaper settings of the same samples."""
+    """What may be taken, and is prepared for.
+
+    For an error its tries; for a budget what fits on a machine as fast as the curve's and, should
+    this one prove slower now, cheaper settings on the same samples.
+    """
     if target.error is not None:
         return for_error(front.points, target.error, name)
     assert target.seconds is not None
