@@ -14,7 +14,7 @@ from harness.materials import Material
 from harness.mesh import Mesh
 from harness.sim.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
 from harness.sim.modal_lanczos import EigenPairs, modes_below
-from harness.sim.modal_mesh import QuadraticMesh, quadratic_mesh
+from harness.sim.modal_mesh import QuadraticMesh, least_determinant, middles_of, quadratic_mesh
 from harness.sim.modal_snap import snapped
 from harness.sim.modal_system import ModalSystem, modal_system
 from harness.sim.modes import Modes
@@ -127,6 +127,7 @@ def solve_modes(
     surface: Mesh | None = None,
     most: int | None = None,
     meshed: float = 0.0,
+    undeformed: Tetrahedra | None = None,
 ) -> Modes:
     """The modes of a volume mesh.
 
@@ -137,6 +138,8 @@ def solve_modes(
         surface: onto which the nodes of the volume mesh's surface are moved; None for as it is.
         most: modes at most, the lowest; None for all up to the limit.
         meshed: s that the volume mesh took, to be listed.
+        undeformed: the same cells where ``surface`` belongs to them, if ``tetrahedra`` were moved
+            away from it since; None if they were not.
 
     Raises:
         WrongUse: a limit or a count that cannot be, or elasticity that is not one.
@@ -148,16 +151,30 @@ def solve_modes(
     _check_elasticity(elasticity, cells)
     with threadpool_limits(limits=1, user_api="blas"):
         begun = time.perf_counter()
-        mesh = quadratic_mesh(tetrahedra.nodes, tetrahedra.cells)
-        if surface is not None:
-            mesh = snapped(mesh, surface)
-            _check_volume(mesh, surface)
+        mesh = _curved(tetrahedra, surface, undeformed or tetrahedra)
         system = modal_system(mesh, elasticity.lame, elasticity.density)
         assembled = time.perf_counter()
         pairs, reached = modes_below(system, limit, most)
         solved = time.perf_counter()
     seconds = {"tetrahedra": meshed, "assembly": assembled - begun, "solve": solved - assembled}
     return _modes(mesh, system, pairs, reached, seconds)
+
+
+def _curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra) -> QuadraticMesh:
+    """Ten-node cells on ``surface``, moved on to where the tetrahedra are now."""
+    mesh = quadratic_mesh(undeformed.nodes, undeformed.cells)
+    if surface is not None:
+        mesh = snapped(mesh, surface)
+        _check_volume(mesh, surface)
+    if undeformed is tetrahedra:
+        return mesh
+    way = np.zeros_like(mesh.nodes)
+    way[: len(tetrahedra.nodes)] = tetrahedra.nodes - undeformed.nodes
+    way[len(tetrahedra.nodes) :] = middles_of(way, mesh.cells, len(way))[len(tetrahedra.nodes) :]
+    moved = QuadraticMesh(mesh.nodes + way, mesh.cells, mesh.faces)
+    if least_determinant(moved).min() <= 0.0:
+        raise MeshRefused("the deformation turns an element inside out; deform the object less")
+    return moved
 
 
 def _check_volume(mesh: QuadraticMesh, surface: Mesh) -> None:

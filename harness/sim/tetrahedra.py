@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import MeshRefused, WrongUse
 from harness.mesh import Mesh
+from harness.objects.solid import from_manifold, to_manifold
 from harness.sim.mesh_repair import boundary_edges
 from harness.sim.modal_mesh import boundary_faces
 from harness.sim.surface_measure import enclosed_volume, thin_wall
@@ -26,6 +27,10 @@ _VOLUME_GATE = 0.15
 """Relative: what flat faces and the envelope may take from a thin wall before its nodes are moved
 onto the surface. A shell that was filled or lost is far beyond it."""
 
+_SIMPLIFIED = 0.3
+"""Of the envelope, what is spent on leaving out faces of the surface before it is filled."""
+
+_MM = 1e-3
 _STOP_ENERGY = 20.0
 """At which fTetWild stops improving cells; 10 is its default, a regular tetrahedron has 3."""
 
@@ -125,17 +130,28 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
 def _filled(mesh: Mesh, edge: float, envelope: float) -> tuple[FloatArray, IntArray]:
     from pytetwild.pytetwild import tetrahedralize as fill
 
+    fewer = _simplified(mesh, _SIMPLIFIED * envelope)
     nodes, cells = fill(
-        mesh.vertices.copy(),
-        mesh.faces.astype(np.int32),
+        fewer.vertices.copy(),
+        fewer.faces.astype(np.int32),
         edge_length_abs=edge,
         simplify=False,
-        epsilon=envelope / mesh.diagonal,
+        epsilon=(1.0 - _SIMPLIFIED) * envelope / fewer.diagonal,
         stop_energy=_STOP_ENERGY,
         num_threads=1,
         vtk_ordering=True,
     )
     return np.asarray(nodes, dtype=np.float64), np.asarray(cells, dtype=np.int64)
+
+
+def _simplified(mesh: Mesh, tolerance: float) -> Mesh:
+    """Fewer faces, none of them further than ``tolerance`` m away: filling takes as long as they are many."""
+    try:
+        solid = to_manifold(Mesh(mesh.vertices / _MM, mesh.faces))
+    except ValueError:
+        return mesh
+    fewer = from_manifold(solid.simplify(tolerance / _MM))
+    return Mesh(fewer.vertices * _MM, fewer.faces)
 
 
 def _signed_volumes(nodes: FloatArray, cells: IntArray) -> FloatArray:
