@@ -159,12 +159,12 @@ def _foresee(target: Any, scene: Any) -> None:
 def _answered(recording: Any, target: Any) -> dict[str, Any]:
     """The estimate as it was asked for, timed, and what the finest levels would have said."""
     from experiments.contact_localization.within import answer_within, front_for
-    from experiments.contact_localization.within_words import as_json, staleness
+    from experiments.contact_localization.within_words import as_json, doubts
     from harness.run_folder import RunFiles
 
     front = front_for(RunFiles(recording).scene, recording.committed)
-    if not front.trusted:
-        warn(staleness(front))
+    for doubt in doubts(front, target):
+        warn(doubt)
     return as_json(answer_within(recording, front, target), front, target, recording)
 
 
@@ -189,26 +189,36 @@ def show(result: dict[str, Any], as_json: bool) -> None:
     if as_json:
         emit(result)
         return
-    ANSWERS.print(answer_line(result), markup=False)
+    for line in answer_lines(result):
+        ANSWERS.print(line, markup=False)
     ANSWERS.print(f"report: {result['report']}", markup=False)
 
 
-def answer_line(result: dict[str, Any]) -> str:
+def answer_lines(result: dict[str, Any]) -> list[str]:
+    """A line for each sense; the last one with the baselines."""
+    estimates = result["estimates"]
+    last = next(reversed(estimates))
+    return [answer_line(result, sense, baselines=sense == last) for sense in estimates]
+
+
+def answer_line(result: dict[str, Any], sense: str, baselines: bool) -> str:
     """The answer, its error where the truth is known, how sure it is, what it took, the baselines."""
-    touch = result["estimates"]["touch"]
-    x, y, z = (1e3 * value for value in touch["position_m"])
+    found = result["estimates"][sense]
+    if "refused" in found:
+        return f"{sense}: refused: {found['refused']}"
+    x, y, z = (1e3 * value for value in found["position_m"])
     said = [
-        f"touch: contact {result['contacts']} at ({x:.1f}, {y:.1f}, {z:.1f}) mm on the {result['object']}"
+        f"{sense}: contact {result['contacts']} at ({x:.1f}, {y:.1f}, {z:.1f}) mm on the {result['object']}"
     ]
-    if touch["error_m"] is not None:
-        symmetric = touch["error_symmetric_m"]
-        modulo = f" ({millimetres(symmetric)} modulo symmetry)" if symmetric < 0.9 * touch["error_m"] else ""
-        said.append(f"error {millimetres(touch['error_m'])}{modulo}")
-    if len(touch["modes"]) > 1:
-        said.append(f"{len(touch['modes'])} likely places")
-    said.append(f"90 % within {millimetres(touch['credible90_m'])}")
-    said.append(f"{touch['seconds']:.2f} s")
-    if result["geometry_baseline_m"] is not None:
+    if found["error_m"] is not None:
+        symmetric = found["error_symmetric_m"]
+        modulo = f" ({millimetres(symmetric)} modulo symmetry)" if symmetric < 0.9 * found["error_m"] else ""
+        said.append(f"error {millimetres(found['error_m'])}{modulo}")
+    if len(found["modes"]) > 1:
+        said.append(f"{len(found['modes'])} likely places")
+    said.append(f"90 % within {millimetres(found['credible90_m'])}")
+    said.append(f"{found['seconds']:.2f} s")
+    if baselines and result["geometry_baseline_m"] is not None:
         said.append(
             f"baselines: geometry alone {millimetres(result['geometry_baseline_m'])}, "
             f"random {millimetres(result['random_baseline_m'])}"

@@ -1,15 +1,20 @@
 """From a run folder to its answer; the bench is not needed, and the truth is not looked at."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from experiments.contact_localization.estimate import Estimate, each_estimate
-from experiments.contact_localization.levels import Levels
+from experiments.contact_localization.estimate import Estimate, each_estimate, estimate
+from experiments.contact_localization.levels import Levels, Senses
 from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.model_of import model_of_run
 from experiments.contact_localization.observation import Observation
+from harness.accuracy import Accuracy
+from harness.acquisition import AcquisitionCalibration, strike_from_readings
+from harness.acquisition_channels import FORCE
 from harness.arrays import FloatArray
-from harness.errors import RecordingDamaged, WrongUse
+from harness.errors import FitRefused, RecordingDamaged, WrongUse
 from harness.geometry import rotation_from_quaternion, transform
 from harness.reading import Reading
 from harness.run_folder import RunFiles
@@ -29,6 +34,8 @@ class Answer:
         prior: what was believed of the object's orientation.
         estimates: after each contact; the last is the answer.
         seconds: of the last answer, from images to region; the surface's samples are made once before.
+        sense: what ``estimates`` are by.
+        others: the last answer by each other sense, or why that sense refused the object.
     """
 
     observations: tuple[Observation, ...]
@@ -36,20 +43,34 @@ class Answer:
     prior: Prior
     estimates: tuple[Estimate, ...]
     seconds: float
+    sense: Senses = "touch"
+    others: Mapping[Senses, Estimate | FitRefused] = field(default_factory=dict)
 
     @property
     def last(self) -> Estimate:
         """The answer."""
         return self.estimates[-1]
 
+    @property
+    def by_sense(self) -> dict[Senses, Estimate | FitRefused]:
+        """The last answer by every sense that was recorded: touch, audio, both."""
+        found: dict[Senses, Estimate | FitRefused] = {**self.others, self.sense: self.last}
+        return {sense: found[sense] for sense in _SENSES if sense in found}
 
-def answer(run: RunFiles, levels: Levels, every_contact: bool = True) -> Answer:
+
+_SENSES: tuple[Senses, ...] = ("touch", "audio", "both")
+
+
+def answer(
+    run: RunFiles, levels: Levels, every_contact: bool = True, accuracy: Accuracy | None = None
+) -> Answer:
     """Estimate from a recording.
 
     Args:
         run: the folder.
         levels: of the estimator's dials.
         every_contact: whether the estimates after each contact are wanted too.
+        accuracy: of the modes that a sound is compared with; None for the default levels.
 
     Raises:
         WrongUse: the run holds no contact yet.
@@ -58,11 +79,30 @@ def answer(run: RunFiles, levels: Levels, every_contact: bool = True) -> Answer:
     observations = observe(run)
     if not observations:
         raise WrongUse(f"{run.recording.folder} holds no contact yet; go on with `touchstone run --resume`")
-    model = Model(run.mesh, run.station.gel.sensor, run.calibration)
-    prior = prior_of(run)
+    model, prior, seed = model_of_run(run, accuracy), prior_of(run), run.recording.header.seed
     first = 1 if every_contact else len(observations)
-    estimates = each_estimate(observations, model, prior, levels, seed=run.recording.header.seed, first=first)
-    return Answer(observations, model, prior, estimates, sum(estimates[-1].seconds.values()))
+    senses: tuple[Senses, ...] = _SENSES if any(o.strike is not None for o in observations) else ("touch",)
+    sense = levels.senses if levels.senses in senses else "touch"
+    if levels.senses == "audio" and sense == "touch":
+        raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
+    estimates = each_estimate(
+        observations, model, prior, replace(levels, senses=sense), seed=seed, first=first
+    )
+    others: dict[Senses, Estimate | FitRefused] = {}
+    for other in senses:
+        if other != sense:
+            others[other] = _tried(observations, model, prior, replace(levels, senses=other), seed)
+    seconds = sum(estimates[-1].seconds.values())
+    return Answer(observations, model, prior, estimates, seconds, sense, others)
+
+
+def _tried(
+    observations: tuple[Observation, ...], model: Model, prior: Prior, levels: Levels, seed: int
+) -> Estimate | FitRefused:
+    try:
+        return estimate(observations, model, prior, levels, seed=seed)
+    except FitRefused as refusal:
+        return refusal
 
 
 def prior_of(run: RunFiles) -> Prior:
@@ -72,13 +112,20 @@ def prior_of(run: RunFiles) -> Prior:
 
 
 def observe(run: RunFiles) -> tuple[Observation, ...]:
-    """The contacts of a run, from its images and arm poses."""
-    flange_from_gel = run.station.flange_from_gel
-    return tuple(observe_step(record, flange_from_gel) for record in run.recording.steps())
+    """The contacts of a run, from its images, arm poses and strikes."""
+    flange_from_gel, acquisition = run.station.flange_from_gel, run.acquisition
+    return tuple(observe_step(record, flange_from_gel, acquisition) for record in run.recording.steps())
 
 
-def observe_step(record: StepRecord, flange_from_gel: FloatArray) -> Observation:
-    """One contact: its images, and where the arm was at rest while they were taken.
+def observe_step(
+    record: StepRecord, flange_from_gel: FloatArray, acquisition: AcquisitionCalibration | None = None
+) -> Observation:
+    """One contact: its images, where the arm was at rest while they were taken, and its strike.
+
+    Args:
+        record: of the step.
+        flange_from_gel: ``(4, 4)`` of the station.
+        acquisition: what the hammer's counts mean; None for a run without sound.
 
     Raises:
         RecordingDamaged: the step has no images, or no pose of the arm with them.
@@ -92,7 +139,9 @@ def observe_step(record: StepRecord, flange_from_gel: FloatArray) -> Observation
             f"step {record.step.index}: no pose of the arm was recorded within {AROUND_IMAGES} s "
             "of its images"
         )
-    return Observation(_middle(poses.values[during]) @ flange_from_gel, images.values)
+    struck = acquisition is not None and FORCE in record.readings
+    strike = strike_from_readings(record.readings, acquisition) if struck and acquisition else None
+    return Observation(_middle(poses.values[during]) @ flange_from_gel, images.values, strike)
 
 
 def _middle(poses: FloatArray) -> FloatArray:

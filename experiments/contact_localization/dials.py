@@ -2,13 +2,21 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from experiments.contact_localization.levels import Levels
+from experiments.contact_localization.levels import Levels, Senses
 from harness.accuracy import Accuracy, Knob, Level
 from harness.effects import knobs_of
 from harness.sim.catalogue import EFFECTS
 
 METHOD = Knob(
     "localization.method", ("particle", "grid"), "", "method", "grid", "the paper's filter, or ours"
+)
+SENSES = Knob(
+    "localization.senses",
+    ("touch", "audio", "both"),
+    "",
+    "method",
+    "both",
+    "what is used of what was recorded",
 )
 SPACING = Knob(
     "localization.spacing", (4e-3, 3e-3, 2e-3, 1.5e-3), "m", "number", 2e-3, "between surface samples"
@@ -20,7 +28,7 @@ PARTICLES = Knob(
 )
 BLOCK = Knob("localization.block", (16, 8), "pixels", "number", 8, "tactile pixels averaged, each way")
 
-KNOBS = (METHOD, SPACING, ROUNDS, SAMPLES, PARTICLES, BLOCK, *knobs_of(EFFECTS))
+KNOBS = (SENSES, METHOD, SPACING, ROUNDS, SAMPLES, PARTICLES, BLOCK, *knobs_of(EFFECTS))
 
 TURNED: Mapping[str, tuple[Knob, ...]] = {
     "grid": (SPACING, ROUNDS, SAMPLES, BLOCK),
@@ -47,7 +55,9 @@ def chosen(texts: list[str]) -> Accuracy:
 
 def levels_of(accuracy: Accuracy) -> Levels:
     """What the estimator takes."""
+    senses: dict[Level, Senses] = {"touch": "touch", "audio": "audio", "both": "both"}
     return Levels(
+        senses=senses[accuracy[SENSES.name]],
         method="particle" if accuracy[METHOD.name] == "particle" else "grid",
         spacing=float(accuracy[SPACING.name]),
         particles=int(accuracy[PARTICLES.name]),

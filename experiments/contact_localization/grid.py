@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from experiments.contact_localization.hypotheses import Hypotheses
+from experiments.contact_localization.heard import Heard
+from experiments.contact_localization.hypotheses import Hypotheses, best_of
 from experiments.contact_localization.search import Search
 from harness.arrays import FloatArray, IntArray
 from harness.sim.compiled import compiled
@@ -14,23 +15,39 @@ _DRAWS_EACH = 8.0
 _FILLED = 0.15
 
 
-def on_samples(search: Search, members: IntArray, anchor: int) -> Hypotheses:
+def on_samples(search: Search, members: IntArray, anchor: int, heard: Heard | None = None) -> Hypotheses:
     """The posterior over surface samples and yaws: places first, then coarse images, then fine ones.
 
     Args:
         search: the run.
         members: ``(m,)`` indices of the contacts that count.
         anchor: the one of them that a hypothesis puts on a sample.
+        heard: what the strikes said; None without.
     """
-    looked = search.look(search.grid(members, anchor), members, _DROPPED_AT)
+    start = search.grid(members, anchor)
+    if heard is None:
+        looked = search.look(start, members, _DROPPED_AT)
+    else:
+        # Sound costs no picture: what it rules out is never looked at.
+        told = heard.nats(search, start.gels, start.yaws)
+        total = start.log_weights + told
+        kept = best_of(total, _DROPPED_AT, len(total))
+        start = Hypotheses(start.gels[kept], start.yaws[kept], start.log_weights[kept])
+        looked = search.look(start, members, _DROPPED_AT, told[kept])
     closer = looked.best(_WORTH_A_LOOK, _MOST_LOOKS)
     search.settle(closer.yaws)
-    log_weights = search.weigh(closer.gels, closer.yaws, members, step=2, rings=1)
+    log_weights = _weighed(search, closer.gels, closer.yaws, members, 2, 1, heard)
     return Hypotheses(closer.gels, closer.yaws, log_weights - log_weights.max())
 
 
 def refine(
-    search: Search, start: Hypotheses, members: IntArray, samples: int, rounds: int, seed: int
+    search: Search,
+    start: Hypotheses,
+    members: IntArray,
+    samples: int,
+    rounds: int,
+    seed: int,
+    heard: Heard | None = None,
 ) -> Hypotheses:
     """The posterior in continuous place and yaw, by repeated importance sampling.
 
@@ -46,6 +63,7 @@ def refine(
         rounds: most rounds, each narrower; they end early where the draws already fill the
             posterior, because a further round would only lose places by chance. 0 returns ``start``.
         seed: of the draws.
+        heard: what the strikes said; None without.
     """
     rng = np.random.default_rng(seed)
     current = start
@@ -63,11 +81,25 @@ def refine(
             repeats / draws,
         )
         finest = attempt == rounds - 1
-        log_weights = search.weigh(gels, yaws, members, step=1 if finest else 2, rings=2) - log_density
+        step = 1 if finest else 2
+        log_weights = _weighed(search, gels, yaws, members, step, 2, heard) - log_density
         current = Hypotheses(gels, yaws, log_weights - log_weights.max())
         if 1.0 / np.sum(current.weights**2) > _FILLED * draws:
             break
     return current
+
+
+def _weighed(
+    search: Search,
+    gels: FloatArray,
+    yaws: FloatArray,
+    members: IntArray,
+    step: int,
+    rings: int,
+    heard: Heard | None,
+) -> FloatArray:
+    total = search.weigh(gels, yaws, members, step=step, rings=rings)
+    return total if heard is None else np.asarray(total + heard.nats(search, gels, yaws))
 
 
 def _turn(search: Search) -> float:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Method = Literal["grid", "particle"]
+Senses = Literal["touch", "audio", "both"]
 
 
 @dataclass(frozen=True)
@@ -11,6 +12,7 @@ class Levels:
     """One choice of every dial.
 
     Attributes:
+        senses: ``"touch"``, ``"audio"``, or ``"both"``: whatever was recorded.
         method: ``"grid"``, the exact posterior refined; ``"particle"``, the paper's filter.
         spacing: metres between the surface's samples.
         particles: of the paper's filter.
@@ -19,6 +21,7 @@ class Levels:
         samples: hypotheses drawn in each round where the yaw is known; four times as many where not.
     """
 
+    senses: Senses = "both"
     method: Method = "grid"
     spacing: float = 2.0e-3
     particles: int = 1000

@@ -5,13 +5,16 @@ from typing import Literal
 
 import numpy as np
 
+from experiments.contact_localization.sound_gains import GainTable, gain_table
 from experiments.contact_localization.surface import Surface, sample_surface
 from experiments.contact_localization.turning import Turning, turning_of
 from harness.arrays import FloatArray, read_only
 from harness.errors import WrongUse
+from harness.materials import Material
 from harness.mesh import Mesh
 from harness.sensor import TactileSensor
 from harness.sim.height_map import RasterMesh
+from harness.sim.modes import Modes
 from harness.sim.tactile_calibration import TactileCalibration
 
 
@@ -61,14 +64,19 @@ class Model:
         mesh: of the object, in metres.
         sensor: its geometry.
         calibration: of its colours, fitted to presses of this sensor.
+        modes: of the object; None where no sound is compared.
+        material: of the object; None where no sound is compared.
     """
 
     mesh: Mesh
     sensor: TactileSensor
     calibration: TactileCalibration
+    modes: Modes | None = None
+    material: Material | None = None
     raster: RasterMesh = field(init=False, repr=False)
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
 
+    _gains: dict[float, GainTable] = field(init=False, default_factory=dict, repr=False)
     _turnings: dict[tuple[float, ...], Turning] = field(init=False, default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -79,6 +87,18 @@ class Model:
         if spacing not in self._surfaces:
             self._surfaces[spacing] = sample_surface(self.mesh, spacing)
         return self._surfaces[spacing]
+
+    def gains(self, spacing: float) -> GainTable:
+        """The modes at the samples ``spacing`` metres apart, tabulated on first use.
+
+        Raises:
+            WrongUse: the model has no modes.
+        """
+        if self.modes is None:
+            raise WrongUse("this model of the object has no modes; give it some to compare sounds with")
+        if spacing not in self._gains:
+            self._gains[spacing] = gain_table(self.modes, self.surface(spacing))
+        return self._gains[spacing]
 
     def turning(self, up: FloatArray) -> Turning:
         """The turns about ``(3,)`` ``up`` that the object does not show, found on first use."""

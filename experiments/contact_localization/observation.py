@@ -8,6 +8,7 @@ import numpy as np
 from experiments.contact_localization.hypotheses import Contact
 from experiments.contact_localization.model import Model
 from experiments.contact_localization.touch import TouchNoise, touch_map
+from harness.acquisition import Strike
 from harness.arrays import ByteArray, FloatArray, read_only
 from harness.errors import DataRefused
 from harness.sim.inverse import invert
@@ -23,10 +24,12 @@ class Observation:
     Attributes:
         base_from_gel: ``(4, 4)`` as the arm reported it while pressed.
         images: ``(n, rows, columns, 3)`` uint8, at least one frame taken while pressed.
+        strike: what was heard when the place was struck; None where it was not.
     """
 
     base_from_gel: FloatArray
     images: ByteArray
+    strike: Strike | None = None
 
     def __post_init__(self) -> None:
         pose = np.asarray(self.base_from_gel, dtype=np.float64)

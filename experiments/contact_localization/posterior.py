@@ -67,10 +67,11 @@ def best_point(points: FloatArray, weights: FloatArray) -> FloatArray:
     few, their_weights = thinned(points, weights)
     gaps = np.linalg.norm(few[:, None] - few[None], axis=2)
     expected = np.minimum(gaps, _GROSS) @ their_weights
-    return _settled(points, weights, few[int(np.argmin(expected))])
+    return settled(points, weights, few[int(np.argmin(expected))])
 
 
-def _settled(points: FloatArray, weights: FloatArray, start: FloatArray) -> FloatArray:
+def settled(points: FloatArray, weights: FloatArray, start: FloatArray) -> FloatArray:
+    """``(3,)``: the mean of what lies within 6 mm of itself, found from ``start``."""
     centre = start
     for _ in range(_SETTLING):
         near = weights * (np.linalg.norm(points - centre, axis=1) < _CORE)

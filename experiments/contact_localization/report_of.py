@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from experiments.contact_localization.answer import Answer as Found
+from experiments.contact_localization.gate import Gate
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.result import Scored, flags_of, result_of
 from experiments.contact_localization.trade import Point
@@ -76,7 +77,7 @@ def report_of(
 
 def _answer(scored: Scored) -> Answer:
     result = result_of(scored, None)
-    touch = result["estimates"]["touch"]
+    touch = result["estimates"][result["answer"]]
     return Answer(
         position=scored.found.last.position_in_object,
         seconds=touch["seconds"],
@@ -92,8 +93,7 @@ def _answer(scored: Scored) -> Answer:
 
 def _contact(scored: Scored, index: int) -> Contact:
     found, comparison, true = scored.found, scored.comparison, scored.true_points
-    after, gate = found.estimates[index], found.last.gates[index]
-    fit = "no contact in the image" if gate.fit is None else f"{gate.fit:.1f} nats"
+    after, gate = found.estimates[index], found.last.gates[index] if found.last.gates else None
     return Contact(
         number=index + 1,
         step=str(index + 1),
@@ -112,9 +112,15 @@ def _contact(scored: Scored, index: int) -> Contact:
         ),
         truth=None if true is None else true[index],
         error=None if true is None else float(np.linalg.norm(after.position_in_object - true[index])),
-        flags=tuple(flags_of(gate)),
-        notes=(("fit", fit),),
+        flags=() if gate is None else tuple(flags_of(gate)),
+        notes=(("fit", _fit(gate)),),
     )
+
+
+def _fit(gate: Gate | None) -> str:
+    if gate is None:
+        return "the image was not used"
+    return "no contact in the image" if gate.fit is None else f"{gate.fit:.1f} nats"
 
 
 def _bench(run: RunFiles, found: Found) -> Bench:
@@ -144,7 +150,7 @@ def _by_contact(scored: Scored, geometry: tuple[float, ...] | None) -> tuple[Cur
         float(np.linalg.norm(estimate.position_in_object - point))
         for estimate, point in zip(scored.found.estimates, true, strict=True)
     )
-    curves = [Curve("touch", counts, ours)]
+    curves = [Curve(scored.found.sense, counts, ours)]
     if geometry is not None:
         curves.append(Curve("translations alone, no image", counts, geometry))
     return tuple(curves)

@@ -9,10 +9,12 @@ import numpy as np
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.baselines import mean_random_error
 from experiments.contact_localization.comparison import Comparison
+from experiments.contact_localization.estimate import Estimate
 from experiments.contact_localization.gate import Gate
 from experiments.contact_localization.posterior import Mode
 from experiments.contact_localization.truth import Truth
 from harness.arrays import FloatArray
+from harness.errors import FitRefused
 from harness.explain import as_json
 from harness.run_folder import RunFiles
 from harness.symmetry import SymmetryGroup
@@ -65,7 +67,11 @@ def result_of(scored: Scored, report: str | None) -> dict[str, Any]:
         "mock": run.recording.header.mock is not None,
         "seed": run.recording.header.seed,
         "contacts": len(found.observations),
-        "estimates": {"touch": touch_estimate(scored)},
+        "estimates": {
+            sense: {"refused": str(found)} if isinstance(found, FitRefused) else estimate_of(scored, found)
+            for sense, found in scored.found.by_sense.items()
+        },
+        "answer": scored.found.sense,
         "random_baseline_m": None if last_true is None else mean_random_error(run.mesh, last_true),
         "geometry_baseline_m": _distance(scored.geometry, last_true),
         "symmetry": scored.symmetry.name,
@@ -78,10 +84,9 @@ def result_of(scored: Scored, report: str | None) -> dict[str, Any]:
     }
 
 
-def touch_estimate(scored: Scored) -> dict[str, Any]:
-    """The estimate by touch, scored where the truth is known."""
-    found, true = scored.found, scored.true_points
-    last = found.last
+def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
+    """An estimate by one sense or by both, scored where the truth is known."""
+    true = scored.true_points
     errors = None if true is None else np.linalg.norm(last.contacts - true, axis=1)
     end = None if true is None else true[-1]
     return {
@@ -97,10 +102,12 @@ def touch_estimate(scored: Scored) -> dict[str, Any]:
         "yaw_rad": last.yaw,
         "yaw_sigma_rad": last.yaw_sigma,
         "contacts": [
-            _contact(k, point, gate, None if errors is None else float(errors[k]))
-            for k, (point, gate) in enumerate(zip(last.contacts, last.gates, strict=True))
+            _contact(
+                k, point, last.gates[k] if last.gates else None, None if errors is None else float(errors[k])
+            )
+            for k, point in enumerate(last.contacts)
         ],
-        "seconds": found.seconds,
+        "seconds": sum(last.seconds.values()),
         "seconds_by_stage": dict(last.seconds),
     }
 
@@ -122,13 +129,13 @@ def fit_of(gate: Gate) -> float | None:
     return gate.fit if gate.fit is not None and np.isfinite(gate.fit) else None
 
 
-def _contact(index: int, point: FloatArray, gate: Gate, error: float | None) -> dict[str, Any]:
+def _contact(index: int, point: FloatArray, gate: Gate | None, error: float | None) -> dict[str, Any]:
     return {
         "contact": index + 1,
         "position_m": point.tolist(),
         "error_m": error,
-        "fit_nats": fit_of(gate),
-        "flags": flags_of(gate),
+        "fit_nats": None if gate is None else fit_of(gate),
+        "flags": [] if gate is None else flags_of(gate),
     }
 
 

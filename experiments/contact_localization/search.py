@@ -84,18 +84,21 @@ class Search:
         gels = gels_at_anchor - (rotations @ self.positions[anchor])[yaws]
         return Hypotheses(gels, self.yaws[yaws], log_weights[kept] - log_weights[kept].max())
 
-    def look(self, start: Hypotheses, members: IntArray, within: float) -> Hypotheses:
+    def look(
+        self, start: Hypotheses, members: IntArray, within: float, told: FloatArray | None = None
+    ) -> Hypotheses:
         """Weigh samples' hypotheses by coarse images, dropping what falls behind as contacts come in.
 
         Args:
             start: on the surface's samples; their weights are not used.
             members: ``(m,)`` indices of contacts whose image shows a contact.
             within: nats behind the best at which a hypothesis is dropped.
+            told: ``(n,)`` nats that something else already says; None for nothing.
         """
         # Between samples the best place is up to half their spacing away.
         off, pitch = 0.4 * self.surface.spacing, self._pitch
         step = max(1, round(self.surface.spacing / pitch))
-        total = self.log_yaw_prior(start.yaws)
+        total = self.log_yaw_prior(start.yaws) + (0.0 if told is None else told)
         gels, yaws = start.gels, start.yaws
         for k, sigma, temperature in self._scales(members):
             total = total + self._term(k, gels, yaws, step, 1, float(np.hypot(sigma, off)), temperature, True)

@@ -117,7 +117,7 @@ def perform_on(
 def score(recording: Recording, accuracy: Accuracy) -> Scored:
     """Estimate, compare, and look at the truth where there is one."""
     run = RunFiles(recording)
-    found = answer(run, levels_of(accuracy))
+    found = answer(run, levels_of(accuracy), accuracy=accuracy)
     warnings = tuple(recording.header.plan.get("warnings", ())) + _doubts(found)
     return Scored(
         run=run,

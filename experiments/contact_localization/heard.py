@@ -1,0 +1,53 @@
+"""What the strikes of a run's first contacts say, ready for the search."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.model import Model
+from experiments.contact_localization.search import Search
+from experiments.contact_localization.sound_analysis import analyse
+from experiments.contact_localization.sound_likelihood import SoundTerm
+from experiments.contact_localization.sound_places import sound_nats
+from harness.acquisition import Strike
+from harness.arrays import FloatArray, IntArray
+from harness.errors import WrongUse
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """The sound of a run's strikes.
+
+    Attributes:
+        term: of the posterior.
+        struck: ``(K,)`` indices of the contacts that were struck.
+    """
+
+    term: SoundTerm
+    struck: IntArray
+
+    def nats(self, search: Search, gels: FloatArray, yaws: FloatArray) -> FloatArray:
+        """``(n,)`` nats of hypotheses, see ``Hypotheses``; 0 where the sound says nothing."""
+        return sound_nats(search, self.term, self.struck, gels, yaws)
+
+
+def hear(strikes: Sequence[Strike | None], model: Model, spacing: float) -> Heard | None:
+    """The strikes as a term; None where nothing was struck.
+
+    Args:
+        strikes: of the contacts in order; None for one that was not struck.
+        model: with the object's modes.
+        spacing: metres between the surface's samples.
+
+    Raises:
+        WrongUse: there are strikes, and the model has no modes.
+    """
+    struck = [k for k, strike in enumerate(strikes) if strike is not None]
+    if not struck:
+        return None
+    if model.modes is None or model.material is None:
+        raise WrongUse("the contacts were struck, and the model of the object has no modes to compare with")
+    evidence = analyse([strike for strike in strikes if strike is not None])
+    term = SoundTerm(evidence, model.gains(spacing), model.modes, model.material)
+    return Heard(term, np.array(struck, dtype=np.int64))

@@ -1,0 +1,131 @@
+"""The ways to a posterior: the grid with images and sound, sound alone, and the paper's filter."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.gate import refuse_bad_fit
+from experiments.contact_localization.grid import on_samples, refine
+from experiments.contact_localization.heard import Heard
+from experiments.contact_localization.hypotheses import Hypotheses
+from experiments.contact_localization.levels import Levels
+from experiments.contact_localization.particle import particle_filter
+from experiments.contact_localization.search import Search
+from experiments.contact_localization.sound_places import by_sound
+from harness.arrays import FloatArray, IntArray
+
+_UNKNOWN_YAW_FACTOR = 4
+_ANCHORS = 3
+_SUSPICIOUS_BELOW = -8.0
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Hypotheses with how the best of them fits.
+
+    Attributes:
+        hypotheses: the posterior.
+        members: ``(m,)`` indices of the contacts whose image counts.
+        fits: ``(m,)`` nats of each at the best hypothesis.
+        pictured: whether pictures along the tool say where a hypothesis' contact lies; without, it
+            is the sample nearest to where the tool ended.
+    """
+
+    hypotheses: Hypotheses
+    members: IntArray
+    fits: FloatArray
+    pictured: bool = True
+
+
+def solve_run(
+    search: Search, count: int, levels: Levels, seed: int, seconds: dict[str, float], heard: Heard | None
+) -> Solution:
+    """The posterior of the first ``count`` contacts.
+
+    Args:
+        search: the run.
+        count: contacts that are used.
+        levels: the method and its dials.
+        seed: of the draws inside the method.
+        seconds: by stage; what is spent here is added.
+        heard: what their strikes said; None without.
+
+    Raises:
+        FitRefused: no image shows a contact, and no sound is asked for alone.
+    """
+    if levels.senses == "audio":
+        assert heard is not None
+        return _by_sound(search, count, heard, seconds)
+    members = search.members(count)
+    if len(members) == 0:
+        refuse_bad_fit(search, members, np.empty(0))
+    if levels.method == "particle":
+        return _by_particles(search, count, members, levels, seed, seconds)
+    best: Solution | None = None
+    # A hypothesis hangs on its anchor: where that contact slipped, another must carry the others.
+    for anchor in _anchors(members):
+        found = _by_grid(search, members, int(anchor), levels, seed, seconds, heard)
+        if best is None or np.median(found.fits) > np.median(best.fits):
+            best = found
+        of_anchor = float(found.fits[np.nonzero(members == anchor)[0][0]])
+        if min(of_anchor, float(np.median(found.fits))) > _SUSPICIOUS_BELOW:
+            break
+    assert best is not None
+    return best
+
+
+def _anchors(members: IntArray) -> IntArray:
+    spread = np.linspace(0, len(members) - 1, min(_ANCHORS, len(members)))
+    return members[np.unique(spread.astype(np.int64))]
+
+
+def _by_grid(
+    search: Search,
+    members: IntArray,
+    anchor: int,
+    levels: Levels,
+    seed: int,
+    seconds: dict[str, float],
+    heard: Heard | None,
+) -> Solution:
+    start = time.perf_counter()
+    coarse = on_samples(search, members, anchor, heard)
+    lap(seconds, "grid", start)
+    start = time.perf_counter()
+    samples = levels.samples * (1 if search.prior.yaw == "known" else _UNKNOWN_YAW_FACTOR)
+    refined = refine(search, coarse, members, samples, levels.rounds, seed, heard)
+    top = int(np.argmax(refined.log_weights))
+    fits = search.gates(refined.gels[top], float(refined.yaws[top]), members)
+    lap(seconds, "refine", start)
+    return Solution(refined, members, fits)
+
+
+def _by_sound(search: Search, count: int, heard: Heard, seconds: dict[str, float]) -> Solution:
+    start = time.perf_counter()
+    everyone = np.arange(count, dtype=np.int64)
+    found = by_sound(search, heard.term, heard.struck, everyone, anchor=0)
+    lap(seconds, "grid", start)
+    return Solution(found, np.empty(0, dtype=np.int64), np.empty(0), pictured=False)
+
+
+def _by_particles(
+    search: Search, count: int, members: IntArray, levels: Levels, seed: int, seconds: dict[str, float]
+) -> Solution:
+    start = time.perf_counter()
+    particles = particle_filter(search, count, levels.particles, seed)
+    rotations = search.prior.object_from_base(particles.yaws)
+    last = count - 1
+    inward = rotations @ search.axes[last]
+    gels_at_last = particles.points + search.contacts[last].indentation * inward
+    gels = gels_at_last - rotations @ search.positions[last]
+    found = Hypotheses(gels, particles.yaws, particles.log_weights)
+    top = int(np.argmax(found.log_weights))
+    fits = search.gates(gels[top], float(found.yaws[top]), members)
+    lap(seconds, "particles", start)
+    return Solution(found, members, fits)
+
+
+def lap(seconds: dict[str, float], stage: str, start: float) -> None:
+    """Add the time since ``start``, of ``time.perf_counter``, to a stage."""
+    seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start

@@ -1,0 +1,74 @@
+"""The model of a scene's object: with its modes where the scene is to be heard."""
+
+from typing import Any
+
+from experiments.contact_localization.model import Model
+from harness.accuracy import Accuracy
+from harness.effects import Facts
+from harness.evaluate import evaluate
+from harness.materials import MATERIALS
+from harness.mesh import Mesh
+from harness.plan import default_accuracy, plan
+from harness.run_folder import RunFiles
+from harness.scene import SceneFile
+from harness.sim.catalogue import EFFECTS
+from harness.sim.modal import from_arrays
+from harness.sim.modes import Modes
+from harness.sim.tactile_calibration import TactileCalibration
+from harness.station_file import Station
+from harness.store import Store, default_folder
+
+
+def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
+    """The object and the sensor as a recording carries them.
+
+    Args:
+        run: the folder.
+        accuracy: levels of the modes' dials; None for the default ones.
+    """
+    return model_of_scene(run.scene, run.station, run.mesh, run.calibration, accuracy)
+
+
+def model_of_scene(
+    scene: SceneFile,
+    station: Station,
+    mesh: Mesh,
+    calibration: TactileCalibration,
+    accuracy: Accuracy | None = None,
+) -> Model:
+    """The object and the sensor of a scene; modes only where it calls for sound.
+
+    Args:
+        scene: resolved.
+        station: gives the sensor.
+        mesh: of the object, in metres.
+        calibration: of the gel, as the estimator is to know it.
+        accuracy: levels of the modes' dials; None for the default ones.
+
+    Raises:
+        MeshRefused: the scene calls for sound, and the object's surface cannot be filled.
+    """
+    if not scene.sensors.sound:
+        return Model(mesh, station.gel.sensor, calibration)
+    modes = object_modes(scene, station, mesh, accuracy)
+    return Model(mesh, station.gel.sensor, calibration, modes, MATERIALS[scene.object.material])
+
+
+def object_modes(scene: SceneFile, station: Station, mesh: Mesh, accuracy: Accuracy | None = None) -> Modes:
+    """The object's modes, from the store where they were found before.
+
+    Args:
+        scene: says the material and the wall.
+        station: gives the sensor.
+        mesh: of the object, in metres.
+        accuracy: levels of the modes' dials; None for the default ones.
+    """
+    chosen = plan(
+        EFFECTS, Facts(scene, station.gel.sensor), ("object.modes",), accuracy or default_accuracy(EFFECTS)
+    )
+    sources: dict[str, Any] = {
+        "object.mesh": mesh,
+        "object.wall": scene.object.wall,
+        "object.material": MATERIALS[scene.object.material],
+    }
+    return from_arrays(evaluate(chosen, sources, Store(default_folder()))["object.modes"])
