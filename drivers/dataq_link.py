@@ -10,16 +10,15 @@ from harness.errors import BenchFault
 if TYPE_CHECKING:
     from serial import Serial
 
-REPLY_TIMEOUT = 0.5
+REPLY_TIMEOUT = 1.0
 """s within which a command is echoed."""
 
 QUIET = 0.06
 """s without a byte after which a stopped box is taken to be drained."""
 
 _READ_TIMEOUT = 0.05
-_DRAIN_TIMEOUT = 2.0
+_DRAIN_TIMEOUT = 5.0
 _DRAIN_STEP = 0.005
-_LARGEST_READ = 1 << 16
 
 
 class LinkCut(BenchFault):
@@ -72,15 +71,17 @@ class DataqLink:
             BenchFault: no echo within ``REPLY_TIMEOUT`` s, another one, or the link is cut.
         """
         self.send(command)
-        reply = self._until_end()
-        try:
-            return answer_to(command, reply)
-        except ValueError as error:
-            said = repr(str(error)) if reply else "nothing"
-            raise BenchFault(
-                f"{self.name}: the box at {self.port} answered {said} to {command!r}; check its power, and "
-                "that it is a DATAQ box in CDC mode (its light blinks yellow)"
-            ) from error
+        heard, began = b"", now()
+        while now() - began < REPLY_TIMEOUT:
+            heard += self._waiting(1)
+            value = answer_to(command, heard)
+            if value is not None:
+                return value
+        said = repr(heard.decode("ascii", "replace")) if heard else "nothing"
+        raise BenchFault(
+            f"{self.name}: the box at {self.port} answered {said} to {command!r}; check its power, and "
+            "that it is a DATAQ box in CDC mode (its light blinks yellow)"
+        )
 
     def send(self, command: str) -> None:
         """Send a command whose echo nobody waits for; ``BenchFault`` where the link is cut."""
@@ -88,42 +89,34 @@ class DataqLink:
         try:
             port.write(command.encode("ascii") + END)
         except OSError as error:
-            raise self._cut(error) from error
+            raise self.cut(_reason(error)) from error
 
-    def read(self) -> tuple[bytes, bool]:
-        """What has arrived (nothing after 50 ms), and whether nothing was left behind it.
+    def fileno(self) -> int:
+        """The port's file descriptor, for a process that reads it instead of this one."""
+        return self._open_port().fileno()
 
-        Raises:
-            BenchFault: the link is cut.
-        """
-        port = self._open_port()
-        try:
-            waiting = min(port.in_waiting, _LARGEST_READ)
-            data = port.read(max(1, waiting))
-            if len(data) == 1 and waiting == 0:
-                data += port.read(min(port.in_waiting, _LARGEST_READ))
-            emptied = port.in_waiting == 0
-        except OSError as error:
-            raise self._cut(error) from error
-        return data, emptied
+    def cut(self, reason: str) -> LinkCut:
+        """That the port is gone, for the operator."""
+        return LinkCut(
+            f"{self.name}: the box at {self.port} went away ({reason}); check its USB cable and its "
+            "power, then open the bench again"
+        )
 
     def drain(self) -> int:
         """Throw away what still comes until the box is quiet; how many bytes that were.
 
         Raises:
-            BenchFault: it is not quiet within 2 s, or the link is cut.
+            BenchFault: it is not quiet within 5 s, or the link is cut.
         """
         began = heard = now()
         thrown = 0
         while now() - heard < QUIET:
-            time.sleep(_DRAIN_STEP)
-            port = self._open_port()
-            try:
-                data = port.read(port.in_waiting)
-            except OSError as error:
-                raise self._cut(error) from error
+            data = self._waiting()
             thrown += len(data)
-            heard = now() if data else heard
+            if data:
+                heard = now()
+            else:
+                time.sleep(_DRAIN_STEP)
             if now() - began > _DRAIN_TIMEOUT:
                 raise BenchFault(
                     f"{self.name}: the box at {self.port} keeps sending after {STOP!r}; "
@@ -131,23 +124,18 @@ class DataqLink:
                 )
         return thrown
 
-    def _until_end(self) -> bytes:
-        """Bytes up to the end of an answer, or those of ``REPLY_TIMEOUT`` s."""
-        reply, began = b"", now()
-        while END not in reply and now() - began < REPLY_TIMEOUT:
-            reply += self.read()[0]
-        return reply
+    def _waiting(self, least: int = 0) -> bytes:
+        """What has arrived already; waits up to 50 ms for the ``least`` bytes."""
+        port = self._open_port()
+        try:
+            return port.read(max(least, port.in_waiting))
+        except OSError as error:
+            raise self.cut(_reason(error)) from error
 
     def _open_port(self) -> "Serial":
         if self._serial is None:
             raise BenchFault(f"{self.name} was used before it was opened; open the bench first")
         return self._serial
-
-    def _cut(self, error: OSError) -> LinkCut:
-        return LinkCut(
-            f"{self.name}: the box at {self.port} went away ({_reason(error)}); check its USB cable and its "
-            "power, then open the bench again"
-        )
 
 
 def find_port(name: str, serial_number: str) -> str:

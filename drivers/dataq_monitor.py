@@ -18,16 +18,22 @@ PROMPT = 0.5e-3
 
 _PROMPT_RESIDUALS = 6.0
 
-PATIENCE = 1.0
-"""s for which nothing may arrive promptly from an emptied port before samples count as lost."""
+STEADY = 0.25
+"""s over which the quickest arrival is taken while none is prompt."""
+
+STEADY_COUNT = 4
+"""Such times in a row whose quickest arrivals must be equally late for samples to count as lost. A sender
+or a host that is merely slow is late by ever other amounts, and catches up."""
 
 SETTLED = 1.0
-"""s of arrivals after which their own rate is believed rather than the nominal one."""
+"""s of arrivals after which their own rate is believed rather than the nominal one, if they come evenly."""
 
 REST_WINDOW = 0.05
 """s over which a rest is measured."""
 
-_REFIT = 0.5
+_REFIT = 0.25
+_CRYSTAL = 200e-6
+_WANDER = 20e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +80,8 @@ class StreamMonitor:
         self._fit: ClockFit | None = None
         self._fitted_at = 0.0
         self._earliest = np.inf
-        self._late_since: float | None = None
+        self._late: list[float] = []
+        self._late_until = 0.0
         self._window: list[AnyArray] = []
         self._windowed = 0
         self._astray = 0
@@ -96,6 +103,11 @@ class StreamMonitor:
             self._see_rest(np.concatenate(self._window), total)
             self._window, self._windowed = [], 0
 
+    @property
+    def settled(self) -> bool:
+        """Whether the arrivals tell the clock: long enough, for how evenly they come."""
+        return self._fit is not None
+
     def lateness(self, total: int, time: float) -> float:
         """Seconds by which an arrival is later than the quickest ones."""
         if self._fit is not None:
@@ -106,22 +118,41 @@ class StreamMonitor:
 
     def _see_time(self, total: int, time: float) -> None:
         late = self.lateness(total, time)
-        residual = 0.0 if self._fit is None else self._fit.residual
-        if late <= max(PROMPT, _PROMPT_RESIDUALS * residual):
-            self.prompt, self._late_since = total, None
+        allowed = self._allowed(time)
+        if late <= allowed:
+            self.prompt, self._late = total, []
             self.clock.arrived(total - 1, time)
             self._refit(time)
-            return
-        self._late_since = time if self._late_since is None else self._late_since
-        if time - self._late_since > PATIENCE:
+        elif not self._late or time > self._late_until:
+            self._judge_lateness()
+            self._late.append(late)
+            self._late_until = time + STEADY
+        else:
+            self._late[-1] = min(self._late[-1], late)
+
+    def _allowed(self, time: float) -> float:
+        """Seconds of lateness of a prompt arrival, for what the clock is known to."""
+        if self._fit is None:
+            return PROMPT + _CRYSTAL * self.clock.span
+        unsure = self._fit.residual / self._fit.span + _WANDER
+        beyond = max(0.0, time - self._fit.arrivals[-1])
+        return float(max(PROMPT, _PROMPT_RESIDUALS * self._fit.residual) + unsure * beyond)
+
+    def _judge_lateness(self) -> None:
+        """Whether the quickest arrivals have been equally late for some time."""
+        newest = self._late[-STEADY_COUNT:]
+        if len(newest) == STEADY_COUNT and max(newest) - min(newest) <= PROMPT:
             self.fault = (
-                f"about {late * self._rate:.0f} samples of each channel are missing: this computer did not "
-                "fetch them in time and the box's memory overflowed; close what else runs on it"
+                f"about {min(newest) * self._rate:.0f} samples of each channel are missing: this computer "
+                "did not fetch them in time and the box's memory overflowed; close what else runs on it"
             )
 
     def _refit(self, time: float) -> None:
-        if self.clock.span >= SETTLED and time - self._fitted_at > _REFIT:
-            self._fit, self._fitted_at = self.clock.fit(), time
+        if self.clock.span < SETTLED or time - self._fitted_at < _REFIT:
+            return
+        fit, self._fitted_at = self.clock.fit(), time
+        if fit.residual <= _CRYSTAL * fit.span:
+            self._fit = fit
 
     def _see_rest(self, words: AnyArray, total: int) -> None:
         rest = float(np.median(counts(words[:, 0], self._model)))

@@ -81,12 +81,17 @@ def packet_exponent(rate: float, channels: int) -> int:
     return int(np.clip(np.floor(np.log2(max(wanted, 16.0))) - 4, 0, _PACKET_LARGEST))
 
 
-def answer_to(command: str, reply: bytes) -> str:
-    """The value in an echo: what follows the command in ``reply``; ``ValueError`` where it is no echo."""
-    text = reply.replace(b"\0", b"").strip(b"\r\n ").decode("ascii", "replace")
-    if text != command and not text.startswith(command + " "):
-        raise ValueError(text)
-    return text[len(command) :].strip()
+def answer_to(command: str, heard: bytes) -> str | None:
+    """The value in the echo of a command: what follows the command in a whole line.
+
+    Other lines are echoes of earlier commands, which a box that was busy sends late. None where no line
+    is an echo of this command.
+    """
+    for line in heard.replace(b"\0", b"").split(END)[:-1]:
+        text = line.strip(b"\n ").decode("ascii", "replace")
+        if text == command or text.startswith(command + " "):
+            return text[len(command) :].strip()
+    return None
 
 
 def without_start_echo(data: bytes) -> tuple[bool, bytes]:

@@ -7,21 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivers.dataq_fetcher import Arrival, Fetcher
 from drivers.dataq_link import DataqLink, LinkCut
-from drivers.dataq_monitor import SETTLED, Rests, StreamMonitor
+from drivers.dataq_monitor import Rests, StreamMonitor
 from drivers.dataq_protocol import MODEL, START, STOP, BoxModel, counts, without_start_echo
 from harness.arrays import AnyArray, BoolArray
 from harness.clock import now
 from harness.clock_fit import ClockFit
 from harness.errors import BenchFault
 
-STALL = 1.0
+STALL = 2.0
 """s without a byte after which the box counts as stalled."""
 
-_PROOF_TIMEOUT = 2.5
+_PROOF_TIMEOUT = 10.0
+_UNREST = 0.5
 _DEAF_TIMEOUT = 10.0
 _LOOK_PERIOD = 0.1
-_SETTLE_TIMEOUT = SETTLED + 3.0
+_FETCH_TIMEOUT = 0.1
+_SETTLE_TIMEOUT = 30.0
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,7 @@ class ScanStream:
         self._partial = b""
         self._heard = now()
         self._fresh = True
+        self._fetcher: Fetcher
         self._thread = threading.Thread(target=self._run, name=f"{link.name} stream", daemon=True)
 
     def start(self) -> None:
@@ -84,6 +88,7 @@ class ScanStream:
         """End fetching and scanning; silent where the box is gone."""
         self._closing.set()
         self._thread.join()
+        self._fetcher.end()
         with contextlib.suppress(BenchFault):
             self._link.send(STOP)
 
@@ -95,7 +100,7 @@ class ScanStream:
     def clock(self) -> ClockFit | None:
         """The clock of the present stretch; None before it has settled."""
         with self._changed:
-            return self._monitor.clock.fit() if self._monitor.clock.span >= SETTLED else None
+            return self._monitor.clock.fit() if self._monitor.settled else None
 
     def settle(self) -> Position:
         """Wait until the clock can be fitted; the newest scan then.
@@ -105,7 +110,7 @@ class ScanStream:
         """
 
         def settled() -> bool:
-            return bool(self._dead) or self._monitor.clock.span >= SETTLED
+            return bool(self._dead) or self._monitor.settled
 
         with self._changed:
             done = self._changed.wait_for(settled, _SETTLE_TIMEOUT)
@@ -156,14 +161,15 @@ class ScanStream:
         """
         end = first.scan + count
 
-        def proven() -> bool:
-            return self._over(first) or min(self._monitor.prompt, self._monitor.ordered) >= end
+        def decided() -> bool:
+            restless = self._monitor.prompt >= end + _UNREST * self._rate
+            return self._over(first) or restless or self._proven >= end
 
         with self._changed:
             timeout = max(0, end - self._total) / self._rate + _PROOF_TIMEOUT
-            done = self._changed.wait_for(proven, timeout)
+            self._changed.wait_for(decided, timeout)
             self._raise_if_over(first)
-            if not done:
+            if self._proven < end:
                 raise BenchFault(self._unproven(end))
             if first.scan < max(0, self._total - len(self._ring)):
                 raise BenchFault(
@@ -191,6 +197,10 @@ class ScanStream:
                     self._dead or f"{self._link.name}: the box did not begin anew; check its cable"
                 )
 
+    @property
+    def _proven(self) -> int:
+        return min(self._monitor.prompt, self._monitor.ordered)
+
     def _unproven(self, end: int) -> str:
         if self._monitor.ordered < end <= self._monitor.prompt:
             rest = np.median(self.rest(0.05), axis=0)
@@ -216,29 +226,35 @@ class ScanStream:
         return kept
 
     def _begin(self) -> None:
-        self._partial, self._fresh, self._heard = b"", True, now()
+        self._partial, self._fresh = b"", True
         self._monitor = StreamMonitor(self._rate, self._model, self._rests)
         self._total = 0
+        self._fetcher = Fetcher(self._link.fileno())
         self._link.send(START)
+        self._heard = now()
 
     def _run(self) -> None:
         while not self._closing.is_set():
             try:
-                data, emptied = self._link.read()
-                arrived = now()
-                if data:
-                    self._take(data, arrived, emptied)
-                elif arrived - self._heard > STALL:
-                    self._monitor.fault = f"the box sent nothing for {STALL:g} s"
+                for arrival in self._fetcher.read(_FETCH_TIMEOUT):
+                    self._see(arrival)
                 if self._monitor.fault or self._asked:
                     self._recover(self._monitor.fault or "begun anew", bool(self._monitor.fault))
             except BenchFault as fault:
                 self._die(str(fault))
                 return
 
-    def _take(self, data: bytes, arrived: float, emptied: bool) -> None:
-        self._heard = arrived
-        data = self._partial + data
+    def _see(self, arrival: Arrival) -> None:
+        if arrival.cut:
+            raise self._link.cut(arrival.cut)
+        if arrival.data:
+            self._take(arrival)
+        elif arrival.time - self._heard > STALL:
+            self._monitor.fault = f"the box sent nothing for {STALL:g} s"
+
+    def _take(self, arrival: Arrival) -> None:
+        self._heard = arrival.time
+        data = self._partial + arrival.data
         if self._fresh:
             self._fresh, data = without_start_echo(data)
         channels = self._ring.shape[1]
@@ -248,7 +264,7 @@ class ScanStream:
         with self._changed:
             self._ring[np.arange(self._total, self._total + len(scans)) % len(self._ring)] = scans
             self._total += len(scans)
-            self._monitor.take(scans, self._total, arrived, emptied)
+            self._monitor.take(scans, self._total, arrival.time, arrival.emptied)
             self._changed.notify_all()
 
     def _recover(self, reason: str, lost: bool) -> None:
@@ -257,6 +273,7 @@ class ScanStream:
             last = self._last_proven()
             if lost:
                 self.losses.append(reason)
+        self._fetcher.end()
         self._silence()
         with self._changed:
             self._begin()
@@ -267,7 +284,7 @@ class ScanStream:
 
     def _last_proven(self) -> float:
         """Bench-clock seconds of the newest scan up to which none is missing."""
-        if self._monitor.clock.span < SETTLED:
+        if not self._monitor.settled:
             return self._heard
         return self._monitor.clock.fit().time(self._monitor.prompt)
 

@@ -24,6 +24,7 @@ from harness.clock import now
 from mocks.daq.instrument import MODELS, Instrument
 from mocks.daq.memory import Fifo
 from mocks.faults import ActiveFault, Fault
+from mocks.lab_processes import keep_time
 
 FAULT_KINDS = ("none", "stall", "overflow", "lost_byte", "lost_word", "unplug")
 """stall: no samples and no answers. overflow: nothing leaves while samples go on. lost_byte, lost_word:
@@ -36,7 +37,7 @@ HOST_MEMORY = 640 << 10
 """Bytes that Linux keeps of a serial port for its program (TTYB_DEFAULT_MEM_LIMIT in tty_buffer.c)."""
 
 _WRITE = 4096
-_PERIOD = 2e-3
+_PERIOD = 4e-3
 _COMMAND_BYTES = 4096
 _LOSSES = {"lost_byte": 1, "lost_word": 2}
 
@@ -121,6 +122,7 @@ class DaqBox:
 
     def serve(self, line: Cues) -> None:
         """Be the instrument until the lab is gone or the cable is pulled."""
+        keep_time()
         line.ready()
         while not line.should_stop() and self._master >= 0:
             fault = line.fault()

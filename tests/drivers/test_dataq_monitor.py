@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.dataq_monitor import PATIENCE, PROMPT, Rests, StreamMonitor
+from drivers.dataq_monitor import PROMPT, STEADY, STEADY_COUNT, Rests, StreamMonitor
 from drivers.dataq_protocol import MODELS
 from harness.arrays import AnyArray
 
@@ -41,7 +41,7 @@ class Stream:
         return words[:, ::-1] if self.swap else words
 
 
-@settings(max_examples=10)
+@settings(deadline=None, max_examples=10)
 @given(st.floats(-100.0, 100.0), st.integers(0, 2**31))
 def test_a_whole_stream_is_proven_whole(ppm: float, seed: int) -> None:
     stream = Stream(seed, ppm)
@@ -51,14 +51,14 @@ def test_a_whole_stream_is_proven_whole(ppm: float, seed: int) -> None:
     assert stream.monitor.ordered > stream.sent - 0.06 * RATE
 
 
-@settings(max_examples=10)
+@settings(deadline=None, max_examples=10)
 @given(st.integers(int(1.2 * PROMPT * RATE), int(RATE)), st.integers(0, 2**31))
 def test_missing_samples_are_noticed_and_counted(lost: int, seed: int) -> None:
     stream = Stream(seed, 60.0)
     stream.run(2.0)
     stream.lose(lost)
     before = stream.sent
-    stream.run(PATIENCE + 0.2)
+    stream.run((STEADY_COUNT + 1) * STEADY)
     assert "memory overflowed" in stream.monitor.fault
     named = float(stream.monitor.fault.split("about ")[1].split(" ")[0])
     assert named == pytest.approx(lost, abs=0.002 * RATE)
@@ -72,6 +72,18 @@ def test_a_host_that_is_slow_and_catches_up_has_lost_nothing() -> None:
     assert stream.monitor.fault == ""
     stream.run(0.5)
     assert stream.monitor.fault == ""
+    assert stream.monitor.prompt > stream.sent - 10 * STEP
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.integers(0, 2**31))
+def test_a_sender_that_falls_behind_and_comes_back_has_lost_nothing(seed: int) -> None:
+    stream, rng = Stream(seed), np.random.default_rng(seed)
+    stream.run(2.0)
+    for late in rng.uniform(0.05, 2.0, 40):
+        stream.run(0.1, late=late)
+    assert stream.monitor.fault == ""
+    stream.run(0.5)
     assert stream.monitor.prompt > stream.sent - 10 * STEP
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.acquisition import AcquisitionCalibration, Strike, shipped_acquisition, strike_from_readings
@@ -59,6 +59,7 @@ def strike_of(force: FloatArray, pressure: FloatArray | None = None, seed: int =
     )
 
 
+@settings(deadline=None)
 @given(st.floats(200.0, 15000.0), st.integers(600, 4000), st.integers(0, 2**31))
 def test_a_strike_is_read_in_newtons(peak: float, at: int, seed: int) -> None:
     strike = strike_of(half_sine(peak, at), seed=seed)
@@ -72,18 +73,21 @@ def test_a_strike_is_read_in_newtons(peak: float, at: int, seed: int) -> None:
     assert abs(strike.times[strike.onset] - (100.0 + (at + 1) / RATE)) < 40 / RATE
 
 
+@settings(deadline=None)
 @given(st.floats(500.0, 15000.0), st.floats(0.12, 1.0), st.integers(60, 2000), st.integers(0, 2**31))
 def test_a_second_hit_is_noticed_wherever_it_comes(peak: float, share: float, gap: int, seed: int) -> None:
     force = half_sine(peak, ONSET) + half_sine(share * peak, ONSET + gap)
     assert strike_of(force, seed=seed).double_hit
 
 
+@settings(deadline=None)
 @given(st.floats(300.0, 15000.0), st.floats(0.0, 0.03), st.integers(60, 2000), st.integers(0, 2**31))
 def test_ringing_of_the_cell_is_no_second_hit(peak: float, share: float, gap: int, seed: int) -> None:
     force = half_sine(peak, ONSET) + half_sine(share * peak, ONSET + gap)
     assert not strike_of(force, seed=seed).double_hit
 
 
+@settings(deadline=None)
 @given(st.sampled_from(["force", "pressure"]), st.integers(1, 20))
 def test_full_scale_on_either_channel_is_an_overload(channel: str, width: int) -> None:
     force, pressure = half_sine(5000.0, ONSET), np.zeros(SCANS)
@@ -99,6 +103,7 @@ def test_beyond_the_calibrated_range_is_an_overload() -> None:
     assert not strike_from_readings(readings, CALIBRATION).overload
 
 
+@settings(deadline=None)
 @given(st.floats(0.0, 80.0), st.integers(0, 2**31))
 def test_what_stays_below_the_threshold_is_silent(peak: float, seed: int) -> None:
     strike = strike_of(half_sine(peak, ONSET), seed=seed)
@@ -107,6 +112,7 @@ def test_what_stays_below_the_threshold_is_silent(peak: float, seed: int) -> Non
     assert strike.onset == 0
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.integers(-32768, 32767), min_size=2, max_size=200),
     st.integers(0, 2**31),

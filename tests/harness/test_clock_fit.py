@@ -26,7 +26,7 @@ def arrivals(ppm: float, seconds: float, seed: int) -> ArrivalClock:
     return clock
 
 
-@settings(max_examples=20)
+@settings(deadline=None, max_examples=20)
 @given(st.floats(-100.0, 100.0), st.integers(0, 2**31))
 def test_the_crystals_drift_is_found(ppm: float, seed: int) -> None:
     fit = arrivals(ppm, 20.0, seed).fit()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
@@ -45,6 +45,7 @@ def counts_of(path: Path, shift: int) -> AnyArray:
     return whole
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(-(2**31), 2**31 - 1), min_size=1, max_size=40), st.sampled_from([8, 16, 24, 32]))
 def test_every_block_comes_back_to_the_bit(values: list[int], bits: int) -> None:
     counts = np.array(values, np.int64) >> (32 - bits)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.arrays import FloatArray
@@ -11,6 +11,7 @@ from harness.resampling import HALF_WIDTH, resample
 RATE = 50e3
 
 
+@settings(deadline=None)
 @given(st.floats(0.0, 0.44), st.floats(0.0, 1.0), st.floats(0.0, 6.3))
 def test_a_sine_is_known_between_its_samples(frequency: float, fraction: float, phase: float) -> None:
     n = np.arange(400)

@@ -1,8 +1,12 @@
 """What goes wrong between the acquisition box and the driver is noticed, and named with what to look at."""
 
+import os
+import signal
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -85,47 +89,91 @@ def test_an_overflow_is_named_and_the_stream_begins_anew(bench: Bench) -> None:
         read_whole(hammer)
 
 
-def test_a_driver_that_does_not_get_to_read_overflows_the_box(monkeypatch: pytest.MonkeyPatch) -> None:
+def held_up(hammer: DataqHammer, seconds: float) -> None:
+    """Keep the process that fetches from running, as a busy computer does."""
+    assert hammer._stream is not None
+    fetcher = hammer._stream._fetcher.pid
+    os.kill(fetcher, signal.SIGSTOP)
+    time.sleep(seconds)
+    os.kill(fetcher, signal.SIGCONT)
+
+
+def test_a_driver_that_does_not_get_to_read_overflows_the_box() -> None:
     """The far end must lose what a pseudo-terminal alone would have kept waiting."""
     with mocked_box(numbered_source, host_memory=4096) as bench, opened(bench) as hammer:
         hammer.capture(lambda: None, 0.1, 0.1, 0.1)
         assert bench.box.lost == 0
-        assert hammer._link is not None
-        read = hammer._link.read
-
-        def slow() -> tuple[bytes, bool]:
-            monkeypatch.undo()
-            time.sleep(0.6)
-            return read()
-
         with pytest.raises(BenchFault, match="memory overflowed"):
-            hammer.capture(lambda: monkeypatch.setattr(hammer._link, "read", slow), 0.05, 0.6, 0.6)
+            hammer.capture(lambda: held_up(hammer, 0.6), 0.05, 0.6, 0.6)
         assert bench.box.lost > 0
         read_whole(hammer)
 
 
-def test_a_driver_that_is_briefly_away_loses_nothing(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_driver_that_is_briefly_away_loses_nothing(bench: Bench) -> None:
     with opened(bench) as hammer:
-        assert hammer._link is not None
-        read = hammer._link.read
-
-        def slow() -> tuple[bytes, bool]:
-            monkeypatch.undo()
-            time.sleep(0.3)
-            return read()
-
         counts = captured(hammer, 0.1)
-        monkeypatch.setattr(hammer._link, "read", slow)
+        held_up(hammer, 0.3)
         read_whole(hammer)
         assert len(counts)
         assert bench.box.lost == 0
         assert hammer.health().drops == 0
 
 
+def test_a_program_that_keeps_its_lock_loses_nothing(bench: Bench) -> None:
+    """Compiling and planning hold the interpreter; the process that fetches has its own."""
+    with opened(bench) as hammer:
+        switching = sys.getswitchinterval()
+        try:
+            sys.setswitchinterval(5.0)
+            ends = time.monotonic() + 3.0
+            while time.monotonic() < ends:
+                sum(range(1000))
+        finally:
+            sys.setswitchinterval(switching)
+        read_whole(hammer)
+        assert bench.box.lost == 0
+        assert hammer.health().drops == 0
+
+
+def test_a_fetching_process_that_dies_is_named(bench: Bench) -> None:
+    with opened(bench) as hammer:
+        hammer.capture(lambda: None, 0.1, 0.1, 0.1)
+        assert hammer._stream is not None
+        os.kill(hammer._stream._fetcher.pid, signal.SIGKILL)
+        with pytest.raises(BenchFault, match="fetches its samples ended"):
+            hammer.capture(lambda: None, 0.1, 0.1, 5.0)
+    with opened(bench) as hammer:
+        read_whole(hammer)
+
+
+def test_a_driver_that_is_killed_leaves_no_process_and_a_quiet_box(bench: Bench) -> None:
+    program = (
+        "import os; from daq_bench import CALIBRATION; from drivers.hammer import DataqHammer\n"
+        f"h = DataqHammer(CALIBRATION, port={bench.box.port!r}); h.open()\n"
+        "print(h._stream._fetcher.pid, flush=True); os.kill(os.getpid(), 9)"
+    )
+    roots = os.pathsep.join(str(Path(__file__).parents[k]) for k in (1, 2))
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": roots},
+        check=False,
+    )
+    fetcher = Path("/proc") / done.stdout.strip()
+    ends = time.monotonic() + 10.0
+    while fetcher.exists() and fetcher.name not in ("", "proc") and time.monotonic() < ends:
+        time.sleep(0.05)
+    assert done.returncode == -9
+    assert not fetcher.exists()
+    with opened(bench) as hammer:
+        read_whole(hammer)
+
+
 def test_a_stalled_box_is_named_and_read_again(bench: Bench) -> None:
     with opened(bench) as hammer:
-        with pytest.raises(BenchFault, match=r"sent nothing for 1 s"):
-            hammer.capture(lambda: bench.cue("stall", 1.3), 0.05, 0.6, 2.0)
+        with pytest.raises(BenchFault, match=r"sent nothing for 2 s"):
+            hammer.capture(lambda: bench.cue("stall", 2.3), 0.05, 0.6, 3.0)
         read_whole(hammer)
 
 
@@ -148,7 +196,9 @@ def test_a_loss_between_two_strikes_does_not_spoil_the_next(bench: Bench) -> Non
     with opened(bench) as hammer:
         read_whole(hammer)
         bench.cue("overflow", 0.2)
-        time.sleep(1.6)
+        ends = time.monotonic() + 20.0
+        while not hammer.health().drops and time.monotonic() < ends:
+            time.sleep(0.05)
         read_whole(hammer)
         assert "memory overflowed" in hammer.health().detail
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from daq_bench import Bench, mocked_box, numbered, numbered_source
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mocks.daq.source import Played, Wiring, skewed
@@ -127,6 +127,7 @@ def test_the_port_goes_with_the_box(bench: Bench) -> None:
     assert not Path(bench.box.port).exists()
 
 
+@settings(deadline=None)
 @given(st.floats(0.0, 1.0), st.floats(0.002, 0.4))
 def test_a_converter_that_comes_later_sees_the_signal_later(fraction: float, frequency: float) -> None:
     t = np.arange(600.0)
