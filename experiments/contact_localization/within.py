@@ -74,6 +74,11 @@ class Front:
     shipped: bool
 
     @property
+    def vouches(self) -> bool:
+        """Whether errors may be promised: the points were measured with no more contacts than the run has."""
+        return self.scale >= 1.0
+
+    @property
     def trusted(self) -> bool:
         """Whether it was measured on this machine with this code."""
         return not self.reasons
@@ -239,14 +244,14 @@ def _solved(
         speed = _speed(readings, front) * front.scale
         found = for_budget(candidates, target.seconds, name, speed, readings.shared[1])
         solved = solve(readings, found.point.levels)
-        return found.point, solved, found.seconds, (found.point.name,), _promise(found.point, solved)
+        return found.point, solved, found.seconds, (found.point.name,), _promise(front, found.point, solved)
     tried: list[str] = []
     spent = readings.shared[1]
     for point in candidates:
         tried.append(point.name)
         spent = most_seconds(point, name, front.scale, spent)
         solved = solve(readings, point.levels)
-        promise = _promise(point, solved)
+        promise = _promise(front, point, solved)
         assert target.error is not None
         if promise <= target.error:
             break
@@ -264,5 +269,7 @@ def _speed(readings: Readings, front: Front) -> float:
     return max(1.0, now) if front.trusted else now
 
 
-def _promise(point: Point, solved: Solved) -> float:
-    return float("inf") if solved.estimate is None else promised(point, solved.estimate.credible90)
+def _promise(front: Front, point: Point, solved: Solved) -> float:
+    if solved.estimate is None or not front.vouches:
+        return float("inf")
+    return promised(point, solved.estimate.credible90)

@@ -22,6 +22,17 @@ def staleness(front: Front) -> str:
     )
 
 
+def doubts(front: Front, target: Target) -> tuple[str, ...]:
+    """What the operator should know of the front before an answer goes by it."""
+    said = [] if front.trusted else [staleness(front)]
+    if target.error is not None and not front.vouches:
+        said.append(
+            f"settings were measured with {front.contacts} contacts and this run has fewer, so no error is "
+            "promised; measure fewer with `touchstone cost contact-localization --contacts N`"
+        )
+    return tuple(said)
+
+
 def as_json(found: Within, front: Front, target: Target, recording: Recording) -> dict[str, Any]:
     """What was asked, what it took, and what the finest levels say, as JSON values."""
     truth = read_truth(recording)

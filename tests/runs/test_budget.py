@@ -1,6 +1,7 @@
 """``run --budget`` and ``--error``, and ``touchstone cost``: levels from the measured front."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from experiments.contact_localization.within import (
     front_for,
     shipped_curve,
 )
-from experiments.contact_localization.within_words import as_json, sentences, staleness
+from experiments.contact_localization.within_words import as_json, doubts, sentences, staleness
 from harness.accuracy import Accuracy, Level
 from harness.cli import invoke
 from harness.cost import Curve, Point, Sample
@@ -128,6 +129,18 @@ def test_an_error_is_promised_from_the_answer_s_own_radius_or_not_at_all(
     assert not strict.kept
     said = as_json(strict, front, Target(error=1e-6), done)
     assert "cannot be promised" in sentences(said)[0]
+
+
+def test_nothing_is_promised_from_more_contacts_than_the_run_has(done: Recording, cache: Path) -> None:
+    measured = curve_of(done)
+    more = tuple(replace(point, condition={**point.condition, "contacts": 6}) for point in measured.points)
+    save(replace(measured, points=more), curve_path(PROGRAM))
+    front, target = front_for(RunFiles(done).scene, done.committed), Target(error=0.1)
+    assert front.scale == 0.5
+    assert any("measured with 6 contacts" in said for said in doubts(front, target))
+    found = answer_within(done, front, target)
+    assert not found.kept
+    assert as_json(found, front, target, done)["promised_error_m"] is None
 
 
 def test_a_budget_that_cannot_be_kept_is_refused_before_anything_moves(done: Recording, cache: Path) -> None:
