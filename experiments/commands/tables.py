@@ -23,6 +23,9 @@ def localization(
     spacing: Annotated[list[str] | None, typer.Option(help="close or spread; both if left out.")] = None,
     gap: Annotated[list[str] | None, typer.Option(help="default or none; both if left out.")] = None,
     yaw: Annotated[list[str] | None, typer.Option(help="known or unknown; both if left out.")] = None,
+    sound: Annotated[
+        bool, typer.Option(help="Whether every place is struck too, with the rows that hear it.")
+    ] = True,
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs; a stopped table resumes there.")] = Path(
         "runs/tables/localization"
@@ -36,7 +39,7 @@ def localization(
 
     Try: touchstone tables localization --seeds 2 --only mug
     """
-    from experiments.contact_localization.table import measure, objects, rows
+    from experiments.contact_localization.table import by_object, measure, objects, rows
     from experiments.contact_localization.table_cell import Cell, cells
     from harness.errors import WrongUse
     from harness.toml_file import nearest
@@ -54,6 +57,7 @@ def localization(
         spacing or ["close", "spread"],
         gap or ["default", "none"],
         yaw or ["known", "unknown"],
+        sound,
     )
     results: dict[Cell, Any] = {}
     columns = (
@@ -73,7 +77,13 @@ def localization(
     table = rows(results)
     failed = sum("failed" in result for result in results.values())
     if json:
-        emit({"schema": 1, "runs": len(results), "failed": failed, "rows": [asdict(row) for row in table]})
+        conditions = sorted({(row.spacing, row.gap, row.yaw) for row in table})
+        objects_ = [
+            {"spacing": c[0], "gap": c[1], "yaw": c[2], "mean_error_m": by_object(results, c)}
+            for c in conditions
+        ]
+        rows_ = [asdict(row) for row in table]
+        emit({"schema": 1, "runs": len(results), "failed": failed, "rows": rows_, "by_object": objects_})
         return 0
     _print(table)
     if failed:

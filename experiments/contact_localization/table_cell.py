@@ -17,17 +17,22 @@ from experiments.contact_localization.answer import observe_step
 from experiments.contact_localization.baselines import geometry_and_axis, geometry_only, mean_random_error
 from experiments.contact_localization.estimate import Estimate, estimate
 from experiments.contact_localization.experiment import ContactLocalization
+from experiments.contact_localization.hypotheses import Contact, Noise
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.model_of import model_of_scene
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.particle import CANDIDATES
 from experiments.contact_localization.planning import plan_run, way_between
 from experiments.contact_localization.result import fit_of
+from experiments.contact_localization.search import Search
+from experiments.contact_localization.sound_mfcc import MfccTable, mfcc_filter
 from harness.arrays import FloatArray
 from harness.clock import now
 from harness.errors import FitRefused
 from harness.geometry import rotation_about
 from harness.mesh import Mesh
-from harness.run_folder import station_calibration
+from harness.run_folder import station_acquisition, station_calibration
 from harness.scene import SceneFile, scene_from_json
 from harness.sim.scene_object import known_object
 from harness.station import RunContext
@@ -36,8 +41,12 @@ from harness.step_file import Step, StepRecord
 from harness.symmetry import SymmetryGroup, find_symmetries
 from mocks.in_process import in_process_bench
 
-METHODS = ("random", "geometry", "geometry + axis", "paper's filter", "ours")
-PAPER = Levels(method="particle", particles=1000)
+METHODS = ("random", "geometry", "geometry + axis", "paper's touch filter", "touch")
+HEARD = ("paper's MFCC filter", "audio", "both")
+"""The methods that need strikes."""
+
+PAPER = Levels(method="particle", particles=1000, senses="touch")
+_LEVELS = {"paper's touch filter": PAPER, **{s: Levels(senses=s) for s in ("touch", "audio", "both")}}
 
 
 @dataclass(frozen=True)
@@ -50,6 +59,7 @@ class Cell:
         gap: ``"default"`` or ``"none"``.
         yaw: ``"known"`` to the estimator or ``"unknown"``.
         seed: of the sites, the world and the draws.
+        sound: whether every place is struck too.
     """
 
     object: str
@@ -57,11 +67,13 @@ class Cell:
     gap: str
     yaw: str
     seed: int
+    sound: bool = False
 
     @property
     def name(self) -> str:
         """Of the cell's file."""
-        return f"{self.object}-{self.spacing}-{self.gap}-{self.yaw}-{self.seed}"
+        plain = f"{self.object}-{self.spacing}-{self.gap}-{self.yaw}-{self.seed}"
+        return f"{plain}-sound" if self.sound else plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +98,7 @@ def scene_of(cell: Cell, scene: SceneFile) -> SceneFile:
     tree = scene.model_dump(mode="json", by_alias=True)
     tree["localization"].update({"spacing": cell.spacing})
     tree["object"]["pose"]["yaw"] = f"{turned:.3f} deg"
+    tree["sensors"]["sound"] = cell.sound
     return scene_from_json(tree, "the table")
 
 
@@ -96,13 +109,14 @@ def run_cell(cell: Cell, scene: SceneFile, station: Station) -> dict[str, Any]:
     run = perform_cell(cell, scene, station, mesh)
     symmetry = find_symmetries(mesh)
     prior = believed(run, cell.yaw)
-    rows = {method: _scored(method, run, prior, symmetry) for method in METHODS}
+    methods = (*METHODS, *HEARD) if cell.sound else METHODS
+    rows = {method: _scored(method, run, prior, symmetry) for method in methods}
     return {"schema": 1, "cell": asdict(cell), "contacts": len(run.observations), "rows": rows}
 
 
 def perform_cell(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> PerformedRun:
     """Plan and perform one run on the bench in process, without answering it."""
-    plan = plan_run(scene, station, mesh, cell.seed)
+    plan, acquisition = plan_run(scene, station, mesh, cell.seed), station_acquisition(scene, station)
     experiment = ContactLocalization(lambda start, end: way_between(plan.bench, start, end))
     with TemporaryDirectory(prefix="touchstone-table-") as folder:
         context = RunContext(Path(folder) / "truth.json", mesh, cell.seed, cell.gap)
@@ -111,9 +125,10 @@ def perform_cell(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> 
         for index, parameters in enumerate(plan.parameters()):
             step = Step(index, "press", parameters)
             readings = {r.channel.name: r for r in experiment.perform(step, bench)}
-            observations.append(observe_step(StepRecord(step, readings, 0.0), station.flange_from_gel))
+            record = StepRecord(step, readings, 0.0)
+            observations.append(observe_step(record, station.flange_from_gel, acquisition))
         true = _truth(context.truth)
-    model = Model(mesh, station.gel.sensor, station_calibration(station))
+    model = model_of_scene(scene, station, mesh, station_calibration(station))
     return PerformedRun(tuple(observations), model, scene.base_from_object(mesh), true, cell.seed)
 
 
@@ -143,8 +158,23 @@ def _scored(method: str, run: PerformedRun, prior: Prior, symmetry: SymmetryGrou
         poses = [observation.base_from_gel for observation in run.observations]
         point = method_of(poses, run.model, prior, Levels().spacing).position_in_object
         return _errors(point, run.true, symmetry, now() - start)
-    levels = PAPER if method == "paper's filter" else Levels()
-    return _estimated(run, prior, levels, symmetry, start)
+    if method == "paper's MFCC filter":
+        return _errors(_by_mfcc(run, prior), run.true, symmetry, now() - start)
+    return _estimated(run, prior, _LEVELS[method], symmetry, start)
+
+
+def _by_mfcc(run: PerformedRun, prior: Prior) -> FloatArray:
+    """``(3,)`` metres: the mean of the paper's filter's most probable distinct particles."""
+    model, strikes = run.model, [observation.strike for observation in run.observations]
+    assert model.modes is not None
+    assert model.material is not None
+    spacing, rate = PAPER.spacing, next(strike.rate for strike in strikes if strike is not None)
+    table = MfccTable(model.gains(spacing), model.modes, model.material, rate)
+    contacts = [Contact(observation.base_from_gel) for observation in run.observations]
+    search = Search(contacts, model, prior, spacing, Noise())
+    particles = mfcc_filter(search, table, strikes, PAPER.particles, run.seed)
+    best = np.argsort(-particles.log_weights, kind="stable")[:CANDIDATES]
+    return np.asarray(particles.points[best].mean(axis=0))
 
 
 def _estimated(
@@ -192,7 +222,8 @@ def cells(
     spacings: Sequence[str],
     gaps: Sequence[str],
     yaws: Sequence[str],
+    sound: bool = False,
 ) -> list[Cell]:
     """Every run of a table, one seed of every object before the next: a table that is stopped is even."""
-    first = [Cell(o, s, g, y, 0) for y in yaws for g in gaps for s in spacings for o in objects]
+    first = [Cell(o, s, g, y, 0, sound) for y in yaws for g in gaps for s in spacings for o in objects]
     return [replace(cell, seed=seed) for seed in seeds for cell in first]

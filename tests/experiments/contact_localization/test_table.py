@@ -30,7 +30,7 @@ def result(errors: Mapping[str, float], held: bool = True, **more: Any) -> dict[
         error = errors.get(method, 0.05)
         written[method] = {"error_m": error, "error_symmetric_m": 0.5 * error, "seconds": 0.2, **more}
     written["random"]["error_symmetric_m"] = None
-    for method in ("paper's filter", "ours"):
+    for method in ("paper's touch filter", "touch"):
         written[method]["in_region90"] = held
     return {"schema": 1, "rows": written}
 
@@ -38,7 +38,7 @@ def result(errors: Mapping[str, float], held: bool = True, **more: Any) -> dict[
 def runs(errors: list[float], gap: str = "default", spacing: str = "close") -> Results:
     """One seed each."""
     return {
-        Cell("mug", spacing, gap, "known", seed): result({"ours": error}, held=error < GROSS)
+        Cell("mug", spacing, gap, "known", seed): result({"touch": error}, held=error < GROSS)
         for seed, error in enumerate(errors)
     }
 
@@ -52,7 +52,7 @@ ERRORS = [1e-3, 2e-3, 3e-3, 60e-3, 1e-3, 4e-3, 2e-3]
 
 
 def test_a_row_has_the_median_the_mean_and_the_share_of_failures() -> None:
-    ours = row(rows(runs(ERRORS)), "ours")
+    ours = row(rows(runs(ERRORS)), "touch")
     assert ours.runs == len(ERRORS)
     assert [interval.value for interval in ours.raw] == pytest.approx(
         [np.median(ERRORS), np.mean(ERRORS), 1.0 / len(ERRORS)]
@@ -66,15 +66,15 @@ def test_a_row_has_the_median_the_mean_and_the_share_of_failures() -> None:
 
 
 def test_every_number_has_an_interval_around_it() -> None:
-    for interval in row(rows(runs(ERRORS)), "ours").raw:
+    for interval in row(rows(runs(ERRORS)), "touch").raw:
         assert interval.low <= interval.value <= interval.high
-    wide, narrow = (row(rows(runs(ERRORS * n)), "ours").raw[1] for n in (1, 16))
+    wide, narrow = (row(rows(runs(ERRORS * n)), "touch").raw[1] for n in (1, 16))
     # Sixteen times the runs, a quarter of the width.
     assert (wide.high - wide.low) / (narrow.high - narrow.low) == pytest.approx(4.0, rel=0.4)
 
 
 def test_a_failure_is_counted_at_its_full_value() -> None:
-    good, bad = (row(rows(runs([1e-3] * 9 + [last])), "ours").raw for last in (1e-3, 0.1))
+    good, bad = (row(rows(runs([1e-3] * 9 + [last])), "touch").raw for last in (1e-3, 0.1))
     assert bad[1].value - good[1].value == pytest.approx(0.099 / 10.0)
     assert (good[2].value, bad[2].value) == (0.0, 0.1)
 
@@ -83,15 +83,15 @@ def test_conditions_are_not_mixed() -> None:
     both = {**runs([1e-3, 1e-3]), **runs([5e-3], gap="none"), **runs([9e-3], spacing="spread")}
     found = rows(both)
     assert len(found) == 3 * len(METHODS)
-    assert row(found, "ours").raw[0].value == pytest.approx(1e-3)
-    assert row(found, "ours", gap="none").raw[0].value == pytest.approx(5e-3)
-    assert row(found, "ours", spacing="spread").raw[0].value == pytest.approx(9e-3)
+    assert row(found, "touch").raw[0].value == pytest.approx(1e-3)
+    assert row(found, "touch", gap="none").raw[0].value == pytest.approx(5e-3)
+    assert row(found, "touch", spacing="spread").raw[0].value == pytest.approx(9e-3)
 
 
 def test_every_method_has_its_row_and_only_ours_a_region() -> None:
     found = rows(runs(ERRORS))
     assert [r.method for r in found] == list(METHODS)
-    assert [r.held is None for r in found] == [method != "ours" for method in METHODS]
+    assert [r.held is None for r in found] == [method != "touch" for method in METHODS]
     assert row(found, "random").symmetric is None
 
 
@@ -106,7 +106,7 @@ def test_a_run_that_could_not_be_performed_is_no_localization_and_none_at_all_is
     failed: Results = {
         Cell("mug", "close", "default", "known", 99): {"schema": 1, "failed": "NotTouched: ..."}
     }
-    assert row(rows({**runs(ERRORS), **failed}), "ours").runs == len(ERRORS)
+    assert row(rows({**runs(ERRORS), **failed}), "touch").runs == len(ERRORS)
     with pytest.raises(WrongUse, match="no run of the table"):
         rows(failed)
 
@@ -146,11 +146,11 @@ def test_a_table_that_is_stopped_is_even() -> None:
 def test_what_is_on_the_disk_is_not_run_again(tmp_path: Path) -> None:
     wanted = cells(["mug"], [0, 1], ["close"], ["default"], ["known"])
     for cell in wanted:
-        written = result({"ours": 1e-3 * (1 + cell.seed)})
+        written = result({"touch": 1e-3 * (1 + cell.seed)})
         (tmp_path / f"{cell.name}.json").write_text(json.dumps(written))
     before = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     found = dict(measure(wanted, objects(None), tmp_path, workers=1))
-    assert [found[cell]["rows"]["ours"]["error_m"] for cell in wanted] == [1e-3, 2e-3]
+    assert [found[cell]["rows"]["touch"]["error_m"] for cell in wanted] == [1e-3, 2e-3]
     assert {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
 
 
