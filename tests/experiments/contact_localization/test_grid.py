@@ -155,3 +155,20 @@ def test_a_wide_posterior_gets_more_draws() -> None:
     sure, wide = Known(), Known((0.25, 0.25, 0.25, 0.25))
     sure_draws, wide_draws = (len(refined(known, 300, rounds=1).gels) for known in (sure, wide))
     assert 300 <= sure_draws <= wide_draws <= 5 * 300
+
+
+def test_a_yaw_that_nothing_shows_is_left_alone() -> None:
+    """Of a bowl every yaw is alike: the grid has one, and places are refined under it."""
+    known = Known(yaw="unknown")
+    known.yaw_observable = False
+    start = start_of(known)
+    alike = start.yaws == start.yaws[3]
+    one = Hypotheses(
+        start.gels[alike], start.yaws[alike], start.log_weights[alike] - start.log_weights[alike].max()
+    )
+    found = refine(cast(Search, known), one, MEMBERS, 1200, 3, 0)
+    assert np.all(found.yaws == start.yaws[3])
+    mean, sigma = moments(found)
+    error = 3.0 / np.sqrt(effective(found))
+    assert np.abs(mean - CENTRE)[:3] / SIGMAS[:3] == pytest.approx(0.0, abs=error)
+    assert sigma[:3] / SIGMAS[:3] == pytest.approx(1.0, abs=error)
