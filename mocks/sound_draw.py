@@ -19,12 +19,11 @@ from mocks.gap_draw import GapDraw
 ComplexArray = npt.NDArray[np.complex128]
 
 # Streams of numbers; each stays what it is when another is added. 0 to 19 are mocks.gap_draw's.
-_RUN, _FREQUENCY, _DAMPING, _GAIN, _PHASE, _BLOW, _STRIKE_GAIN, _STRIKE_PHASE, _NOISE, _IDLE, _CONVERTER = (
-    range(20, 31)
-)
+_RUN, _FREQUENCY, _DAMPING, _GAIN, _PHASE, _WALL, _POISSON, _FIELD = range(20, 28)
+_BLOW, _STRIKE_GAIN, _STRIKE_PHASE, _NOISE, _IDLE, _CONVERTER = range(28, 34)
 
-IMPULSE = 6.0e-3
-"""N s of a strike: 47 N for 0.2 ms, a light solenoid with a hard tip."""
+IMPULSE = 12.0e-3
+"""N s of a strike: 94 N for 0.2 ms, a solenoid with a hard tip."""
 
 HARDER = 10.0
 """Times the impulse of a strike that is out of range."""
@@ -72,6 +71,25 @@ class SoundDraw:
         self.damping = float(np.exp(self._gap.damping * run.standard_normal()))
         self.force_gain = 1.0 + self._gap.force_gain * run.standard_normal()
         self.room_seed = int(run.integers(2**31))
+
+    @property
+    def wall_change(self) -> float:
+        """Of the true object's wall: a share of itself."""
+        return float(self._draw.random(_WALL).uniform(*self._gap.wall))
+
+    @property
+    def poisson_change(self) -> float:
+        """Added to Poisson's ratio of the true object."""
+        return float(self._gap.poisson * self._draw.random(_POISSON).uniform(-1.0, 1.0))
+
+    @property
+    def elastic_field(self) -> float:
+        """Deviation, relative, of Young's modulus and of the density over the true object."""
+        return self._gap.elastic_field
+
+    def material_random(self) -> np.random.Generator:
+        """The numbers that the fields of the true object's material are made of."""
+        return self._draw.random(_FIELD)
 
     @property
     def nominal_impulse(self) -> float:
@@ -133,6 +151,9 @@ class SoundDraw:
         """The run's draws in SI, for the report."""
         gap = self._gap
         return {
+            "wall_change": self.wall_change,
+            "poisson_change": self.poisson_change,
+            "elastic_field": gap.elastic_field,
             "frequency_factor": self.frequency,
             "damping_factor": self.damping,
             "force_gain": self.force_gain,

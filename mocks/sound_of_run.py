@@ -6,6 +6,7 @@ from harness.errors import WrongUse
 from harness.gap import Gap
 from harness.scene import SceneFile
 from harness.station_file import Station
+from mocks.gap_draw import GapDraw
 from mocks.world import World
 
 if TYPE_CHECKING:
@@ -38,6 +39,6 @@ def strikes_of(
     from mocks.world_instrument import instrument_of
     from mocks.world_sound import WorldSound
 
-    instrument = instrument_of(world, scene, gap.sound, seed)
+    instrument = instrument_of(world, scene, GapDraw(gap, seed))
     sound = WorldSound(world, instrument, gap, seed, flange_from_hammer, hammer.rate)
     return StrikeCounts(sound, hammer.acquisition)

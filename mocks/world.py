@@ -102,7 +102,9 @@ class World:
 
     Attributes:
         sensor: the make of the gel.
-        mesh: the true object, in its own frame.
+        nominal: the object's drawing, on the world's own tessellation.
+        mesh: the true object, in its own frame; the same faces.
+        scale: of the true object.
         base_from_object: ``(4, 4)``, where it truly stands.
         background: ``(rows, columns, 3)``, the picture of the untouched gel.
     """
@@ -116,9 +118,10 @@ class World:
         self.sensor = bench.sensor
         edges = bench.mesh.corners - np.roll(bench.mesh.corners, 1, axis=1)
         longest = float(np.linalg.norm(edges, axis=-1).max())
-        self._nominal = split_long_edges(bench.mesh, min(LONGEST_EDGE, CUT * longest))
-        self._deviation = self._draw.deviation(self._nominal.bounds.mean(axis=0))
-        self.mesh = Mesh(self._deviation.applied(self._nominal.vertices), self._nominal.faces)
+        self.nominal = split_long_edges(bench.mesh, min(LONGEST_EDGE, CUT * longest))
+        self._deviation = self._draw.deviation(self.nominal.bounds.mean(axis=0))
+        self.scale = self._draw.run.scale
+        self.mesh = Mesh(self._deviation.applied(self.nominal.vertices), self.nominal.faces)
         self.base_from_object = read_only(self._placed())
         self._object_from_base = inverse(self.base_from_object)
         self._raster = RasterMesh(self.mesh)
@@ -229,7 +232,7 @@ class World:
 
     def _placed(self) -> FloatArray:
         """``base_from_object``: turned and moved about the middle of the object."""
-        middle = apply(self._bench.base_from_object, self._nominal.bounds.mean(axis=0)[None])[0]
+        middle = apply(self._bench.base_from_object, self.nominal.bounds.mean(axis=0)[None])[0]
         run = self._draw.run
         moved = translation(middle + run.position) @ transform(run.object_rotation, np.zeros(3))
         placed: FloatArray = moved @ translation(-middle) @ self._bench.base_from_object
@@ -273,7 +276,7 @@ class World:
 
     def _nominal_point(self, face: int, point: FloatArray) -> FloatArray:
         """Where a material point of a true face is on the nominal surface."""
-        nominal: FloatArray = shares_of_corners(self.mesh, face, point) @ self._nominal.corners[face]
+        nominal: FloatArray = shares_of_corners(self.mesh, face, point) @ self.nominal.corners[face]
         return nominal
 
     def _indentation(self, base_from_flange: FloatArray, step: int) -> FloatArray:

@@ -37,7 +37,7 @@ class Instrument:
     """The true object as something that sounds.
 
     Attributes:
-        modes: in the frame and near the surface of the true object.
+        modes: of the true object, by the places of the nominal one.
         dampings: ``(m,)`` 1/s, of its material.
         levels: ``(m,)`` Pa for each unit of a mode's ringing, as ``harness.sim.modal_sound.ring`` makes it
             of a force in N and a gain in 1/sqrt(kg), at the microphone.
@@ -112,7 +112,8 @@ class WorldSound:
         self._flange_from_hammer = flange_from_hammer
         self._rate = rate
         self._room = self._room_of(gap)
-        self.frequencies = self._draw.frequencies(instrument.modes.frequencies)
+        # Frequencies of a body go with one over its size.
+        self.frequencies = self._draw.frequencies(instrument.modes.frequencies / world.scale)
         self.dampings = self._draw.dampings(instrument.dampings)
         self._levels = instrument.levels * self._draw.gains(len(instrument.levels))
         self.noise = self._middling_level(gap) * 10.0 ** (-gap.sound.signal_to_noise / 20.0)
@@ -172,7 +173,7 @@ class WorldSound:
     def _heard(
         self, force: FloatArray, met: Met, direction: FloatArray, step: int, sample: int
     ) -> FloatArray:
-        gains = self._modes.gains(met.point[None], direction[None])[0]
+        gains = self._modes.gains(met.nominal[None], direction[None])[0]
         amplitudes = gains * self._levels * self._draw.strike_gains(len(gains), step, sample)
         rung = ring(self.frequencies, self.dampings, amplitudes[None], force[None], self._rate)[0]
         heard: FloatArray = rung if self._room is None else reverberated(rung[None], self._room)[0]

@@ -1,15 +1,27 @@
 """``touchstone check``: open every instrument of a station and see how it does."""
 
+import math
 import tempfile
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
 from experiments.commands import options
 from experiments.commands.output import ANSWERS, CONSOLE, emit
+from harness.device import Health
+from harness.errors import BenchFault
+
+if TYPE_CHECKING:
+    from harness.station import Bench
+
+_LISTEN = 0.5
+"""s."""
+
+_HEARING = 20e-6
+"""Pa, the reference of sound pressure levels (ISO 1683)."""
 
 
 def check(
@@ -17,7 +29,7 @@ def check(
     seconds: Annotated[float, typer.Option(help="How long to watch each stream.", min=0.5, max=600.0)] = 3.0,
     json: options.Json = False,
 ) -> int:
-    """Open every instrument of a station: rate, drops, latency. Nothing moves.
+    """Open every instrument of a station: rate, drops, latency, level. Nothing moves, nothing is struck.
 
     Every instrument that does not open is named, with the cable to look at.
 
@@ -30,6 +42,8 @@ def check(
 
     bench_file = load_station(station_path(station))
     scene = scene_from_options("builtin:mug")
+    heard = scene.sensors.model_copy(update={"sound": bench_file.hammer is not None})
+    scene = scene.model_copy(update={"sensors": heard})
     with tempfile.TemporaryDirectory(prefix="touchstone-check-") as folder:
         context = RunContext(Path(folder) / "truth.json", known_object(scene).mesh)
         with (
@@ -39,9 +53,14 @@ def check(
             bench.pause(seconds)
             bench.gel.read(1, timeout=3.0)
             found = [bench.arm.health(), bench.gel.health()]
+            levels = None if bench.hammer is None else rest_levels(bench)
+            if bench.hammer is not None and levels is not None:
+                found.append(_with_levels(bench.hammer.health(), levels))
             safety = bench.arm.state().safety
     if json:
-        emit({"schema": 1, "station": station, "safety": safety, "instruments": [asdict(h) for h in found]})
+        instruments = [asdict(health) for health in found]
+        said = {"schema": 1, "station": station, "safety": safety, "instruments": instruments}
+        emit({**said, "hammer_levels": None if levels is None else asdict(levels)})
         return 0
     table = Table(title=f"{bench_file.title or station}: arm {safety}")
     for heading in ("instrument", "identity", "rate (Hz)", "drops", "latency (ms)", ""):
@@ -53,3 +72,45 @@ def check(
         )
     ANSWERS.print(table)
     return 0
+
+
+@dataclass(frozen=True)
+class RestLevels:
+    """What the hammer's box reads while nothing is struck.
+
+    Attributes:
+        force_rms_n: N, about its mean.
+        pressure_rms_pa: Pa, about its mean.
+        sound_level_db: of the pressure, over 20 uPa.
+    """
+
+    force_rms_n: float
+    pressure_rms_pa: float
+    sound_level_db: float
+
+
+def rest_levels(bench: "Bench") -> RestLevels:
+    """Listen for a moment with nothing fired.
+
+    Raises:
+        BenchFault: the box failed.
+        DataRefused: a channel rests where its calibration says that it cannot.
+    """
+    from harness.acquisition import strike_from_readings
+
+    assert bench.hammer is not None
+    assert bench.station.hammer is not None
+    readings = bench.hammer.capture(lambda: None, 0.0, _LISTEN, 0.0)
+    by_name = {reading.channel.name: reading for reading in readings}
+    rest = strike_from_readings(by_name, bench.station.hammer.acquisition)
+    pressure = float(rest.pressure.std())
+    # A converter that reads one count for ever is broken, not silent.
+    level = 20.0 * math.log10(pressure / _HEARING) if pressure > 0.0 else -math.inf
+    if not math.isfinite(level):
+        raise BenchFault("the microphone reads the same count for ever; check its cable and its supply")
+    return RestLevels(float(rest.force.std()), pressure, level)
+
+
+def _with_levels(health: Health, levels: RestLevels) -> Health:
+    said = f"rest {levels.force_rms_n:.3f} N rms, {levels.sound_level_db:.0f} dB SPL"
+    return replace(health, detail=f"{said}; {health.detail}" if health.detail else said)
