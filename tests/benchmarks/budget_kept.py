@@ -15,15 +15,47 @@ from pathlib import Path
 import numpy as np
 
 from experiments.contact_localization.costing import Work, gathered, measure
-from experiments.contact_localization.dials import PARTICLES, settings
+from experiments.contact_localization.dials import (
+    BLOCK,
+    METHOD,
+    PARTICLES,
+    ROUNDS,
+    SAMPLES,
+    SPACING,
+    settings,
+)
 from experiments.contact_localization.table import objects
 from experiments.contact_localization.table_cell import cells
+from harness.accuracy import Level
 from harness.cost import LEAST_ERROR, Point, Sample
 from harness.cost_choice import for_budget, for_error, promised
 from harness.cost_file import save
 from harness.station_file import load_station, station_path
 
 SHARE = 0.95
+
+
+def _grid(spacing: float, rounds: int, samples: int, block: int) -> dict[str, Level]:
+    dials = {SPACING.name: spacing, ROUNDS.name: rounds, SAMPLES.name: samples, BLOCK.name: block}
+    return {METHOD.name: "grid", **dials}
+
+
+def _particles(spacing: float, number: int, block: int) -> dict[str, Level]:
+    return {METHOD.name: "particle", SPACING.name: spacing, PARTICLES.name: number, BLOCK.name: block}
+
+
+QUICK = (
+    _particles(4e-3, 300, 16),
+    _particles(2e-3, 1000, 8),
+    _grid(4e-3, 0, 600, 16),
+    _grid(4e-3, 0, 600, 8),
+    _grid(2e-3, 0, 600, 8),
+    _grid(4e-3, 3, 600, 8),
+    _grid(2e-3, 3, 600, 16),
+    _grid(2e-3, 1, 600, 8),
+    _grid(2e-3, 3, 600, 8),
+    _grid(1.5e-3, 3, 1200, 8),
+)
 
 
 def say(line: str) -> None:
@@ -40,14 +72,14 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--first-seed", type=int, default=3000)
     parser.add_argument("--only", action="append")
-    parser.add_argument("--most-particles", type=int, default=10_000)
+    parser.add_argument("--quick", action="store_true", help="ten settings that span the range")
     parser.add_argument("--curve", type=Path, help="write the curve of all runs here too")
     parser.add_argument("--out", type=Path, default=Path("runs/cost/budget_kept"))
     given = parser.parse_args()
     scenes = objects(None)
     seeds = range(given.first_seed, given.first_seed + given.seeds)
     wanted = cells(given.only or list(scenes), seeds, [given.spacing], ["default"], [given.yaw])
-    tried = [s for s in settings() if int(s.get(PARTICLES.name, 0)) <= given.most_particles]
+    tried = list(QUICK) if given.quick else settings()
     work = Work(tuple(wanted), tuple(tried), (6,))
     found: list[tuple[str, Point]] = []
     for cell, points in measure(work, scenes, load_station(station_path("mock")), given.out, say):
