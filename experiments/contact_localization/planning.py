@@ -80,6 +80,8 @@ def twin_of(scene: SceneFile, station: Station, mesh: Mesh) -> TwinBench:
         pedestal_radius=0.5 * scene.support.width,
         joint_range=np.array([safety.joint_low, safety.joint_high]),
         flange_from_hammer=station.flange_from_hammer,
+        workspace=np.array([safety.workspace_low, safety.workspace_high]),
+        tool_points=station.tool_points,
     )
 
 

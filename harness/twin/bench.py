@@ -26,6 +26,7 @@ PAD_RIM: Final = 1e-3  # m of gel around the window that the camera sees
 HOUSING_LENGTH: Final = 0.06  # m along the sensor's axis
 MOUNT_RADIUS: Final = 0.022  # m, of what carries the housing on the flange
 NO_GAP: Final = 1e-3  # m; an object this near the table stands on it
+WORKSPACE_MARGIN: Final = 5e-3  # m; between two samples of a sweep a point bulges less than that
 
 _GREY, _BLACK, _WOOD = (0.55, 0.57, 0.6, 1.0), (0.12, 0.12, 0.14, 1.0), (0.72, 0.6, 0.45, 1.0)
 _GEL, _FOAM, _OBJECT = (0.9, 0.75, 0.3, 1.0), (0.3, 0.33, 0.4, 1.0), (0.8, 0.35, 0.25, 1.0)
@@ -84,6 +85,9 @@ class TwinBench:
         joint_range: ``(2, 6)`` rad, within the maker's, which holds alone where it is None.
         flange_from_hammer: ``(4, 4)``, the tip of the striker at rest, z along the strike; None
             without one.
+        workspace: ``(2, 3)`` m in base, the corners of the box that the station keeps the tool in; None
+            without one.
+        tool_points: ``(n, 3)`` m in the flange's frame, the points that are kept in it.
 
     Raises:
         WrongUse: an unknown arm, or an object that reaches below the table.
@@ -101,6 +105,8 @@ class TwinBench:
         clearance: float = 2e-3,
         joint_range: FloatArray | None = None,
         flange_from_hammer: FloatArray | None = None,
+        workspace: FloatArray | None = None,
+        tool_points: FloatArray | None = None,
     ) -> None:
         if clearance < 1e-3:
             raise WrongUse(f"twin: a clearance of {1e3 * clearance:g} mm; it must be at least 1 mm")
@@ -134,6 +140,8 @@ class TwinBench:
         self._part_of_geom = np.array([names.index(name) for name in geoms])
         self._gel, self._object = names.index("gel"), names.index("object")
         self._within = -1.0
+        self._workspace = None if workspace is None else np.asarray(workspace, dtype=np.float64)
+        self._tool_points = np.zeros((1, 3)) if tool_points is None else np.asarray(tool_points)
 
     def place(self, joints: FloatArray) -> None:
         """Put the bodies where ``(6,)`` rad put them."""
@@ -173,10 +181,10 @@ class TwinBench:
 
     def judge(self, near: Near, press: bool) -> tuple[Hit, ...]:
         """What of the pairs is too near, with the bodies where :meth:`place` last put them."""
+        hits = self._outside()
         close = near.gaps < self.clearance
         if not close.any():
-            return ()
-        hits = []
+            return tuple(hits)
         for first, second in np.unique(near.pairs[close], axis=0).tolist():
             gap = float(near.gaps[(near.pairs == (first, second)).all(axis=1)].min())
             if self._object in (first, second) and not self._object_hit(first + second - self._object, press):
@@ -199,6 +207,15 @@ class TwinBench:
             for part in tool
             if not (press and part == self._gel)
         )
+
+    def _outside(self) -> list[Hit]:
+        """How far the tool has left the station's workspace, with the bodies where they are."""
+        if self._workspace is None:
+            return []
+        points = apply(self._base_from_link(6), self._tool_points)
+        low, high = self._workspace
+        gap = float(np.minimum(points - low, high - points).min()) - WORKSPACE_MARGIN
+        return [] if gap >= 0.0 else [Hit("tool", "limit_of_the_workspace", gap)]
 
     def _object_hit(self, part: int, press: bool) -> bool:
         """Whether a moving part really is too near the object, by its triangles."""

@@ -1,5 +1,6 @@
 """Plans of close contacts: each has a free way from the one before, also where a first choice had none."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,13 @@ import pytest
 from experiments.contact_localization import sites
 from experiments.contact_localization.planning import HOME, Itinerary, RunPlan, plan_run
 from experiments.contact_localization.sites import SHORTEST_STEP
+from harness import kinematics
 from harness.errors import WrongUse
+from harness.geometry import apply
 from harness.scene import SceneFile, scene_from_json, scene_from_options
 from harness.sim.scene_object import known_object
-from harness.station_file import load_station, station_path
+from harness.station_file import Station, load_station, station_from_json, station_path
+from harness.twin.rehearsal import rehearse
 
 pytestmark = pytest.mark.timeout(240)  # on a cold machine the first plan compiles
 
@@ -96,3 +100,36 @@ def test_an_object_out_of_the_arms_reach_is_refused_with_numbers(monkeypatch: py
         match=r"^only 0 of 6 contacts .* to 0 of these the arm could take the gel .*another pose of the obj",
     ):
         planned(scene, 1)
+
+
+def highest(plan: RunPlan, station: Station) -> float:
+    """m above the base of the highest point of the tool on any way."""
+    tops = []
+    for contact in plan.contacts:
+        stations = np.vstack([contact.start, contact.travel])
+        for start, end in itertools.pairwise(stations):
+            way = start + np.linspace(0.0, 1.0, 50)[:, None] * (end - start)
+            poses = kinematics.forward(station.arm.model, way)
+            tops += [float(apply(pose, station.tool_points)[:, 2].max()) for pose in poses]
+    return max(tops)
+
+
+def lowered(height: str) -> Station:
+    """The mocked station with a lower ceiling."""
+    tree = STATION.model_dump(mode="json", by_alias=True)
+    tree["arm"]["safety"]["workspace_high"][2] = height
+    return station_from_json(tree, "the test")
+
+
+def test_ways_stay_in_the_stations_workspace() -> None:
+    """The driver would refuse to leave it, in the middle of a run."""
+    scene = scene_from_options("builtin:mug")
+    free = planned(scene, 1)
+    ceiling = highest(free, STATION) - 0.01
+    station = lowered(f"{1e3 * ceiling:.1f} mm")
+    plan = plan_run(scene, station, known_object(scene).mesh, 1)
+    assert highest(plan, station) < ceiling
+    refused = rehearse(plan.bench, free.segments()).refusals
+    assert refused
+    assert refused[0].bodies == (("tool", "limit_of_the_workspace"),)
+    assert "the tool would run into the limit of the workspace" in str(refused[0])
