@@ -10,6 +10,7 @@ from experiments.contact_localization.answer import Answer as Found
 from experiments.contact_localization.gate import Gate
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.result import Scored, flags_of, result_of
+from experiments.contact_localization.sound_report import posterior_of, sound_of
 from experiments.contact_localization.trade import Point
 from experiments.contact_localization.twin_check import deviations
 from harness.device import Health
@@ -22,11 +23,10 @@ from harness.report.data import (
     Curve,
     EffectRun,
     Instrument,
-    Missing,
-    Posterior,
     ReportData,
 )
 from harness.report.props import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.report.values import Missing
 from harness.run_folder import RunFiles
 
 NO_TRUTH = Missing("the truth is not known: this is not a mocked run, or its truth was taken away")
@@ -69,6 +69,7 @@ def report_of(
         twin=deviations(run, found),
         versions={name: text for name, text in header.versions.items() if name != "git"},
         git=header.versions["git"],
+        sound=sound_of(scored),
         symmetry=scored.symmetry.name,
         accuracy={name: str(level) for name, level in scored.accuracy.items()},
         warnings=scored.warnings,
@@ -102,14 +103,7 @@ def _contact(scored: Scored, index: int) -> Contact:
         live_height=comparison.live_height[index],
         simulated_height=comparison.simulated_height[index],
         object_from_gel=comparison.object_from_gel[index],
-        posterior=Posterior(
-            after.points,
-            after.weights,
-            after.position_in_object,
-            np.array([mode.position for mode in after.modes]).reshape(-1, 3),
-            np.array([mode.weight for mode in after.modes]),
-            after.credible90,
-        ),
+        posterior=posterior_of(after),
         truth=None if true is None else true[index],
         error=None if true is None else float(np.linalg.norm(after.position_in_object - true[index])),
         flags=() if gate is None else tuple(flags_of(gate)),

@@ -4,13 +4,8 @@ from dataclasses import dataclass, field
 
 from harness.arrays import AnyArray, FloatArray
 from harness.mesh import Mesh
-
-
-@dataclass(frozen=True)
-class Missing:
-    """Something the report would show and cannot, and why."""
-
-    reason: str
+from harness.report.sound_data import Sound
+from harness.report.values import Missing, Posterior
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,27 +33,6 @@ class Answer:
     random_baseline: float | None = None
     geometry_baseline: float | None = None
     modes: int = 1
-
-
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """Where a contact may have been, as weighted places on the object.
-
-    Attributes:
-        points: ``(n, 3)`` metres, object frame.
-        weights: ``(n,)``, not negative, any sum but zero.
-        estimate: ``(3,)`` metres.
-        modes: ``(k, 3)`` metres, separate likely places, best first.
-        mode_weights: ``(k,)`` share of the posterior each holds.
-        credible90: metres.
-    """
-
-    points: FloatArray
-    weights: FloatArray
-    estimate: FloatArray
-    modes: FloatArray
-    mode_weights: FloatArray
-    credible90: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +201,7 @@ class ReportData:
         twin: recorded poses against the rehearsal.
         versions: of packages, by name.
         git: hash of the checkout, with "+" if it was changed.
+        sound: what each sense contributed.
         symmetry: the object's, in words.
         accuracy: the chosen levels by knob.
         warnings: what the operator should know.
@@ -252,6 +227,7 @@ class ReportData:
     twin: tuple[TwinDeviation, ...] | Missing
     versions: dict[str, str]
     git: str
+    sound: Sound | Missing
     symmetry: str = "not looked for"
     accuracy: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

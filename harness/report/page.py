@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from harness.arrays import AnyArray, FloatArray
 from harness.report import wording
 from harness.report.charts import error_chart
-from harness.report.data import Answer, Contact, Curve, Missing, Posterior, ReportData
+from harness.report.data import Answer, Contact, Curve, ReportData
 from harness.report.figures import Album, Picture
 from harness.report.pictures import (
     bench_figure,
@@ -20,6 +20,7 @@ from harness.report.pictures import (
     posterior_strip,
 )
 from harness.report.tiles import DIFFERENCE_GAIN, difference, height_picture, png, root_mean_square
+from harness.report.values import Missing, Posterior
 
 PAGE = "report.html"
 """Name of the page in a report's folder."""

@@ -11,10 +11,11 @@ from harness.arrays import FloatArray
 from harness.geometry import apply
 from harness.mesh import Mesh
 from harness.report.camera import Camera, look_at
-from harness.report.data import Bench, Contact, Missing, Part, Posterior
+from harness.report.data import Bench, Contact, Part
 from harness.report.props import CLAY
 from harness.report.shading import Shot
 from harness.report.style import ANSWER, DPI, HEAT, INK, TOOL, TRUTH, blank
+from harness.report.values import Missing, Posterior
 
 _ELEVATION = np.radians(28.0)
 _KERNEL = 2.5e-3

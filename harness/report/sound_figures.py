@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from harness.arrays import FloatArray
-from harness.report.data import Posterior
 from harness.report.pictures import Heat, Sides
 from harness.report.shading import Shot
 from harness.report.style import ANSWER, INK, SOFT, TRUTH, blank, styled
+from harness.report.values import Posterior
 
 FLOOR = -70.0
 """dB against a spectrogram's own loudest, below which nothing is told apart."""

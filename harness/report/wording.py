@@ -1,7 +1,8 @@
 """Numbers as an operator reads them, and captions in words."""
 
 from harness.arrays import FloatArray
-from harness.report.data import Answer, Missing, ReportData
+from harness.report.data import Answer, ReportData
+from harness.report.values import Missing
 
 NONE = "\N{EN DASH}"
 """Stands where there is no number."""

@@ -18,12 +18,11 @@ from harness.report.data import (
     Curve,
     EffectRun,
     Instrument,
-    Missing,
-    Posterior,
     ReportData,
     TwinDeviation,
 )
 from harness.report.props import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.report.values import Missing, Posterior
 from harness.sensor import GELSIGHT_R15
 from harness.sim.height_map import RasterMesh, height_maps, penetration
 

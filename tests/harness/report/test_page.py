@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from harness.report.data import Answer, Missing, ReportData
+from harness.report.data import Answer, ReportData
 from harness.report.page import write_report
+from harness.report.values import Missing
 
 SECTIONS = (
     "bench", "posterior", "errors", "contacts", "instruments", "calibrations", "effects", "world", "twin",

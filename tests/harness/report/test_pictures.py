@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 from harness.geometry import translation
 from harness.report.camera import look_at, see
 from harness.report.charts import error_chart
-from harness.report.data import Curve, Part, Posterior
+from harness.report.data import Curve, Part
 from harness.report.pictures import Heat
 from harness.report.props import box, convex, cylinder
 from harness.report.shading import Shot
 from harness.report.tiles import difference, height_picture, png
+from harness.report.values import Posterior
 from harness.report.wording import duration, millimetres
 
 CAMERA = look_at(np.zeros(3), 0.7, 0.4, 0.2, 90, 120)

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 
 from harness.arrays import AnyArray, FloatArray
 from harness.objects.household import build
-from harness.report.data import Posterior
 from harness.report.figures import Album
 from harness.report.pictures import object_sides
 from harness.report.sound_figures import PeakRow, mode_table, senses_figure, spectrogram_pair
+from harness.report.values import Posterior
 
 TIMES = np.linspace(0.01, 0.39, 40)
 FREQUENCIES = np.linspace(0.0, 12_000.0, 120)
