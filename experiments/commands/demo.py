@@ -7,7 +7,7 @@ import typer
 
 from experiments.commands import options
 from experiments.commands.output import CONSOLE
-from experiments.commands.run import Experiment, Spacing, run
+from experiments.commands.run import Experiment, Sense, Spacing, run
 
 
 def demo(
@@ -18,18 +18,21 @@ def demo(
     out: Annotated[Path | None, typer.Option(help="The run's folder.")] = None,
     json: options.Json = False,
 ) -> int:
-    """Localize a contact on the mocked bench from end to end, and write the report.
+    """Localize a contact on the mocked bench from end to end, by touch, by sound and by both.
 
-    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object six times; the drivers are
-    those of a real bench. The estimate is made from the recording alone.
+    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object six times and strikes each
+    place with a mocked hammer (over a serial line); the drivers are those of a real bench. The estimates are
+    made from the recording alone. The object's modes are computed the first time and kept.
     """
     CONSOLE.print(
-        "mock bench: a UR5e's controller and a GelSight's stream on loopback, with a reality gap of their own"
+        "mock bench: a UR5e's controller and a GelSight's stream on loopback, a hammer and a microphone on a "
+        "serial line, with a reality gap of their own"
     )
     return run(
         Experiment.CONTACT_LOCALIZATION,
         object_=f"builtin:{object_}",
         spacing=Spacing.SPREAD,
+        sense=Sense.BOTH,
         seed=seed,
         out=out,
         json=json,

@@ -74,7 +74,9 @@ def refuse_bad_fit(search: Search, members: IntArray, fits: FloatArray) -> None:
     heard = np.array([_repeated(search, int(k)) is None for k in members])
     # Floored: the quantile's interpolation must not subtract one infinity from another.
     floored = np.maximum(fits[heard], _FAR_BELOW)
-    typical, quartile = float(np.median(floored)), float(np.quantile(floored, 0.25))
+    # Of few contacts the quartile leans on the worst; it must leave one of them out all the same.
+    share = max(0.25, 1.0 / max(1, len(floored) - 1))
+    typical, quartile = float(np.median(floored)), float(np.quantile(floored, share))
     many = int(heard.sum()) >= _ENOUGH
     limit = REFUSE_BELOW if many else REFUSE_FEW_BELOW
     if typical >= limit and (not many or quartile >= REFUSE_QUARTILE_BELOW):

@@ -49,9 +49,7 @@ def test_good_fits_pass_and_bad_ones_do_not(six: Search) -> None:
 @pytest.mark.parametrize(
     "count",
     [
-        pytest.param(
-            4, marks=pytest.mark.xfail(strict=True, reason="the quartile of four mixes in the lowest")
-        ),
+        4,
         5,
         6,
     ],
