@@ -26,7 +26,6 @@ in words why no more can come."""
 BEAT: Final = 0.05
 """s without a byte after which an empty frame says that none came."""
 
-_PERIOD: Final = 4e-3
 _LARGEST: Final = 1 << 16
 _PUNCTUAL: Final = -10
 _STOP: Final = b"stop\r"
@@ -40,28 +39,21 @@ def main() -> None:
     os.set_blocking(port, False)
     os.set_blocking(out, False)
     waiting = bytearray(_frame(EMPTIED, b""))  # says that fetching has begun
-    beat = time.monotonic()
-    while True:
+    kind, beat = EMPTIED, time.monotonic()
+    while kind != CUT:
         readable, _, _ = select.select([port, parent], [out] if waiting else [], [], BEAT)
         if parent in readable:
             with contextlib.suppress(OSError):
                 os.write(port, _STOP)
             return
-        if port in readable:
-            kind, data = _fetch(port)
+        if port in readable or time.monotonic() - beat > BEAT:
+            kind, data = _fetch(port) if port in readable else (EMPTIED, b"")
             waiting += _frame(kind, data)
             beat = time.monotonic()
-            if kind == CUT:
-                os.set_blocking(out, True)
-        elif time.monotonic() - beat > BEAT:
-            waiting += _frame(EMPTIED, b"")
-            beat = time.monotonic()
+        os.set_blocking(out, kind == CUT)  # the last words are waited for
         with contextlib.suppress(BlockingIOError):
             while waiting:
                 del waiting[: os.write(out, waiting)]
-        if port in readable and kind == CUT:
-            return
-        time.sleep(_PERIOD)  # a few packets at a time are cheaper than one
 
 
 def _fetch(port: int) -> tuple[int, bytes]:
@@ -84,4 +76,5 @@ def _frame(kind: int, data: bytes) -> bytes:
 
 
 if __name__ == "__main__":
-    main()
+    with contextlib.suppress(BrokenPipeError):  # the parent is gone
+        main()

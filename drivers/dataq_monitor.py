@@ -13,8 +13,13 @@ from drivers.dataq_protocol import BoxModel, counts, likely_loss
 from harness.arrays import AnyArray, FloatArray
 from harness.clock_fit import ArrivalClock, ClockFit
 
-PROMPT = 0.5e-3
-"""s of lateness up to which an arrival proves that nothing is missing before it: 25 samples at 50 kHz."""
+PROMPT = 2e-3
+"""s of lateness up to which an arrival counts as proof that nothing is missing before it: a computer that
+grows busier makes even its quickest arrivals a millisecond later. Whole scans of less than this in all
+(100 at 50 kHz) can be lost unnoticed; a part of a scan cannot, nor can what a box loses whose memory of
+20 ms was full while nobody fetched, but for a rare chance."""
+
+_EQUALLY = 0.5e-3
 
 _PROMPT_RESIDUALS = 6.0
 
@@ -141,7 +146,7 @@ class StreamMonitor:
     def _judge_lateness(self) -> None:
         """Whether the quickest arrivals have been equally late for some time."""
         newest = self._late[-STEADY_COUNT:]
-        if len(newest) == STEADY_COUNT and max(newest) - min(newest) <= PROMPT:
+        if len(newest) == STEADY_COUNT and max(newest) - min(newest) <= _EQUALLY:
             self.fault = (
                 f"about {min(newest) * self._rate:.0f} samples of each channel are missing: this computer "
                 "did not fetch them in time and the box's memory overflowed; close what else runs on it"

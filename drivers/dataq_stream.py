@@ -22,8 +22,9 @@ STALL = 2.0
 _PROOF_TIMEOUT = 10.0
 _UNREST = 0.5
 _DEAF_TIMEOUT = 10.0
-_LOOK_PERIOD = 0.1
+_LOOK_PERIOD = 5e-3
 _FETCH_TIMEOUT = 0.1
+_NEWS_TIMEOUT = 0.1
 _SETTLE_TIMEOUT = 30.0
 
 
@@ -139,7 +140,7 @@ class ScanStream:
         seen = since.scan
         while True:
             with self._changed:
-                self._changed.wait(_LOOK_PERIOD)
+                self._changed.wait(_NEWS_TIMEOUT)
                 self._raise_if_over(since)
                 seen = max(seen, self._total - len(self._ring))
                 new = self._kept(seen, self._total)
@@ -234,7 +235,7 @@ class ScanStream:
         self._heard = now()
 
     def _run(self) -> None:
-        while not self._closing.is_set():
+        while not self._closing.wait(_LOOK_PERIOD):
             try:
                 for arrival in self._fetcher.read(_FETCH_TIMEOUT):
                     self._see(arrival)

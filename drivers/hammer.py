@@ -1,7 +1,8 @@
 """The impact hammer: its force cell and a measurement microphone on one acquisition box.
 
 The hammer is wired to input 0 and the microphone to input 1 of a DATAQ DI-2108 or DI-1110. The box
-scans from ``open()`` to ``close()``, so that its clock is known by the time of the first strike;
+scans from ``open()`` to ``close()``, so that its clock is known by the time of the first strike; a process
+of its own fetches the samples, so that no compiling or planning in this one loses any;
 the trigger is in software, on the force. What is recorded are raw counts with true times: the two
 channels are converted one after the other, and each has its own times. Newtons and pascals are
 ``harness.acquisition``'s.

@@ -38,6 +38,7 @@ HOST_MEMORY = 640 << 10
 
 _WRITE = 4096
 _PERIOD = 4e-3
+_LONGEST_WAIT = 20e-3
 _COMMAND_BYTES = 4096
 _LOSSES = {"lost_byte": 1, "lost_word": 2}
 
@@ -134,11 +135,20 @@ class DaqBox:
             elif self._master >= 0:
                 self._obey()
                 self._sample()
-                select.select([self._master], [], [], _PERIOD)
+                select.select([self._master], [], [], self._until_packet())
 
     @property
     def _scan_rate(self) -> float:
         return self._speed * self._instrument.aggregate_rate / len(self._instrument.scan_list)
+
+    def _until_packet(self) -> float:
+        """Seconds until the last of the next few packets is full, which then leaves at once."""
+        if not self._instrument.scanning:
+            return _PERIOD
+        scan, packet = 2 * len(self._instrument.scan_list), self._instrument.packet
+        few = max(1, round(_PERIOD * self._scan_rate * scan / packet))
+        full = math.ceil((self._taken * scan // packet + few) * packet / scan)
+        return min(max(0.0, self._began + full / self._scan_rate - now()), _LONGEST_WAIT)
 
     def _begin(self, fault: Fault) -> None:
         if fault.kind == "unplug":
