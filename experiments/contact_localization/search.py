@@ -47,7 +47,7 @@ class Search:
         self.surface: Surface = model.surface(spacing)
         self.turning = model.turning(prior.up) if prior.yaw == "unknown" else None
         self.yaws = _KNOWN_YAWS if self.turning is None else _yaws_over(self.turning.period)
-        self._shared = 1
+        self._rough = False
         self.positions = np.array([contact.base_from_gel[:3, 3] for contact in contacts])
         self.positions -= self.positions[0]
         self.axes = np.array([contact.axis for contact in contacts])
@@ -115,12 +115,13 @@ class Search:
             gels: ``(n, 3)`` metres, see ``Hypotheses``.
             yaws: ``(n,)`` rad.
             members: ``(m,)`` indices of contacts whose image shows a contact.
-            step: view pixels between the cells over which the arm's error is integrated.
+            step: fine view pixels between the cells over which the arm's error is integrated.
             rings: cells on each side.
         """
         total = self.log_yaw_prior(yaws)
+        cells = max(1, step // 2) if self._rough else step
         for k, sigma, temperature in self._scales(members):
-            total = total + self._term(k, gels, yaws, step, rings, sigma, temperature, False)
+            total = total + self._term(k, gels, yaws, cells, rings, sigma, temperature, self._rough)
         return total
 
     def _term(
@@ -177,7 +178,7 @@ class Search:
         what lies behind an edge that was just missed was not touched.
         """
         points = self.gel_centres(contact, gels, yaws)
-        for chosen, view, places in self.placed(contact, gels, yaws):
+        for chosen, view, places in self.placed(contact, gels, yaws, self._rough):
             row, column = np.round((places[:, :2] - view.origin) / view.pitch).astype(np.int64).T[::-1]
             rows, columns = view.depth.shape
             inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
@@ -247,18 +248,18 @@ class Search:
         return self.turning is None or self.turning.fold != 0
 
     def settle(self, yaws: FloatArray) -> None:
-        """Look at the yaws that are left: where they are many, two share each fine picture from now on.
+        """Look at the yaws that are left: where they are many, coarse pictures do from now on.
 
-        So many yaws are left only where they hardly matter.
+        So many yaws are left only where readings hardly tell places apart: what half a millimetre more
+        would say does not matter then, and a fine picture for every yaw costs most of the seconds.
         """
-        self._shared = 1
-        self._shared = 2 if len(np.unique(self.pictures(yaws))) > _MANY_PICTURES else 1
+        self._rough = len(np.unique(self.pictures(yaws))) > _MANY_PICTURES
 
     def pictures(self, yaws: FloatArray, coarse: bool = False) -> IntArray:
         """``(n,)`` number of the picture whose yaw is nearest; 0, the nominal one, where it is known."""
         if self.prior.yaw == "known":
             return np.zeros(len(yaws), dtype=np.int64)
-        shared = _SHARED_COARSELY if coarse else self._shared
+        shared = _SHARED_COARSELY if coarse else 1
         numbers = shared * np.round(np.degrees(yaws) / (_YAW_STEP * shared))
         return np.asarray(numbers.astype(np.int64) % _PICTURES)
 
