@@ -10,9 +10,11 @@ from harness.arrays import ByteArray, FloatArray, read_only
 from harness.evaluate import Evaluation, evaluate
 from harness.explain import scene_plan
 from harness.geometry import inverse, transform
+from harness.materials import MATERIALS
 from harness.plan import Plan
 from harness.run_folder import RunFiles
 from harness.sim.inverse import invert
+from harness.store import Store, default_folder
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +48,14 @@ def compare(found: Answer, run: RunFiles, accuracy: Accuracy) -> Comparison:
     plan = scene_plan(run.scene, run.station.gel.sensor, accuracy)
     sources = {
         "object.mesh": run.mesh,
+        "object.wall": run.scene.object.wall,
+        "object.material": MATERIALS[run.scene.object.material],
         "contact.gel_from_object": inverse(object_from_gel),
         "sensor": run.station.gel.sensor,
         "sensor.calibration": run.calibration,
         "seed": run.recording.header.seed,
     }
-    evaluation = evaluate(plan, sources)
+    evaluation = evaluate(plan, sources, Store(default_folder()))
     return Comparison(
         read_only(live),
         evaluation["touch.image"],
