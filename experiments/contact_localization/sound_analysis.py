@@ -39,8 +39,8 @@ class Analysis:
         duration: s of each strike that are read.
         before: s before the trigger at which reading begins.
         pulse: s of force that are read; what the cell shows later is its own noise (ISO 7626-5).
-        force_floor: share of its greatest spectral value below which a force excites nothing;
-            0.1 is the 20 dB of ISO 7626-5.
+        force_floor: share of its greatest spectral value below which a force excites nothing: 26 dB
+            against the 20 of ISO 7626-5, because what is too noisy is found out by itself.
         lowest: Hz; below it are the room and the object rocking on its stand.
         prominence: dB that a peak stands above its surroundings.
         above_noise: dB that it stands above what was heard before the strikes.
@@ -60,11 +60,11 @@ class Analysis:
     duration: float = 0.3
     before: float = 1.0e-3
     pulse: float = 4.0e-3
-    force_floor: float = 0.1
+    force_floor: float = 0.05
     lowest: float = 150.0
     prominence: float = 6.0
     above_noise: float = 10.0
-    above_floor: float = 11.0
+    above_floor: float = 9.0
     floor_reach: float = 250.0
     edge: float = 0.25
     residual: float = 0.12

@@ -36,8 +36,8 @@ class SoundNoise:
     scales: int = 4
     scale_weight: float = 0.3
     clutter: float = 0.2
-    weight: float = 0.1
-    group: float = 0.005
+    weight: float = 0.2
+    group: float = 0.01
     most: int = 3
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sounding_plate as plate
+from scipy.signal import oaconvolve
 
 from experiments.contact_localization.sound_analysis import Peak, analyse
 from harness.acquisition import Strike
@@ -162,3 +163,21 @@ def test_silence_of_the_microphone_says_nothing() -> None:
 def test_a_cell_that_reads_nothing_is_no_division_by_zero() -> None:
     _, strikes = _run(14)
     assert analyse([replace(s, force=np.zeros_like(s.force)) for s in strikes]).peaks == ()
+
+
+def test_echoes_of_a_room_are_not_taken_for_modes() -> None:
+    rng = np.random.default_rng(15)
+    modes, points = plate.plate_modes(), plate.places(STRIKES, rng)
+    dry = plate.strikes(modes, points, rng, np.exp(1j * np.arange(12)), 3e-3)
+    echoes = rng.normal(size=20_000) * np.exp(-17.0 * np.arange(20_000) / plate.RATE)
+    echoes *= np.sqrt(0.5 / np.sum(echoes**2))
+    echoes[0] = 1.0
+    size = len(dry[0].pressure)
+    wet = [replace(s, pressure=oaconvolve(s.pressure, echoes)[:size]) for s in dry]
+    evidence = analyse(wet)
+    gains = modes.gains(points, plate.down(STRIKES))
+    assert len(evidence.peaks) >= 8
+    for peak in evidence.peaks:
+        mode = int(np.argmin(np.abs(modes.frequencies - peak.frequency)))
+        assert peak.frequency == pytest.approx(modes.frequencies[mode], rel=5e-3)
+        assert _alike(peak.y[peak.heard], gains[peak.heard, mode]) > 0.9

@@ -1,0 +1,130 @@
+"""Where strikes fall under a hypothesis, the posterior they make, and the arrays for the report."""
+
+import numpy as np
+import pytest
+import sounding_plate as plate
+
+from experiments.contact_localization.hypotheses import Contact, Noise
+from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.posterior import best_point
+from experiments.contact_localization.search import Search
+from experiments.contact_localization.sound_analysis import SoundEvidence, analyse
+from experiments.contact_localization.sound_gains import gain_table
+from experiments.contact_localization.sound_likelihood import SoundTerm
+from experiments.contact_localization.sound_pictures import share_of_samples, sound_pair, spectrogram
+from experiments.contact_localization.sound_places import by_sound, sound_nats, strike_places
+from harness.arrays import FloatArray
+from harness.geometry import frame_facing, rotation_about, transform
+from harness.materials import Material
+from harness.sensor import GELSIGHT_R15
+from harness.sim.tactile_calibration import shipped_calibration
+
+MODES = plate.plate_modes()
+SPACING = 3.0e-3
+MODEL = Model(
+    plate.box(plate.LENGTH, plate.WIDTH, plate.THICKNESS),
+    GELSIGHT_R15,
+    shipped_calibration("gelsight_r15_bench"),
+)
+TABLE = gain_table(MODES, MODEL.surface(SPACING))
+DAMPED = Material("as the strikes are made", 2500.0, 6e10, 0.2, alpha=50.0, beta=0.0)
+K = 5
+INDENTATION = 1.0e-3
+
+
+def _search(points: FloatArray, prior: Prior) -> Search:
+    """Contacts pressed by the usual millimetre, seen from a base in which the prior is the truth."""
+    down = frame_facing(np.array([0.0, 0.0, -1.0]), 0.0)
+    pressed = points - [0.0, 0.0, INDENTATION]
+    offset = np.array([0.4, -0.1, 0.2])
+    rotation = prior.base_from_object
+    contacts = [Contact(transform(rotation @ down, rotation @ point + offset)) for point in pressed]
+    return Search(contacts, MODEL, prior, SPACING, Noise())
+
+
+def test_strikes_fall_where_the_gel_was_less_its_indentation() -> None:
+    points = plate.places(K, np.random.default_rng(0))
+    turned = rotation_about(np.array([0.0, 0.0, 1.0]), 0.7)
+    search = _search(points, Prior(turned))
+    aside = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 2e-3, 0.0]])
+    gels = points[0] - np.array([0.0, 0.0, INDENTATION]) + aside
+    found, directions = strike_places(search, np.arange(K), gels, np.zeros(3))
+    assert found[0] == pytest.approx(points, abs=1e-12)
+    assert found[1] == pytest.approx(points + aside[1], abs=1e-12)
+    assert directions == pytest.approx(np.tile([0.0, 0.0, -1.0], (3, K, 1)), abs=1e-12)
+
+
+def test_only_the_struck_contacts_are_asked_for_in_their_order() -> None:
+    points = plate.places(K, np.random.default_rng(1))
+    search = _search(points, Prior(np.eye(3)))
+    gels = points[:1] - [0.0, 0.0, INDENTATION]
+    found, _ = strike_places(search, np.array([3, 1]), gels, np.zeros(1))
+    assert found[0] == pytest.approx(points[[3, 1]], abs=1e-12)
+
+
+def test_a_yaw_turns_places_and_directions_together() -> None:
+    points = plate.places(K, np.random.default_rng(2))
+    nominal, off = _search(points, Prior(np.eye(3))), np.array([0.4])
+    gels = points[:1] - [0.0, 0.0, INDENTATION]
+    straight, _ = strike_places(nominal, np.arange(K), gels, np.zeros(1))
+    turned, directions = strike_places(nominal, np.arange(K), gels, off)
+    back = rotation_about(np.array([0.0, 0.0, 1.0]), 0.4)
+    assert (turned[0] - turned[0, 0]) @ back.T == pytest.approx(straight[0] - straight[0, 0], abs=1e-12)
+    assert np.linalg.norm(directions, axis=2) == pytest.approx(1.0)
+
+
+def test_sound_alone_finds_the_place_on_a_flat_plate() -> None:
+    """Places and axes say nothing between the plate's edges."""
+    errors = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        points = plate.places(K, rng)
+        search = _search(points, Prior(np.eye(3)))
+        term = SoundTerm(analyse(plate.strikes(MODES, points, rng)), TABLE, MODES, DAMPED)
+        found = by_sound(search, term, np.arange(K), np.arange(K), K - 1)
+        answer = best_point(search.contact_places(K - 1, found), found.weights)
+        errors.append(np.linalg.norm(answer - points[-1]))
+    assert np.median(errors) < 4e-3
+
+
+def test_sounds_that_say_nothing_leave_the_posterior_of_the_places() -> None:
+    points = plate.places(K, np.random.default_rng(4))
+    search = _search(points, Prior(np.eye(3)))
+    nothing = SoundEvidence(np.ones(K, dtype=np.bool_), ("",) * K, (), (), (0.0, 0.0))
+    term = SoundTerm(nothing, TABLE, MODES, DAMPED)
+    grid = search.grid(np.arange(K), K - 1)
+    assert np.all(sound_nats(search, term, np.arange(K), grid.gels, grid.yaws) == 0.0)
+    found = by_sound(search, term, np.arange(K), np.arange(K), K - 1)
+    assert found.log_weights == pytest.approx(grid.log_weights)
+
+
+def test_a_spectrogram_shows_a_tone_where_it_is() -> None:
+    times = np.arange(20_000) / plate.RATE
+    heard = spectrogram(0.2 * np.sqrt(2.0) * np.sin(2.0 * np.pi * 3000.0 * times), plate.RATE)
+    assert heard.levels.shape == (len(heard.frequencies), len(heard.times))
+    assert heard.loudest == pytest.approx(0.2, rel=1e-3)
+    assert heard.frequencies[np.argmax(heard.levels, axis=0)] == pytest.approx(3000.0, abs=50.0)
+    silence = spectrogram(np.zeros(10), plate.RATE)
+    assert np.isfinite(silence.levels).all()
+    assert silence.loudest == 0.0
+
+
+def test_recorded_and_simulated_ring_at_the_same_frequencies() -> None:
+    rng = np.random.default_rng(5)
+    points = plate.places(1, rng)
+    strike = plate.strikes(MODES, points, rng, np.ones(12, dtype=np.complex128), 1e-4)[0]
+    pair = sound_pair(strike, MODES, DAMPED, points[0], np.array([0.0, 0.0, -1.0]), 1.0)
+    late = pair.recorded.times > 0.05
+    recorded = pair.recorded.levels[:, late].mean(axis=1)
+    simulated = pair.simulated.levels[:, late].mean(axis=1)
+    assert np.corrcoef(recorded, simulated)[0, 1] > 0.8
+
+
+def test_a_posterior_over_samples_keeps_its_weight() -> None:
+    surface = TABLE.surface
+    rng = np.random.default_rng(6)
+    chosen = rng.choice(len(surface.points), 50, replace=False)
+    weights = rng.random(50)
+    shares = share_of_samples(surface.points[chosen], weights, surface)
+    assert shares.sum() == pytest.approx(1.0)
+    assert shares[chosen] == pytest.approx(weights / weights.sum())
