@@ -20,8 +20,10 @@ grows busier makes even its quickest arrivals a millisecond later. Whole scans o
 20 ms was full while nobody fetched, but for a rare chance."""
 
 _EQUALLY = 0.5e-3
+_EQUALLY_SHARE = 0.1
+_QUICK = 0.25
 
-_PROMPT_RESIDUALS = 6.0
+_PROMPT_EVEN = 6.0
 
 STEADY = 0.25
 """s over which the quickest arrival is taken while none is prompt."""
@@ -83,6 +85,7 @@ class StreamMonitor:
         self._rests = rests
         self._rate = nominal_rate
         self._fit: ClockFit | None = None
+        self._even = 0.0
         self._fitted_at = 0.0
         self._earliest = np.inf
         self._late: list[float] = []
@@ -139,14 +142,16 @@ class StreamMonitor:
         """Seconds of lateness of a prompt arrival, for what the clock is known to."""
         if self._fit is None:
             return PROMPT + _CRYSTAL * self.clock.span
-        unsure = self._fit.residual / self._fit.span + _WANDER
+        unsure = self._even / self._fit.span + _WANDER
         beyond = max(0.0, time - self._fit.arrivals[-1])
-        return float(max(PROMPT, _PROMPT_RESIDUALS * self._fit.residual) + unsure * beyond)
+        return float(max(PROMPT, _PROMPT_EVEN * self._even) + unsure * beyond)
 
     def _judge_lateness(self) -> None:
         """Whether the quickest arrivals have been equally late for some time."""
         newest = self._late[-STEADY_COUNT:]
-        if len(newest) == STEADY_COUNT and max(newest) - min(newest) <= _EQUALLY:
+        if len(newest) < STEADY_COUNT:
+            return
+        if max(newest) - min(newest) <= max(_EQUALLY, _EQUALLY_SHARE * min(newest)):
             self.fault = (
                 f"about {min(newest) * self._rate:.0f} samples of each channel are missing: this computer "
                 "did not fetch them in time and the box's memory overflowed; close what else runs on it"
@@ -156,8 +161,9 @@ class StreamMonitor:
         if self.clock.span < SETTLED or time - self._fitted_at < _REFIT:
             return
         fit, self._fitted_at = self.clock.fit(), time
-        if fit.residual <= _CRYSTAL * fit.span:
-            self._fit = fit
+        even = float(np.quantile(fit.lateness, _QUICK))
+        if even <= _CRYSTAL * fit.span:
+            self._fit, self._even = fit, even
 
     def _see_rest(self, words: AnyArray, total: int) -> None:
         rest = float(np.median(counts(words[:, 0], self._model)))

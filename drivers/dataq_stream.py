@@ -19,7 +19,7 @@ from harness.errors import BenchFault
 STALL = 2.0
 """s without a byte after which the box counts as stalled."""
 
-_PROOF_TIMEOUT = 10.0
+_PROOF_TIMEOUT = 30.0
 _UNREST = 0.5
 _DEAF_TIMEOUT = 10.0
 _LOOK_PERIOD = 5e-3

@@ -207,6 +207,6 @@ class DataqHammer:
         starts = clock.time(first.scan), clock.time(first.scan + 1.0 / _CHANNELS)
         kept = np.unique(np.linspace(0, len(clock.samples) - 1, _CLOCK_PAIRS).round().astype(np.int64))
         arrivals = np.stack([clock.samples[kept], clock.arrivals[kept]], axis=1)
-        late = arrivals[:, 1] - clock.start - arrivals[:, 0] / clock.rate
+        late = clock.lateness[kept]
         form = CaptureForm(self._rate, self._threshold, self._model.full_scale)
         return readings_of_capture(words, starts, clock.rate, form, arrivals - (first.scan, 0.0), late)

@@ -42,6 +42,12 @@ class ClockFit:
         return self.start + sample / self.rate
 
     @property
+    def lateness(self) -> FloatArray:
+        """``(n,)`` s by which the arrivals it was fitted to were later than it says."""
+        late: FloatArray = self.arrivals - self.start - self.samples / self.rate
+        return late
+
+    @property
     def span(self) -> float:
         """Seconds between the first and the last arrival."""
         return float(self.arrivals[-1] - self.arrivals[0])
