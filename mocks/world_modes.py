@@ -47,8 +47,8 @@ def perturbed(nominal: Tetrahedra, wall_change: float) -> Tetrahedra:
     made = tetrahedra(moved, nominal.cells)
     if not np.array_equal(made.cells, nominal.cells):
         raise MeshRefused(
-            f"a wall changed by {wall_change:.1%} turns a cell inside out; change it less, or mesh the object "
-            "with smaller elements"
+            f"a wall changed by {wall_change:.1%} turns a cell inside out; change it less, or mesh the "
+            "object with smaller elements"
         )
     return made
 

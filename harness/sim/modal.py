@@ -162,6 +162,7 @@ def solve_modes(
 
 def _curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra) -> QuadraticMesh:
     """Ten-node cells on ``surface``, moved on to where the tetrahedra are now."""
+    _check_cells(undeformed)
     mesh = quadratic_mesh(undeformed.nodes, undeformed.cells)
     if surface is not None:
         mesh = snapped(mesh, surface)
@@ -175,6 +176,16 @@ def _curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra
     if least_determinant(moved).min() <= 0.0:
         raise MeshRefused("the deformation turns an element inside out; deform the object less")
     return moved
+
+
+def _check_cells(tetrahedra: Tetrahedra) -> None:
+    unused = len(tetrahedra.nodes) - len(np.unique(tetrahedra.cells))
+    inverted = int(np.count_nonzero(tetrahedra.volumes <= 0.0))
+    if unused or inverted:
+        raise MeshRefused(
+            f"the volume mesh has {unused} nodes that no element holds and {inverted} inverted elements; "
+            "make it with harness.sim.tetrahedra.tetrahedra, which leaves out the ones and turns the others"
+        )
 
 
 def _check_volume(mesh: QuadraticMesh, surface: Mesh) -> None:

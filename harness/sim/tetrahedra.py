@@ -16,7 +16,8 @@ from harness.sim.modal_mesh import boundary_faces
 from harness.sim.surface_measure import enclosed_volume, thin_wall
 
 ENVELOPE_OF_WALL = 0.2
-"""Of the thinnest wall, how far the tetrahedra may leave the surface; a wall survives half of it."""
+"""Of the thinnest wall, how far the tetrahedra may leave the surface. With what leaving out faces
+takes, both sides of a wall come no nearer than two fifths of it."""
 
 _ENVELOPE_OF_SIZE = 5e-3
 _FLATTEST = 1e-8
@@ -27,8 +28,8 @@ _VOLUME_GATE = 0.15
 """Relative: what flat faces and the envelope may take from a thin wall before its nodes are moved
 onto the surface. A shell that was filled or lost is far beyond it."""
 
-_SIMPLIFIED = 0.3
-"""Of the envelope, what is spent on leaving out faces of the surface before it is filled."""
+_SIMPLIFIED = 0.5
+"""Of the envelope, how far the surface may move, beside it, to leave out faces before it is filled."""
 
 _MM = 1e-3
 _STOP_ENERGY = 20.0
@@ -116,7 +117,7 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
     wall = thin_wall(mesh)
     if envelope is None:
         envelope = min(ENVELOPE_OF_WALL * wall, _ENVELOPE_OF_SIZE * mesh.diagonal)
-    if not 0.0 < envelope <= 0.5 * wall:
+    if not 0.0 < envelope <= 0.25 * wall:
         raise WrongUse(
             f"an envelope of {envelope * 1e3:.3g} mm lets a wall of {wall * 1e3:.3g} mm close up; say one "
             f"above 0 and up to {0.25 * wall * 1e3:.3g} mm"
@@ -136,7 +137,7 @@ def _filled(mesh: Mesh, edge: float, envelope: float) -> tuple[FloatArray, IntAr
         fewer.faces.astype(np.int32),
         edge_length_abs=edge,
         simplify=False,
-        epsilon=(1.0 - _SIMPLIFIED) * envelope / fewer.diagonal,
+        epsilon=envelope / fewer.diagonal,
         stop_energy=_STOP_ENERGY,
         num_threads=1,
         vtk_ordering=True,
