@@ -50,10 +50,26 @@ def most_seconds(point: Point, name: str | None, speed: float = 1.0, spent: floa
         speed: how many seconds a measured CPU second takes here and now.
         spent: s that the part shared by all settings has taken already; predicted where None.
     """
-    samples = like(point, name)
-    rest = predicted_at_most(np.array([sample.cpu for sample in samples]))
-    shared = max(sample.shared for sample in samples) * speed if spent is None else spent
-    return shared + rest * speed
+    shared = max(s.shared for s in like(point, name)) * speed if spent is None else spent
+    return shared + _most_of_the_rest(point, name) * speed
+
+
+def _most_of_the_rest(point: Point, name: str | None) -> float:
+    """The bound on the next run's own CPU seconds: about its object's mean, where that was measured.
+
+    Objects differ far more than runs of one object do, and these alike: the spread within objects
+    is taken from all of them together, so two runs of each already tell it.
+    """
+    groups: dict[str, list[float]] = {}
+    for sample in point.samples:
+        groups.setdefault(sample.object, []).append(float(np.log(sample.cpu)))
+    freedom = len(point.samples) - len(groups)
+    if name not in groups or freedom < _ENOUGH:
+        return predicted_at_most(np.array([sample.cpu for sample in point.samples]))
+    own = np.array(groups[name])
+    squares = sum(float(((np.array(logs) - np.mean(logs)) ** 2).sum()) for logs in groups.values())
+    reach = float(stats.t.ppf(KEPT, freedom)) * np.sqrt(squares / freedom * (1.0 + 1.0 / len(own)))
+    return float(np.exp(own.mean() + reach))
 
 
 def stretch(point: Point, share: float = MET) -> float:
