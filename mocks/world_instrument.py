@@ -59,8 +59,8 @@ def _modes(solid: Mesh, made_of: Material, edge: float, draw: SoundDraw, store: 
     """The modes of one run's object, kept by everything that they depend on."""
     fields = draw.material_random()
     wall, poisson, sigma = draw.wall_change, draw.poisson_change, draw.elastic_field
-    # The first numbers of the stream stand for the stream.
-    told = [wall, poisson, sigma, FIELD_LENGTH, draw.material_random().standard_normal(4)]
+    # The first numbers of the stream stand for the stream; without fields all runs share their modes.
+    told = [wall, poisson, sigma, FIELD_LENGTH, draw.material_random().standard_normal(4) if sigma else 0.0]
     key = digest(["world modes", VERSION, solid.vertices, solid.faces, made_of, LIMIT, edge, *told])
     kept = store.get(key)
     if isinstance(kept, Mapping):
