@@ -80,8 +80,11 @@ def read(observations: Sequence[Observation], model: Model, prior: Prior, seed: 
 
 
 def prepare(model: Model, setting: Setting) -> None:
-    """Make what depends on the object alone, before any reading is needed: its samples."""
-    _ = model.surface(levels_at(setting).spacing).tree
+    """Make what depends on the object alone, before any reading is needed: its samples and gains."""
+    spacing = levels_at(setting).spacing
+    _ = model.surface(spacing).tree
+    if model.modes is not None:
+        model.gains(spacing)
 
 
 def solve(readings: Readings, setting: Setting) -> Solved:
@@ -91,7 +94,10 @@ def solve(readings: Readings, setting: Setting) -> Solved:
     estimate, refusal = None, None
     try:
         contacts = _contacts(readings, levels, noise)
-        estimate = locate(contacts, readings.model, readings.prior, levels, noise, seed=readings.seed)[-1]
+        strikes = [observation.strike for observation in readings.observations]
+        estimate = locate(
+            contacts, readings.model, readings.prior, levels, noise, seed=readings.seed, strikes=strikes
+        )[-1]
     except FitRefused as error:
         refusal = str(error)
     return Solved(estimate, time.process_time() - cpu, time.perf_counter() - wall, refusal)

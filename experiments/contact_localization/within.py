@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.contact_localization.answer import observe, prior_of
 from experiments.contact_localization.dials import FINEST, METHOD, SPACING
-from experiments.contact_localization.model import Model
+from experiments.contact_localization.model_of import model_of_run
 from experiments.contact_localization.solving import (
     ESTIMATOR,
     PROGRAM,
@@ -180,7 +180,7 @@ def answer_within(recording: Recording, front: Front, target: Target) -> Within:
     samples, and the loading of compiled kernels come before and are not counted.
     """
     run = RunFiles(recording)
-    model, prior = Model(run.mesh, run.station.gel.sensor, run.calibration), prior_of(run)
+    model, prior = model_of_run(run), prior_of(run)
     seed = recording.header.seed
     observations = observe(run)
     if not observations:
