@@ -165,12 +165,7 @@ class Lab:
         striker = Striker(strikes, lambda: self._shared.firing)
         box = DaqBox(Played(strikes.idle(), striker.next_record), drift_ppm=DRIFT_PPM)
         self._hammer_port = box.port
-
-        def serve(line: Line) -> None:
-            keep_time()
-            box.serve(line)
-
-        self._children["hammer"] = Child("hammer", serve)
+        self._children["hammer"] = Child("hammer", box.serve)
         box.leave()
 
     def _mark(self, step: int, sample: int) -> Mapping[str, int]:
