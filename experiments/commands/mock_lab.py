@@ -41,9 +41,12 @@ def mock_lab(
         try:
             where = lab.start()
             if json:
-                emit({"schema": 1, "arm": where.arm, "gel": where.gel, "camera": where.camera})
+                named = {"arm": where.arm, "gel": where.gel, "camera": where.camera}
+                emit({"schema": 1, **named, "hammer": where.hammer})
             else:
                 ANSWERS.print(f"arm: {where.arm} (ports 29999, 30003, 30004)\ngel: {where.gel}", markup=False)
+                if where.hammer is not None:
+                    ANSWERS.print(f"hammer: {where.hammer} (a serial port)", markup=False)
             CONSOLE.print("Ctrl-C ends it")
             while True:
                 time.sleep(3600)
