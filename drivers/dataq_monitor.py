@@ -20,7 +20,6 @@ grows busier makes even its quickest arrivals a millisecond later. Whole scans o
 20 ms was full while nobody fetched, but for a rare chance."""
 
 _EQUALLY = 0.5e-3
-_EQUALLY_SHARE = 0.1
 _QUICK = 0.25
 
 _PROMPT_EVEN = 6.0
@@ -151,7 +150,7 @@ class StreamMonitor:
         newest = self._late[-STEADY_COUNT:]
         if len(newest) < STEADY_COUNT:
             return
-        if max(newest) - min(newest) <= max(_EQUALLY, _EQUALLY_SHARE * min(newest)):
+        if max(newest) - min(newest) <= max(_EQUALLY, self._even):
             self.fault = (
                 f"about {min(newest) * self._rate:.0f} samples of each channel are missing: this computer "
                 "did not fetch them in time and the box's memory overflowed; close what else runs on it"

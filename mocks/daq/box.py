@@ -26,10 +26,6 @@ from mocks.daq.memory import Fifo
 from mocks.faults import ActiveFault, Fault
 from mocks.lab_processes import keep_time
 
-FAULT_KINDS = ("none", "stall", "overflow", "lost_byte", "lost_word", "unplug")
-"""stall: no samples and no answers. overflow: nothing leaves while samples go on. lost_byte, lost_word:
-one is missing from the stream. unplug: the cable is pulled, for good."""
-
 MEMORY = 4096
 """Bytes of the instrument's own."""
 
@@ -37,8 +33,8 @@ HOST_MEMORY = 640 << 10
 """Bytes that Linux keeps of a serial port for its program (TTYB_DEFAULT_MEM_LIMIT in tty_buffer.c)."""
 
 _WRITE = 4096
-_PERIOD = 4e-3
-_LONGEST_WAIT = 20e-3
+_PERIOD = 10e-3
+_LONGEST_WAIT = 30e-3
 _COMMAND_BYTES = 4096
 _LOSSES = {"lost_byte": 1, "lost_word": 2}
 
@@ -178,7 +174,7 @@ class DaqBox:
     def _sample(self) -> None:
         """Take the scans that are due, in steps, and let them out as the cable takes them."""
         due = math.floor((now() - self._began) * self._scan_rate) if self._instrument.scanning else 0
-        step = max(1, self._memory_scans() // 4)
+        step = max(1, self._memory_scans() // 2)
         while self._instrument.scanning and self._taken < due:
             count = min(step, due - self._taken)
             self._memory.push(self._words(count))
