@@ -11,7 +11,6 @@ from typing import Any
 from harness.accuracy import Knob, Level
 from harness.arrays import AnyArray, FloatArray
 from harness.effects import Condition, Effect
-from harness.mesh import Mesh
 from harness.sim.microphone_response import as_heard
 from harness.sim.modal import ELEMENT_SHARE, HEARING, VERSION, default_edge, from_arrays, modes_of, to_arrays
 from harness.sim.modal_radiation import RadiationLevel, radiation
@@ -40,12 +39,9 @@ SOUND = Condition(lambda f: f.scene.sensors.sound, "sensors.sound is true", "sen
 ROOM = Condition(lambda f: f.scene.room is not None, "the scene has a [room]", "the scene has no [room]")
 
 
-def _solid(given: Given, _levels: Levels) -> Mesh:
-    return walled(given["object.mesh"], given["object.wall"])
-
-
 def _modes(given: Given, levels: Levels) -> dict[str, AnyArray]:
-    solid, material, most = given["object.solid"], given["object.material"], int(levels[MODES.name])
+    solid = walled(given["object.mesh"], given["object.wall"])
+    material, most = given["object.material"], int(levels[MODES.name])
     edge = default_edge(solid, material, HEARING, most, float(levels[EDGE.name]))
     return to_arrays(modes_of(solid, material, HEARING, edge, most))
 
@@ -68,10 +64,9 @@ def _pressure(given: Given, _levels: Levels) -> FloatArray:
 
 
 SOUND_EFFECTS = (
-    Effect("object.solid", ("object.mesh", "object.wall"), _solid, when=SOUND),
     Effect(
         "object.modes",
-        ("object.solid", "object.material"),
+        ("object.mesh", "object.wall", "object.material"),
         _modes,
         when=SOUND,
         knobs=(EDGE, MODES),
