@@ -1,6 +1,5 @@
 """Fill the report of a run from its folder, its answer and, for a mocked run, its truth."""
 
-import datetime as dt
 import sys
 from collections.abc import Mapping
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from experiments.contact_localization.answer import Answer as Found
 from experiments.contact_localization.gate import Gate
+from experiments.contact_localization.instruments_report import artefacts, instruments
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.result import Scored, flags_of, result_of
 from experiments.contact_localization.sound_report import posterior_of, sound_of
@@ -17,17 +17,21 @@ from harness.device import Health
 from harness.geometry import inverse
 from harness.report.data import (
     Answer,
-    Artefact,
     Bench,
     Contact,
     Curve,
     EffectRun,
-    Instrument,
     ReportData,
 )
 from harness.report.props import arm_parts, object_part, sensor_parts, table_and_pedestal
 from harness.report.values import Missing
 from harness.run_folder import RunFiles
+
+FOR_SOUND = {
+    "object.solid": "object.modes needs it",
+    "object.modes": "the estimate by sound needs it",
+}
+"""Effects that the estimate by sound evaluates itself, and why."""
 
 NO_TRUTH = Missing("the truth is not known: this is not a mocked run, or its truth was taken away")
 
@@ -62,8 +66,8 @@ def report_of(
         bench=_bench(run, found),
         error_by_contact=_by_contact(scored, geometry_errors),
         error_by_seconds=_by_seconds(trade),
-        instruments=_instruments(run, health),
-        calibrations=(_artefact(run),),
+        instruments=instruments(run, health),
+        calibrations=artefacts(run),
         effects=_effects(scored),
         world=_world(scored),
         twin=deviations(run, found),
@@ -171,47 +175,6 @@ def _method(levels: Levels) -> str:
     return "grid" if levels.method == "grid" else "the paper's particle filter"
 
 
-def _instruments(run: RunFiles, health: Mapping[str, Health] | None) -> tuple[Instrument, ...] | Missing:
-    if health is None:
-        return Missing("estimated again from the recording: no instrument was open")
-    nominal = {"arm": run.station.arm.rate, "gel": run.station.gel.rate}
-    steps = run.recording.steps()
-    return tuple(
-        Instrument(
-            name=name,
-            address=said.identity,
-            rate=said.rate,
-            nominal_rate=nominal.get(name),
-            readings=sum(
-                len(reading.times)
-                for step in steps
-                for reading in step.readings.values()
-                if reading.channel.name.startswith(f"{name}.")
-            ),
-            drops=said.drops,
-            latency_median=said.latency,
-            latency_99=None,
-            remark=said.detail,
-        )
-        for name, said in health.items()
-    )
-
-
-def _artefact(run: RunFiles) -> Artefact:
-    header = run.calibration.header
-    made = dt.datetime.fromisoformat(header.date)
-    made = made if made.tzinfo is not None else made.replace(tzinfo=dt.UTC)
-    age = dt.datetime.fromisoformat(run.recording.header.created) - made
-    return Artefact(
-        name=f"tactile optics of {header.sensor}",
-        serial=header.serial,
-        made=header.date,
-        age_days=age.total_seconds() / 86400.0,
-        residual=f"{header.held_out_db:.1f} dB on presses held out, {header.residual_rms:.1f} counts rms",
-        sha256=run.calibration.sha256,
-    )
-
-
 def _effects(scored: Scored) -> tuple[EffectRun, ...]:
     plan, evaluation = scored.comparison.plan, scored.comparison.evaluation
     ran = [
@@ -224,7 +187,18 @@ def _effects(scored: Scored) -> tuple[EffectRun, ...]:
         )
         for step in plan.ran
     ]
-    return (*ran, *(EffectRun(step.effect.provides, False, step.reason) for step in plan.skipped))
+    skipped = [EffectRun(step.effect.provides, False, step.reason) for step in plan.skipped]
+    return tuple(_by_the_estimate(scored, one) for one in (*ran, *skipped))
+
+
+def _by_the_estimate(scored: Scored, effect: EffectRun) -> EffectRun:
+    """An effect that the comparison had no use for, and the estimate by sound had."""
+    modes = scored.found.model.modes
+    if effect.ran or effect.name not in FOR_SOUND or modes is None:
+        return effect
+    stages = [stage for stage in modes.seconds if (stage == "tetrahedra") == (effect.name == "object.solid")]
+    took = sum(modes.seconds[stage] for stage in stages)
+    return EffectRun(effect.name, True, f"{FOR_SOUND[effect.name]}; took {took:.1f} s once, and is kept")
 
 
 def _world(scored: Scored) -> dict[str, str] | Missing:

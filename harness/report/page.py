@@ -19,6 +19,8 @@ from harness.report.pictures import (
     posterior_figure,
     posterior_strip,
 )
+from harness.report.sound_data import PeakLine
+from harness.report.sound_figures import senses_figure, spectrogram_pair
 from harness.report.tiles import DIFFERENCE_GAIN, difference, height_picture, png, root_mean_square
 from harness.report.values import Missing, Posterior
 
@@ -70,6 +72,7 @@ def _content(data: ReportData, album: Album) -> dict[str, Any]:
         "cards": wording.cards(data.answer) if isinstance(data.answer, Answer) else [],
         "bench": bench if isinstance(bench, Missing) else album.photograph("bench", bench_figure(bench)),
         **_on_the_object(data, album),
+        **_sound(data, album),
         "tiles": {contact.number: _tiles(contact, album) for contact in data.contacts},
         "fits": {contact.number: _fit(contact) for contact in data.contacts},
         "gain": f"{DIFFERENCE_GAIN:g}",
@@ -97,6 +100,36 @@ def _on_the_object(data: ReportData, album: Album) -> dict[str, Any]:
         shown["strip"] = album.photograph("posterior_by_contact", posterior_strip(sides, data.contacts))
         shown["last"] = album.photograph("posterior", posterior_figure(sides, located[-1]))
     return shown
+
+
+def _sound(data: ReportData, album: Album) -> dict[str, Any]:
+    """Each sense on the object, and a strike beside the model's."""
+    sound = data.sound
+    if isinstance(sound, Missing):
+        return {"senses": sound, "spectrograms": sound, "bars": []}
+    pair = sound.pair
+    truth = data.contacts[-1].truth if data.contacts else None
+    sides = object_sides(data.mesh, _towards(data), _SIDE_PIXELS)
+    believed = {wording.SENSES[sense.name]: sense.posterior for sense in sound.senses}
+    return {
+        "bars": _bars(sound.peaks),
+        "senses": album.photograph("senses", senses_figure(sides, believed, truth)),
+        "spectrograms": pair
+        if isinstance(pair, Missing)
+        else album.photograph(
+            "spectrograms",
+            spectrogram_pair(pair.times, pair.frequencies, pair.recorded, pair.simulated),
+        ),
+    }
+
+
+def _bars(peaks: tuple[PeakLine, ...] | Missing) -> list[float]:
+    """Per cent of the longest bar that each peak's gets."""
+    if isinstance(peaks, Missing):
+        return []
+    counted = [abs(peak.counted) for peak in peaks]
+    longest = max(counted, default=0.0)
+    return [100.0 * one / longest if longest > 0.0 else 0.0 for one in counted]
 
 
 def _towards(data: ReportData) -> FloatArray:

@@ -2,7 +2,11 @@
 
 from harness.arrays import FloatArray
 from harness.report.data import Answer, ReportData
+from harness.report.sound_data import PeakLine, SenseAnswer, Sound
 from harness.report.values import Missing
+
+SENSES = {"touch": "touch", "audio": "sound", "both": "touch and sound"}
+"""The senses by the names they have in answers, as an operator reads them."""
 
 NONE = "\N{EN DASH}"
 """Stands where there is no number."""
@@ -11,6 +15,13 @@ NONE = "\N{EN DASH}"
 def millimetres(metres: float | None, digits: int = 2) -> str:
     """A length with its unit, or a dash."""
     return NONE if metres is None else f"{metres * 1e3:.{digits}f} mm"
+
+
+def area(square_metres: float | None) -> str:
+    """An area with the unit that suits it, or a dash."""
+    if square_metres is None:
+        return NONE
+    return f"{square_metres * 1e6:.0f} mm²" if square_metres < 1e-3 else f"{square_metres * 1e4:.0f} cm²"
 
 
 def duration(seconds: float | None) -> str:
@@ -46,7 +57,56 @@ def headline(data: ReportData) -> str:
     sentence = ", ".join(said) + "."
     if answer.modes > 1:
         sentence += f" The readings fit {answer.modes} separate places; this is the likeliest."
-    return sentence
+    return sentence if isinstance(data.sound, Missing) else f"{sentence} {by_sense(data.sound)}"
+
+
+def by_sense(sound: Sound) -> str:
+    """How near each sense came, in one sentence."""
+    said = "; ".join(f"{SENSES[sense.name]}, {_nearness(sense)}" for sense in sound.senses)
+    return f"By {said}."
+
+
+def _nearness(sense: SenseAnswer) -> str:
+    if isinstance(sense.posterior, Missing):
+        return "no answer"
+    certain = f"90 % within {millimetres(sense.posterior.credible90, 1)}"
+    return certain if sense.error is None else f"{millimetres(sense.error)} off ({certain})"
+
+
+def heard(sound: Sound) -> str:
+    """What the strikes say together, in one or two sentences."""
+    counted = sum(strike.unused == "" for strike in sound.strikes)
+    said = f"{counted} of {len(sound.strikes)} strikes count"
+    if sound.band is not None:
+        said += f"; together they excite {sound.band[0] / 1e3:.1f} to {sound.band[1] / 1e3:.1f} kHz"
+    if not isinstance(sound.peaks, Missing):
+        matched = sum(bool(peak.modes) for peak in sound.peaks)
+        said += f". {_count(len(sound.peaks), 'resonance')} in common, {matched} taken for modes"
+        said += f", and {sound.set_aside} more set aside as echoes or as more than one waveform"
+        said += f". The object rings {100.0 * (sound.scale - 1.0):+.1f} % from its model"
+    return said + "."
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("" if number == 1 else "s")
+
+
+def modes_of(peak: PeakLine) -> str:
+    """Numbers of the modes that a peak is taken for."""
+    if not peak.modes:
+        return "none"
+    first, last = peak.modes[0], peak.modes[-1]
+    return str(first) if first == last else f"{first} to {last}"
+
+
+def percent(share: float | None, digits: int = 2) -> str:
+    """A signed relative difference, or a dash."""
+    return NONE if share is None else f"{100.0 * share:+.{digits}f} %"
+
+
+def quantity(value: float | None, unit: str, digits: int = 3) -> str:
+    """A number to so many digits with its unit, or a dash."""
+    return NONE if value is None else f"{value:.{digits}g} {unit}"
 
 
 def cards(answer: Answer) -> list[tuple[str, str, str]]:

@@ -22,6 +22,7 @@ from harness.report.data import (
     TwinDeviation,
 )
 from harness.report.props import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.report.sound_data import PeakLine, SenseAnswer, Sound, SpectrogramPair, StrikeLine
 from harness.report.values import Missing, Posterior
 from harness.sensor import GELSIGHT_R15
 from harness.sim.height_map import RasterMesh, height_maps, penetration
@@ -94,6 +95,50 @@ def contact(mesh: Mesh, raster: RasterMesh, face: int, number: int) -> Contact:
 def gel_pose(shown: Contact) -> FloatArray:
     assert not isinstance(shown.object_from_gel, Missing)
     return shown.object_from_gel
+
+
+RESONANCES = (1210.0, 2440.0, 3890.0, 7015.0)
+
+
+def decays(scale: float) -> FloatArray:
+    """Levels of the resonances as they die away, over a floor."""
+    times, frequencies = np.linspace(0.01, 0.39, 60), np.linspace(0.0, 12_000.0, 200)
+    lines = [-0.5 * ((frequencies[:, None] - scale * f) / 60.0) ** 2 - 0.04 * f * times for f in RESONANCES]
+    levels: FloatArray = np.maximum(np.max(lines, axis=0), -90.0)
+    return levels
+
+
+def sound(mesh: Mesh, truth: FloatArray) -> Sound:
+    """By touch no answer; by sound a wide one; by both a narrow one."""
+    wide, narrow = posterior(mesh, truth, 2), posterior(mesh, truth, 6)
+    times, frequencies = np.linspace(0.01, 0.39, 60), np.linspace(0.0, 12_000.0, 200)
+    return Sound(
+        senses=(
+            SenseAnswer("touch", Missing("no place on this object explains the <images>")),
+            SenseAnswer("audio", wide, 7.31e-3, 2.4e-3, 0.0312),
+            SenseAnswer("both", narrow, 1.27e-3, 6.1e-5, 0.231),
+        ),
+        strikes=(
+            StrikeLine(1, "", 41.23, 3.1e-4, 2.44),
+            StrikeLine(2, "the hammer hit twice", 18.0, 2.0e-3, 1.2),
+            StrikeLine(3, "no strike came"),
+            *(StrikeLine(number, "", 38.0, 3.3e-4, 2.1) for number in (4, 5, 6)),
+        ),
+        pair=SpectrogramPair(6, times, frequencies, decays(1.013), decays(1.0)),
+        peaks=(
+            PeakLine(1225.7, 31.0, 0.013, -4.0, (1,), 1225.1, 24.0, 0.97, 5.21, 0.2),
+            PeakLine(2465.0, 44.0, 0.031, 0.0, (2, 3), 2471.7, 49.0, 0.71, -1.4, 0.2),
+            PeakLine(5111.0, 60.0, 0.092, -21.0, (), None, None, 0.88, 0.0, 0.2),
+        ),
+        set_aside=4,
+        band=(180.0, 9400.0),
+        scale=1.013,
+    )
+
+
+def true_point(shown: Contact) -> FloatArray:
+    assert shown.truth is not None
+    return shown.truth
 
 
 @pytest.fixture(scope="session")
@@ -178,6 +223,7 @@ def sample() -> ReportData:
         twin=tuple(TwinDeviation(c.step, 2.1e-4, 4.4e-4, 8e-4, 6.1e-4) for c in contacts),
         versions={"touchstone": "0.1.0", "numpy": "2.3.1", "ur_rtde": "1.6.1"},
         git="054b11f+",
+        sound=sound(mesh, true_point(contacts[-1])),
         symmetry="no rotation",
         accuracy={"samples": "2 mm", "kernel": "0.064 mm"},
         warnings=("The calibration was fitted at 22 degrees; the gel was at 27.",),
@@ -212,4 +258,5 @@ def without_everything(data: ReportData) -> ReportData:
         effects=gone,
         world=gone,
         twin=gone,
+        sound=gone,
     )

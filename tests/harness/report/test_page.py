@@ -9,13 +9,17 @@ import pytest
 
 from harness.report.data import Answer, ReportData
 from harness.report.page import write_report
+from harness.report.sound_data import StrikeLine
 from harness.report.values import Missing
 
 SECTIONS = (
-    "bench", "posterior", "errors", "contacts", "instruments", "calibrations", "effects", "world", "twin",
-    "versions",
+    "bench", "posterior", "sound", "errors", "contacts", "instruments", "calibrations", "effects", "world",
+    "twin", "versions",
 )  # fmt: skip
-BESIDE = ("bench", "contacts", "posterior", "posterior_by_contact", "error_by_contact", "error_by_seconds")
+BESIDE = (
+    "bench", "contacts", "posterior", "posterior_by_contact", "error_by_contact", "error_by_seconds",
+    "senses", "spectrograms",
+)  # fmt: skip
 
 
 class Page(HTMLParser):
@@ -57,7 +61,7 @@ def light(data: ReportData) -> ReportData:
     """The same run without its pictures, which take the time."""
     gone = Missing("left out")
     contacts = tuple(replace(c, posterior=gone, object_from_gel=gone) for c in data.contacts[:1])
-    return replace(data, bench=gone, contacts=contacts)
+    return replace(data, bench=gone, contacts=contacts, sound=gone)
 
 
 def test_the_page_holds_everything_it_shows(written: Path, page: Page) -> None:
@@ -98,6 +102,51 @@ def test_the_headline_says_position_error_certainty_and_ambiguity(
     assert "2 separate places" in page.text
 
 
+def test_the_headline_says_how_near_each_sense_came(page: Page) -> None:
+    assert "By touch, no answer; sound, 7.31 mm off (90 % within" in page.text
+    assert "touch and sound, 1.27 mm off" in page.text
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "no answer: no place on this object explains the <images>", "24 cm²", "61 mm²", "31.2 ms", "41.2 N",
+        "310 µs", "2.44 Pa", "not used: the hammer hit twice", "not used: no strike came",
+        "4 of 6 strikes count; together they excite 0.2 to 9.4 kHz",
+        "3 resonances in common, 2 taken for modes, and 4 more set aside", "rings +1.3 % from its model",
+        "The strike of contact 6", "1225.7 Hz", "1225.1 Hz", "+0.05 %", "2 to 3", "-0.27 %", "97 %",
+        "+5.21 at 0.2", "-1.40 at 0.2", "9.2 %",
+    ],
+)  # fmt: skip
+def test_what_each_sense_contributed_is_on_the_page(page: Page, said: str) -> None:
+    assert said in page.text
+
+
+def test_bars_are_to_scale_and_show_which_side_a_peak_is_on(written: Path) -> None:
+    bars = re.findall(r'<i( class="against")? style="width: ([0-9.]+)%"', written.read_text(encoding="utf-8"))
+    assert [(bool(against), float(width)) for against, width in bars] == [
+        (False, 100.0),
+        (True, pytest.approx(100.0 * 1.4 / 5.21, abs=0.05)),
+        (False, 0.0),
+    ]
+
+
+def test_sound_that_says_nothing_is_said_to(report_data: ReportData, tmp_path: Path) -> None:
+    full = report_data.sound
+    assert not isinstance(full, Missing)
+    unused = tuple(StrikeLine(number, "no strike came") for number in (1, 2))
+    quiet = replace(
+        full, strikes=unused, pair=Missing("no strike counts"), peaks=Missing("fewer than two"), band=None
+    )
+    text = Page(write_report(replace(light(report_data), sound=quiet), tmp_path).read_text("utf-8")).text
+    assert "0 of 2 strikes count." in text
+    assert "Not available: no strike counts." in text
+    assert "Not available: fewer than two." in text
+    assert "None" not in text
+    assert not (tmp_path / "spectrograms.png").exists()
+    assert (tmp_path / "senses.png").exists()
+
+
 def test_every_figure_has_a_caption_and_every_picture_words_in_its_place(written: Path, page: Page) -> None:
     assert page.tags.count("figure") == page.tags.count("figcaption") >= 6
     assert all(re.search(r'alt="[^"]{5,}"', tag) for tag in re.findall(r"<img[^>]*>", written.read_text()))
@@ -125,7 +174,7 @@ def test_mock_results_and_only_they_are_labelled(report_data: ReportData, tmp_pa
 
 
 def test_what_is_missing_is_said_to_be_with_its_reason(report_data: ReportData, tmp_path: Path) -> None:
-    names = ("answer", "bench", "error_by_contact", "error_by_seconds", "instruments")
+    names = ("answer", "bench", "error_by_contact", "error_by_seconds", "instruments", "sound")
     more = ("calibrations", "effects", "world", "twin")
     reasons = {name: Missing(f"the reason for {name} & <it>") for name in names + more}
     bare = replace(
@@ -139,6 +188,7 @@ def test_what_is_missing_is_said_to_be_with_its_reason(report_data: ReportData, 
         effects=reasons["effects"],
         world=reasons["world"],
         twin=reasons["twin"],
+        sound=reasons["sound"],
     )
     text = Page(write_report(bare, tmp_path).read_text(encoding="utf-8")).text
     for name in names + more:

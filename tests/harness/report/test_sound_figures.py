@@ -13,8 +13,8 @@ from harness.arrays import AnyArray, FloatArray
 from harness.objects.household import build
 from harness.report.figures import Album
 from harness.report.pictures import object_sides
-from harness.report.sound_figures import PeakRow, mode_table, senses_figure, spectrogram_pair
-from harness.report.values import Posterior
+from harness.report.sound_figures import senses_figure, spectrogram_pair
+from harness.report.values import Missing, Posterior
 
 TIMES = np.linspace(0.01, 0.39, 40)
 FREQUENCIES = np.linspace(0.0, 12_000.0, 120)
@@ -65,25 +65,6 @@ def test_levels_that_do_not_fit_their_axes_are_refused() -> None:
         spectrogram_pair(TIMES, FREQUENCIES, np.full((120, 40), -np.inf), decay(4000.0))
 
 
-def test_a_mode_table_says_each_peak_its_mode_and_its_weight() -> None:
-    figure = mode_table(
-        [PeakRow(812.4, 810.0, 0.2), PeakRow(2210.0, None, 0.01), PeakRow(5000.0, 4950.0, 0.7)]
-    )
-    written = [text.get_text() for text in figure.axes[0].texts]
-    assert written[4:8] == ["5000", "4950", "+1.01 %", "0.7"]
-    assert written[8:12] == ["812", "810", "+0.30 %", "0.2"]
-    assert written[12:16] == ["2210", "none", "", "0.01"]
-    assert ink(figure) > 0.02
-
-
-@pytest.mark.parametrize("row", [PeakRow(0.0, 1.0, 1.0), PeakRow(1.0, -1.0, 1.0), PeakRow(1.0, None, np.nan)])
-def test_a_table_of_impossible_numbers_is_refused(row: PeakRow) -> None:
-    with pytest.raises(ValueError, match="above zero"):
-        mode_table([row])
-    with pytest.raises(ValueError, match="needs a peak"):
-        mode_table([])
-
-
 def test_each_sense_has_a_column_and_its_own_place() -> None:
     mesh = build("mug")
     rng = np.random.default_rng(3)
@@ -106,6 +87,19 @@ def test_each_sense_has_a_column_and_its_own_place() -> None:
     same = senses_figure(object_sides(mesh, places[0], 120), {"one": touch, "other": replace(touch)})
     one, other = (np.asarray(axes.images[0].get_array()) for axes in same.axes[:2])
     assert np.array_equal(one, other)
+
+
+def test_a_sense_without_an_answer_leaves_the_object_bare() -> None:
+    mesh = build("mug")
+    sides = object_sides(mesh, mesh.vertices[0], 80)
+    place = mesh.vertices[0]
+    found = Posterior(place[None], np.ones(1), place, place[None], np.ones(1), 3e-3)
+    figure = senses_figure(sides, {"touch": Missing("it is another object"), "sound": found})
+    bare, heated = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
+    assert np.array_equal(bare, sides.shots[0].picture())
+    assert not np.array_equal(bare, heated)
+    assert figure.axes[0].get_title() == "touch\nno answer"
+    assert len(figure.axes[0].collections) == 0
 
 
 def test_no_sense_is_no_picture() -> None:
