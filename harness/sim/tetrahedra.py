@@ -1,7 +1,9 @@
 """A surface filled with tetrahedra, or refused: never a shell that became a ball."""
 
+import contextlib
 from dataclasses import dataclass
 from functools import cached_property
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -132,16 +134,18 @@ def _filled(mesh: Mesh, edge: float, envelope: float) -> tuple[FloatArray, IntAr
     from pytetwild.pytetwild import tetrahedralize as fill
 
     fewer = _simplified(mesh, _SIMPLIFIED * envelope)
-    nodes, cells = fill(
-        fewer.vertices.copy(),
-        fewer.faces.astype(np.int32),
-        edge_length_abs=edge,
-        simplify=False,
-        epsilon=envelope / fewer.diagonal,
-        stop_energy=_STOP_ENERGY,
-        num_threads=1,
-        vtk_ordering=True,
-    )
+    # fTetWild leaves a file of its own in the folder it runs in.
+    with TemporaryDirectory(prefix="touchstone-fill-") as folder, contextlib.chdir(folder):
+        nodes, cells = fill(
+            fewer.vertices.copy(),
+            fewer.faces.astype(np.int32),
+            edge_length_abs=edge,
+            simplify=False,
+            epsilon=envelope / fewer.diagonal,
+            stop_energy=_STOP_ENERGY,
+            num_threads=1,
+            vtk_ordering=True,
+        )
     return np.asarray(nodes, dtype=np.float64), np.asarray(cells, dtype=np.int64)
 
 
