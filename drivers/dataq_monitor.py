@@ -40,6 +40,7 @@ REST_WINDOW = 0.05
 _REFIT = 0.25
 _CRYSTAL = 200e-6
 _WANDER = 20e-6
+_NO_CRYSTAL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +116,11 @@ class StreamMonitor:
         """Whether the arrivals tell the clock: long enough, for how evenly they come."""
         return self._fit is not None
 
+    @property
+    def fit(self) -> ClockFit | None:
+        """The newest clock that is to be believed; None before one is."""
+        return self._fit
+
     def lateness(self, total: int, time: float) -> float:
         """Seconds by which an arrival is later than the quickest ones."""
         if self._fit is not None:
@@ -161,7 +167,8 @@ class StreamMonitor:
             return
         fit, self._fitted_at = self.clock.fit(), time
         even = float(np.quantile(fit.lateness, _QUICK))
-        if even <= _CRYSTAL * fit.span:
+        # Few and uneven arrivals can make a line that no crystal keeps; more of them will not.
+        if even <= _CRYSTAL * fit.span and abs(fit.rate / self._rate - 1.0) <= _NO_CRYSTAL:
             self._fit, self._even = fit, even
 
     def _see_rest(self, words: AnyArray, total: int) -> None:

@@ -101,7 +101,7 @@ class ScanStream:
     def clock(self) -> ClockFit | None:
         """The clock of the present stretch; None before it has settled."""
         with self._changed:
-            return self._monitor.clock.fit() if self._monitor.settled else None
+            return self._monitor.fit
 
     def settle(self) -> Position:
         """Wait until the clock can be fitted; the newest scan then.
@@ -170,14 +170,15 @@ class ScanStream:
             timeout = max(0, end - self._total) / self._rate + _PROOF_TIMEOUT
             self._changed.wait_for(decided, timeout)
             self._raise_if_over(first)
-            if self._proven < end:
+            fit = self._monitor.fit
+            if self._proven < end or fit is None:
                 raise BenchFault(self._unproven(end))
             if first.scan < max(0, self._total - len(self._ring)):
                 raise BenchFault(
                     f"{self._link.name}: the oldest of the {count} samples asked for is no longer kept; "
                     f"the newest {len(self._ring)} are"
                 )
-            return self._kept(first.scan, end).copy(), self._monitor.clock.fit()
+            return self._kept(first.scan, end).copy(), fit
 
     def rest(self, seconds: float) -> AnyArray:
         """``(n, channels)`` counts of the newest ``seconds``."""
@@ -285,9 +286,8 @@ class ScanStream:
 
     def _last_proven(self) -> float:
         """Bench-clock seconds of the newest scan up to which none is missing."""
-        if not self._monitor.settled:
-            return self._heard
-        return self._monitor.clock.fit().time(self._monitor.prompt)
+        fit = self._monitor.fit
+        return self._heard if fit is None else fit.time(self._monitor.prompt)
 
     def _silence(self) -> None:
         """Have the box stop, and answer: one that is deaf would later obey all it was told at once.

@@ -111,7 +111,9 @@ def test_the_estimator_reads_the_same_of_the_raw_counts(strikes: list[dict[str, 
 
 def test_the_second_channel_is_timed_half_a_sample_later(strikes: list[dict[str, Reading]]) -> None:
     for strike in strikes:
-        assert np.allclose(strike[PRESSURE].times - strike[FORCE].times, 10e-6, atol=1e-9)
+        assert np.allclose(
+            strike[PRESSURE].times - strike[FORCE].times, 10e-6, rtol=0.0, atol=1e-8
+        )  # a rate known to 0.1 %
 
 
 def test_the_clock_is_the_crystals_and_not_nominal(bench: Bench) -> None:
@@ -229,7 +231,7 @@ def test_health_says_rate_drift_and_drops(bench: Bench) -> None:
     with opened(bench) as hammer:
         hammer.capture(lambda: None, 0.1, 0.1, 0.2)
         health = hammer.health()
-    assert health.rate == pytest.approx(RATE, rel=5e-4)
+    assert health.rate == pytest.approx(RATE, rel=1e-3)
     assert health.drops == 0
     assert "ppm of nominal" in health.detail
     assert hammer.health().detail == "closed"
