@@ -20,14 +20,14 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 
-from harness.arrays import ByteArray, FloatArray
+from harness.arrays import FloatArray
 from harness.clock import now
 from harness.errors import TouchstoneError, WrongUse
 from harness.gap import load_gap
@@ -35,7 +35,7 @@ from harness.geometry import frame_facing, inverse, transform
 from harness.kinematics import forward
 from harness.station_sections import ArmSection
 from mocks.faults import parse
-from mocks.gelsight_stream import MjpegServer
+from mocks.lab_cameras import Seen, stream
 from mocks.lab_processes import CAMERA_PORT, GEL_PORT, Child, Line, free_address, keep_time
 from mocks.lab_scene import read_lab_scene
 from mocks.shared_pose import Mark, SharedPose
@@ -59,33 +59,6 @@ TOOL_OUTPUTS = 16
 
 _GEL, _CAMERA = 0, 1
 _ORPHAN_CHECK = 0.5
-
-
-class Seen:
-    """A camera's view of the world at the arm's present pose, step and sample."""
-
-    def __init__(
-        self, shared: SharedPose, viewer: int, look: Callable[[FloatArray, int, int], ByteArray]
-    ) -> None:
-        self._shared = shared
-        self._viewer = viewer
-        self._look = look
-        self._pose = shared.base_from_flange
-        self._mark = shared.mark
-
-    def state(self) -> Hashable:
-        """Pose, step and sample."""
-        self._mark = self._shared.mark
-        self._pose = self._shared.base_from_flange
-        return self._pose.tobytes(), self._mark.step, self._mark.sample
-
-    def picture(self) -> ByteArray:
-        """What the world shows there."""
-        return self._look(self._pose, self._mark.step, self._mark.sample)
-
-    def sent(self) -> None:
-        """Tell the lab which mark has been shown."""
-        self._shared.set_shown(self._viewer, self._mark.number)
 
 
 class Lab:
@@ -117,11 +90,11 @@ class Lab:
         self._has_camera = camera
         self._children = {"arm": Child("arm", lambda line: controller(address, line))}
         gel = Seen(shared, _GEL, world.tactile_image)
-        self._children["gel"] = Child("gel", lambda line: _stream(address, GEL_PORT, gel, GEL_RATE, line))
+        self._children["gel"] = Child("gel", lambda line: stream(address, GEL_PORT, gel, GEL_RATE, line))
         if camera:
             seen = Seen(shared, _CAMERA, lambda pose, _step, _sample: world.scene_image(pose))
             self._children["camera"] = Child(
-                "camera", lambda line: _stream(address, CAMERA_PORT, seen, CAMERA_RATE, line)
+                "camera", lambda line: stream(address, CAMERA_PORT, seen, CAMERA_RATE, line)
             )
         self._hammer_port: str | None = None
         if strikes is not None:
@@ -185,19 +158,6 @@ class Lab:
             raise WrongUse(f"this bench has no {fault.instrument}")
         self._children[fault.instrument].cue(fault)
         return dict(cue)
-
-
-def _stream(address: str, port: int, view: Seen, rate: float, line: Line) -> None:
-    server = MjpegServer(address, port, view, rate)
-    line.ready()
-
-    def should_stop() -> bool:
-        fault = line.fault()
-        if fault is not None:
-            server.fault.set(fault)
-        return line.should_stop()
-
-    server.serve(should_stop)
 
 
 def _lines(descriptor: int, orphaned: Callable[[], bool]) -> Iterator[str]:
