@@ -24,6 +24,7 @@ from experiments.contact_localization.posterior import (
     settled,
 )
 from experiments.contact_localization.search import Search
+from experiments.contact_localization.sound_gate import distinct_strikes, refuse_strange_sound
 from harness.acquisition import Strike
 from harness.arrays import FloatArray, read_only
 from harness.errors import WrongUse
@@ -135,6 +136,7 @@ def locate(
 ) -> tuple[Estimate, ...]:
     """As ``each_estimate``, from height maps already recovered and strikes as they were captured."""
     search = Search(contacts, model, prior, levels.spacing, noise)
+    strikes = distinct_strikes([contact.base_from_gel for contact in contacts[: len(strikes)]], strikes)
     count = len(contacts)
     answers = []
     for k in range(count if first is None else first, count + 1):
@@ -146,6 +148,8 @@ def locate(
         if heard is not None:
             lap(seconds, "sounds", start)
         found = solve_run(search, k, levels, seed, seconds, heard)
+        if k == count and levels.senses == "audio" and heard is not None:
+            refuse_strange_sound(search, found.hypotheses, heard, k)
         # The paper's filter has no measure of fit to be refused by.
         if k == count and levels.method == "grid" and found.pictured:
             refuse_bad_fit(search, found.members, found.fits)

@@ -19,6 +19,7 @@ from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.planning import RunPlan, plan_run, twin_of, way_between
 from experiments.contact_localization.report_of import report_of
 from experiments.contact_localization.result import Scored, result_of
+from experiments.contact_localization.sound_gate import doubts_of_sound
 from experiments.contact_localization.strike import Ask, by_hand, somebody
 from experiments.contact_localization.trade import trade
 from experiments.contact_localization.truth import read_truth
@@ -174,10 +175,12 @@ def _trade(scored: Scored) -> Any:
 
 
 def _doubts(found: Answer) -> tuple[str, ...]:
+    of_sound = doubts_of_sound(found.observations)
     if len(found.last.modes) < 2:
-        return ()
+        return of_sound
     shares = ", ".join(f"{100 * mode.weight:.0f} %" for mode in found.last.modes)
     return (
+        *of_sound,
         f"the answer is ambiguous: {len(found.last.modes)} places stay likely ({shares}); "
         "one more contact elsewhere on the object would tell them apart",
     )

@@ -1,0 +1,200 @@
+"""Which strikes speak for themselves, and whether places and sounds alone can be of this object."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.heard import Heard
+from experiments.contact_localization.hypotheses import Hypotheses
+from experiments.contact_localization.likelihood import arrange, geometry_scores
+from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.search import SAME_AXIS, SAME_PLACE, Search
+from experiments.contact_localization.sound_analysis import analyse
+from experiments.contact_localization.sound_places import strike_places
+from harness.acquisition import Strike
+from harness.arrays import FloatArray
+from harness.errors import FitRefused
+
+UNEXPLAINED = 0.3
+"""Share of the resonances heard that no mode explains, beyond which the sound is another object's.
+Calibration runs: 0 to 0.25 on the right object, 0.17 to 1 on others."""
+
+REFUSE_BELOW = -3.0
+"""Nats of places and sound at the best hypothesis, where the sound is another object's."""
+
+REFUSE_UNHEARD_BELOW = -8.0
+"""The same where nothing was heard. Calibration runs: places and yaw at least -5.7 on the right object."""
+
+REFUSE_SOUNDING_BELOW = -20.0
+"""The same where the sound is the object's. Calibration runs: at least 3.3 on the right object."""
+
+_FEWEST = 2
+
+
+@dataclass(frozen=True, eq=False)
+class SoundFit:
+    """How contacts fit the best hypothesis without their images.
+
+    Attributes:
+        places: ``(contacts,)`` nats of each contact's place and tool axis, 0 at best.
+        yaw: nats of the object's yaw, 0 at best.
+        sound: nats over a sound that says nothing.
+        resonances: how many were heard.
+        unexplained: how many of them no mode explains.
+    """
+
+    places: FloatArray
+    yaw: float
+    sound: float
+    resonances: int
+    unexplained: int
+
+    @property
+    def total(self) -> float:
+        """Nats, 0 for contacts that lie on the object and were not heard."""
+        return float(self.places.sum()) + self.yaw + self.sound
+
+    @property
+    def limit(self) -> float:
+        """The least ``total`` that is not refused."""
+        if self.resonances == 0:
+            return REFUSE_UNHEARD_BELOW
+        strange = self.unexplained > UNEXPLAINED * self.resonances
+        return REFUSE_BELOW if strange else REFUSE_SOUNDING_BELOW
+
+
+def fit_by_sound(search: Search, hypotheses: Hypotheses, heard: Heard, count: int) -> SoundFit:
+    """The fit of the most probable hypothesis.
+
+    Args:
+        search: the run.
+        hypotheses: of ``by_sound`` with the first contact as the anchor.
+        heard: the run's strikes.
+        count: contacts that count.
+    """
+    top = int(np.argmax(hypotheses.log_weights))
+    gels, yaws = hypotheses.gels[top : top + 1], hypotheses.yaws[top : top + 1]
+    best = Hypotheses(gels, yaws, np.zeros(1))
+    points, directions = strike_places(search, heard.struck, gels, yaws)
+    rows = heard.term.mode_table(points[0], directions[0])
+    return SoundFit(
+        places=_places(search, best, count),
+        yaw=float(search.log_yaw_prior(yaws)[0]),
+        sound=float(heard.nats(search, gels, yaws)[0]),
+        resonances=len(rows),
+        unexplained=sum(not row.modes for row in rows),
+    )
+
+
+def refuse_strange_sound(search: Search, hypotheses: Hypotheses, heard: Heard, count: int) -> None:
+    """Raise where neither the places of the contacts nor their sounds can be of this object.
+
+    Places that fit badly are forgiven where the resonances are the object's; resonances that are not
+    are forgiven where the places fit, since frequencies depend on walls and materials too.
+
+    Raises:
+        FitRefused: naming the worst contact.
+    """
+    fit = fit_by_sound(search, hypotheses, heard, count)
+    if fit.total >= fit.limit:
+        return
+    worst = int(np.argmin(fit.places))
+    raise FitRefused(
+        f"what was struck does not fit this object: the best place explains it with {fit.total:.1f} nats "
+        f"(limit {fit.limit:g}), and {_of_resonances(fit)}; contact {worst + 1} is the worst, its place fits "
+        f"with {fit.places[worst]:.1f}. Check that it is this object, its units, its wall and its material"
+    )
+
+
+def _of_resonances(fit: SoundFit) -> str:
+    if fit.resonances == 0:
+        return "nothing was heard that speaks for it"
+    return f"no mode explains {fit.unexplained} of the {fit.resonances} resonances heard"
+
+
+def distinct_strikes(
+    base_from_gels: Sequence[FloatArray], strikes: Sequence[Strike | None]
+) -> list[Strike | None]:
+    """The strikes, with None for every one that repeats an earlier one's place.
+
+    What the model does not know of a place is the same in every strike there: however often one place
+    is struck, it is one witness, and by itself says nothing.
+
+    Args:
+        base_from_gels: ``(4, 4)`` each, of the contacts.
+        strikes: of the same contacts.
+    """
+    repeated = _repeated(base_from_gels, strikes)
+    return [None if k in repeated else strike for k, strike in enumerate(strikes)]
+
+
+def doubts_of_sound(observations: Sequence[Observation]) -> tuple[str, ...]:
+    """What a reader must know of a run's strikes; empty where all count, or none was meant to be made."""
+    strikes = [observation.strike for observation in observations]
+    if all(strike is None for strike in strikes):
+        return ()
+    poses = [observation.base_from_gel for observation in observations]
+    distinct = distinct_strikes(poses, strikes)
+    evidence = analyse([strike for strike in distinct if strike is not None])
+    reasons = iter(evidence.reasons)
+    repeated = _repeated(poses, strikes)
+    said = [
+        next(reasons) if strike is not None else _missing(repeated, k) for k, strike in enumerate(distinct)
+    ]
+    left_out = ", ".join(f"contact {k + 1} ({reason})" for k, reason in enumerate(said) if reason)
+    why = f"; left out: {left_out}" if left_out else ""
+    usable = int(evidence.used.sum())
+    if usable < _FEWEST:
+        found = f"{usable} of {len(strikes)} strikes could be used and {_FEWEST} are needed"
+    elif not evidence.peaks:
+        found = "no resonance stood out of the noise in two strikes"
+    else:
+        return (f"{len(strikes) - usable} of {len(strikes)} strikes were not used{why}",) if why else ()
+    return (f"sound says nothing: {found}{why}; the answer by sound is by the places of the contacts alone",)
+
+
+def _missing(repeated: Mapping[int, int], contact: int) -> str:
+    earlier = repeated.get(contact)
+    return "not struck" if earlier is None else f"struck where contact {earlier + 1} was"
+
+
+def _repeated(base_from_gels: Sequence[FloatArray], strikes: Sequence[Strike | None]) -> dict[int, int]:
+    """Contacts whose strike repeats that of an earlier contact, which can be used itself."""
+    repeated: dict[int, int] = {}
+    counting: list[int] = []
+    for k, strike in enumerate(strikes):
+        if strike is None or strike.silent or strike.overload or strike.double_hit:
+            continue
+        earlier = [j for j in counting if _same(base_from_gels[j], base_from_gels[k])]
+        if earlier:
+            repeated[k] = earlier[0]
+        else:
+            counting.append(k)
+    return repeated
+
+
+def _same(one: FloatArray, other: FloatArray) -> bool:
+    near = float(np.linalg.norm(one[:3, 3] - other[:3, 3])) < SAME_PLACE
+    return near and float(one[:3, 2] @ other[:3, 2]) > float(np.cos(SAME_AXIS))
+
+
+def _places(search: Search, best: Hypotheses, count: int) -> FloatArray:
+    """``(contacts,)`` nats of every contact's place and axis at one hypothesis."""
+    noise = search.noise.geometry
+    rotations = search.prior.object_from_base(best.yaws)
+    indentations = np.array([contact.indentation for contact in search.contacts[:count]])
+    points = search.positions[:count] - indentations[:, None] * search.axes[:count]
+    anchor = np.asarray(search.surface.tree.query(search.contact_places(0, best))[1], dtype=np.int64)
+    zero = np.zeros(1, dtype=np.int64)
+
+    def score(members: list[int]) -> float:
+        arrangement = arrange(rotations, points[members], search.axes[members], 0)
+        return float(
+            geometry_scores(
+                search.surface, arrangement, anchor, zero, np.zeros(1), noise, use_axis=True, within=np.inf
+            )[0]
+        )
+
+    first = score([0])
+    return np.array([first, *(score([0, k]) - first for k in range(1, count))])

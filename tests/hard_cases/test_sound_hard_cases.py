@@ -1,0 +1,259 @@
+"""Strikes that failed are left out and said so; an object that sounds like another one is refused."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.contact_localization.answer import observe_step
+from experiments.contact_localization.estimate import Estimate, estimate
+from experiments.contact_localization.experiment import ContactLocalization
+from experiments.contact_localization.levels import Levels, Senses
+from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.model_of import model_of_scene
+from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.planning import RunPlan, plan_run, way_between
+from experiments.contact_localization.sound_gate import doubts_of_sound
+from harness.acquisition import Strike
+from harness.arrays import FloatArray
+from harness.errors import DataRefused, FitRefused
+from harness.gap import gap_path
+from harness.run_folder import station_acquisition, station_calibration
+from harness.scene import SceneFile, scene_from_json
+from harness.sim.scene_object import known_object
+from harness.station import RunContext
+from harness.station_file import Station, load_station, station_path
+from harness.step_file import Step, StepRecord
+from mocks.in_process import in_process_bench
+
+pytestmark = pytest.mark.timeout(300, func_only=True)  # on a cold machine the modes are computed first
+
+SEED, CONTACTS = 1, 6
+
+HARMED = {"silent": 1, "saturated": 2, "double": 3}
+"""Contact, from 0, at which a strike of the harmed bench fails, by how."""
+
+HEARD: tuple[Senses, ...] = ("audio", "both")
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run of the mug with the default gap.
+
+    Attributes:
+        good: its contacts.
+        harmed: the first four of them again, three of the strikes having failed.
+        model: of the mug.
+        prior: its yaw known.
+        true: ``(3,)`` metres, the last contact.
+    """
+
+    good: tuple[Observation, ...]
+    harmed: tuple[Observation, ...]
+    model: Model
+    prior: Prior
+    true: FloatArray
+
+    def error(self, found: Estimate) -> float:
+        """Metres."""
+        return float(np.linalg.norm(found.position_in_object - self.true))
+
+
+def scene_of(name: str) -> SceneFile:
+    tree = {
+        "schema": 1,
+        "object": {"mesh": f"builtin:{name}", "material": "ceramic"},
+        "sensors": {"sound": True},
+        "localization": {"contacts": CONTACTS, "spacing": "close"},
+    }
+    return scene_from_json(tree, "the test")
+
+
+def performed(
+    scene: SceneFile, station: Station, plan: RunPlan, truth: Path, gap: str, steps: int
+) -> tuple[Observation, ...]:
+    """The first contacts of a plan, on the bench in process."""
+    mesh, acquisition = known_object(scene).mesh, station_acquisition(scene, station)
+    experiment = ContactLocalization(lambda start, end: way_between(plan.bench, start, end))
+    bench = in_process_bench(scene, station, RunContext(truth, mesh, SEED, gap))
+    observations = []
+    for index, parameters in enumerate(plan.parameters()[:steps]):
+        step = Step(index, "press", parameters)
+        readings = {reading.channel.name: reading for reading in experiment.perform(step, bench)}
+        record = StepRecord(step, readings, 0.0)
+        observations.append(observe_step(record, station.flange_from_gel, acquisition))
+    return tuple(observations)
+
+
+def model_of(name: str, station: Station) -> Model:
+    scene = scene_of(name)
+    return model_of_scene(scene, station, known_object(scene).mesh, station_calibration(station))
+
+
+@pytest.fixture(scope="module")
+def station() -> Station:
+    return load_station(station_path("mock"))
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Run:
+    folder, scene = tmp_path_factory.mktemp("struck"), scene_of("mug")
+    failing = gap_path("default").read_text() + "".join(
+        f"{how}_strikes = [{contact}]\n" for how, contact in HARMED.items()
+    )
+    (folder / "failing.toml").write_text(failing)
+    mesh = known_object(scene).mesh
+    plan = plan_run(scene, station, mesh, SEED)
+    good = performed(scene, station, plan, folder / "good.json", "default", CONTACTS)
+    harmed = performed(scene, station, plan, folder / "harmed.json", str(folder / "failing.toml"), 4)
+    contacts = json.loads((folder / "good.json").read_text())["contacts"]
+    prior = Prior(scene.base_from_object(mesh)[:3, :3])
+    return Run(good, harmed, model_of("mug", station), prior, np.array(contacts[-1]["point_in_object_m"]))
+
+
+@pytest.fixture(scope="module")
+def whole(run: Run) -> dict[Senses, Estimate]:
+    """The answers to the run as it went."""
+    return {senses: by(senses, run.good, run) for senses in HEARD}
+
+
+def by(senses: Senses, observations: Sequence[Observation], run: Run, model: Model | None = None) -> Estimate:
+    return estimate(observations, model or run.model, run.prior, Levels(senses=senses), seed=SEED)
+
+
+def with_strikes(run: Run, change: Callable[[int, Strike], Strike | None]) -> tuple[Observation, ...]:
+    """The run with some of its strikes changed, or taken away."""
+    return tuple(replace(one, strike=change(k, strike_of(one))) for k, one in enumerate(run.good))
+
+
+def strike_of(observation: Observation) -> Strike:
+    assert observation.strike is not None
+    return observation.strike
+
+
+def silenced(_: int, strike: Strike) -> Strike:
+    """What the box reads of a striker that reaches nothing: its own noise."""
+    noise = np.random.default_rng(3).standard_normal((2, len(strike.force)))
+    before = slice(0, strike.onset // 2)
+    force, pressure = strike.force[before].std() * noise[0], strike.pressure[before].std() * noise[1]
+    return replace(strike, force=force, pressure=pressure, onset=0, silent=True)
+
+
+def test_the_run_itself_is_answered(run: Run, whole: dict[Senses, Estimate]) -> None:
+    assert run.error(whole["both"]) < 4e-3
+    assert run.error(whole["audio"]) < 10e-3
+    assert doubts_of_sound(run.good) == ()
+
+
+@pytest.mark.parametrize(
+    ("how", "reason"),
+    [("silent", "no strike came"), ("saturated", "overloaded"), ("double", "hit twice")],
+)
+def test_a_strike_that_failed_is_left_out_and_said(
+    how: str, reason: str, run: Run, whole: dict[Senses, Estimate]
+) -> None:
+    contact = HARMED[how]
+    observations = (*run.good[:contact], run.harmed[contact], *run.good[contact + 1 :])
+    strike = strike_of(run.harmed[contact])
+    assert (strike.silent, strike.overload, strike.double_hit) == tuple(how == one for one in HARMED)
+    (doubt,) = doubts_of_sound(observations)
+    assert f"contact {contact + 1}" in doubt
+    assert reason in doubt
+    both = by("both", observations, run)
+    assert np.linalg.norm(both.position_in_object - whole["both"].position_in_object) < 3e-3
+    alone = by("audio", observations, run)
+    assert alone.region.contains(run.true) or run.error(alone) < 2.0 * alone.credible90
+
+
+def test_a_strike_that_was_never_made_is_left_out_and_said(run: Run, whole: dict[Senses, Estimate]) -> None:
+    observations = with_strikes(run, lambda k, strike: None if k == 2 else strike)
+    (doubt,) = doubts_of_sound(observations)
+    assert "contact 3 (not struck)" in doubt
+    both = by("both", observations, run)
+    assert np.linalg.norm(both.position_in_object - whole["both"].position_in_object) < 3e-3
+
+
+def test_strikes_that_are_all_silent_say_nothing(run: Run, whole: dict[Senses, Estimate]) -> None:
+    observations = with_strikes(run, silenced)
+    (doubt,) = doubts_of_sound(observations)
+    assert doubt.startswith("sound says nothing: 0 of 6 strikes could be used")
+    alone = by("audio", observations, run)
+    assert alone.region.contains(run.true)
+    assert alone.credible90 > 2.0 * whole["audio"].credible90, "the places alone say less"
+    touched = by("touch", observations, run)
+    np.testing.assert_array_equal(
+        by("both", observations, run).position_in_object, touched.position_in_object
+    )
+
+
+def test_one_strike_alone_says_nothing(run: Run) -> None:
+    observations = with_strikes(run, lambda k, strike: strike if k == 0 else silenced(k, strike))
+    (doubt,) = doubts_of_sound(observations)
+    assert doubt.startswith("sound says nothing: 1 of 6 strikes could be used and 2 are needed")
+    assert by("audio", observations, run).region.contains(run.true)
+
+
+def test_noise_in_place_of_sound_says_nothing(run: Run, whole: dict[Senses, Estimate]) -> None:
+    random = np.random.default_rng(5)
+
+    def noisy(_: int, strike: Strike) -> Strike:
+        return replace(strike, pressure=strike.pressure.std() * random.standard_normal(len(strike.pressure)))
+
+    observations = with_strikes(run, noisy)
+    alone = by("audio", observations, run)
+    assert alone.region.contains(run.true)
+    assert alone.credible90 > whole["audio"].credible90
+    both = by("both", observations, run)
+    assert np.linalg.norm(both.position_in_object - whole["both"].position_in_object) < 3e-3
+
+
+@pytest.mark.parametrize("senses", HEARD)
+def test_another_object_is_refused(senses: Senses, run: Run, station: Station) -> None:
+    with pytest.raises(FitRefused, match=r"contact \d"):
+        by(senses, run.good, run, model_of("bowl", station))
+
+
+def test_another_object_of_which_nothing_is_heard_is_refused(run: Run, station: Station) -> None:
+    with pytest.raises(FitRefused, match="does not fit this object"):
+        by("audio", with_strikes(run, silenced), run, model_of("bowl", station))
+
+
+def test_contacts_all_at_one_place_are_one_witness(run: Run) -> None:
+    """Touch alone may still know the place; sound then adds nothing and says so."""
+    observations = [run.good[-1]] * CONTACTS
+    (doubt,) = doubts_of_sound(observations)
+    assert doubt.startswith("sound says nothing: 1 of 6 strikes could be used")
+    assert "contact 2 (struck where contact 1 was)" in doubt
+    alone = by("audio", observations, run)
+    assert alone.region.contains(run.true)
+    assert alone.credible90 > 20e-3
+    both, touched = by("both", observations, run), by("touch", observations, run)
+    np.testing.assert_array_equal(both.position_in_object, touched.position_in_object)
+    assert both.region.contains(run.true)
+
+
+@pytest.mark.parametrize("channel", ["force", "pressure"])
+@pytest.mark.parametrize("senses", HEARD)
+def test_a_signal_that_is_not_finite_is_refused(senses: Senses, channel: str, run: Run) -> None:
+    def spoiled(k: int, strike: Strike) -> Strike:
+        if k != 1:
+            return strike
+        force, pressure = strike.force.copy(), strike.pressure.copy()
+        (force if channel == "force" else pressure)[strike.onset + 5] = np.nan
+        return replace(strike, force=force, pressure=pressure)
+
+    with pytest.raises(DataRefused, match="not finite"):
+        by(senses, with_strikes(run, spoiled), run)
+
+
+@pytest.mark.parametrize("senses", HEARD)
+def test_the_gain_of_the_microphone_does_not_matter(
+    senses: Senses, run: Run, whole: dict[Senses, Estimate]
+) -> None:
+    louder = with_strikes(run, lambda _, strike: replace(strike, pressure=1000.0 * strike.pressure))
+    found = by(senses, louder, run)
+    np.testing.assert_allclose(found.position_in_object, whole[senses].position_in_object, atol=1e-6)
+    assert found.credible90 == pytest.approx(whole[senses].credible90, rel=1e-6)
