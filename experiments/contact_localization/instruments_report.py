@@ -4,7 +4,7 @@ import datetime as dt
 from collections.abc import Mapping
 
 from harness.acquisition import AcquisitionCalibration
-from harness.acquisition_channels import FORCE, PRESSURE
+from harness.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
 from harness.device import Health
 from harness.reading import Reading
 from harness.report.data import Artefact, Instrument
@@ -63,7 +63,9 @@ def nominal_rates(station: Station) -> dict[str, float]:
 
 
 def samples(reading: Reading) -> int:
-    """How many samples a reading holds: of force and pressure each count of its blocks is one."""
+    """How many samples a reading holds: each count of a block is one, a remark on a capture is none."""
+    if reading.channel.name in (CLOCK, FLAGS):
+        return 0
     return int(reading.values.size) if reading.channel.name in _IN_BLOCKS else len(reading.times)
 
 

@@ -27,12 +27,6 @@ from harness.report.props import arm_parts, object_part, sensor_parts, table_and
 from harness.report.values import Missing
 from harness.run_folder import RunFiles
 
-FOR_SOUND = {
-    "object.solid": "object.modes needs it",
-    "object.modes": "the estimate by sound needs it",
-}
-"""Effects that the estimate by sound evaluates itself, and why."""
-
 NO_TRUTH = Missing("the truth is not known: this is not a mocked run, or its truth was taken away")
 
 
@@ -187,18 +181,7 @@ def _effects(scored: Scored) -> tuple[EffectRun, ...]:
         )
         for step in plan.ran
     ]
-    skipped = [EffectRun(step.effect.provides, False, step.reason) for step in plan.skipped]
-    return tuple(_by_the_estimate(scored, one) for one in (*ran, *skipped))
-
-
-def _by_the_estimate(scored: Scored, effect: EffectRun) -> EffectRun:
-    """An effect that the comparison had no use for, and the estimate by sound had."""
-    modes = scored.found.model.modes
-    if effect.ran or effect.name not in FOR_SOUND or modes is None:
-        return effect
-    stages = [stage for stage in modes.seconds if (stage == "tetrahedra") == (effect.name == "object.solid")]
-    took = sum(modes.seconds[stage] for stage in stages)
-    return EffectRun(effect.name, True, f"{FOR_SOUND[effect.name]}; took {took:.1f} s once, and is kept")
+    return (*ran, *(EffectRun(step.effect.provides, False, step.reason) for step in plan.skipped))
 
 
 def _world(scored: Scored) -> dict[str, str] | Missing:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
-from experiments.contact_localization.surface import Surface
+from experiments.contact_localization.sound_analysis import Analysis
 from harness.acquisition import Strike
 from harness.arrays import FloatArray, read_only
 from harness.materials import Material
@@ -87,22 +87,9 @@ def sound_pair(
     """
     frequencies = factor * modes.frequencies
     amplitudes = modes.gains(point[None], direction[None]) * radiation(modes, _DISTANCE)
-    force = strike.force[strike.onset :]
+    # What the cell says after the blow is its own noise, which would ring the modes for ever.
+    force = strike.force[strike.onset :].copy()
+    force[round(Analysis().pulse * strike.rate) :] = 0.0
     rung = ring(frequencies, dampings(frequencies, material), amplitudes, force[None], strike.rate)[0]
     recorded = spectrogram(strike.pressure[strike.onset :], strike.rate)
     return SoundPair(recorded, spectrogram(rung, strike.rate))
-
-
-def share_of_samples(points: FloatArray, weights: FloatArray, surface: Surface) -> FloatArray:
-    """``(samples,)``: how much of a posterior lies nearest to each sample, summing to 1.
-
-    One such array a sense (by touch, by sound, by both) is the picture of what each contributed.
-
-    Args:
-        points: ``(n, 3)`` metres, places of one contact under the hypotheses.
-        weights: ``(n,)``.
-        surface: whose samples.
-    """
-    nearest = np.asarray(surface.tree.query(points)[1])
-    shares = np.bincount(nearest, weights=weights, minlength=len(surface.points))
-    return read_only(shares / shares.sum())

@@ -13,13 +13,15 @@ from harness.report.charts import error_chart
 from harness.report.data import Answer, Contact, Curve, ReportData
 from harness.report.figures import Album, Picture
 from harness.report.pictures import (
+    Sides,
     bench_figure,
+    close_up,
     contacts_figure,
     object_sides,
     posterior_figure,
     posterior_strip,
 )
-from harness.report.sound_data import PeakLine
+from harness.report.sound_data import PeakLine, Sound
 from harness.report.sound_figures import senses_figure, spectrogram_pair
 from harness.report.tiles import DIFFERENCE_GAIN, difference, height_picture, png, root_mean_square
 from harness.report.values import Missing, Posterior
@@ -28,6 +30,7 @@ PAGE = "report.html"
 """Name of the page in a report's folder."""
 
 _SIDE_PIXELS = 460
+_LEAST_ACROSS = 0.03
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,7 @@ def write_report(data: ReportData, folder: Path) -> Path:
 
 def _content(data: ReportData, album: Album) -> dict[str, Any]:
     bench = data.bench
+    sides = object_sides(data.mesh, _towards(data), _SIDE_PIXELS) if _is_drawn(data) else None
     return {
         "data": data,
         "say": wording,
@@ -71,8 +75,8 @@ def _content(data: ReportData, album: Album) -> dict[str, Any]:
         "headline": wording.headline(data),
         "cards": wording.cards(data.answer) if isinstance(data.answer, Answer) else [],
         "bench": bench if isinstance(bench, Missing) else album.photograph("bench", bench_figure(bench)),
-        **_on_the_object(data, album),
-        **_sound(data, album),
+        **_on_the_object(data, album, sides),
+        **_sound(data, album, sides),
         "tiles": {contact.number: _tiles(contact, album) for contact in data.contacts},
         "fits": {contact.number: _fit(contact) for contact in data.contacts},
         "gain": f"{DIFFERENCE_GAIN:g}",
@@ -81,8 +85,19 @@ def _content(data: ReportData, album: Album) -> dict[str, Any]:
     }
 
 
-def _on_the_object(data: ReportData, album: Album) -> dict[str, Any]:
-    """Contacts and posteriors on the object; it is only drawn if there is one of them."""
+def _is_drawn(data: ReportData) -> bool:
+    """Whether the object is: if a contact was located or posed, or a sense has something to show."""
+    shown = [
+        one
+        for contact in data.contacts
+        for one in (contact.posterior, contact.object_from_gel)
+        if not isinstance(one, Missing)
+    ]
+    return bool(shown) or not isinstance(data.sound, Missing)
+
+
+def _on_the_object(data: ReportData, album: Album, sides: Sides | None) -> dict[str, Any]:
+    """Contacts and posteriors on the object."""
     located = [contact for contact in data.contacts if isinstance(contact.posterior, Posterior)]
     posed = any(not isinstance(contact.object_from_gel, Missing) for contact in data.contacts)
     shown: dict[str, Any] = {
@@ -91,9 +106,8 @@ def _on_the_object(data: ReportData, album: Album) -> dict[str, Any]:
         "last": Missing("no contact has a posterior"),
         "last_contact": located[-1] if located else None,
     }
-    if not (located or posed):
+    if sides is None:
         return shown
-    sides = object_sides(data.mesh, _towards(data), _SIDE_PIXELS)
     if posed:
         shown["contacts_picture"] = album.photograph("contacts", contacts_figure(sides, data.contacts))
     if located:
@@ -102,18 +116,20 @@ def _on_the_object(data: ReportData, album: Album) -> dict[str, Any]:
     return shown
 
 
-def _sound(data: ReportData, album: Album) -> dict[str, Any]:
+def _sound(data: ReportData, album: Album, sides: Sides | None) -> dict[str, Any]:
     """Each sense on the object, and a strike beside the model's."""
     sound = data.sound
-    if isinstance(sound, Missing):
-        return {"senses": sound, "spectrograms": sound, "bars": []}
+    if isinstance(sound, Missing) or sides is None:
+        return {}
     pair = sound.pair
     truth = data.contacts[-1].truth if data.contacts else None
-    sides = object_sides(data.mesh, _towards(data), _SIDE_PIXELS)
+    across = _across(data, sound)
+    near = close_up(data.mesh, _towards(data), _to_the_tool(data), across, _SIDE_PIXELS)
     believed = {wording.SENSES[sense.name]: sense.posterior for sense in sound.senses}
     return {
         "bars": _bars(sound.peaks),
-        "senses": album.photograph("senses", senses_figure(sides, believed, truth)),
+        "across": across,
+        "senses": album.photograph("senses", senses_figure((*sides.shots, near), believed, truth)),
         "spectrograms": pair
         if isinstance(pair, Missing)
         else album.photograph(
@@ -121,6 +137,22 @@ def _sound(data: ReportData, album: Album) -> dict[str, Any]:
             spectrogram_pair(pair.times, pair.frequencies, pair.recorded, pair.simulated),
         ),
     }
+
+
+def _across(data: ReportData, sound: Sound) -> float:
+    """Metres that a close-up shows: what every sense believes, or the object where that is less."""
+    found = [one.posterior for one in sound.senses if not isinstance(one.posterior, Missing)]
+    around = _towards(data)
+    reach = [one.credible90 + float(np.linalg.norm(one.estimate - around)) for one in found]
+    return min(max(_LEAST_ACROSS, 3.0 * max(reach, default=0.0)), data.mesh.diagonal)
+
+
+def _to_the_tool(data: ReportData) -> FloatArray:
+    """``(3,)`` from the last contact to where the tool came from; away from the middle where unknown."""
+    posed = data.contacts[-1].object_from_gel if data.contacts else Missing("there is no contact")
+    if isinstance(posed, Missing):
+        return _towards(data) - data.mesh.bounds.mean(axis=0)
+    return np.asarray(-posed[:3, 2])
 
 
 def _bars(peaks: tuple[PeakLine, ...] | Missing) -> list[float]:

@@ -18,6 +18,7 @@ from harness.report.style import ANSWER, DPI, HEAT, INK, TOOL, TRUTH, blank
 from harness.report.values import Missing, Posterior
 
 _ELEVATION = np.radians(28.0)
+_STEEPEST = np.radians(85.0)
 _KERNEL = 2.5e-3
 _PITCH = 1.25e-3
 _LIFT = 3e-3
@@ -50,6 +51,23 @@ def object_sides(mesh: Mesh, towards: FloatArray, pixels: int) -> Sides:
     cameras = [_framing(mesh, bearing + turn, pixels) for turn in (0.5, 0.5 + np.pi)]
     part = (Part(mesh, np.eye(4), CLAY),)
     return Sides((Shot(part, cameras[0]), Shot(part, cameras[1])), mesh.diagonal)
+
+
+def close_up(mesh: Mesh, place: FloatArray, away: FloatArray, width: float, pixels: int) -> Shot:
+    """A view of the object about a point of it.
+
+    Args:
+        mesh: metres, object frame.
+        place: ``(3,)`` metres, in the middle.
+        away: ``(3,)`` from the point to the eye, of any length but zero.
+        width: metres across the picture at the point.
+        pixels: rows and columns.
+    """
+    azimuth = float(np.arctan2(away[1], away[0]))
+    elevation = float(np.arctan2(away[2], np.hypot(away[0], away[1])))
+    # From straight above there would be no telling which way is up.
+    camera = look_at(place, azimuth, np.clip(elevation, -_STEEPEST, _STEEPEST), width, pixels, pixels)
+    return Shot((Part(mesh, np.eye(4), CLAY),), camera)
 
 
 def _framing(mesh: Mesh, azimuth: float, pixels: int) -> Camera:

@@ -1,13 +1,14 @@
 """Pictures of what was heard: a strike beside the model's, and each sense's posterior."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from harness.arrays import FloatArray
-from harness.report.pictures import Heat, Sides
+from harness.report.pictures import Heat
 from harness.report.shading import Shot
 from harness.report.style import ANSWER, INK, SOFT, TRUTH, blank, styled
 from harness.report.values import Missing, Posterior
@@ -17,6 +18,8 @@ FLOOR = -70.0
 
 _SPREAD = 30.0
 _LIFT = 3e-3
+_SENSE_WIDTH = 3.1
+_TITLES = 0.5
 
 
 def spectrogram_pair(
@@ -47,11 +50,12 @@ def spectrogram_pair(
         figure = blank(10.2, 3.5)
         figure.set_layout_engine("constrained")
         row = list(np.asarray(figure.subplots(1, 3, sharex=True, sharey=True)))
-        for axes, levels, title in ((row[0], heard, "recorded"), (row[1], rung, "simulated")):
-            _levels(axes, times, frequencies, levels, title, "magma", (FLOOR, 0.0))
-        _levels(
-            row[2], times, frequencies, heard - rung, "recorded - simulated", "RdBu_r", (-_SPREAD, _SPREAD)
-        )
+        _levels(row[0], times, frequencies, heard, "recorded", "magma", (FLOOR, 0.0))
+        last = _levels(row[1], times, frequencies, rung, "simulated", "magma", (FLOOR, 0.0))
+        figure.colorbar(last, ax=row[:2], label="dB", shrink=0.9, aspect=30)
+        both = "recorded - simulated"
+        apart = _levels(row[2], times, frequencies, heard - rung, both, "RdBu_r", (-_SPREAD, _SPREAD))
+        figure.colorbar(apart, ax=row[2], label="dB", shrink=0.9, aspect=30)
         row[0].set_ylabel("frequency in kHz")
         for axes in row:
             axes.set_xlabel("ms from the strike")
@@ -66,7 +70,7 @@ def _levels(
     title: str,
     colours: str,
     limits: tuple[float, float],
-) -> None:
+) -> QuadMesh:
     drawn = axes.pcolormesh(
         1e3 * times,
         1e-3 * frequencies,
@@ -78,32 +82,32 @@ def _levels(
         rasterized=True,
     )
     axes.set_title(title, fontsize=10)
-    assert axes.figure is not None
-    axes.figure.colorbar(drawn, ax=axes, label="dB", shrink=0.9)
+    return drawn
 
 
 def senses_figure(
-    sides: Sides, by_sense: Mapping[str, Posterior | Missing], truth: FloatArray | None = None
+    shots: Sequence[Shot], by_sense: Mapping[str, Posterior | Missing], truth: FloatArray | None = None
 ) -> Figure:
-    """Where each sense believes the contact to be, a column a sense, on the object from two sides.
+    """Where each sense believes the contact to be: a column a sense, a row a view of the object.
 
     Args:
-        sides: of `harness.report.pictures.object_sides`; fewer than 500 pixels do.
+        shots: square views of the object; fewer than 500 pixels do.
         by_sense: posteriors by the sense's name, in order; a sense that has none leaves the object bare.
         truth: ``(3,)`` metres, object frame.
 
     Raises:
-        ValueError: there is no sense.
+        ValueError: there is no sense, or no view.
     """
-    if not by_sense:
-        raise ValueError("a picture of the senses needs the posterior of one at least")
+    if not by_sense or not shots:
+        raise ValueError("a picture of the senses needs the posterior of one at least, and a view of it")
     with styled():
-        figure = blank(3.4 * len(by_sense), 7.1)
-        grid = np.asarray(figure.subplots(2, len(by_sense), squeeze=False))
-        figure.subplots_adjust(0.0, 0.0, 1.0, 0.925, 0.02, 0.02)
+        high = _SENSE_WIDTH * len(shots) + _TITLES
+        figure = blank(_SENSE_WIDTH * len(by_sense), high)
+        grid = np.asarray(figure.subplots(len(shots), len(by_sense), squeeze=False))
+        figure.subplots_adjust(0.0, 0.0, 1.0, 1.0 - _TITLES / high, 0.02, 0.02)
         for (sense, found), column in zip(by_sense.items(), grid.T, strict=True):
             _title(column[0], sense, found)
-            for axes, shot in zip(column, sides.shots, strict=True):
+            for axes, shot in zip(column, shots, strict=True):
                 _believed(axes, shot, found, truth)
     return figure
 
@@ -129,6 +133,6 @@ def _mark(axes: Axes, shot: Shot, place: FloatArray, marker: str, colour: str) -
     pixel = shot.camera.project(place[None])[0][0]
     strength = 0.25 if bool(shot.hidden(place[None], _LIFT)[0]) else 1.0
     axes.scatter(
-        float(pixel[0]), float(pixel[1]), s=90.0, marker=marker, c=colour,
+        float(pixel[0]), float(pixel[1]), s=70.0, marker=marker, c=colour,
         edgecolors="white", linewidths=1.1, alpha=strength, zorder=5,
     )  # fmt: skip

@@ -35,7 +35,9 @@ def duration(seconds: float | None) -> str:
 
 def rate(hertz: float | None) -> str:
     """A frequency with its unit, or a dash."""
-    return NONE if hertz is None else f"{hertz:.4g} Hz"
+    if hertz is None:
+        return NONE
+    return f"{hertz:.4g} Hz" if hertz < 1e4 else f"{hertz / 1e3:.5g} kHz"
 
 
 def place(position: FloatArray) -> str:
@@ -62,8 +64,8 @@ def headline(data: ReportData) -> str:
 
 def by_sense(sound: Sound) -> str:
     """How near each sense came, in one sentence."""
-    said = "; ".join(f"{SENSES[sense.name]}, {_nearness(sense)}" for sense in sound.senses)
-    return f"By {said}."
+    said = ", ".join(f"by {SENSES[sense.name]} {_nearness(sense)}" for sense in sound.senses)
+    return f"{said[:1].upper()}{said[1:]}."
 
 
 def _nearness(sense: SenseAnswer) -> str:
@@ -82,7 +84,8 @@ def heard(sound: Sound) -> str:
     if not isinstance(sound.peaks, Missing):
         matched = sum(bool(peak.modes) for peak in sound.peaks)
         said += f". {_count(len(sound.peaks), 'resonance')} in common, {matched} taken for modes"
-        said += f", and {sound.set_aside} more set aside as echoes or as more than one waveform"
+        if sound.set_aside:
+            said += f", and {sound.set_aside} more set aside as echoes or as more than one waveform"
         said += f". The object rings {100.0 * (sound.scale - 1.0):+.1f} % from its model"
     return said + "."
 

@@ -8,7 +8,7 @@ import pytest
 
 from experiments.contact_localization.instruments_report import artefacts, instruments, samples
 from harness.acquisition import shipped_acquisition
-from harness.acquisition_channels import BLOCK, FORCE, PRESSURE, block_channel
+from harness.acquisition_channels import BLOCK, FLAGS, FORCE, PRESSURE, block_channel
 from harness.device import Health
 from harness.reading import Channel, Reading
 from harness.report.values import Missing
@@ -48,6 +48,8 @@ def run(box: Any = BOX) -> RunFiles:
 def test_a_block_of_the_box_is_as_many_samples_as_it_holds() -> None:
     assert samples(reading(FORCE, 4)) == 4 * BLOCK
     assert samples(poses(70)) == 70
+    remark = Reading(Channel(FLAGS, "1", (5,), "float64"), np.zeros(1), np.zeros((1, 5)))
+    assert samples(remark) == 0
 
 
 def test_the_box_is_one_row_with_both_channels_and_its_nominal_rate() -> None:

@@ -12,7 +12,7 @@ from experiments.contact_localization.search import Search
 from experiments.contact_localization.sound_analysis import SoundEvidence, analyse
 from experiments.contact_localization.sound_gains import gain_table
 from experiments.contact_localization.sound_likelihood import SoundTerm
-from experiments.contact_localization.sound_pictures import share_of_samples, sound_pair, spectrogram
+from experiments.contact_localization.sound_pictures import sound_pair, spectrogram
 from experiments.contact_localization.sound_places import by_sound, sound_nats, strike_places
 from harness.arrays import FloatArray
 from harness.geometry import frame_facing, rotation_about, transform
@@ -122,13 +122,3 @@ def test_recorded_and_simulated_ring_at_the_same_frequencies() -> None:
         for top in tops:
             # A frame of 20 ms resolves 50 Hz.
             assert np.abs(MODES.frequencies - heard.frequencies[top]).min() < 60.0
-
-
-def test_a_posterior_over_samples_keeps_its_weight() -> None:
-    surface = TABLE.surface
-    rng = np.random.default_rng(6)
-    chosen = rng.choice(len(surface.points), 50, replace=False)
-    weights = rng.random(50)
-    shares = share_of_samples(surface.points[chosen], weights, surface)
-    assert shares.sum() == pytest.approx(1.0)
-    assert shares[chosen] == pytest.approx(weights / weights.sum())

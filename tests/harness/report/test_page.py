@@ -103,8 +103,8 @@ def test_the_headline_says_position_error_certainty_and_ambiguity(
 
 
 def test_the_headline_says_how_near_each_sense_came(page: Page) -> None:
-    assert "By touch, no answer; sound, 7.31 mm off (90 % within" in page.text
-    assert "touch and sound, 1.27 mm off" in page.text
+    assert "By touch no answer, by sound 7.31 mm off (90 % within" in page.text
+    assert "by touch and sound 1.27 mm off" in page.text
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from harness.arrays import AnyArray, FloatArray
 from harness.objects.household import build
 from harness.report.figures import Album
-from harness.report.pictures import object_sides
+from harness.report.pictures import close_up, object_sides
 from harness.report.sound_figures import senses_figure, spectrogram_pair
 from harness.report.values import Missing, Posterior
 
@@ -74,29 +74,46 @@ def test_each_sense_has_a_column_and_its_own_place() -> None:
         weights = np.exp(-0.5 * (np.linalg.norm(places - centre, axis=1) / width) ** 2)
         return Posterior(places, weights, centre, centre[None], np.ones(1), 2.1 * width)
 
+    shots = (
+        *object_sides(mesh, places[0], 120).shots,
+        close_up(mesh, places[0], np.array([0.2, 0.1, 1.0]), 0.04, 120),
+    )
     touch = about(places[0], 0.02)
     senses = {"touch": touch, "audio": about(places[1], 0.03), "both": about(places[0], 5e-3)}
-    figure = senses_figure(object_sides(mesh, places[0], 120), senses, truth=places[0])
-    assert len(figure.axes) == 6
+    figure = senses_figure(shots, senses, truth=places[0])
+    assert len(figure.axes) == 9
     titles = [axes.get_title() for axes in figure.axes]
     assert [title.split("\n")[0] for title in titles if title] == ["touch", "audio", "both"]
     assert "10.5 mm" in titles[2]
     assert ink(figure) > 0.1
     pictures = [np.asarray(axes.images[0].get_array()) for axes in figure.axes]
     assert not np.array_equal(pictures[0], pictures[1])
-    same = senses_figure(object_sides(mesh, places[0], 120), {"one": touch, "other": replace(touch)})
+    same = senses_figure(shots, {"one": touch, "other": replace(touch)})
     one, other = (np.asarray(axes.images[0].get_array()) for axes in same.axes[:2])
     assert np.array_equal(one, other)
 
 
+@pytest.mark.parametrize("away", [(0.0, 0.0, 1.0), (0.3, -0.2, 0.0), (0.0, 0.5, -0.4)])
+def test_a_close_up_has_its_place_in_the_middle_and_its_width_across(away: tuple[float, ...]) -> None:
+    mesh = build("mug")
+    place = mesh.vertices[7]
+    camera = close_up(mesh, place, np.array(away), 0.05, 100).camera
+    middle = camera.project(place[None])[0][0]
+    assert middle == pytest.approx([50.0, 50.0], abs=1.0)
+    aside = np.cross(np.array(away), [0.3, 0.4, 0.5])
+    aside *= 0.01 / np.linalg.norm(aside)
+    moved = camera.project((place + aside)[None])[0][0]
+    assert np.linalg.norm(moved - middle) == pytest.approx(20.0, abs=0.5)
+
+
 def test_a_sense_without_an_answer_leaves_the_object_bare() -> None:
     mesh = build("mug")
-    sides = object_sides(mesh, mesh.vertices[0], 80)
+    shots = object_sides(mesh, mesh.vertices[0], 80).shots
     place = mesh.vertices[0]
     found = Posterior(place[None], np.ones(1), place, place[None], np.ones(1), 3e-3)
-    figure = senses_figure(sides, {"touch": Missing("it is another object"), "sound": found})
+    figure = senses_figure(shots, {"touch": Missing("it is another object"), "sound": found})
     bare, heated = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
-    assert np.array_equal(bare, sides.shots[0].picture())
+    assert np.array_equal(bare, shots[0].picture())
     assert not np.array_equal(bare, heated)
     assert figure.axes[0].get_title() == "touch\nno answer"
     assert len(figure.axes[0].collections) == 0
@@ -105,4 +122,4 @@ def test_a_sense_without_an_answer_leaves_the_object_bare() -> None:
 def test_no_sense_is_no_picture() -> None:
     mesh = build("mug")
     with pytest.raises(ValueError, match="of one at least"):
-        senses_figure(object_sides(mesh, mesh.vertices[0], 40), {})
+        senses_figure(object_sides(mesh, mesh.vertices[0], 40).shots, {})
