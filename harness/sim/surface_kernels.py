@@ -5,6 +5,9 @@ import numpy as np
 from harness.arrays import FloatArray, IntArray
 from harness.sim.compiled import compiled
 
+_SEAM = 1e-9
+"""By which a triangle is larger for a ray, so that none slips through between two of them."""
+
 
 @compiled
 def nearest_on_triangle(point: FloatArray, corners: FloatArray, out: FloatArray) -> float:
@@ -133,11 +136,11 @@ def first_hits(origins: FloatArray, directions: FloatArray, corners: FloatArray)
                 continue
             sx, sy, sz = ox - ax, oy - ay, oz - az
             u = (sx * px + sy * py + sz * pz) / volume
-            if u < 0.0 or u > 1.0:
+            if u < -_SEAM or u > 1.0 + _SEAM:
                 continue
             qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
             v = (dx * qx + dy * qy + dz * qz) / volume
-            if v < 0.0 or u + v > 1.0:
+            if v < -_SEAM or u + v > 1.0 + _SEAM:
                 continue
             t = (e2x * qx + e2y * qy + e2z * qz) / volume
             if 0.0 < t < far[n]:

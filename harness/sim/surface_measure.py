@@ -7,8 +7,8 @@ from harness.mesh import Mesh
 from harness.sim.face_grid import build_face_grid
 from harness.sim.surface_kernels import column_crossings, first_hits, nearest_places
 
-_LINES = 96
-"""Vertical lines along each side: enough for a percent of a thin vessel's volume."""
+_LINES = 256
+"""Vertical lines along each side: enough for half a percent of a vessel's volume."""
 
 _ASKED = 800
 """Places whose wall is measured to know how thin a mesh is."""
@@ -21,7 +21,7 @@ def enclosed_volume(mesh: Mesh) -> float:
     """Cubic metres of the points that the surface winds around once or more.
 
     A signed volume counts overlapping bodies twice; this counts what is there. Integrated along
-    vertical lines, to about one percent.
+    vertical lines, to about half a percent.
     """
     low, high = mesh.bounds
     sides = np.array([_LINES, _LINES])
