@@ -44,8 +44,8 @@ def test_the_total_is_of_places_yaw_and_sound() -> None:
     [
         (0, 0, REFUSE_UNHEARD_BELOW),
         (10, 0, REFUSE_SOUNDING_BELOW),
-        (10, 3, REFUSE_SOUNDING_BELOW),
-        (10, 4, REFUSE_BELOW),
+        (8, 2, REFUSE_SOUNDING_BELOW),
+        (8, 3, REFUSE_BELOW),
         (1, 1, REFUSE_BELOW),
     ],
 )
