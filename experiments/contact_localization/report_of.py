@@ -25,6 +25,7 @@ from harness.report.data import (
 )
 from harness.report.props import arm_parts, object_part, sensor_parts, table_and_pedestal
 from harness.report.values import Missing
+from harness.report.wording import SENSES
 from harness.run_folder import RunFiles
 
 NO_TRUTH = Missing("the truth is not known: this is not a mocked run, or its truth was taken away")
@@ -142,7 +143,7 @@ def _by_contact(scored: Scored, geometry: tuple[float, ...] | None) -> tuple[Cur
         float(np.linalg.norm(estimate.position_in_object - point))
         for estimate, point in zip(scored.found.estimates, true, strict=True)
     )
-    curves = [Curve(scored.found.sense, counts, ours)]
+    curves = [Curve(SENSES[scored.found.sense], counts, ours)]
     if geometry is not None:
         curves.append(Curve("translations alone, no image", counts, geometry))
     return tuple(curves)

@@ -151,7 +151,7 @@ def _to_the_tool(data: ReportData) -> FloatArray:
     """``(3,)`` from the last contact to where the tool came from; away from the middle where unknown."""
     posed = data.contacts[-1].object_from_gel if data.contacts else Missing("there is no contact")
     if isinstance(posed, Missing):
-        return _towards(data) - data.mesh.bounds.mean(axis=0)
+        return np.asarray(_towards(data) - data.mesh.bounds.mean(axis=0))
     return np.asarray(-posed[:3, 2])
 
 

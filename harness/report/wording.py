@@ -83,10 +83,11 @@ def heard(sound: Sound) -> str:
         said += f"; together they excite {sound.band[0] / 1e3:.1f} to {sound.band[1] / 1e3:.1f} kHz"
     if not isinstance(sound.peaks, Missing):
         matched = sum(bool(peak.modes) for peak in sound.peaks)
-        said += f". {_count(len(sound.peaks), 'resonance')} in common, {matched} taken for modes"
+        said += f". {_count(len(sound.peaks), 'resonance')} in common, {matched} of them taken for modes"
         if sound.set_aside:
             said += f", and {sound.set_aside} more set aside as echoes or as more than one waveform"
-        said += f". The object rings {100.0 * (sound.scale - 1.0):+.1f} % from its model"
+        side = "above" if sound.scale >= 1.0 else "below"
+        said += f". The object rings {100.0 * abs(sound.scale - 1.0):.1f} % {side} its model"
     return said + "."
 
 
