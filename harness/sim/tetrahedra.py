@@ -21,7 +21,9 @@ ENVELOPE_OF_WALL = 0.2
 """Of the thinnest wall, how far the tetrahedra may leave the surface. With what leaving out faces
 takes, both sides of a wall come no nearer than two fifths of it."""
 
-_ENVELOPE_OF_SIZE = 5e-3
+_ENVELOPE_OF_EDGE = 0.03
+"""Of the edge aimed at: smaller elements follow the surface more closely, or they gain nothing."""
+
 _FLATTEST = 1e-8
 """Least volume of a cell as a share of its edges' root mean square cubed: below it, stiffness
 grows so large that the eigenvalues lose their digits."""
@@ -104,7 +106,7 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
         mesh: closed, outward; parts that overlap count once.
         edge: m, longest edge aimed at; where the surface bends or is thin they are shorter.
         envelope: m, how far the cells may leave the surface; None for a fifth of the thinnest
-            wall, and no more than 0.5 % of the mesh's diagonal.
+            wall, and no more than 3 % of the edge.
 
     Raises:
         WrongUse: an edge or an envelope that cannot be.
@@ -118,7 +120,7 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
         )
     wall = thin_wall(mesh)
     if envelope is None:
-        envelope = min(ENVELOPE_OF_WALL * wall, _ENVELOPE_OF_SIZE * mesh.diagonal)
+        envelope = min(ENVELOPE_OF_WALL * wall, _ENVELOPE_OF_EDGE * edge)
     if not 0.0 < envelope <= 0.25 * wall:
         raise WrongUse(
             f"an envelope of {envelope * 1e3:.3g} mm lets a wall of {wall * 1e3:.3g} mm close up; say one "
