@@ -21,12 +21,16 @@ ENVELOPE_OF_WALL = 0.2
 """Of the thinnest wall, how far the tetrahedra may leave the surface. With what leaving out faces
 takes, both sides of a wall come no nearer than two fifths of it."""
 
+_ENVELOPE_OF_SIZE = 2e-3
 _ENVELOPE_OF_EDGE = 0.03
 """Of the edge aimed at: smaller elements follow the surface more closely, or they gain nothing."""
 
 _FLATTEST = 1e-8
 """Least volume of a cell as a share of its edges' root mean square cubed: below it, stiffness
 grows so large that the eigenvalues lose their digits."""
+
+_SLIT = 1e-6
+"""Of the surface's area, what may be open: an edge along which a face without area was left out."""
 
 _VOLUME_GATE = 0.15
 """Relative: what flat faces and the envelope may take from a thin wall before its nodes are moved
@@ -106,7 +110,7 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
         mesh: closed, outward; parts that overlap count once.
         edge: m, longest edge aimed at; where the surface bends or is thin they are shorter.
         envelope: m, how far the cells may leave the surface; None for a fifth of the thinnest
-            wall, and no more than 3 % of the edge.
+            wall, and no more than 3 % of the edge and 0.2 % of the mesh's diagonal.
 
     Raises:
         WrongUse: an edge or an envelope that cannot be.
@@ -120,7 +124,7 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
         )
     wall = thin_wall(mesh)
     if envelope is None:
-        envelope = min(ENVELOPE_OF_WALL * wall, _ENVELOPE_OF_EDGE * edge)
+        envelope = min(ENVELOPE_OF_WALL * wall, _ENVELOPE_OF_EDGE * edge, _ENVELOPE_OF_SIZE * mesh.diagonal)
     if not 0.0 < envelope <= 0.25 * wall:
         raise WrongUse(
             f"an envelope of {envelope * 1e3:.3g} mm lets a wall of {wall * 1e3:.3g} mm close up; say one "
@@ -180,12 +184,25 @@ def _check_slivers(nodes: FloatArray, cells: IntArray, volumes: FloatArray) -> N
 
 
 def _check_closed(mesh: Mesh) -> None:
-    rim = len(boundary_edges(mesh.faces))
-    if rim:
+    rim = boundary_edges(mesh.faces)
+    if len(rim) and _open_area(mesh, rim) > _SLIT * float(mesh.face_areas.sum()):
         raise MeshRefused(
-            f"the surface is open ({rim} rim edges), so that it has no inside to sound; close it, or say how "
-            "thick its wall is (--wall)"
+            f"the surface is open ({len(rim)} rim edges), so that it has no inside to sound; close it, or "
+            "say how thick its wall is (--wall)"
         )
+
+
+def _open_area(mesh: Mesh, rim: IntArray) -> float:
+    """Square metres of fans that would close every rim; a slit left by a flat face has none."""
+    ends = mesh.vertices[rim]
+    graph = coo_array((np.ones(len(rim)), (rim[:, 0], rim[:, 1])), shape=(len(mesh.vertices),) * 2)
+    loop = connected_components(graph, directed=False)[1][rim[:, 0]]
+    area = 0.0
+    for number in np.unique(loop):
+        mine = ends[loop == number]
+        spokes = mine - mine.reshape(-1, 3).mean(axis=0)
+        area += 0.5 * float(np.linalg.norm(np.cross(spokes[:, 0], spokes[:, 1]), axis=1).sum())
+    return area
 
 
 def _check_volume(found: Tetrahedra, mesh: Mesh, envelope: float) -> None:
