@@ -46,7 +46,8 @@ def test_the_total_is_of_places_yaw_and_sound() -> None:
         (10, 0, REFUSE_SOUNDING_BELOW),
         (8, 2, REFUSE_SOUNDING_BELOW),
         (8, 3, REFUSE_BELOW),
-        (1, 1, REFUSE_BELOW),
+        (2, 2, REFUSE_UNHEARD_BELOW),
+        (3, 1, REFUSE_BELOW),
     ],
 )
 def test_the_limit_is_stricter_the_more_the_sound_is_anothers(
