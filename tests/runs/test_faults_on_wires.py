@@ -16,6 +16,7 @@ import pytest
 from whole_run import Quiet, copied, edited
 
 from experiments.contact_localization import session_of
+from experiments.contact_localization.strike import Ask
 from harness.cli import invoke
 from harness.device import Health
 from harness.errors import SafetyStop, TouchstoneError
@@ -92,9 +93,11 @@ def resume(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
     def go_on(recording: Recording, fault: Cue, look: Callable[[Bench], dict[str, Any]]) -> Session:
         failed: dict[str, Any] = {}
 
-        def faulty(bench: Bench, run: Recording, progress: Progress) -> tuple[bool, dict[str, Health]]:
+        def faulty(
+            bench: Bench, run: Recording, progress: Progress, ask: Ask | None = None
+        ) -> tuple[bool, dict[str, Health]]:
             try:
-                return perform_on(bench, run, Cued(progress, bench, fault))
+                return perform_on(bench, run, Cued(progress, bench, fault), ask)
             except TouchstoneError:
                 failed.update(moved=moved_in(bench, 0.3), **look(bench))
                 raise
