@@ -116,12 +116,14 @@ def test_the_second_channel_is_timed_half_a_sample_later(strikes: list[dict[str,
         )  # a rate known to 0.1 %
 
 
-def test_the_clock_is_the_crystals_and_not_nominal(bench: Bench) -> None:
-    with opened(bench) as hammer:
+@pytest.mark.parametrize("drift", [-600.0, 600.0])
+def test_the_clock_is_the_crystals_and_not_nominal(drift: float) -> None:
+    """Of a crystal worse than any: a process that shares two cores is told of samples up to 0.4 ms late,
+    and over 3.5 s that is 110 ppm. The benchmark fits 60 s, and finds a crystal's 40 ppm."""
+    with mocked_box(played(RECORDS), drift_ppm=drift) as bench, opened(bench) as hammer:
         readings = by_name(hammer.capture(lambda: None, 0.5, 3.5, 3.5))
     rate = BLOCK * (len(readings[FORCE].times) - 1) / np.ptp(readings[FORCE].times)
-    # A process that shares two cores is told of samples up to 0.1 ms late; over 3.5 s that is 30 ppm.
-    assert (rate / RATE - 1.0) * 1e6 == pytest.approx(DRIFT_PPM, abs=30.0)
+    assert (rate / RATE - 1.0) * 1e6 == pytest.approx(drift, abs=200.0)
     assert np.abs(readings[CLOCK].values[:, 1]).min() < 1e-9
     assert np.median(readings[CLOCK].values[:, 1]) < 1e-3
 
