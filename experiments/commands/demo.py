@@ -20,7 +20,7 @@ def demo(
 ) -> int:
     """Localize a contact on the mocked bench from end to end, by touch, by sound and by both.
 
-    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object six times and strikes each
+    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object five times and strikes each
     place with a mocked hammer (over a serial line); the drivers are those of a real bench. The estimates are
     made from the recording alone. The object's modes are computed the first time and kept.
     """
@@ -31,6 +31,7 @@ def demo(
     return run(
         Experiment.CONTACT_LOCALIZATION,
         object_=f"builtin:{object_}",
+        contacts=5,
         spacing=Spacing.SPREAD,
         sense=Sense.BOTH,
         seed=seed,

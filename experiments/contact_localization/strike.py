@@ -103,7 +103,7 @@ class StrikeSpeeds:
         acceleration: m/s^2.
     """
 
-    approach: float = 0.030
+    approach: float = 0.045
     acceleration: float = 0.2
 
 
