@@ -224,9 +224,14 @@ def test_stop_works_in_a_signal_handler_during_a_motion(make_arm: MakeArm) -> No
 def test_an_interrupt_during_a_motion_stops_the_arm(make_arm: MakeArm, tmp_path: Path) -> None:
     arm = make_arm("hang")
     arm.open()
-    threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
-    with pytest.raises(KeyboardInterrupt):
-        move(arm)
+    # A program started in the background inherits interrupts that are ignored.
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            move(arm)
+    finally:
+        signal.signal(signal.SIGINT, previous)
     assert sent(tmp_path) == ["move", "stop"]
 
 
