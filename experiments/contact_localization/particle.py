@@ -1,11 +1,12 @@
 """The paper's particle filter over places on the surface (ObjectFolder 2.0, section 5.2).
 
 Particles start uniformly over the surface. At each contact they are weighed by the
-similarity between what the gel read and what it would have read at the particle, resampled,
+similarity between what was read and what would have been read at the particle, resampled,
 and carried on by the arm's translation to the next contact, where each is put back on the
 surface. The ten most similar particles are the candidates; their mean is the answer.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,10 @@ from experiments.contact_localization.hypotheses import normalised
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.touch import similarities
 from harness.arrays import FloatArray, IntArray
+
+Similarity = Callable[[int, IntArray, FloatArray], FloatArray | None]
+"""Of a contact's reading to what particles would read, from the contact's index, the particles' ``(n,)``
+samples and ``(n,)`` yaws: ``(n,)`` from -1 to 1; None for a contact that says nothing."""
 
 CANDIDATES = 10
 _EVERY = 5
@@ -50,7 +55,7 @@ class Particles:
 def particle_filter(
     search: Search, count: int, particles: int, seed: int, temperature: float = TEMPERATURE
 ) -> Particles:
-    """Run the filter over the first ``count`` contacts.
+    """Run the filter by touch over the first ``count`` contacts.
 
     Args:
         search: the run.
@@ -58,6 +63,31 @@ def particle_filter(
         particles: how many.
         seed: of the start and of the resampling.
         temperature: of the weights.
+    """
+
+    def felt(k: int, at: IntArray, yaws: FloatArray) -> FloatArray | None:
+        return _similarity(search, k, at, yaws) if search.contacts[k].shows_contact else None
+
+    return filtered(search, count, felt, particles, seed, temperature)
+
+
+def filtered(
+    search: Search,
+    count: int,
+    similarity: Similarity,
+    particles: int,
+    seed: int,
+    temperature: float = TEMPERATURE,
+) -> Particles:
+    """Run the filter by any sense over the first ``count`` contacts.
+
+    Args:
+        search: the run.
+        count: contacts.
+        similarity: of each contact's reading.
+        particles: how many.
+        seed: of the start and of the resampling.
+        temperature: of the weight ``exp(similarity / temperature)``.
     """
     rng = np.random.default_rng(seed)
     surface = search.surface
@@ -69,8 +99,9 @@ def particle_filter(
             at, yaws, log_weights = _resampled(at, yaws, log_weights, rng)
             moved = search.prior.object_from_base(yaws) @ (search.positions[k] - search.positions[k - 1])
             at = _nearest(search, surface.points[at] + moved)
-        if search.contacts[k].shows_contact:
-            log_weights = log_weights + _similarity(search, k, at, yaws) / temperature
+        alike = similarity(k, at, yaws)
+        if alike is not None:
+            log_weights = log_weights + alike / temperature
             log_weights -= log_weights.max()
     return Particles(surface.points[at], yaws, log_weights)
 

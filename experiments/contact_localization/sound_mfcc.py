@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import dct, rfft, rfftfreq
 
-from experiments.contact_localization.particle import TEMPERATURE, Particles
+from experiments.contact_localization.particle import TEMPERATURE, Particles, filtered
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.sound_gains import GainTable
 from harness.acquisition import Strike
@@ -22,7 +22,6 @@ from harness.materials import Material
 from harness.sim.modes import Modes, dampings
 
 _CHUNK = 512
-_YAW_STEP = 10.0
 
 
 @dataclass(frozen=True)
@@ -154,34 +153,12 @@ def mfcc_filter(
         seed: of the start and of the resampling.
         temperature: of the weight ``exp(cosine / temperature)``.
     """
-    rng = np.random.default_rng(seed)
-    surface = search.surface
-    at = rng.choice(len(surface.points), size=particles, p=surface.areas / surface.areas.sum())
-    yaws = np.zeros(particles)
-    if search.prior.yaw == "unknown":
-        yaws = np.radians(_YAW_STEP * rng.integers(0, round(360.0 / _YAW_STEP), particles))
-    log_weights = np.zeros(particles)
-    for k, strike in enumerate(strikes):
-        if k > 0:
-            chosen, log_weights = _resampled(log_weights, rng)
-            at, yaws = at[chosen], yaws[chosen]
-            moved = search.prior.object_from_base(yaws) @ (search.positions[k] - search.positions[k - 1])
-            at = np.asarray(surface.tree.query(surface.points[at] + moved)[1])
-        if strike is not None:
-            log_weights = log_weights + table.similarities(strike)[at] / temperature
-            log_weights -= log_weights.max()
-    return Particles(surface.points[at], yaws, log_weights)
 
+    def heard(k: int, at: IntArray, _yaws: FloatArray) -> FloatArray | None:
+        strike = strikes[k]
+        return None if strike is None else table.similarities(strike)[at]
 
-def _resampled(log_weights: FloatArray, rng: np.random.Generator) -> tuple[IntArray, FloatArray]:
-    weights = np.exp(log_weights)
-    weights /= weights.sum()
-    count = len(weights)
-    if 1.0 / np.sum(weights**2) >= 0.5 * count:
-        return np.arange(count), log_weights
-    marks = (np.arange(count) + rng.random()) / count
-    chosen = np.minimum(np.searchsorted(np.cumsum(weights), marks), count - 1)
-    return chosen.astype(np.int64), np.zeros(count)
+    return filtered(search, len(strikes), heard, particles, seed, temperature)
 
 
 def _mode_powers(modes: Modes, material: Material, rate: float, settings: Mfcc) -> FloatArray:

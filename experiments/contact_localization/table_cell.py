@@ -22,7 +22,6 @@ from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.model_of import model_of_scene
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.particle import CANDIDATES
 from experiments.contact_localization.planning import plan_run, way_between
 from experiments.contact_localization.result import fit_of
 from experiments.contact_localization.search import Search
@@ -173,8 +172,7 @@ def _by_mfcc(run: PerformedRun, prior: Prior) -> FloatArray:
     contacts = [Contact(observation.base_from_gel) for observation in run.observations]
     search = Search(contacts, model, prior, spacing, Noise())
     particles = mfcc_filter(search, table, strikes, PAPER.particles, run.seed)
-    best = np.argsort(-particles.log_weights, kind="stable")[:CANDIDATES]
-    return np.asarray(particles.points[best].mean(axis=0))
+    return np.asarray(particles.candidates().mean(axis=0))
 
 
 def _estimated(
