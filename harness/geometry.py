@@ -112,10 +112,12 @@ def frame_facing(axis: FloatArray, yaw: float) -> FloatArray:
     its sign change: one pole instead of a seam along the equator).
     """
     x, y, z = axis
-    if z < -1.0 + 1e-12:
+    across = x * x + y * y
+    if z < 0.0 and across == 0.0:
         base = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
     else:
-        a = 1.0 / (1.0 + z)
+        # The same number; near the pole 1 + z has lost the digits that x and y still have.
+        a = 1.0 / (1.0 + z) if z > -0.9 else (1.0 - z) / across
         b = -x * y * a
         base = np.array([[1.0 - x * x * a, b, x], [b, 1.0 - y * y * a, y], [-x, -y, z]])
     rotation: FloatArray = base @ rotation_about(np.array([0.0, 0.0, 1.0]), yaw)
