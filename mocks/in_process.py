@@ -22,7 +22,7 @@ from mocks.lab_scene import nominal_bench
 from mocks.simulated_motion import Stage
 from mocks.sound_of_run import strikes_of
 from mocks.truth import TruthFile
-from mocks.ur.hooks import HOME
+from mocks.ur.hooks import LEFT_ABOVE
 from mocks.world import World
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
     strikes = strikes_of(world, scene, station, gap, run.seed)
     truth = TruthFile(run.truth, world, run.seed, None if strikes is None else strikes.sound)
     stage = Stage()
-    arm = InProcessArm(station.arm.model, np.array(HOME), world, stage, PACKET_RATE)
+    arm = InProcessArm(station.arm.model, np.array(LEFT_ABOVE), world, stage, PACKET_RATE)
 
     def mark(step: int, sample: int) -> None:
         stage.step, stage.sample = step, sample

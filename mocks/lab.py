@@ -41,7 +41,7 @@ from mocks.lab_scene import read_lab_scene
 from mocks.shared_pose import Mark, SharedPose
 from mocks.sound_of_run import strikes_of
 from mocks.truth import TruthFile
-from mocks.ur.hooks import HOME, ControllerConfig
+from mocks.ur.hooks import LEFT_ABOVE, ControllerConfig
 from mocks.ur.serve import serve
 from mocks.world import NominalBench, World
 
@@ -212,7 +212,7 @@ def _controller(world: World, arm: ArmSection, shared: SharedPose, seed: int) ->
     def run(address: str, line: Line) -> None:
         keep_time()
         serve(
-            ControllerConfig(host=address, model=arm.model, seed=seed),
+            ControllerConfig(host=address, model=arm.model, seed=seed, joints=LEFT_ABOVE),
             Push(),
             publish,
             line.should_stop,
@@ -231,7 +231,7 @@ def _begin(arguments: argparse.Namespace) -> Lab:
     told, gap = read_lab_scene(arguments.scene), load_gap(arguments.gap)
     world = World(told.bench, gap, arguments.seed)
     strikes = strikes_of(world, told.scene, told.station, gap, arguments.seed)
-    start = forward(told.station.arm.model, np.array(HOME))
+    start = forward(told.station.arm.model, np.array(LEFT_ABOVE))
     _compile(world, told.bench, start)
     shared = SharedPose(start)
     return Lab(

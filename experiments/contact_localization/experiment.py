@@ -115,8 +115,8 @@ class Speeds:
 class Way(Protocol):
     """Finds joint way points that hit nothing."""
 
-    def __call__(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """``(n, 6)`` rad, from ``(6,)`` to ``(6,)``."""
+    def __call__(self, here: FloatArray, planned: FloatArray) -> FloatArray:
+        """``(m, 6)`` rad, from ``(6,)`` to the last of the ``(n, 6)`` postures of a planned travel."""
 
 
 class ContactLocalization:
@@ -171,8 +171,7 @@ class ContactLocalization:
         """Along the planned way points; from elsewhere than planned, by another way to the last of them."""
         here = bench.arm.state().joints
         planned = np.abs(here - start).max() < WHERE_PLANNED
-        end = travel[-1] if len(travel) else start
-        for joints in travel if planned else self.way(here, end):
+        for joints in travel if planned else self.way(here, np.vstack([start, travel])):
             speed = joint_speed(bench.station, here, joints, self.speeds.travel)
             bench.arm.move_joints(joints, speed, self.speeds.travel_acceleration)
             here = joints

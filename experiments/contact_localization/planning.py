@@ -163,16 +163,31 @@ class Itinerary:
         return self.strikes[-1].ready_joints if self.strikes else self.contacts[-1].stand_off_joints
 
 
-def way_between(bench: TwinBench, start: FloatArray, end: FloatArray) -> FloatArray:
-    """``(n, 6)`` rad from where the arm is to where a step begins, hitting nothing.
+def way_between(bench: TwinBench, here: FloatArray, planned: FloatArray) -> FloatArray:
+    """From where the arm is to the end of a planned travel, hitting nothing.
+
+    Straight to its end where there is a natural way; else onto the travel, as late as can be, and
+    along it; else by a search.
+
+    Args:
+        bench: the twin.
+        here: ``(6,)`` rad.
+        planned: ``(n, 6)`` rad: the travel, the posture that it starts at first.
+
+    Returns:
+        ``(m, 6)`` rad, the last of them the travel's end.
 
     Raises:
         WrongUse: there is no such way.
     """
-    way = connect(bench, start, end)
-    if way is None:
-        raise WrongUse(
-            "no way was found from where the arm is to the first contact; move it by hand to a place above "
-            "the object, clear of the table, and start again"
-        )
-    return way
+    for thorough in (False, True):
+        for k in reversed(range(len(planned))):
+            way = connect(bench, here, planned[k], thorough=thorough)
+            if way is not None:
+                return np.concatenate([way, planned[k + 1 :]])
+    meeting = " and ".join(f"the {hit.first} is in the {hit.second}" for hit in bench.hits(here))
+    raise WrongUse(
+        "no way was found from where the arm is to the first contact"
+        + (f" (by the twin {meeting} there)" if meeting else "")
+        + "; move it by hand to a place above the object, clear of the table, and start again"
+    )

@@ -17,10 +17,12 @@ class GainTable:
     Attributes:
         surface: whose samples; gives the sample nearest to any place.
         shapes: ``(samples, m, 3)`` 1/sqrt(kg), float32.
+        mean_squares: ``(m,)`` 1/kg: of each mode's gain along the normal, over the samples.
     """
 
     surface: Surface
     shapes: AnyArray
+    mean_squares: FloatArray
 
     def nearest(self, points: FloatArray) -> IntArray:
         """``(n,)`` sample nearest to each of ``(n, 3)`` points in metres, however far."""
@@ -34,4 +36,7 @@ class GainTable:
 
 def gain_table(modes: Modes, surface: Surface) -> GainTable:
     """Tabulate the modes at a surface's samples."""
-    return GainTable(surface, read_only(modes.at(surface.points).astype(np.float32)))
+    shapes = modes.at(surface.points).astype(np.float32)
+    along = np.einsum("smi,si->sm", shapes, surface.normals.astype(np.float32))
+    squares = np.asarray(np.mean(along**2, axis=0, dtype=np.float64))
+    return GainTable(surface, read_only(shapes), read_only(squares))

@@ -183,10 +183,7 @@ class SoundTerm:
 
     def _unit_gains(self) -> FloatArray:
         """``(m,)``: one over the noise of each mode's gain; one figure a group, so that any basis will do."""
-        normals = self._table.surface.normals
-        squares = np.array(
-            [np.mean(np.sum(shape * normals, axis=1) ** 2) for shape in self._table.shapes.transpose(1, 0, 2)]
-        )
+        squares = self._table.mean_squares
         result = np.empty(len(squares))
         for a, b in zip(self._starts[:-1], self._starts[1:], strict=True):
             result[a:b] = 1.0 / (np.sqrt(squares[a:b].mean()) * self._noise.spread)

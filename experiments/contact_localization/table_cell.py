@@ -116,7 +116,7 @@ def run_cell(cell: Cell, scene: SceneFile, station: Station) -> dict[str, Any]:
 def perform_cell(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> PerformedRun:
     """Plan and perform one run on the bench in process, without answering it."""
     plan, acquisition = plan_run(scene, station, mesh, cell.seed), station_acquisition(scene, station)
-    experiment = ContactLocalization(lambda start, end: way_between(plan.bench, start, end))
+    experiment = ContactLocalization(lambda here, planned: way_between(plan.bench, here, planned))
     with TemporaryDirectory(prefix="touchstone-table-") as folder:
         context = RunContext(Path(folder) / "truth.json", mesh, cell.seed, cell.gap)
         bench = in_process_bench(scene, station, context)

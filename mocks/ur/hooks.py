@@ -15,6 +15,9 @@ _QUARTER: Final = 1.5707963267948966
 HOME: Final[Six] = (0.0, -_QUARTER, _QUARTER, -_QUARTER, -_QUARTER, 0.0)
 """rad; the arm reaches along -x of its base, the tool points down."""
 
+LEFT_ABOVE: Final[Six] = (_QUARTER / 6.0, -1.05 * _QUARTER, _QUARTER / 1.8, -_QUARTER / 1.8, -_QUARTER, 0.0)
+"""rad; where somebody left a bench's arm: the tool points down from 0.65 m, above a tall object."""
+
 
 class ContactModel(Protocol):
     """What the tool feels."""

@@ -77,7 +77,7 @@ def performed(
 ) -> tuple[Observation, ...]:
     """The first contacts of a plan, on the bench in process."""
     mesh, acquisition = known_object(scene).mesh, station_acquisition(scene, station)
-    experiment = ContactLocalization(lambda start, end: way_between(plan.bench, start, end))
+    experiment = ContactLocalization(lambda here, planned: way_between(plan.bench, here, planned))
     bench = in_process_bench(scene, station, RunContext(truth, mesh, SEED, gap))
     observations = []
     for index, parameters in enumerate(plan.parameters()[:steps]):

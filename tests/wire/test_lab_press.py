@@ -45,7 +45,7 @@ class Run:
 
 def performed(bench: Bench, plan: RunPlan, truth: Path) -> Run:
     experiment = ContactLocalization(
-        lambda start, end: way_between(plan.bench, start, end), Speeds(travel=0.4)
+        lambda here, planned: way_between(plan.bench, here, planned), Speeds(travel=0.4)
     )
     step = Step(STEP, "press", plan.parameters()[0])
     read: Sequence[Reading] = experiment.perform(step, bench)

@@ -56,7 +56,7 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh) -> RunPlan:
 
 def performed(bench: Bench, plan: RunPlan) -> Readings:
     experiment = ContactLocalization(
-        lambda start, end: way_between(plan.bench, start, end), Speeds(travel=0.4)
+        lambda here, planned: way_between(plan.bench, here, planned), Speeds(travel=0.4)
     )
     read = experiment.perform(Step(STEP, "press", plan.parameters()[0]), bench)
     return {reading.channel.name: reading for reading in read}
