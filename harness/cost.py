@@ -31,7 +31,7 @@ class Sample:
         object: what was touched, by a name that two different objects do not share.
         error: m; a refused answer counts as a random one.
         radius: m, within which the answer itself claims 90 %; None where it claims nothing.
-        shared: s of CPU time for what is done alike at every setting, such as reading images.
+        shared: s of CPU time for what is done alike at every setting that needs it: reading images.
         cpu: s of CPU time for the rest.
         wall: s on the clock for the rest.
     """

@@ -10,10 +10,13 @@ from harness.errors import WrongUse
 KEPT = 0.975
 """Share of runs in which a budget is to be kept: above the 95 % promised, for what was not sampled."""
 
-MET = 0.95
-"""Share of runs in which an error is to be met."""
+MET = 0.975
+"""Share of runs in which a promised error is to be met, likewise."""
 
 _ENOUGH = 4
+
+_OWN = 10.0
+"""Runs that the spread of all objects counts for, beside those of an object's own."""
 
 
 def predicted_at_most(values: FloatArray, share: float = KEPT) -> float:
@@ -48,7 +51,7 @@ def most_seconds(point: Point, name: str | None, speed: float = 1.0, spent: floa
         point: the setting.
         name: of the object.
         speed: how many seconds a measured CPU second takes here and now.
-        spent: s that the part shared by all settings has taken already; predicted where None.
+        spent: s that the part shared by settings has taken already; predicted where None.
     """
     shared = max(s.shared for s in like(point, name)) * speed if spent is None else spent
     return shared + _most_of_the_rest(point, name) * speed
@@ -57,37 +60,69 @@ def most_seconds(point: Point, name: str | None, speed: float = 1.0, spent: floa
 def _most_of_the_rest(point: Point, name: str | None) -> float:
     """The bound on the next run's own CPU seconds: about its object's mean, where that was measured.
 
-    Objects differ far more than runs of one object do, and these alike: the spread within objects
-    is taken from all of them together, so two runs of each already tell it.
+    Objects differ far more than runs of one object do. How much these differ is taken from all
+    objects together and from the object's own runs, which count for more the more there are.
     """
     groups: dict[str, list[float]] = {}
     for sample in point.samples:
         groups.setdefault(sample.object, []).append(float(np.log(sample.cpu)))
-    freedom = len(point.samples) - len(groups)
-    if name not in groups or freedom < _ENOUGH:
+    pooled = len(point.samples) - len(groups)
+    if name not in groups or pooled < _ENOUGH:
         return predicted_at_most(np.array([sample.cpu for sample in point.samples]))
-    own = np.array(groups[name])
-    squares = sum(float(((np.array(logs) - np.mean(logs)) ** 2).sum()) for logs in groups.values())
-    reach = float(stats.t.ppf(KEPT, freedom)) * np.sqrt(squares / freedom * (1.0 + 1.0 / len(own)))
+    own, freedom = np.array(groups[name]), len(groups[name]) - 1
+    squares = {of: float(((np.array(logs) - np.mean(logs)) ** 2).sum()) for of, logs in groups.items()}
+    shared = min(_OWN, float(pooled))
+    variance = (shared * sum(squares.values()) / pooled + squares[name]) / (shared + freedom)
+    reach = float(stats.t.ppf(KEPT, shared + freedom)) * np.sqrt(variance * (1.0 + 1.0 / len(own)))
     return float(np.exp(own.mean() + reach))
 
 
-def stretch(point: Point, share: float = MET) -> float:
-    """What a claimed 90 % radius must be multiplied with to hold the truth in ``share`` of runs.
+def promises(point: Point, share: float = MET) -> tuple[FloatArray, FloatArray]:
+    """What a setting can promise by how sure its answer says it is.
 
-    Split conformal prediction with error / radius as the score (Lei et al., Distribution-free
-    predictive inference for regression, 2018): the ``ceil((n + 1) share)``-th smallest score.
-    Nothing is assumed of the errors' distribution, and a radius that claims too much is found out.
+    The ``n`` surest of the measured runs, by the radius they claimed, are exchangeable with a new run
+    that claims no more than the least sure of them: its error stays, with probability ``share``, below
+    the ``ceil((n + 1) share)``-th smallest of theirs (Vovk et al., Algorithmic Learning in a Random
+    World, 2005, section 2.2; as a choice of whom to answer: Geifman and El-Yaniv, Selective
+    classification for deep neural networks, 2017). Each group promises something; the least of what
+    the groups a run belongs to promise is taken. Nothing is assumed of the errors' distribution, and
+    answers that are wrong and sure of themselves are counted where they do harm: among the sure.
+
+    Args:
+        point: the setting; runs whose answer was refused claim nothing and promise nothing.
+        share: of runs in which a promise is to be met.
 
     Returns:
-        Infinity where too few runs were measured to promise that share.
+        ``(k,)`` m, ascending: claimed radii of groups large enough for any promise; ``(k,)`` m: the
+        error promised to an answer that claims no more.
     """
-    scores = [s.error / s.radius for s in point.samples if s.radius is not None and s.radius > 0.0]
-    rank = int(np.ceil((len(scores) + 1) * share - 1e-9))
-    return float(np.sort(scores)[rank - 1]) if 1 <= rank <= len(scores) else float("inf")
+    pairs = sorted((s.radius, s.error) for s in point.samples if s.radius is not None)
+    radii, errors = np.array([pair[0] for pair in pairs]), [pair[1] for pair in pairs]
+    limits, promised = [], []
+    for count in range(1, len(pairs) + 1):
+        rank = int(np.ceil((count + 1) * share - 1e-9))
+        tied = count < len(pairs) and radii[count] == radii[count - 1]
+        if rank <= count and not tied:
+            limits.append(radii[count - 1])
+            promised.append(sorted(errors[:count])[rank - 1])
+    least = np.minimum.accumulate(np.array(promised)[::-1])[::-1] if promised else np.zeros(0)
+    return np.array(limits), least
+
+
+def promise(point: Point, radius: float, share: float = MET) -> float:
+    """Metres within which the truth lies, in ``share`` of runs, given the radius that the answer claims.
+
+    Returns:
+        Infinity where too few runs were measured, or none that was so unsure.
+    """
+    limits, promised = promises(point, share)
+    group = int(np.searchsorted(limits, radius))
+    return float(promised[group]) if group < len(limits) else float("inf")
 
 
 def promise_share(point: Point, name: str | None, error: float) -> float:
     """Share of runs like these in which the answer can promise an ``error`` in m."""
-    factor, samples = stretch(point), like(point, name)
-    return float(np.mean([s.radius is not None and factor * s.radius <= error for s in samples]))
+    limits, promised = promises(point)
+    kept = limits[promised <= error]
+    reach = float(kept.max()) if len(kept) else -1.0
+    return float(np.mean([s.radius is not None and s.radius <= reach for s in like(point, name)]))

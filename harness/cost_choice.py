@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.accuracy import Level
 from harness.cost import Point, best_within
-from harness.cost_bounds import like, most_seconds, promise_share, stretch
+from harness.cost_bounds import like, most_seconds, promise, promise_share
 from harness.errors import WrongUse
 
 
@@ -39,7 +39,7 @@ def for_budget(
         budget: s on the clock, above zero.
         name: of the object, see ``Sample``.
         speed: s that a measured CPU second takes here and now.
-        spent: s already taken by what all settings share; predicted where None.
+        spent: s already taken by what settings share; predicted where None.
     """
     prices = {point.name: most_seconds(point, name, speed, spent) for point in points}
     best = best_within(points, budget, prices)
@@ -76,11 +76,6 @@ def for_error(points: Sequence[Point], error: float, name: str | None) -> tuple[
     return (last,) if first is last or shares[last.name] == 0.0 else (first, last)
 
 
-def promised(point: Point, radius: float) -> float:
-    """Metres from the answer within which the truth lies, in 95 % of runs, given its claimed radius."""
-    return stretch(point) * radius
-
-
 def nearest_condition(
     conditions: Sequence[Mapping[str, Level]], wanted: Mapping[str, Level], count: str
 ) -> tuple[Mapping[str, Level], float]:
@@ -109,9 +104,9 @@ def nearest_condition(
 
 
 def _price(point: Point, name: str | None) -> float:
-    return float(np.exp(np.mean([np.log(sample.cpu) for sample in like(point, name)])))
+    return float(np.exp(np.mean([np.log(s.shared + s.cpu) for s in like(point, name)])))
 
 
 def _typical_promise(point: Point, name: str | None) -> float:
     radii = [sample.radius for sample in like(point, name) if sample.radius is not None]
-    return stretch(point) * float(np.median(radii)) if radii else float("inf")
+    return promise(point, float(np.median(radii))) if radii else float("inf")

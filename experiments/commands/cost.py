@@ -12,7 +12,7 @@ from experiments.commands.output import ANSWERS, CONSOLE, emit, warn
 
 
 def contact_localization(
-    seeds: Annotated[int, typer.Option(help="Runs of each object.", min=1, max=1000)] = 5,
+    seeds: Annotated[int, typer.Option(help="Runs of each object.", min=1, max=1000)] = 10,
     first_seed: Annotated[int, typer.Option(help="The first of them.", min=0)] = 3000,
     only: Annotated[
         list[str] | None, typer.Option(help="Only this built-in object; may be given again.")
@@ -20,6 +20,10 @@ def contact_localization(
     scene: options.SceneOption = None,
     spacing: Annotated[list[str] | None, typer.Option(help="close or spread; both if left out.")] = None,
     yaw: Annotated[list[str] | None, typer.Option(help="known or unknown; known if left out.")] = None,
+    sense: Annotated[
+        str,
+        typer.Option(help="touch: pressed only; both: struck too, and answered by touch, sound and both."),
+    ] = "both",
     gap: Annotated[str, typer.Option(help="Reality gap of the mocked bench: default or none.")] = "default",
     contacts: Annotated[
         list[int] | None, typer.Option(help="Contacts used; 2, 4 and 6 if left out.", min=1)
@@ -35,14 +39,15 @@ def contact_localization(
     """Error against seconds of the estimate; `run --budget` and `run --error` go by it.
 
     Every run is performed once on the mocked bench in process; its readings are answered at every
-    setting of the dials, from the first 2, 4 and 6 contacts. One process, one answer at a time: leave
-    the machine alone meanwhile. The curve is kept for this machine and this code, beside those of other
-    conditions; with --scene the object of a scene is measured, and budgets for it go by its own seconds.
+    setting of the dials, and at a few from the first 2 and 4 contacts. Runs are performed side by side;
+    then one process answers, one answer at a time: leave the machine alone meanwhile. The curve is kept
+    for this machine and this code, beside those of other conditions; with --scene the object of a scene
+    is measured, and budgets for it go by its own seconds.
 
     Try: touchstone cost contact-localization --seeds 2 --only mug --contacts 6
     """
-    from experiments.contact_localization.costing import Work, gathered, joined, measure
-    from experiments.contact_localization.dials import METHOD, settings
+    from experiments.contact_localization.costing import Work, gathered, joined, measure, preparations
+    from experiments.contact_localization.dials import METHOD, SENSES, settings, settings_by_count
     from experiments.contact_localization.solving import ESTIMATOR, PROGRAM
     from experiments.contact_localization.table_cell import cells
     from harness.cost_file import curve_path, load, save
@@ -52,24 +57,32 @@ def contact_localization(
     from harness.station_file import load_station, station_path
 
     scenes = _scenes(only, scene)
+    sound = _known("--sense", [sense], ("touch", "both")) == ["both"]
     wanted = cells(
         list(scenes),
         range(first_seed, first_seed + seeds),
         _known("--spacing", spacing or ["close", "spread"], ("close", "spread")),
         _known("--gap", [gap], ("default", "none")),
         _known("--yaw", yaw or ["known"], ("known", "unknown")),
+        sound,
     )
-    work = Work(tuple(wanted), tuple(settings(thorough)), tuple(sorted(set(contacts or (2, 4, 6)))))
+    work = Work(
+        tuple(wanted),
+        tuple(settings(thorough, sound)),
+        tuple(sorted(set(contacts or (2, 4, 6)))),
+        tuple(settings_by_count(sound)),
+    )
     station = load_station(station_path("mock"))
-    points = []
+    points: list[Any] = []
+    models: dict[str, Any] = {}
     with _bar() as bar:
         task = bar.add_task("runs", total=len(wanted))
-        for _, found in measure(work, scenes, station, out / "cells", warn):
+        for _, found in measure(work, scenes, station, out / "cells", warn, _cores(), models):
             points += found
             bar.advance(task)
     if not points:
         raise DataRefused("no run could be performed; the reasons stand above")
-    curve = gathered(points, "What a contact's place costs")
+    curve = gathered(points, "What a contact's place costs", preparations(models))
     path = curve_path(PROGRAM)
     if path.exists():
         old = load(path)
@@ -77,7 +90,7 @@ def contact_localization(
             curve = joined(old, curve)
     save(curve, path)
     save(curve, out / "curve.json")
-    page = write_cost_page(curve, (), METHOD.name, "contacts", out)
+    page = write_cost_page(curve, (), (SENSES.name, METHOD.name), "contacts", out)
     result = _result(curve, path, page)
     if json:
         emit(result)
@@ -86,6 +99,13 @@ def contact_localization(
     ANSWERS.print(f"curve: {path}", markup=False)
     ANSWERS.print(f"page: {page}", markup=False)
     return 0
+
+
+def _cores() -> int:
+    import os
+    import sys
+
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def _bar() -> Progress:

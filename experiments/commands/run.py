@@ -128,7 +128,7 @@ def _target(budget: str | None, error: str | None, level: list[str] | None) -> A
     """What was asked of the estimate; None where nothing was."""
     if budget is None and error is None:
         return None
-    from experiments.contact_localization.within import Target
+    from experiments.contact_localization.front import Target
     from harness.quantities import LENGTH, TIME
 
     if budget is not None and error is not None:
@@ -147,8 +147,8 @@ def _target(budget: str | None, error: str | None, level: list[str] | None) -> A
 
 def _foresee(target: Any, scene: Any) -> None:
     """What will be tried, before anything moves; a budget that cannot be kept ends here."""
+    from experiments.contact_localization.front import foresee, front_for
     from experiments.contact_localization.solving import object_key
-    from experiments.contact_localization.within import foresee, front_for
     from harness.sim.scene_object import known_object
 
     front = front_for(scene, scene.localization.contacts)
@@ -158,7 +158,8 @@ def _foresee(target: Any, scene: Any) -> None:
 
 def _answered(recording: Any, target: Any) -> dict[str, Any]:
     """The estimate as it was asked for, timed, and what the finest levels would have said."""
-    from experiments.contact_localization.within import answer_within, front_for
+    from experiments.contact_localization.front import front_for
+    from experiments.contact_localization.within import answer_within
     from experiments.contact_localization.within_words import as_json, doubts
     from harness.run_folder import RunFiles
 

@@ -1,11 +1,12 @@
 """Every dial of a localization run: the estimator's own and the simulation's, as one accuracy."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 from experiments.contact_localization.levels import Levels, Senses
 from harness.accuracy import Accuracy, Knob, Level
 from harness.effects import knobs_of
 from harness.sim.catalogue import EFFECTS
+from harness.sim.sound_effects import EDGE, MODES
 
 METHOD = Knob(
     "localization.method", ("particle", "grid"), "", "method", "grid", "the paper's filter, or ours"
@@ -30,17 +31,39 @@ BLOCK = Knob("localization.block", (16, 8), "pixels", "number", 8, "tactile pixe
 
 KNOBS = (SENSES, METHOD, SPACING, ROUNDS, SAMPLES, PARTICLES, BLOCK, *knobs_of(EFFECTS))
 
-TURNED: Mapping[str, tuple[Knob, ...]] = {
-    "grid": (SPACING, ROUNDS, SAMPLES, BLOCK),
-    "particle": (SPACING, PARTICLES, BLOCK),
-}
-"""Which dials change what each method answers. The simulation's dials are not among them: an
-estimate has its own terms, and only the comparison draws simulated readings."""
+SIMULATED = (MODES, EDGE)
+"""Dials of the simulation that an estimate depends on: the modes that its sounds are compared with.
+Its other terms are its own, and only the comparison of a report draws simulated readings."""
 
-FINEST = {
-    METHOD.name: "grid",
-    **{knob.name: knob.levels[-1] for knob in TURNED["grid"]},
-}
+
+def _grid(senses: str, spacing: float, rounds: int, samples: int, block: int) -> dict[str, Level]:
+    dials = {SPACING.name: spacing, ROUNDS.name: rounds, SAMPLES.name: samples, BLOCK.name: block}
+    return {SENSES.name: senses, METHOD.name: "grid", **dials}
+
+
+def _particles(number: int, spacing: float, block: int) -> dict[str, Level]:
+    dials = {SPACING.name: spacing, PARTICLES.name: number, BLOCK.name: block}
+    return {SENSES.name: "touch", METHOD.name: "particle", **dials}
+
+
+def _by_sound(spacing: float) -> dict[str, Level]:
+    return {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: spacing}
+
+
+_GRIDS = (
+    (4e-3, 0, 600, 16),
+    (3e-3, 0, 600, 16),
+    (2e-3, 0, 600, 16),
+    (2e-3, 0, 600, 8),
+    (3e-3, 1, 600, 16),
+    (2e-3, 1, 600, 16),
+    (2e-3, 3, 600, 16),
+    (2e-3, 3, 600, 8),
+    (1.5e-3, 3, 1200, 8),
+)
+"""Spacing, rounds, samples and block: from the cheapest to the finest, where the front is likely to lie."""
+
+FINEST = _grid("both", 1.5e-3, 3, 1200, 8)
 """What is asked after an answer, to say what more time would have given."""
 
 
@@ -67,54 +90,68 @@ def levels_of(accuracy: Accuracy) -> Levels:
     )
 
 
-def settings(thorough: bool = False) -> list[dict[str, Level]]:
-    """Choices of levels to measure: of each method its cheapest, default and finest, and the way between.
+def settings(thorough: bool = False, sound: bool = True) -> list[dict[str, Level]]:
+    """Choices of levels to measure, each once: by every sense, from the cheapest to the finest.
 
     Args:
-        thorough: also every single dial turned from each of the three.
+        thorough: also every single dial turned from the default, by each sense.
+        sound: whether the runs were heard; touch alone where not.
     """
-    found: list[dict[str, Level]] = []
-    for method, knobs in TURNED.items():
-        for setting in _sweep(method, knobs, thorough):
-            if setting not in found:
-                found.append(setting)
+    found = [
+        *(_grid("touch", *dials) for dials in _GRIDS),
+        *(_particles(*dials) for dials in ((300, 4e-3, 16), (1000, 2e-3, 8), (3000, 2e-3, 8))),
+    ]
+    if sound:
+        found += [_grid("both", *dials) for dials in _GRIDS]
+        found += [_by_sound(float(spacing)) for spacing in SPACING.levels]
+        found += _other_modes()
+    for turned in _turned(sound) if thorough else ():
+        if turned not in found:
+            found.append(turned)
     return found
 
 
+def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
+    """The few settings that are measured with fewer contacts too."""
+    dials = ((2e-3, 0, 600, 16), (2e-3, 3, 600, 8))
+    touch = [_grid("touch", *each) for each in dials]
+    return [*touch, *(_grid("both", *each) for each in dials), _by_sound(2e-3)] if sound else touch
+
+
+def _other_modes() -> list[dict[str, Level]]:
+    """Fewer modes, and modes of coarser elements, than the default ones."""
+    few: tuple[dict[str, Level], ...] = ({MODES.name: 16}, {MODES.name: 32}, {EDGE.name: 0.7})
+    full, quick = _grid("both", 2e-3, 3, 600, 8), _grid("both", 4e-3, 0, 600, 16)
+    return [*({**full, **level} for level in few), {**quick, **few[0]}, {**_by_sound(2e-3), **few[1]}]
+
+
+def _turned(sound: bool) -> Iterator[dict[str, Level]]:
+    """Every dial of the grid turned from its default, one at a time."""
+    for senses in ("touch", "both") if sound else ("touch",):
+        default = _grid(senses, 2e-3, 3, 600, 8)
+        for knob in (SPACING, ROUNDS, SAMPLES, BLOCK, *(SIMULATED if senses == "both" else ())):
+            for level in knob.levels:
+                if level == knob.default:
+                    continue
+                yield {**default, knob.name: level}
+
+
 def setting_name(setting: Mapping[str, Level]) -> str:
-    """For people: ``"grid, spacing 2 mm, rounds 3, samples 600, block 8"``."""
+    """For people: ``"both, grid, spacing 2 mm, rounds 3, samples 600, block 8"``."""
     knobs = {knob.name: knob for knob in KNOBS}
-    said = [str(setting[METHOD.name])]
+    said = [str(setting[name]) for name in (SENSES.name, METHOD.name) if name in setting]
     for name, level in setting.items():
-        if name != METHOD.name:
+        if name not in (SENSES.name, METHOD.name):
             value = f"{1e3 * float(level):g} mm" if knobs[name].unit == "m" else f"{level}"
             said.append(f"{name.removeprefix('localization.')} {value}")
     return ", ".join(said)
 
 
-def _sweep(method: str, knobs: Sequence[Knob], thorough: bool) -> Iterator[dict[str, Level]]:
-    bases = [
-        {knob.name: knob.levels[0] for knob in knobs},
-        {knob.name: knob.default for knob in knobs},
-        {knob.name: knob.levels[-1] for knob in knobs},
-    ]
-    for base in bases:
-        yield _plain(method, base)
-    # From the cheapest to the finest, one dial after the other: where the front is likely to lie.
-    way = dict(bases[0])
-    for knob in reversed(knobs):
-        for level in knob.levels:
-            way[knob.name] = level
-            yield _plain(method, way)
-    for base in bases if thorough else bases[1:2]:
-        for knob in knobs:
-            for level in knob.levels:
-                yield _plain(method, {**base, knob.name: level})
+def needs_images(setting: Mapping[str, Level]) -> bool:
+    """Whether a setting looks at the tactile images."""
+    return setting.get(SENSES.name, SENSES.default) != "audio"
 
 
-def _plain(method: str, setting: Mapping[str, Level]) -> dict[str, Level]:
-    """The setting with its method; a dial that another leaves without effect is put to its default."""
-    plain = {METHOD.name: method, **setting}
-    if plain.get(ROUNDS.name) == 0:
-        plain[SAMPLES.name] = SAMPLES.default
-    return plain
+def needs_sound(setting: Mapping[str, Level]) -> bool:
+    """Whether a setting was measured on runs that were heard; one that names no sense was not."""
+    return setting.get(SENSES.name, "touch") != "touch"

@@ -1,19 +1,24 @@
 """Fill the report of a run from its folder, its answer and, for a mocked run, its truth."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from experiments.contact_localization.answer import Answer as Found
+from experiments.contact_localization.estimate import each_estimate
 from experiments.contact_localization.gate import Gate
 from experiments.contact_localization.instruments_report import artefacts, instruments
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.result import Scored, flags_of, result_of
+from experiments.contact_localization.solving import levels_at
 from experiments.contact_localization.sound_report import posterior_of, sound_of
 from experiments.contact_localization.trade import Point
 from experiments.contact_localization.twin_check import deviations
+from harness.arrays import FloatArray
 from harness.device import Health
+from harness.errors import FitRefused, WrongUse
 from harness.geometry import inverse
 from harness.report.data import (
     Answer,
@@ -143,18 +148,37 @@ def _by_contact(scored: Scored, geometry: tuple[float, ...] | None) -> tuple[Cur
         float(np.linalg.norm(estimate.position_in_object - point))
         for estimate, point in zip(scored.found.estimates, true, strict=True)
     )
-    curves = [Curve(SENSES[scored.found.sense], counts, ours)]
+    curves = [Curve(SENSES[scored.found.sense], counts, ours), *_by_other_senses(scored, true)]
     if geometry is not None:
         curves.append(Curve("translations alone, no image", counts, geometry))
     return tuple(curves)
+
+
+def _by_other_senses(scored: Scored, true: FloatArray) -> Iterator[Curve]:
+    """The same readings after each contact by each other sense that answered in the end."""
+    found, seed = scored.found, scored.run.recording.header.seed
+    for sense, last in found.others.items():
+        if isinstance(last, FitRefused):
+            continue
+        levels = replace(levels_at(scored.accuracy), senses=sense)
+        count = len(found.observations)
+        before = found.observations[: count - 1]
+        try:
+            early = each_estimate(before, found.model, found.prior, levels, seed=seed) if before else ()
+        except (FitRefused, WrongUse):  # the first contacts were not struck, or told nothing yet
+            continue
+        points = [estimate.position_in_object for estimate in (*early, last)]
+        errors = tuple(float(np.linalg.norm(p - t)) for p, t in zip(points, true, strict=True))
+        yield Curve(SENSES[sense], tuple(float(k + 1) for k in range(count)), errors)
 
 
 def _by_seconds(trade: tuple[Point, ...]) -> tuple[Curve, ...] | Missing:
     if not trade:
         return NO_TRUTH
     methods: dict[str, list[Point]] = {}
+    heard = any(point.levels.senses == "audio" for point in trade)
     for point in trade:
-        methods.setdefault(_method(point.levels), []).append(point)
+        methods.setdefault(_method(point.levels, heard), []).append(point)
     return tuple(
         Curve(
             name,
@@ -166,8 +190,10 @@ def _by_seconds(trade: tuple[Point, ...]) -> tuple[Curve, ...] | Missing:
     )
 
 
-def _method(levels: Levels) -> str:
-    return "grid" if levels.method == "grid" else "the paper's particle filter"
+def _method(levels: Levels, heard: bool) -> str:
+    if levels.method == "particle":
+        return "the paper's particle filter"
+    return f"grid, {SENSES[levels.senses]}" if heard else "grid"
 
 
 def _effects(scored: Scored) -> tuple[EffectRun, ...]:
@@ -179,6 +205,7 @@ def _effects(scored: Scored) -> tuple[EffectRun, ...]:
             step.reason,
             evaluation.calls.get(step.effect.provides, 0),
             evaluation.seconds.get(step.effect.provides),
+            step.effect.provides in evaluation.from_store,
         )
         for step in plan.ran
     ]

@@ -5,7 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.answer import Answer
-from experiments.contact_localization.dials import BLOCK, METHOD, PARTICLES, ROUNDS, SAMPLES, SPACING
+from experiments.contact_localization.dials import (
+    BLOCK,
+    METHOD,
+    PARTICLES,
+    ROUNDS,
+    SAMPLES,
+    SENSES,
+    SPACING,
+)
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.solving import Setting, levels_at, prepare, read, solve
 from harness.arrays import FloatArray
@@ -16,7 +24,12 @@ def _grid(spacing: float, rounds: int, samples: int) -> Setting:
 
 
 def _particles(number: int) -> Setting:
-    return {METHOD.name: "particle", PARTICLES.name: number, BLOCK.name: BLOCK.default}
+    return {
+        SENSES.name: "touch",
+        METHOD.name: "particle",
+        PARTICLES.name: number,
+        BLOCK.name: BLOCK.default,
+    }
 
 
 LEVELS: dict[str, Setting] = {
@@ -31,6 +44,15 @@ LEVELS: dict[str, Setting] = {
     "3,000 particles": _particles(3000),
 }
 """What the report tries, by name, from cheap to exact for each method; `touchstone cost` tries more."""
+
+BY_SENSE: dict[str, Setting] = {
+    "touch: 4 mm, no refinement": {SENSES.name: "touch", **_grid(4.0e-3, 0, 600)},
+    "touch: 2 mm, no refinement": {SENSES.name: "touch", **_grid(2.0e-3, 0, 600)},
+    "touch: 2 mm, refined": {SENSES.name: "touch", **_grid(2.0e-3, 3, 600)},
+    "sound: 4 mm": {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: 4.0e-3},
+    "sound: 2 mm": {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: 2.0e-3},
+}
+"""What is tried beside where contacts were struck, so that each sense is seen alone."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +82,7 @@ def trade(found: Answer, true: FloatArray, seed: int) -> tuple[Point, ...]:
     """
     readings = read(found.observations, found.model, found.prior, seed)
     points = []
-    for name, setting in LEVELS.items():
+    for name, setting in (LEVELS | BY_SENSE if readings.heard else LEVELS).items():
         prepare(found.model, setting)
         solved = solve(readings, setting)
         if solved.estimate is None:

@@ -1,19 +1,27 @@
-"""Answer a recording within a budget of seconds, or to an error: the levels come from the measured front."""
+"""Answer a run within a budget of seconds, or to an error: the levels come from the measured front."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import as_file, files
-from pathlib import Path
 
 import numpy as np
 
 from experiments.contact_localization.answer import observe, prior_of
-from experiments.contact_localization.dials import FINEST, METHOD, SPACING
+from experiments.contact_localization.dials import (
+    FINEST,
+    METHOD,
+    SENSES,
+    SIMULATED,
+    SPACING,
+    needs_images,
+    needs_sound,
+)
+from experiments.contact_localization.front import Front, Target
+from experiments.contact_localization.model import Prior
 from experiments.contact_localization.model_of import model_of_run
+from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.solving import (
-    ESTIMATOR,
-    PROGRAM,
+    Models,
     Readings,
     Setting,
     Solved,
@@ -22,75 +30,48 @@ from experiments.contact_localization.solving import (
     read,
     solve,
 )
-from harness.accuracy import Level
-from harness.cost import Curve, Point
-from harness.cost_bounds import most_seconds
-from harness.cost_choice import for_budget, for_error, nearest_condition, promised
-from harness.cost_file import curve_path, load
-from harness.cost_provenance import code, machine, stale
+from harness.cost import Point
+from harness.cost_bounds import most_seconds, promise
+from harness.cost_choice import for_budget, for_error
 from harness.errors import WrongUse
 from harness.recording import Recording
 from harness.run_folder import RunFiles
-from harness.scene import SceneFile
-
-SHIPPED = "data/cost.json"
-
-
-@dataclass(frozen=True)
-class Target:
-    """What is asked of an answer: one of the two.
-
-    Attributes:
-        seconds: s on the clock for the estimate.
-        error: m.
-    """
-
-    seconds: float | None = None
-    error: float | None = None
-
-    def __post_init__(self) -> None:
-        if (self.seconds is None) == (self.error is None):
-            raise WrongUse("give either a budget of seconds or an error to be met")
 
 
 @dataclass(frozen=True, eq=False)
-class Front:
-    """The measured settings that a run goes by.
+class Run:
+    """What an answer is made from.
 
     Attributes:
-        points: of the condition nearest to the run's.
-        scale: how many times their seconds are to be expected, for its number of contacts.
-        contacts: how many the points were measured with.
-        reasons: why the curve is stale; empty where it is not.
-        made: when it was measured.
-        shipped: whether it came with the program.
+        observations: of the contacts.
+        models: of the object.
+        prior: of its orientation.
+        seed: of the draws.
+        object: the name that its seconds were measured under.
     """
 
-    points: tuple[Point, ...]
-    scale: float
-    contacts: int
-    reasons: tuple[str, ...]
-    made: str
-    shipped: bool
+    observations: tuple[Observation, ...]
+    models: Models
+    prior: Prior
+    seed: int
+    object: str
 
     @property
-    def vouches(self) -> bool:
-        """Whether errors may be promised: the points were measured with no more contacts than the run has."""
-        return self.scale >= 1.0
+    def heard(self) -> bool:
+        """Whether any contact was struck."""
+        return any(observation.strike is not None for observation in self.observations)
 
-    @property
-    def trusted(self) -> bool:
-        """Whether it was measured on this machine with this code."""
-        return not self.reasons
+    def read(self, setting: Setting) -> Readings:
+        """Its readings as a setting takes them."""
+        return read(self.observations, self.models.at(setting), self.prior, self.seed, needs_images(setting))
 
 
 @dataclass(frozen=True, eq=False)
-class Within:
+class Asked:
     """An answer as it was asked for.
 
     Attributes:
-        setting: that gave it.
-        name: of the setting.
+        point: the setting that gave it.
         solved: the answer itself.
         seconds: s on the clock, from readings to answer.
         cpu: s of CPU time, likewise.
@@ -98,12 +79,9 @@ class Within:
         promise: m within which the truth lies in 95 % of runs; infinity where nothing is promised.
         kept: whether the budget was kept, or the error promised.
         tried: names of the settings tried, in order.
-        finest: the answer at the finest levels, made afterwards.
-        finest_seconds: s on the clock that it took in all.
     """
 
-    setting: Setting
-    name: str
+    point: Point
     solved: Solved
     seconds: float
     cpu: float
@@ -111,114 +89,79 @@ class Within:
     promise: float
     kept: bool
     tried: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Within:
+    """An answer as it was asked for, and what more time would have given.
+
+    Attributes:
+        asked: the answer.
+        finest: the answer at the finest levels, made afterwards.
+        finest_seconds: s on the clock that it took in all.
+    """
+
+    asked: Asked
     finest: Solved
     finest_seconds: float
-
-
-def front_for(scene: SceneFile, contacts: int) -> Front:
-    """The curve of this machine, or the one that came with the program, for runs like this one.
-
-    Raises:
-        WrongUse: nothing like this run was measured.
-        DataRefused: this machine's curve is damaged.
-    """
-    wanted: dict[str, Level] = {
-        "spacing": scene.localization.spacing,
-        "gap": "default",  # a real bench has one, and a mocked one without is only cheaper to please
-        "yaw": scene.localization.yaw,
-        "contacts": contacts,
-    }
-    path = curve_path(PROGRAM)
-    own = load(path) if path.exists() else None
-    now, here = code(ESTIMATOR), machine()
-    if own is not None and _has(own, wanted):
-        return _front(own, wanted, stale(own, here, now), shipped=False)
-    shipped = shipped_curve()
-    return _front(shipped, wanted, stale(shipped, here, now), shipped=True)
-
-
-def shipped_curve() -> Curve:
-    """The curve that comes with the program, of another machine or an earlier state of the code."""
-    with as_file(files("experiments.contact_localization").joinpath(SHIPPED)) as path:
-        return load(Path(path))
-
-
-def _has(curve: Curve, wanted: Mapping[str, Level]) -> bool:
-    return bool(curve.where({name: value for name, value in wanted.items() if name != "contacts"}))
-
-
-def _front(curve: Curve, wanted: Mapping[str, Level], reasons: Sequence[str], shipped: bool) -> Front:
-    condition, scale = nearest_condition(curve.conditions(), wanted, "contacts")
-    return Front(
-        curve.where(condition), scale, int(condition["contacts"]), tuple(reasons), curve.made, shipped
-    )
-
-
-def foresee(front: Front, target: Target, name: str) -> str:
-    """What will be tried, in a sentence.
-
-    Raises:
-        WrongUse: the cheapest setting measured on this machine takes longer than the budget.
-    """
-    if target.seconds is None:
-        assert target.error is not None
-        tried = for_error(front.points, target.error, name)
-        return f"for an error of {1e3 * target.error:g} mm: {', then '.join(point.name for point in tried)}"
-    found = for_budget(front.points, target.seconds, name, front.scale)
-    if not found.fits and front.trusted:
-        raise WrongUse(
-            f"a budget of {target.seconds:g} s cannot be kept: the cheapest setting may take "
-            f"{found.seconds:.2g} s here ({found.point.name}); allow more, or touch less often"
-        )
-    return f"for {target.seconds:g} s: {found.point.name}, at most {found.seconds:.2g} s"
 
 
 def answer_within(recording: Recording, front: Front, target: Target) -> Within:
     """Answer a recorded run as asked, then once more at the finest levels.
 
     The seconds are from readings in memory to the answer. What depends on the object alone, its
-    samples, and the loading of compiled kernels come before and are not counted.
+    samples and modes, and the loading of compiled kernels come before and are not counted.
+
+    Raises:
+        WrongUse: the recording holds no contact yet.
     """
-    run = RunFiles(recording)
-    model, prior = model_of_run(run), prior_of(run)
-    seed = recording.header.seed
-    observations = observe(run)
+    files = RunFiles(recording)
+    observations = observe(files)
     if not observations:
         raise WrongUse(f"{recording.folder} holds no contact yet; go on with `touchstone run --resume`")
-    name = object_key(run.scene.object.name, run.mesh)
-    candidates = _candidates(front, target, name)
-    for point in candidates:
-        prepare(model, point.levels)
-    first = read(observations[:1], model, prior, seed)
-    for point in {point.levels[METHOD.name]: point for point in reversed(candidates)}.values():
-        solve(first, point.levels)  # loads the compiled kernels of each method
-    cpu, wall = time.process_time(), time.perf_counter()
-    readings = read(observations, model, prior, seed)
-    point, solved, predicted, tried, promise = _solved(readings, front, target, name, candidates)
-    taken = time.process_time() - cpu, time.perf_counter() - wall
-    kept = taken[1] <= target.seconds if target.seconds is not None else promise <= (target.error or 0.0)
-    prepare(model, FINEST)
+    name = object_key(files.scene.object.name, files.mesh)
+    models = Models(lambda accuracy: model_of_run(files, accuracy))
+    run = Run(observations, models, prior_of(files), recording.header.seed, name)
+    asked = ask(run, front if run.heard else front.unheard(), target)
+    prepare(models.at(FINEST), FINEST)
+    readings = run.read(FINEST)
     finest = solve(readings, FINEST)
-    return Within(
-        setting=point.levels,
-        name=point.name,
-        solved=solved,
-        seconds=taken[1],
-        cpu=taken[0],
-        predicted=predicted,
-        promise=promise,
-        kept=kept and solved.estimate is not None,
-        tried=tried,
-        finest=finest,
-        finest_seconds=readings.shared[1] + finest.wall,
-    )
+    return Within(asked, finest, readings.shared[1] + finest.wall)
+
+
+def ask(run: Run, front: Front, target: Target, loaded: bool = False) -> Asked:
+    """Answer a run as asked; what is prepared and loaded before is not counted.
+
+    Args:
+        run: the readings.
+        front: settings to choose from.
+        target: what is asked.
+        loaded: whether this process has answered by every sense and method before.
+    """
+    candidates = _candidates(front, target, run.object)
+    for point in candidates:
+        prepare(run.models.at(point.levels), point.levels)
+    if not loaded:
+        _load_kernels(run, candidates)
+    cpu, wall = time.process_time(), time.perf_counter()
+    if target.seconds is not None:
+        point, solved, predicted = _in_time(run, front, target.seconds, candidates)
+        tried: tuple[str, ...] = (point.name,)
+    else:
+        assert target.error is not None
+        point, solved, predicted, tried = _to_error(run, front, target.error, candidates)
+    taken = time.process_time() - cpu, time.perf_counter() - wall
+    promised = _promise(front, point, solved)
+    kept = taken[1] <= target.seconds if target.seconds is not None else promised <= (target.error or 0.0)
+    kept = kept and solved.estimate is not None
+    return Asked(point, solved, taken[1], taken[0], predicted, promised, kept, tried)
 
 
 def _candidates(front: Front, target: Target, name: str) -> tuple[Point, ...]:
     """What may be taken, and is prepared for.
 
     For an error its tries; for a budget what fits on a machine as fast as the curve's and, should
-    this one prove slower now, cheaper settings on the same samples.
+    this one prove slower now, cheaper settings on the same samples and modes.
     """
     if target.error is not None:
         return for_error(front.points, target.error, name)
@@ -230,32 +173,57 @@ def _candidates(front: Front, target: Target, name: str) -> tuple[Point, ...]:
         if point is chosen.point
         or (
             most_seconds(point, name, front.scale) < 0.7 * chosen.seconds
-            and point.levels[SPACING.name] == chosen.point.levels[SPACING.name]
+            and _prepared_alike(point.levels, chosen.point.levels)
         )
     ]
     cheapest = min(front.points, key=lambda point: most_seconds(point, name, front.scale))
     return tuple(dict.fromkeys((*cheaper, cheapest)))
 
 
-def _solved(
-    readings: Readings, front: Front, target: Target, name: str, candidates: Sequence[Point]
-) -> tuple[Point, Solved, float, tuple[str, ...], float]:
-    if target.seconds is not None:
+def _prepared_alike(one: Setting, other: Setting) -> bool:
+    modes = not needs_sound(one) or all(one.get(k.name) == other.get(k.name) for k in SIMULATED)
+    return modes and one[SPACING.name] == other[SPACING.name]
+
+
+def _load_kernels(run: Run, candidates: Sequence[Point]) -> None:
+    """Answer one contact by each sense and method."""
+    struck = [observation for observation in run.observations if observation.strike is not None]
+    few = (struck or list(run.observations))[:1]
+    kinds = {(p.levels.get(SENSES.name), p.levels[METHOD.name]): p.levels for p in candidates}
+    for levels in kinds.values():
+        solve(read(few, run.models.at(levels), run.prior, run.seed, needs_images(levels)), levels)
+
+
+def _in_time(
+    run: Run, front: Front, seconds: float, candidates: Sequence[Point]
+) -> tuple[Point, Solved, float]:
+    found = for_budget(candidates, seconds, run.object, front.scale)
+    readings = run.read(found.point.levels)
+    if needs_images(found.point.levels):
+        # Reading the images, which every such setting needs, has shown how fast this machine is now.
         speed = _speed(readings, front) * front.scale
-        found = for_budget(candidates, target.seconds, name, speed, readings.shared[1])
-        solved = solve(readings, found.point.levels)
-        return found.point, solved, found.seconds, (found.point.name,), _promise(front, found.point, solved)
+        found = for_budget(candidates, seconds, run.object, speed, readings.shared[1])
+    levels = found.point.levels
+    return found.point, solve(readings.under(run.models.at(levels)), levels), found.seconds
+
+
+def _to_error(
+    run: Run, front: Front, error: float, candidates: Sequence[Point]
+) -> tuple[Point, Solved, float, tuple[str, ...]]:
     tried: list[str] = []
-    spent = readings.shared[1]
+    readings: Readings | None = None
+    spent: float | None = None
     for point in candidates:
         tried.append(point.name)
-        spent = most_seconds(point, name, front.scale, spent)
-        solved = solve(readings, point.levels)
-        promise = _promise(front, point, solved)
-        assert target.error is not None
-        if promise <= target.error:
+        if readings is None or (needs_images(point.levels) and not readings.heights):
+            readings = run.read(point.levels)
+            spent = (spent or 0.0) + readings.shared[1]
+        spent = most_seconds(point, run.object, front.scale, spent)
+        solved = solve(readings.under(run.models.at(point.levels)), point.levels)
+        if _promise(front, point, solved) <= error:
             break
-    return point, solved, spent, tuple(tried), promise
+    assert spent is not None
+    return point, solved, spent, tuple(tried)
 
 
 def _speed(readings: Readings, front: Front) -> float:
@@ -264,12 +232,12 @@ def _speed(readings: Readings, front: Front) -> float:
     On the machine of the curve it never counts as less than 1: a single fast reading promises
     nothing about the rest.
     """
-    measured = float(np.median([s.shared for point in front.points for s in point.samples]))
-    now = readings.shared[1] / front.scale / measured
+    shared = [s.shared for p in front.points for s in p.samples if needs_images(p.levels)]
+    now = readings.shared[1] / front.scale / float(np.median(shared))
     return max(1.0, now) if front.trusted else now
 
 
 def _promise(front: Front, point: Point, solved: Solved) -> float:
     if solved.estimate is None or not front.vouches:
         return float("inf")
-    return promised(point, solved.estimate.credible90)
+    return promise(point, solved.estimate.credible90)

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.dials import FINEST, setting_name
+from experiments.contact_localization.front import Front, Target
 from experiments.contact_localization.solving import Solved
 from experiments.contact_localization.truth import read_truth
-from experiments.contact_localization.within import Front, Target, Within
+from experiments.contact_localization.within import Within
 from harness.arrays import FloatArray
 from harness.recording import Recording
 
@@ -35,20 +36,20 @@ def doubts(front: Front, target: Target) -> tuple[str, ...]:
 
 def as_json(found: Within, front: Front, target: Target, recording: Recording) -> dict[str, Any]:
     """What was asked, what it took, and what the finest levels say, as JSON values."""
-    truth = read_truth(recording)
+    truth, asked = read_truth(recording), found.asked
     last = recording.committed - 1
     true = None if truth is None else truth.points.get(last)
     return {
         "asked": {"budget_s": target.seconds, "error_m": target.error},
-        "setting": found.name,
-        "levels": dict(found.setting),
-        "tried": list(found.tried),
-        "seconds": found.seconds,
-        "cpu_s": found.cpu,
-        "predicted_at_most_s": found.predicted,
-        "promised_error_m": found.promise if np.isfinite(found.promise) else None,
-        "kept": found.kept,
-        **_answer_json(found.solved, true),
+        "setting": asked.point.name,
+        "levels": dict(asked.point.levels),
+        "tried": list(asked.tried),
+        "seconds": asked.seconds,
+        "cpu_s": asked.cpu,
+        "predicted_at_most_s": asked.predicted,
+        "promised_error_m": asked.promise if np.isfinite(asked.promise) else None,
+        "kept": asked.kept,
+        **_answer_json(asked.solved, true),
         "finest": {
             "setting": setting_name(FINEST),
             "seconds": found.finest_seconds,
@@ -96,7 +97,7 @@ def _finest(finest: Mapping[str, Any]) -> str:
 
 
 def _apart(found: Within) -> float | None:
-    ours, finest = found.solved.estimate, found.finest.estimate
+    ours, finest = found.asked.solved.estimate, found.finest.estimate
     if ours is None or finest is None:
         return None
     return float(np.linalg.norm(ours.position_in_object - finest.position_in_object))

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from harness.report.data import Curve
+from harness.report.marks import key, number_marks
 from harness.report.style import blank, styled
 
 _COLOURS = ("#c2410c", "#5b616b", "#0f766e", "#1b3fae", "#9d6b00", "#8a2d79")
@@ -13,13 +14,16 @@ _COLOURS = ("#c2410c", "#5b616b", "#0f766e", "#1b3fae", "#9d6b00", "#8a2d79")
 def error_chart(curves: tuple[Curve, ...], x_label: str, logarithmic_x: bool) -> Figure:
     """Errors in millimetres on a logarithmic scale; the first curve is drawn strong.
 
+    Points that have labels are numbered, and the numbers explained beside the drawing.
+
     Args:
         curves: at least one; errors of zero are drawn at the scale's lower end.
         x_label: with its unit.
         logarithmic_x: for seconds; contacts are counted.
     """
     with styled():
-        figure = blank(6.4, 3.9)
+        labels = [label for curve in curves for label in curve.labels]
+        figure = blank(8.2 if labels else 6.4, 3.9)
         figure.set_layout_engine("constrained")
         axes = figure.add_subplot()
         floor = (
@@ -37,9 +41,6 @@ def error_chart(curves: tuple[Curve, ...], x_label: str, logarithmic_x: bool) ->
                 label=curve.name,
                 zorder=3 if strong else 2,
             )
-            for x, error, label in zip(curve.x, curve.error, curve.labels, strict=False):
-                at = (x, max(error * 1e3, floor))
-                axes.annotate(label, at, (5, 5), textcoords="offset points", fontsize=8)
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -48,12 +49,25 @@ def error_chart(curves: tuple[Curve, ...], x_label: str, logarithmic_x: bool) ->
         axes.set_xlabel(x_label)
         if logarithmic_x:
             axes.set_xscale("log")
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
             axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axes.xaxis.set_minor_formatter(NullFormatter())
         else:
             axes.set_xticks(sorted({x for curve in curves for x in curve.x}))
         axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)
         axes.set_axisbelow(True)
         axes.legend(frameon=False, fontsize=9)
+        if labels:
+            at = np.array(
+                [
+                    (x, max(1e3 * e, floor))
+                    for c in curves
+                    if c.labels
+                    for x, e in zip(c.x, c.error, strict=True)
+                ]
+            )
+            key(axes, [f"{number}  {label}" for number, label in enumerate(labels, start=1)])
+            number_marks(figure, axes, at, [str(number) for number in range(1, len(labels) + 1)])
     return figure
 
 

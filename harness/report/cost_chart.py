@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from harness.cost import Point, front
+from harness.report.marks import key, number_marks
 from harness.report.style import SOFT, blank, styled
 
 _COLOURS = ("#1b3fae", "#c2410c", "#0f766e", "#8a2d79", "#9d6b00")
@@ -14,42 +16,27 @@ _DOMINATED = 0.45
 _TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
 
 
-def cost_chart(points: Sequence[Point], family: str, title: str, stale: bool) -> Figure:
-    """Every setting with its 90 % intervals; dominated ones pale, the front joined and numbered.
+def cost_chart(points: Sequence[Point], families: Sequence[str], title: str, stale: bool) -> Figure:
+    """Every setting with its 90 % intervals; dominated ones pale, the front joined, numbered and named.
 
     Args:
         points: of one condition, at least one.
-        family: the dial whose levels get a colour each.
+        families: the dials each combination of whose levels gets a colour.
         title: over the drawing.
         stale: whether the curve no longer holds; written across it.
     """
     best = front(points)
     with styled():
-        figure = blank(8.2, 4.9)
+        figure = blank(10.4, 4.9)
         figure.set_layout_engine("constrained")
         axes = figure.add_subplot()
-        for number, name in enumerate(dict.fromkeys(str(p.levels[family]) for p in points)):
-            mine = [point for point in points if str(point.levels[family]) == name]
-            _marks(
-                axes,
-                [p for p in mine if p not in best],
-                _COLOURS[number % 5],
-                f"{name}, dominated",
-                pale=True,
-            )
-            _marks(
-                axes,
-                [p for p in mine if p in best],
-                _COLOURS[number % 5],
-                f"{name}, on the front",
-                pale=False,
-            )
-        axes.plot(
-            [p.seconds.value for p in best], [1e3 * p.error.value for p in best], color=SOFT, lw=1.0, zorder=1
-        )
-        for number, point in enumerate(best, start=1):
-            at = (point.seconds.value, 1e3 * point.error.value)
-            axes.annotate(str(number), at, (6, 6), textcoords="offset points", fontsize=9, fontweight="bold")
+        for number, name in enumerate(dict.fromkeys(family_of(p, families) for p in points)):
+            mine = [point for point in points if family_of(point, families) == name]
+            colour = _COLOURS[number % len(_COLOURS)]
+            _marks(axes, [p for p in mine if p not in best], colour, f"{name}, dominated", pale=True)
+            _marks(axes, [p for p in mine if p in best], colour, f"{name}, on the front", pale=False)
+        at = np.array([(p.seconds.value, 1e3 * p.error.value) for p in best])
+        axes.plot(*at.T, color=SOFT, lw=1.0, zorder=1)
         if stale:
             axes.text(
                 0.5, 0.5, "STALE", transform=axes.transAxes, fontsize=64, color="#c2410c", alpha=0.16,
@@ -59,8 +46,15 @@ def cost_chart(points: Sequence[Point], family: str, title: str, stale: bool) ->
         axes.set_xlabel("seconds of CPU time, from readings to answer (geometric mean, 90 % interval)")
         axes.set_ylabel("error in mm (geometric mean, 90 % interval)")
         _logarithmic(axes)
-        axes.legend(frameon=False, fontsize=9)
+        axes.legend(frameon=False, fontsize=8)
+        key(axes, [f"{number}  {point.name}" for number, point in enumerate(best, start=1)])
+        number_marks(figure, axes, at, [str(number) for number in range(1, len(best) + 1)])
     return figure
+
+
+def family_of(point: Point, families: Sequence[str]) -> str:
+    """The levels of some dials, for the legend; a dial that a point does not name is left out."""
+    return ", ".join(str(point.levels[name]) for name in families if name in point.levels)
 
 
 def contacts_chart(curves: Sequence[tuple[str, Sequence[tuple[int, Point]]]]) -> Figure:

@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from harness.accuracy import Level
 from harness.cost import Curve, Point, front
-from harness.cost_bounds import predicted_at_most, stretch
+from harness.cost_bounds import MET, predicted_at_most, promises
 from harness.report.cost_chart import contacts_chart, cost_chart
 from harness.report.figures import Album, Picture
 
@@ -45,17 +45,20 @@ HEADINGS = (
     "CPU",
     "wall",
     "next run at most",
-    "90 % radius times",
+    "promised to all",
+    "to the surer half",
 )
 
 
-def write_cost_page(curve: Curve, reasons: Sequence[str], family: str, count: str, folder: Path) -> Path:
+def write_cost_page(
+    curve: Curve, reasons: Sequence[str], families: Sequence[str], count: str, folder: Path
+) -> Path:
     """Write the page and its pictures.
 
     Args:
         curve: what was measured.
         reasons: why it is stale; empty where it is not.
-        family: the dial whose levels get a colour each.
+        families: the dials each combination of whose levels gets a colour.
         count: the condition that is drawn as an axis of its own: how many contacts.
         folder: made if it does not exist; files of the same names are replaced.
 
@@ -77,7 +80,7 @@ def write_cost_page(curve: Curve, reasons: Sequence[str], family: str, count: st
         reasons=reasons,
         headings=HEADINGS,
         sections=[
-            _section(curve.where(condition), condition, number, family, bool(reasons), album)
+            _section(curve.where(condition), condition, number, families, bool(reasons), album)
             for number, condition in enumerate(curve.conditions(), start=1)
         ],
         by_count=_by_count(curve, count, album),
@@ -90,7 +93,7 @@ def _section(
     points: Sequence[Point],
     condition: Mapping[str, Level],
     number: int,
-    family: str,
+    families: Sequence[str],
     stale: bool,
     album: Album,
 ) -> Section:
@@ -100,12 +103,11 @@ def _section(
         Row(str(best.index(point) + 1) if point in best else "", _cells(point))
         for point in sorted(points, key=lambda p: p.seconds.value)
     ]
-    picture = album.drawing(f"cost_{number}", cost_chart(points, family, title, stale))
+    picture = album.drawing(f"cost_{number}", cost_chart(points, families, title, stale))
     return Section(f"c{number}", title, picture, max(len(p.samples) for p in points), tuple(rows))
 
 
 def _cells(point: Point) -> tuple[str, ...]:
-    factor = stretch(point)
     several = len(point.samples) > 1
     return (
         point.name,
@@ -116,24 +118,41 @@ def _cells(point: Point) -> tuple[str, ...]:
         f"{point.seconds.value:.3f} [{point.seconds.low:.3f}, {point.seconds.high:.3f}] s",
         f"{float(np.median(point.wall_seconds)):.3f} s",
         f"{predicted_at_most(point.cpu_seconds):.2f} s" if several else "one run",
-        f"{factor:.2f}" if np.isfinite(factor) else "too few runs",
+        _promised(point, 1.0),
+        _promised(point, 0.5),
     )
 
 
+def _promised(point: Point, share: float) -> str:
+    """The error promised to the run that is as sure as this share of the measured ones."""
+    radii = sorted(s.radius for s in point.samples if s.radius is not None)
+    limits, promised = promises(point, MET)
+    if not len(limits):
+        return "too few runs"
+    at = radii[max(1, int(np.ceil(share * len(radii)))) - 1]
+    return f"{1e3 * float(promised[np.searchsorted(limits, at)]):.1f} mm"
+
+
 def _by_count(curve: Curve, count: str, album: Album) -> Picture | None:
-    """Settings measured with several numbers of contacts: those on the front with the most of them."""
+    """Settings measured with several numbers of contacts: those of least error with the most."""
     curves = []
     most = max(float(condition[count]) for condition in curve.conditions())
     for condition in curve.conditions():
         if float(condition[count]) != most:
             continue
         rest = {name: value for name, value in condition.items() if name != count}
-        for point in front(curve.where(condition))[-2:]:
+        several = [p for p in curve.where(condition) if len(_alike(curve, rest, p)) > 1]
+        for point in sorted(several, key=lambda p: p.error.value)[:_DRAWN]:
             same = sorted(
-                ((int(p.condition[count]), p) for p in curve.where(rest) if p.levels == point.levels),
-                key=lambda pair: pair[0],
+                ((int(p.condition[count]), p) for p in _alike(curve, rest, point)), key=lambda pair: pair[0]
             )
-            if len(same) > 1:
-                said = ", ".join(map(str, rest.values()))
-                curves.append((f"{said}: {point.name}", same))
+            said = ", ".join(map(str, rest.values()))
+            curves.append((f"{said}: {point.name}", same))
     return album.drawing("cost_by_contacts", contacts_chart(curves)) if curves else None
+
+
+_DRAWN = 4
+
+
+def _alike(curve: Curve, rest: Mapping[str, Level], point: Point) -> list[Point]:
+    return [p for p in curve.where(rest) if p.levels == point.levels]

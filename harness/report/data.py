@@ -156,6 +156,7 @@ class EffectRun:
         reason: in words.
         calls: how often, None if not counted.
         seconds: total, None if not timed.
+        stored: whether it was read from the store of results instead of computed.
     """
 
     name: str
@@ -163,6 +164,7 @@ class EffectRun:
     reason: str
     calls: int | None = None
     seconds: float | None = None
+    stored: bool = False
 
 
 @dataclass(frozen=True)

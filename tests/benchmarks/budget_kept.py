@@ -1,61 +1,48 @@
 """How often a budget is kept and an error met, and how far the choice is from the best there was.
 
-Run as ``python tests/benchmarks/budget_kept.py --spacing spread --seeds 4``. Runs on the built-in
-objects are performed in process and answered at every setting (kept in ``--out``, so a stopped
-measurement resumes). Then, for each run in turn, the curve of all *other* runs chooses for it:
-what is chosen has never seen the run it is judged by. The best there was is the one fixed setting
-that does best on the very runs it is judged by. Seconds are of CPU time.
+Run as ``python tests/benchmarks/budget_kept.py`` after ``touchstone cost contact-localization``. Runs on
+the built-in objects, of seeds that the curve has not seen, are performed in process. Each is asked for
+every budget and error as ``touchstone run`` asks, and then answered at every setting that was measured,
+so that the best there was is found by trying all. One file a run is kept in ``--out``: what is stopped
+resumes there. What is judged:
+
+- a budget: in how many runs it was kept, on the clock. The error, as a mean over the runs, beside the
+  least mean error of any one setting that keeps the budget in 19 of 20 of the same runs. Runs that would
+  have been refused before anything moved are counted apart.
+- an error: in how many of the runs it was promised to it was met. The seconds, as a mean over all runs,
+  beside those of the cheapest one setting whose error is met in 19 of 20 of them.
 """
 
 import argparse
+import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.costing import Work, gathered, measure
-from experiments.contact_localization.dials import (
-    BLOCK,
-    METHOD,
-    PARTICLES,
-    ROUNDS,
-    SAMPLES,
-    SPACING,
-    settings,
-)
+from experiments.contact_localization.costing import Case, performed, warm, workers_of
+from experiments.contact_localization.front import Front, Target, front_of
+from experiments.contact_localization.solving import ESTIMATOR, PROGRAM, Models, Setting
 from experiments.contact_localization.table import objects
-from experiments.contact_localization.table_cell import cells
+from experiments.contact_localization.table_cell import Cell, cells
+from experiments.contact_localization.within import ask
 from harness.accuracy import Level
-from harness.cost import LEAST_ERROR, Point, Sample
-from harness.cost_choice import for_budget, for_error, promised
-from harness.cost_file import save
+from harness.cost import LEAST_ERROR, Curve
+from harness.cost_choice import for_budget
+from harness.cost_file import curve_path, load, sample_json
+from harness.cost_provenance import code, machine, stale
+from harness.recording import write_text_whole
 from harness.station_file import load_station, station_path
 
 SHARE = 0.95
+CONTACTS = 6
+BUDGETS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0)
+ERRORS = (2e-3, 3e-3, 5e-3, 8e-3, 12e-3, 20e-3)
 
-
-def _grid(spacing: float, rounds: int, samples: int, block: int) -> dict[str, Level]:
-    dials = {SPACING.name: spacing, ROUNDS.name: rounds, SAMPLES.name: samples, BLOCK.name: block}
-    return {METHOD.name: "grid", **dials}
-
-
-def _particles(spacing: float, number: int, block: int) -> dict[str, Level]:
-    return {METHOD.name: "particle", SPACING.name: spacing, PARTICLES.name: number, BLOCK.name: block}
-
-
-QUICK = (
-    _particles(4e-3, 300, 16),
-    _particles(2e-3, 1000, 8),
-    _grid(4e-3, 0, 600, 16),
-    _grid(4e-3, 0, 600, 8),
-    _grid(2e-3, 0, 600, 8),
-    _grid(4e-3, 3, 600, 8),
-    _grid(2e-3, 3, 600, 16),
-    _grid(2e-3, 1, 600, 8),
-    _grid(2e-3, 3, 600, 8),
-    _grid(1.5e-3, 3, 1200, 8),
-)
+Record = Mapping[str, Any]
 
 
 def say(line: str) -> None:
@@ -67,124 +54,174 @@ def say(line: str) -> None:
 def main() -> None:
     """Measure what is missing, then judge."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--spacing", default="spread", choices=("close", "spread"))
+    parser.add_argument("--spacing", action="append", choices=("close", "spread"))
     parser.add_argument("--yaw", default="known", choices=("known", "unknown"))
+    parser.add_argument("--sense", default="both", choices=("touch", "both"))
     parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--first-seed", type=int, default=3000)
+    parser.add_argument("--first-seed", type=int, default=4000)
     parser.add_argument("--only", action="append")
-    parser.add_argument("--quick", action="store_true", help="ten settings that span the range")
-    parser.add_argument("--curve", type=Path, help="write the curve of all runs here too")
+    parser.add_argument("--workers", type=int, default=2, help="processes that perform runs")
+    parser.add_argument("--curve", type=Path, help="this machine's own if left out")
     parser.add_argument("--out", type=Path, default=Path("runs/cost/budget_kept"))
     given = parser.parse_args()
-    scenes = objects(None)
+    curve = load(given.curve or curve_path(PROGRAM))
     seeds = range(given.first_seed, given.first_seed + given.seeds)
-    wanted = cells(given.only or list(scenes), seeds, [given.spacing], ["default"], [given.yaw])
-    tried = list(QUICK) if given.quick else settings()
-    work = Work(tuple(wanted), tuple(tried), (6,))
-    found: list[tuple[str, Point]] = []
-    for cell, points in measure(work, scenes, load_station(station_path("mock")), given.out, say):
-        say(f"{cell.name}: {len(points)} answers")
-        found += [(cell.name, point) for point in points]
-    if given.curve is not None:
-        save(gathered([point for _, point in found], "What a contact's place costs"), given.curve)
-    folds = []
-    for run in dict.fromkeys(name for name, _ in found):
-        known = [point for name, point in found if name != run]
-        held = [point for name, point in found if name == run]
-        folds.append((gathered(known, "known").points, gathered(held, "held out").points))
-    say(f"{given.spacing}, yaw {given.yaw}, {sum(len(held[0].samples) for _, held in folds)} runs held out")
-    for budget in (0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0):
-        say(judged_budget(folds, budget))
-    for error in (2e-3, 3e-3, 5e-3, 8e-3, 12e-3, 20e-3):
-        say(judged_error(folds, error))
+    names = given.only or list(objects(None))
+    for spacing in given.spacing or ("close", "spread"):
+        wanted = cells(names, seeds, [spacing], ["default"], [given.yaw], given.sense == "both")
+        say(judged(measured(wanted, curve, given.out, given.workers), f"{spacing}, yaw {given.yaw}"))
 
 
-Folds = Sequence[tuple[Sequence[Point], Sequence[Point]]]
+def measured(wanted: Sequence[Cell], curve: Curve, folder: Path, workers: int) -> list[Record]:
+    """A record of each run that can be performed, from the disk where it was made before."""
+    reasons = stale(curve, machine(), code(ESTIMATOR))
+    if reasons:
+        say(f"the curve is stale, so its seconds are scaled and its errors are of other code: {reasons}")
+    folder.mkdir(parents=True, exist_ok=True)
+    stamp = {"machine": machine(), "sha256": code(ESTIMATOR)["sha256"], "curve": curve.made}
+    known = {cell: _kept(folder / f"{cell.name}.json", stamp) for cell in wanted}
+    scenes, station = objects(None), load_station(station_path("mock"))
+    models: dict[str, Models] = {}
+    missing = [cell for cell, record in known.items() if record is None]
+    with workers_of(workers if missing else 1) as pool:
+        cases = performed(missing, scenes, station, pool, models, say)
+    for number, (cell, case) in enumerate(cases.items(), start=1):
+        record = {**stamp, **_record(case, _front(curve, cell, reasons))}
+        write_text_whole(folder / f"{cell.name}.json", json.dumps(record, allow_nan=False))
+        known[cell] = record
+        say(f"{cell.name}: run {number} of {len(cases)}")
+    return [record for record in known.values() if record is not None]
 
 
-def judged_budget(folds: Folds, budget: float) -> str:
-    """One line: runs, share kept, typical error, and the best setting's."""
-    taken: list[Sample] = []
-    refused = 0
-    for known, held in folds:
-        for run in held[0].samples:
-            choice = for_budget(known, budget, run.object, 1.0, run.shared)
-            if choice.fits:
-                taken.append(_sample(held, choice.point.name, run.run))
-            else:
-                refused += 1
-    if not taken:
-        return f"budget {budget:g} s: refused in all {refused} runs"
-    kept = np.mean([s.shared + s.cpu <= budget for s in taken])
-    ours = _typical([s.error for s in taken])
-    best = _best_error(folds, budget, {s.run for s in taken})
-    beside = (
-        "none keeps it" if best is None else f"{1e3 * best[0]:.2f} mm ({best[1]}), ratio {ours / best[0]:.2f}"
-    )
-    return (
-        f"budget {budget:g} s: kept in {100 * kept:.0f} % of {len(taken)} runs ({refused} refused before); "
-        f"error {1e3 * ours:.2f} mm; best fixed setting {beside}"
-    )
+def _kept(path: Path, stamp: Mapping[str, Any]) -> Record | None:
+    if not path.exists():
+        return None
+    record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return record if all(record.get(name) == value for name, value in stamp.items()) else None
 
 
-def judged_error(folds: Folds, error: float) -> str:
-    """One line: runs, share promised, share met of those, seconds, and the cheapest setting's."""
-    seconds, met, not_promised, names = [], [], 0, set()
-    for known, held in folds:
-        for run in held[0].samples:
-            spent = run.shared
-            for point in for_error(known, error, run.object):
-                sample = _sample(held, point.name, run.run)
-                spent += sample.cpu
-                promise = float("inf") if sample.radius is None else promised(point, sample.radius)
-                if promise <= error:
-                    break
-            if promise > error:
-                not_promised += 1
-                continue
-            met.append(sample.error <= error)
-            seconds.append(spent)
-            names.add(run.run)
-    if not met:
-        return f"error {1e3 * error:g} mm: promised in none of {not_promised} runs"
-    ours = _typical(seconds)
-    best = _best_seconds(folds, error, names)
-    beside = "none meets it" if best is None else f"{best[0]:.3f} s ({best[1]}), ratio {ours / best[0]:.2f}"
-    return (
-        f"error {1e3 * error:g} mm: met in {100 * np.mean(met):.0f} % of {len(met)} promised runs "
-        f"({not_promised} not promised); {ours:.3f} s; cheapest fixed setting {beside}"
-    )
+def _front(curve: Curve, cell: Cell, reasons: Sequence[str]) -> Front:
+    wanted: dict[str, Level] = {
+        "spacing": cell.spacing,
+        "gap": cell.gap,
+        "yaw": cell.yaw,
+        "contacts": CONTACTS,
+    }
+    found = front_of(curve, wanted, reasons, shipped=False)
+    return found if cell.sound else found.unheard()
 
 
-def _best_error(folds: Folds, budget: float, runs: set[str]) -> tuple[float, str] | None:
+def _record(case: Case, front: Front) -> dict[str, Any]:
+    """One run: as asked for each budget and error, and at every setting."""
+    settings: list[Setting] = [point.levels for point in front.points]
+    warm(case, settings)
+    budgets = [_asked(case, front, Target(seconds=budget)) for budget in BUDGETS]
+    errors = [_asked(case, front, Target(error=error)) for error in ERRORS]
+    tried = {point.name: sample_json(case.sample(point.levels, CONTACTS)) for point in front.points}
+    return {"object": case.run.object, "budgets": budgets, "errors": errors, "tried": tried}
+
+
+def _asked(case: Case, front: Front, target: Target) -> dict[str, Any]:
+    refused = target.seconds is not None and not _foreseen(case, front, target.seconds)
+    found = ask(case.run, front, target, loaded=True)
+    return {
+        "asked": target.seconds if target.seconds is not None else target.error,
+        "refused_before": refused,
+        "setting": found.point.name,
+        "tried": len(found.tried),
+        "kept": found.kept,
+        "wall_s": found.seconds,
+        "cpu_s": found.cpu,
+        "error_m": case.error_of(found.solved, CONTACTS),
+    }
+
+
+def _foreseen(case: Case, front: Front, seconds: float) -> bool:
+    return for_budget(front.points, seconds, case.run.object, front.scale).fits
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One fixed setting on some runs: errors in m and seconds, ``(runs,)`` each."""
+
+    name: str
+    errors: Sequence[float]
+    seconds: Sequence[float]
+
+
+def tried_on(records: Sequence[Record]) -> list[Tried]:
+    """Every setting on all of these runs."""
     found = []
-    for name, samples in _by_setting(folds, runs).items():
-        if np.mean([s.shared + s.cpu <= budget for s in samples]) >= SHARE:
-            found.append((_typical([s.error for s in samples]), name))
-    return min(found, default=None)
-
-
-def _best_seconds(folds: Folds, error: float, runs: set[str]) -> tuple[float, str] | None:
-    found = []
-    for name, samples in _by_setting(folds, runs).items():
-        if np.mean([s.error <= error for s in samples]) >= SHARE:
-            found.append((_typical([s.shared + s.cpu for s in samples]), name))
-    return min(found, default=None)
-
-
-def _by_setting(folds: Folds, runs: set[str]) -> dict[str, list[Sample]]:
-    found: dict[str, list[Sample]] = {}
-    for _, held in folds:
-        for point in held:
-            found.setdefault(point.name, []).extend(s for s in point.samples if s.run in runs)
+    for name in records[0]["tried"]:
+        samples = [record["tried"][name] for record in records]
+        seconds = [sample["shared_cpu_s"] + sample["cpu_s"] for sample in samples]
+        found.append(Tried(name, [sample["error_m"] for sample in samples], seconds))
     return found
 
 
-def _sample(points: Sequence[Point], name: str, run: str) -> Sample:
-    return next(s for p in points if p.name == name for s in p.samples if s.run == run)
+def judged(records: Sequence[Record], title: str) -> str:
+    """All lines of one condition."""
+    if not records:
+        return f"{title}: no run could be performed"
+    lines = [f"{title}: {len(records)} runs that the curve has not seen"]
+    lines += [judged_budget(records, index) for index in range(len(BUDGETS))]
+    lines += [judged_error(records, index) for index in range(len(ERRORS))]
+    return "\n".join(lines)
 
 
-def _typical(values: Sequence[float]) -> float:
+def judged_budget(records: Sequence[Record], index: int) -> str:
+    """One line: runs, how many kept it, the errors' means, and the best setting's."""
+    budget = BUDGETS[index]
+    taken = [record for record in records if not record["budgets"][index]["refused_before"]]
+    refused = len(records) - len(taken)
+    if not taken:
+        return f"  budget {budget:g} s: refused before anything moved in all {refused} runs"
+    ours = [record["budgets"][index] for record in taken]
+    kept = sum(answer["wall_s"] <= budget for answer in ours)
+    by_cpu = sum(answer["cpu_s"] <= budget for answer in ours)
+    errors = [answer["error_m"] for answer in ours]
+    fixed = [t for t in tried_on(taken) if np.mean([s <= budget for s in t.seconds]) >= SHARE]
+    return (
+        f"  budget {budget:g} s: kept in {kept} of {len(ours)} runs ({by_cpu} by CPU time; {refused} refused "
+        f"before); error {1e3 * geometric(errors):.2f} mm, mean {1e3 * np.mean(errors):.2f}; "
+        + _beside_errors(fixed, errors)
+    )
+
+
+def _beside_errors(fixed: Sequence[Tried], errors: Sequence[float]) -> str:
+    if not fixed:
+        return "no fixed setting keeps it in 19 of 20"
+    best = min(fixed, key=lambda t: geometric(t.errors))
+    least = min(float(np.mean(t.errors)) for t in fixed)
+    ratio = geometric(errors) / geometric(best.errors)
+    return (
+        f"best fixed {1e3 * geometric(best.errors):.2f} mm ({best.name}): ratio {ratio:.2f}; "
+        f"by the mean {1e3 * least:.2f} mm: ratio {np.mean(errors) / least:.2f}"
+    )
+
+
+def judged_error(records: Sequence[Record], index: int) -> str:
+    """One line: runs, how many were promised it, how many met it, seconds, and the cheapest setting's."""
+    wanted = ERRORS[index]
+    ours = [record["errors"][index] for record in records]
+    promised = [answer for answer in ours if answer["kept"]]
+    met = sum(answer["error_m"] <= wanted for answer in promised)
+    seconds = geometric([answer["cpu_s"] for answer in ours])
+    fixed = [t for t in tried_on(records) if np.mean([e <= wanted for e in t.errors]) >= SHARE]
+    if fixed:
+        best = min(fixed, key=lambda t: geometric(t.seconds))
+        ratio = seconds / geometric(best.seconds)
+        beside = f"cheapest fixed {geometric(best.seconds):.3f} s ({best.name}): ratio {ratio:.2f}"
+    else:
+        beside = "no fixed setting meets it in 19 of 20"
+    return (
+        f"  error {1e3 * wanted:g} mm: met in {met} of the {len(promised)} runs it was promised to, of "
+        f"{len(ours)}; {seconds:.3f} s; {beside}"
+    )
+
+
+def geometric(values: Sequence[float]) -> float:
+    """Geometric mean; errors count as the least that the bench resolves."""
     return float(np.exp(np.mean(np.log(np.maximum(values, LEAST_ERROR)))))
 
 

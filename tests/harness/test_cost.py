@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from harness.accuracy import Level
 from harness.code_version import closure, content_hash
 from harness.cost import Curve, Point, Sample, best_within, cheapest_within, front
-from harness.cost_bounds import KEPT, most_seconds, predicted_at_most, promise_share, stretch
+from harness.cost_bounds import KEPT, most_seconds, predicted_at_most, promise, promise_share
 from harness.cost_choice import for_budget, for_error, nearest_condition
 from harness.cost_file import curve_path, from_json, load, save, to_json
 from harness.cost_provenance import machine, stale
@@ -143,26 +143,62 @@ def test_a_bound_needs_more_than_one_run() -> None:
         predicted_at_most(np.array([1.0]))
 
 
-def claiming(errors_: np.ndarray, radius: float = 1.0) -> Point:
-    return Point(
-        "p", {}, CONDITION, tuple(sample(str(k), float(e), radius=radius) for k, e in enumerate(errors_))
-    )
+def claiming(errors_: np.ndarray, radii: np.ndarray | None = None) -> Point:
+    claimed = np.ones(len(errors_)) if radii is None else radii
+    pairs = enumerate(zip(errors_, claimed, strict=True))
+    return Point("p", {}, CONDITION, tuple(sample(str(k), float(e), radius=float(r)) for k, (e, r) in pairs))
 
 
-def test_a_stretched_radius_holds_the_truth_as_often_as_it_says_whatever_the_tail() -> None:
+def test_a_promise_is_met_as_often_as_it_says_whatever_the_tail() -> None:
     rng = np.random.default_rng(3)
-    held = []
+    met = []
     for _ in range(1500):
         errors_ = np.abs(rng.standard_cauchy(40)) + 1e-6
-        held.append(errors_[-1] <= stretch(claiming(errors_[:-1]), 0.95))
-    assert np.mean(held) >= 0.95 - 0.02
-    assert np.mean(held) <= 1.0 - 0.02
+        met.append(errors_[-1] <= promise(claiming(errors_[:-1]), 1.0, 0.95))
+    assert np.mean(met) >= 0.95 - 0.02
+    assert np.mean(met) <= 1.0 - 0.02
+
+
+def test_a_promise_made_only_to_the_sure_is_met_by_them_though_some_are_wrong_and_sure() -> None:
+    rng = np.random.default_rng(4)
+    met = []
+    for _ in range(600):
+        radii = np.exp(rng.normal(0.0, 1.0, 61))
+        errors_ = 0.5 * radii * np.abs(rng.standard_normal(61))
+        wrong = rng.random(61) < 0.03  # at any radius: among the surest too
+        errors_ = np.where(wrong, 50.0, errors_) + 1e-6
+        known, sure = claiming(errors_[:-1], radii[:-1]), float(radii[-1])
+        for wanted in (1.0, 2.0, 4.0):
+            if promise(known, sure, 0.95) <= wanted:
+                met.append(errors_[-1] <= wanted)
+    assert len(met) > 200
+    assert np.mean(met) >= 0.95 - 0.015
+
+
+def test_the_surer_are_promised_no_more_error_and_the_least_sure_nothing() -> None:
+    radii = np.linspace(1.0, 4.0, 60)
+    known = claiming(radii**2, radii)
+    promised = [promise(known, float(radius), 0.95) for radius in np.linspace(0.5, 4.0, 30)]
+    assert promised == sorted(promised)
+    assert promised[0] < 0.6 * promised[-1]
+    assert promise(known, 4.1, 0.95) == math.inf
 
 
 def test_too_few_runs_promise_nothing() -> None:
-    assert stretch(claiming(np.full(18, 1e-3))) == math.inf
-    assert stretch(claiming(np.full(19, 0.5))) == pytest.approx(0.5)
-    assert promise_share(claiming(np.full(18, 1e-3)), "mug", 1.0) == 0.0
+    assert promise(claiming(np.full(18, 1e-3)), 1.0, 0.95) == math.inf
+    assert promise(claiming(np.full(19, 0.5)), 1.0, 0.95) == 0.5
+    assert promise(claiming(np.full(38, 0.5)), 1.0) == math.inf
+    assert promise(claiming(np.full(39, 0.5)), 1.0) == 0.5
+    assert promise_share(claiming(np.full(38, 1e-3)), "mug", 1.0) == 0.0
+    assert promise_share(claiming(np.full(39, 1e-3)), "mug", 1.0) == 1.0
+
+
+def test_a_refused_answer_promises_nothing_and_counts_as_no_claim() -> None:
+    known = claiming(np.full(40, 0.5))
+    refused = replace(known.samples[0], run="refused", radius=None)
+    more = replace(known, samples=(*known.samples, refused))
+    assert promise(more, 1.0) == 0.5
+    assert promise_share(more, "mug", 1.0) == pytest.approx(40 / 41)
 
 
 def test_a_budget_takes_the_best_that_keeps_it_in_nearly_every_run() -> None:

@@ -12,17 +12,11 @@ from experiments.commands import run as run_command
 from experiments.contact_localization import session_of
 from experiments.contact_localization.costing import Case, Work, gathered, joined, measure
 from experiments.contact_localization.dials import FINEST, KNOBS, METHOD, SPACING, setting_name, settings
+from experiments.contact_localization.front import Front, Target, foresee, front_for, shipped_curve
 from experiments.contact_localization.solving import ESTIMATOR, PROGRAM, object_key
 from experiments.contact_localization.table import objects
 from experiments.contact_localization.table_cell import cells
-from experiments.contact_localization.within import (
-    Front,
-    Target,
-    answer_within,
-    foresee,
-    front_for,
-    shipped_curve,
-)
+from experiments.contact_localization.within import answer_within
 from experiments.contact_localization.within_words import as_json, doubts, sentences, staleness
 from harness.accuracy import Accuracy, Level
 from harness.cli import invoke
@@ -68,7 +62,7 @@ def curve_of(recording: Recording, coarse_cpu: float = 0.2, fine_cpu: float = 3.
 
     def point(setting: dict[str, Level], cpu: float, error: float) -> Point:
         samples = tuple(
-            Sample(f"r{k}", name, error, 0.8 * error, 0.05, cpu * (1.0 + 1e-3 * k), cpu) for k in range(40)
+            Sample(f"r{k}", name, error, 0.1, 0.05, cpu * (1.0 + 1e-3 * k), cpu) for k in range(40)
         )
         return Point(setting_name(setting), setting, condition, samples)
 
@@ -82,9 +76,9 @@ def test_a_budget_takes_what_keeps_it_and_says_what_it_took(done: Recording, cac
     assert front.trusted
     target = Target(seconds=30.0)
     found = answer_within(done, front, target)
-    assert found.setting == DEFAULT
-    assert found.kept
-    assert found.cpu < 30.0
+    assert found.asked.point.levels == DEFAULT
+    assert found.asked.kept
+    assert found.asked.cpu < 30.0
     said = as_json(found, front, target, done)
     assert said["kept"] is True
     assert said["error_m"] < 20e-3
@@ -97,8 +91,8 @@ def test_a_budget_takes_what_keeps_it_and_says_what_it_took(done: Recording, cac
 def test_a_budget_too_small_for_the_finer_setting_takes_the_coarser(done: Recording, cache: Path) -> None:
     save(curve_of(done, 0.01, 1e4), curve_path(PROGRAM))
     front = front_for(RunFiles(done).scene, done.committed)
-    found = answer_within(done, front, Target(seconds=20.0))
-    assert found.setting == COARSE
+    found = answer_within(done, front, Target(seconds=20.0)).asked
+    assert found.point.levels == COARSE
     assert found.tried == (setting_name(COARSE),)
 
 
@@ -108,9 +102,9 @@ def test_the_answer_within_a_budget_is_the_run_s_answer_at_those_levels(
     save(curve_of(done), curve_path(PROGRAM))
     recording = copied(done, tmp_path / "copy")
     front = front_for(RunFiles(recording).scene, recording.committed)
-    found = answer_within(recording, front, Target(seconds=30.0))
+    found = answer_within(recording, front, Target(seconds=30.0)).asked
     assert found.solved.estimate is not None
-    scored = session_of.score(recording, Accuracy.default(KNOBS).with_(found.setting))
+    scored = session_of.score(recording, Accuracy.default(KNOBS).with_(found.point.levels))
     np.testing.assert_array_equal(
         scored.found.last.position_in_object, found.solved.estimate.position_in_object
     )
@@ -121,12 +115,12 @@ def test_an_error_is_promised_from_the_answer_s_own_radius_or_not_at_all(
 ) -> None:
     save(curve_of(done), curve_path(PROGRAM))
     front = front_for(RunFiles(done).scene, done.committed)
-    generous = answer_within(done, front, Target(error=0.1))
+    generous = answer_within(done, front, Target(error=0.1)).asked
     assert generous.tried == (setting_name(COARSE),)
     assert generous.kept
     assert generous.promise <= 0.1
     strict = answer_within(done, front, Target(error=1e-6))
-    assert not strict.kept
+    assert not strict.asked.kept
     said = as_json(strict, front, Target(error=1e-6), done)
     assert "cannot be promised" in sentences(said)[0]
 
@@ -139,7 +133,7 @@ def test_nothing_is_promised_from_more_contacts_than_the_run_has(done: Recording
     assert front.scale == 0.5
     assert any("measured with 6 contacts" in said for said in doubts(front, target))
     found = answer_within(done, front, target)
-    assert not found.kept
+    assert not found.asked.kept
     assert as_json(found, front, target, done)["promised_error_m"] is None
 
 
@@ -273,9 +267,10 @@ def test_the_command_measures_keeps_and_draws(
     cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "experiments.contact_localization.dials.settings", lambda _thorough: [COARSE, DEFAULT]
+        "experiments.contact_localization.dials.settings", lambda _thorough, _sound: [COARSE, DEFAULT]
     )
     arguments = ["cost", "contact-localization", "--only", "wrench", "--seeds", "1", "--spacing", "spread"]
+    arguments += ["--sense", "touch"]
     arguments += ["--contacts", "2", "--out", str(tmp_path / "out"), "--json"]
     assert invoke(arguments) == 0
     result = json.loads(capsys.readouterr().out)
@@ -291,7 +286,8 @@ def test_the_command_measures_keeps_and_draws(
 
 
 @pytest.mark.parametrize(
-    "option", [["--only", "mog"], ["--spacing", "wide"], ["--yaw", "any"], ["--gap", "big"]]
+    "option",
+    [["--only", "mog"], ["--spacing", "wide"], ["--yaw", "any"], ["--gap", "big"], ["--sense", "smell"]],
 )
 def test_a_mistyped_option_of_the_command_is_named(
     option: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -303,7 +299,7 @@ def test_a_mistyped_option_of_the_command_is_named(
 def test_a_stale_curve_is_drawn_as_stale(done: Recording, tmp_path: Path) -> None:
     from harness.report.cost_page import write_cost_page
 
-    page = write_cost_page(curve_of(done), ("cores was 2, is 4",), METHOD.name, "contacts", tmp_path)
+    page = write_cost_page(curve_of(done), ("cores was 2, is 4",), (METHOD.name,), "contacts", tmp_path)
     assert "STALE" in page.read_text()
     assert "cores was 2, is 4" in page.read_text()
 
