@@ -47,6 +47,7 @@ class PortAudioMicrophone:
         name: of the instrument, as messages call it.
         serial: of the microphone, as the station states it.
         keep: s of sound kept.
+        latency: s by which the card's times are late, as measured; taken off every time.
 
     Raises:
         ValueError: a number above that cannot be.
@@ -64,6 +65,7 @@ class PortAudioMicrophone:
         name: str = "microphone",
         serial: str = "",
         keep: float = 30.0,
+        latency: float = 0.0,
     ) -> None:
         if bits not in _BITS or not 0 <= channel < channels or min(rate, block, threshold) < 1:
             raise ValueError(
@@ -71,13 +73,14 @@ class PortAudioMicrophone:
                 f"and rate, block and threshold above zero ({rate}, {block}, {threshold})"
             )
         self.name = name
-        self.form = Format(rate, bits, channels, channel, block)
+        self.form = Format(rate, bits, channels, channel, block, latency)
         self._device = device
         self._serial = serial
         self._threshold = threshold
         self._keep = keep
         self._blocks = self._empty()
         self._next = 0
+        self._opened = 0.0
         self._stream: Any = None
 
     def open(self) -> None:
@@ -121,6 +124,27 @@ class PortAudioMicrophone:
         first = self._heard()
         end = first + self._samples(seconds)
         return self._readings(first, end)
+
+    def between(self, start: float, end: float) -> tuple[Reading, ...]:
+        """The sound from ``start`` to ``end`` s on the bench clock, remembered or awaited, in whole blocks.
+
+        Returns:
+            As `record`.
+
+        Raises:
+            BenchFault: as `record`; or the sound of ``start`` is not kept, or was before the opening.
+        """
+        self._require(end - start)
+        newest = self._heard()
+        clock = clock_of(self._blocks.since(newest - self._samples(_CLOCK_SECONDS)), self.form)
+        first, last = (int(np.floor(clock.index_at(time + self.form.latency))) for time in (start, end))
+        oldest = self._blocks.since(0)[0].first
+        if first < oldest:
+            raise BenchFault(
+                f"{self.name}: the sound of {(oldest - first) / self.form.rate:.2f} s is not there any more, "
+                f"or was before the microphone was opened; {self._keep:g} s are kept: ask for it sooner"
+            )
+        return self._readings(first, last + 1)
 
     def capture(
         self, fire: Callable[[], None], before: float, after: float, timeout: float
@@ -169,10 +193,9 @@ class PortAudioMicrophone:
 
     def _begin(self, library: Any) -> Any:
         """The stream, running."""
-        found = portaudio.find_input(library, self._device)
-        self._check_channels(found)
+        found = portaudio.find_input(library, self._device, self.form.channels)
         self._blocks = self._empty()
-        self._next = 0
+        self._next, self._opened = 0, now()
         kind = {
             "device": found["index"],
             "channels": self.form.channels,
@@ -199,14 +222,6 @@ class PortAudioMicrophone:
                 "close other programs that use it, or set another rate in the station"
             ) from error
         return stream
-
-    def _check_channels(self, found: dict[str, Any]) -> None:
-        if found["max_input_channels"] != self.form.channels:
-            raise BenchFault(
-                f"{self.name}: {found['name']!r} has {found['max_input_channels']} input channels and the "
-                f"station says {self.form.channels}; another number would be mixed without a word: set "
-                "the station's channels to the device's"
-            )
 
     def _listen(self, data: Any, frames: int, times: Any, status: Any) -> None:
         """PortAudio's thread: keep the block and what is known of it, and nothing else."""
@@ -272,7 +287,7 @@ class PortAudioMicrophone:
         self._hear(end + self._samples(1.1 * SETTLE), STALL)
         heard = self._blocks.since(first - self._samples(_CLOCK_SECONDS))
         self._check_rate(heard)
-        return readings(heard, first, end, self.form, flags)
+        return readings(heard, first, end, self.form, self._opened, flags)
 
     def _check_rate(self, heard: list[Block]) -> None:
         rate = usual_rate(heard, self.form)

@@ -40,6 +40,7 @@ class Format:
         channels: interleaved in a block.
         channel: which of them is the microphone, from 0.
         block: samples in a block.
+        latency: s by which the card's times are late, as measured; taken off.
     """
 
     rate: int
@@ -47,6 +48,7 @@ class Format:
     channels: int
     channel: int
     block: int
+    latency: float = 0.0
 
     @property
     def full_scale(self) -> int:

@@ -2,8 +2,13 @@
 
 A sound card counts its own seconds, 10 to 100 ppm away from the computer's, and says of each
 block only when the block was handed over. Hand-over comes late now and then, never early by
-more than the card's own jitter, so late blocks are given little weight. Unlike `harness.clock_fit`, which
-fits to arrivals of a whole run, this serves for the few tenths of a second since a gap.
+more than the card's own jitter, so late blocks are given little weight.
+
+This is another fit than that of `harness.clock_fit`, because it is given something else. There,
+arrivals are late by chance and never early, over a whole run, and a line under all of them is
+sought; no rate is assumed. Here, PortAudio takes the age of a block off its arrival, so that
+errors go both ways, and the line must hold a few tenths of a second after a gap, when the rate
+is better known from the crystal than from the blocks.
 """
 
 from dataclasses import dataclass
@@ -31,12 +36,14 @@ class SampleClock:
         time: s on the bench clock, of that sample.
         rate: samples per bench-clock second.
         residual: s, median distance of the blocks' measured times from the line.
+        uncertainty: s, standard deviation of the line at its anchor, as if blocks erred independently.
     """
 
     index: float
     time: float
     rate: float
     residual: float
+    uncertainty: float
 
     def times(self, indices: FloatArray) -> FloatArray:
         """Bench-clock seconds of samples, ``(n,)``."""
@@ -76,7 +83,18 @@ def fit_clock(indices: FloatArray, times: FloatArray, nominal_rate: float) -> Sa
         scale = max(_SHARPNESS, _MAD_TO_DEVIATION * float(np.median(np.abs(residuals))))
         weights = np.where(residuals > scale, scale / np.maximum(residuals, scale), 1.0)
     residual = float(np.median(np.abs(excess - offset - stretch * elapsed)))
-    return SampleClock(anchor, float(times[-1]) + offset, nominal_rate / (1.0 + stretch), residual)
+    uncertainty = _uncertainty(elapsed, weights, scale)
+    return SampleClock(
+        anchor, float(times[-1]) + offset, nominal_rate / (1.0 + stretch), residual, uncertainty
+    )
+
+
+def _uncertainty(x: FloatArray, weights: FloatArray, noise: float) -> float:
+    """Standard deviation in s, at ``x = 0``, of the line that `_line` draws through noise ``noise`` s."""
+    total = weights.sum()
+    mean = weights @ x / total
+    spread = weights @ (x - mean) ** 2 + (noise / CRYSTAL_DRIFT) ** 2
+    return float(noise * np.sqrt(1.0 / total + mean**2 / spread))
 
 
 def _line(x: FloatArray, y: FloatArray, weights: FloatArray, noise: float) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from drivers.microphone_blocks import Block, Format
 from drivers.microphone_clock import SampleClock, fit_clock, steps
 from harness.acquisition_channels import PRESSURE, block_channel
 from harness.arrays import AnyArray, BoolArray, FloatArray
-from harness.microphone_take import BAD, CALLBACK, CLOCK, COUNT_BROKEN, FLAGS, OVERLOAD
+from harness.microphone_take import BAD, CALLBACK, CLOCK, CLOCK_FIELDS, COUNT_BROKEN, FLAGS, OVERLOAD
 from harness.reading import Channel, Reading
 
 SETTLE = 0.2
@@ -96,7 +96,7 @@ def overloaded(counts: AnyArray, form: Format) -> bool:
 
 
 def readings(
-    blocks: Sequence[Block], first: int, end: int, form: Format, flags: int = 0
+    blocks: Sequence[Block], first: int, end: int, form: Format, opened: float, flags: int = 0
 ) -> tuple[Reading, ...]:
     """What was recorded, and what is known of it.
 
@@ -105,31 +105,33 @@ def readings(
         first: number of the take's first sample.
         end: number of the sample after its last.
         form: of their bytes.
+        opened: s on the bench clock, when the stream was.
         flags: raised for every block of the take.
 
     Returns:
         ``microphone.pressure`` counts ``(n, block)``; ``microphone.flags`` ``(n,)``, of
         `harness.microphone_take`; ``microphone.callback`` ``(n, 2)`` s, arrival on the bench
         clock and age of the first sample as PortAudio states it, 0 where it states none;
-        ``microphone.clock`` ``(1, 4)``, number of a sample, its bench time in s, samples a
-        second, residual in s. All but the last have the fitted times of the blocks' first samples.
+        ``microphone.clock`` ``(1, 6)``, of `harness.microphone_take`. All but the last have the
+        fitted times of the blocks' first samples, less the latency that the form states.
     """
     doubtful = places_of_doubt(blocks, form)
     inside = [block.first < end and block.first + form.block > first for block in blocks]
     take = [block for block, is_inside in zip(blocks, inside, strict=True) if is_inside]
     clock = clock_of(_unbroken(blocks, doubtful, first, form), form)
-    times = clock.times(firsts(take))
+    times = clock.times(firsts(take)) - form.latency
     counts = np.stack([form.counts(block.counts) for block in take])
     flags |= COUNT_BROKEN if np.any(doubtful[inside]) else 0
     flags |= OVERLOAD if overloaded(counts.ravel(), form) else 0
     raised = np.array([block.flags | flags for block in take])
     callback = np.array([(block.arrived, block.age) for block in take])
-    line = np.array([[clock.index, clock.time, clock.rate, clock.residual]])
+    time = clock.time - form.latency
+    line = np.array([[clock.index, time, clock.rate, clock.residual, clock.uncertainty, opened]])
     return (
         Reading(block_channel(PRESSURE, form.block, form.rate), times, counts),
         Reading(_channel(FLAGS, "1", (), "uint8", form), times, raised),
         Reading(_channel(CALLBACK, "s", (2,), "float64", form), times, callback),
-        Reading(_channel(CLOCK, "1", (4,), "float64", form), times[:1], line),
+        Reading(_channel(CLOCK, "1", (len(CLOCK_FIELDS),), "float64", form), times[:1], line),
     )
 
 

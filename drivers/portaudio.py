@@ -60,14 +60,15 @@ def _list_again(library: Any) -> None:
         ) from error
 
 
-def find_input(library: Any, device: str) -> dict[str, Any]:
-    """The one input device of that name.
+def find_input(library: Any, device: str, channels: int) -> dict[str, Any]:
+    """The one input device of that name, which must have just so many channels.
 
     A device is named as PortAudio names it, or by its name, a comma, a space and its host API
     (``"Scarlett 2i2 USB: Audio (hw:1,0), ALSA"``), or by a part of one name only.
 
     Raises:
-        BenchFault: there is none, or more than one; lists those that there are.
+        BenchFault: there is none, or more than one; lists those that there are. Or it has another
+            number of channels.
     """
     interfaces = library.query_hostapis()
     inputs = [dict(found) for found in library.query_devices() if found["max_input_channels"] > 0]
@@ -75,12 +76,22 @@ def find_input(library: Any, device: str) -> dict[str, Any]:
     chosen = [each for name, each in full.items() if device in (name, each["name"])]
     chosen = chosen or [each for name, each in full.items() if device and device in name]
     if len(chosen) == 1:
-        return chosen[0]
+        return _with_channels(chosen[0], channels)
     there = "; ".join(repr(name) for name in full) or "none at all"
     problem = "is no sound input here" if not chosen else f"fits {len(chosen)} sound inputs"
     raise BenchFault(
         f"microphone: {device!r} {problem}; plug it in or name one of these in the station: {there}"
     )
+
+
+def _with_channels(found: dict[str, Any], channels: int) -> dict[str, Any]:
+    if found["max_input_channels"] != channels:
+        raise BenchFault(
+            f"microphone: {found['name']!r} has {found['max_input_channels']} input channels and the station "
+            f"says {channels}; another number would be mixed without a word: set the station's channels to "
+            "the device's"
+        )
+    return found
 
 
 def _reason(error: Exception) -> str:

@@ -9,8 +9,8 @@ newtons, pascals, and whether the strike can be used.
 import hashlib
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -25,16 +25,16 @@ from harness.acquisition_channels import (
     SHORTEST_REST,
     judge,
 )
+from harness.acquisition_record import Record, check_counts, middle, reading_of, rest_of
 from harness.arrays import FloatArray, read_only
-from harness.errors import CalibrationRefused, DataRefused, RecordingDamaged
+from harness.errors import CalibrationRefused, DataRefused
+from harness.microphone_take import take_of
 from harness.reading import Reading
 from harness.resampling import resample
 
 SCHEMA = 1
 
 _SHIPPED = Path(__file__).parent / "data"
-_STEADY = 1e-4
-_FAR = 6.0
 _TEXTS = ("model", "serial", "hammer_serial", "microphone_serial", "date", "made_from")
 _SIGNED = ("hammer_offset", "microphone_offset")
 _FULL_SCALES = (2**11 - 1, 2**15 - 1, 2**23 - 1, 2**31 - 1)
@@ -62,7 +62,8 @@ class AcquisitionCalibration:
         microphone_offset: counts at rest.
         microphone_limit: Pa, the greatest pressure of the calibration.
         offset_tolerance: counts by which a rest may differ from its offset; less than half of the two
-            offsets' difference, or a swap of the channels could not be told.
+            offsets' difference, or a swap of the channels could not be told. Counts of the box: of a
+            microphone's own converter it is the same share of full scale.
         residual: relative, of the fit or as the certificates state it.
     """
 
@@ -170,8 +171,14 @@ class Strike:
         onset: sample at which the force reached the trigger's threshold; 0 where silent.
         start: s on the bench clock, of sample 0.
         overload: full scale was read, or the calibrated range was left: amplitudes are not to be trusted.
+            Also where ``lost`` says that the sound is not.
         double_hit: the hammer touched twice.
         silent: no force reached the threshold; there is nothing to analyse.
+        lost: why the sound of a microphone on a clock of its own must not be used; empty where it may.
+        jitter: s, standard deviation of the sound's place against the force's, from strike to strike; 0 on
+            one clock. A latency common to all strikes is not in it: see ``opened``.
+        opened: s on the bench clock, when the microphone's own stream was opened; 0 on one clock. Between
+            strikes of two streams the latency may differ.
     """
 
     rate: float
@@ -182,6 +189,20 @@ class Strike:
     overload: bool
     double_hit: bool
     silent: bool
+    lost: str = ""
+    jitter: float = 0.0
+    opened: float = 0.0
+
+    @property
+    def fault(self) -> str:
+        """Why the strike must not be used, in words; empty where it may be."""
+        if self.silent:
+            return "no strike came"
+        if self.lost:
+            return self.lost
+        if self.overload:
+            return "a channel was overloaded"
+        return "the hammer hit twice" if self.double_hit else ""
 
     @property
     def times(self) -> FloatArray:
@@ -194,7 +215,10 @@ def strike_from_readings(readings: Mapping[str, Reading], calibration: Acquisiti
 
     The pressure is resampled, band-limited, to the times of the force: spectra of the two are divided
     by each other, and a skew of 10 us would be 0.6 rad at 10 kHz. What the two records do not
-    share in time is left out.
+    share in time is left out. A microphone on a clock of its own is late by a latency that nobody
+    knows: common to all strikes of its stream, it turns every peak of their transfer functions by the
+    same angle, which no estimate reads. What is not common is the clocks' uncertainty (``jitter``);
+    takes in which it is too great, or samples were lost, are marked.
 
     Args:
         readings: by channel name, as a step's record holds them; other channels are ignored.
@@ -205,27 +229,29 @@ def strike_from_readings(readings: Mapping[str, Reading], calibration: Acquisiti
             from its calibrated offset (as it does when the channels are swapped).
         RecordingDamaged: block times that no steady clock gives.
     """
-    force, pressure = (_Record.of(readings, name) for name in (FORCE, PRESSURE))
-    threshold = float(_reading(readings, FLAGS).values[0][FLAG_FIELDS.index("threshold")])
+    force, pressure = (Record.of(readings, name) for name in (FORCE, PRESSURE))
+    threshold = float(reading_of(readings, FLAGS).values[0][FLAG_FIELDS.index("threshold")])
     scales = calibration.full_scale_counts, calibration.microphone_full_scale_counts
-    _check_counts(force, scales[0])
-    _check_counts(pressure, scales[1])
+    check_counts(force, scales[0])
+    check_counts(pressure, scales[1])
     flags = judge(force.counts, pressure.counts, threshold, *scales)
     tolerance = calibration.offset_tolerance
     before = force.counts[: max(0, flags.onset - GUARD)]
     quiet = force.counts if flags.silent else before
     force_rest = calibration.hammer_offset
     if len(quiet) >= SHORTEST_REST:
-        force_rest = _rest(FORCE, float(np.median(quiet)), calibration.hammer_offset, tolerance)
+        force_rest = rest_of(FORCE, float(np.median(quiet)), calibration.hammer_offset, tolerance)
     # Sound swings about its rest; all of it tells the rest better than the short, rumbling time before.
-    pressure_rest = _rest(PRESSURE, _middle(pressure.counts), calibration.microphone_offset, tolerance)
+    tolerance *= calibration.microphone_full_scale_counts / calibration.full_scale_counts
+    pressure_rest = rest_of(PRESSURE, middle(pressure.counts), calibration.microphone_offset, tolerance)
     newtons = (force.counts - force_rest) * calibration.newtons_per_count
     pascals = (pressure.counts - pressure_rest) * calibration.pascals_per_count
     times = force.start + np.arange(len(newtons)) / force.rate
     shared = (times >= pressure.start) & (times <= pressure.end)
     if not np.any(shared):
         raise DataRefused(f"{FORCE} and {PRESSURE} have no moment in common; they are of different strikes")
-    first = int(np.argmax(shared))
+    first, take = int(np.argmax(shared)), take_of(readings)
+    lost = "" if take is None else take.fault
     beyond = np.abs(newtons).max() > calibration.hammer_limit or (
         np.abs(pascals).max() > calibration.microphone_limit
     )
@@ -235,70 +261,34 @@ def strike_from_readings(readings: Mapping[str, Reading], calibration: Acquisiti
         read_only(resample(pascals, pressure.start, pressure.rate, times[shared], force.rate)),
         0 if flags.silent else max(0, flags.onset - first),
         float(times[first]),
-        bool(flags.overload or beyond),
+        bool(flags.overload or beyond or lost),
         flags.double_hit,
         flags.silent,
+        lost,
+        0.0 if take is None else take.uncertainty,
+        0.0 if take is None else take.opened,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Record:
-    """All blocks of one channel in a row, and the steady clock that their times give."""
+def of_one_stream(strikes: Sequence[Strike | None]) -> tuple[Strike | None, ...]:
+    """The strikes of a run, with those marked lost whose sound cannot be compared with most others'.
 
-    name: str
-    counts: FloatArray
-    start: float
-    rate: float
+    A sound card opened anew, as when a run is resumed, may have another latency, which nobody
+    knows. Strikes heard by the stream with most usable ones stay as they are.
 
-    @property
-    def end(self) -> float:
-        return self.start + (len(self.counts) - 1) / self.rate
-
-    @classmethod
-    def of(cls, readings: Mapping[str, Reading], name: str) -> "_Record":
-        reading = _reading(readings, name)
-        blocks, block = reading.values.shape
-        if blocks < 2:
-            raise DataRefused(f"{name} has {blocks} block; two are needed to know the rate of its samples")
-        numbers = np.arange(blocks) * block
-        origin = reading.times[0]
-        period, late = np.polyfit(numbers, reading.times - origin, 1)
-        astray = np.abs(reading.times - origin - late - period * numbers).max()
-        if not period > 0.0 or astray > _STEADY:
-            raise RecordingDamaged(
-                f"{name}: block times leave a steady clock by {astray * 1e6:.0f} us; "
-                f"at most {_STEADY * 1e6:.0f} us are possible"
-            )
-        counts = reading.values.ravel().astype(np.float64)
-        return cls(name, counts, float(origin + late), 1.0 / float(period))
+    Args:
+        strikes: in order; None where a place was not struck.
+    """
+    streams = [strike.opened for strike in strikes if strike is not None and not strike.fault]
+    if len(set(streams)) < 2:
+        return tuple(strikes)
+    most = max(sorted(set(streams)), key=streams.count)
+    why = "the microphone was opened anew in between: its latency may be another"
+    return tuple(
+        strike if strike is None or strike.fault or strike.opened == most else _lost(strike, why)
+        for strike in strikes
+    )
 
 
-def _reading(readings: Mapping[str, Reading], name: str) -> Reading:
-    if name not in readings:
-        raise DataRefused(f"the step has no channel {name}; it recorded {', '.join(sorted(readings))}")
-    return readings[name]
-
-
-def _check_counts(record: _Record, full_scale: int) -> None:
-    low, high = record.counts.min(), record.counts.max()
-    if low < -full_scale - 1 or high > full_scale:
-        raise DataRefused(
-            f"{record.name} holds counts from {low:.0f} to {high:.0f}; the calibrated box says "
-            f"{-full_scale - 1} to {full_scale}: the calibration is of another box"
-        )
-
-
-def _middle(counts: FloatArray) -> float:
-    """The mean of what is not far out: neither a loud beginning nor a full scale moves it."""
-    away = np.abs(counts - np.median(counts))
-    return float(counts[away <= _FAR * max(1.0, float(np.median(away)))].mean())
-
-
-def _rest(name: str, rest: float, offset: float, tolerance: float) -> float:
-    """Counts at rest as measured, checked against the calibrated offset."""
-    if abs(rest - offset) > tolerance:
-        raise DataRefused(
-            f"{name} rests at {rest:.0f} counts; it was calibrated at {offset:.0f}, within "
-            f"{tolerance:.0f}: check that the channels are not swapped, or calibrate again"
-        )
-    return rest
+def _lost(strike: Strike, why: str) -> Strike:
+    return replace(strike, lost=why, overload=True)

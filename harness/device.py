@@ -155,6 +155,13 @@ class Microphone(Protocol):
     def record(self, seconds: float) -> tuple[Reading, ...]:
         """The next ``seconds`` of sound: counts, flags, callback times and the fitted clock."""
 
+    def between(self, start: float, end: float) -> tuple[Reading, ...]:
+        """The sound from ``start`` to ``end`` s on the bench clock, as ``record`` returns it.
+
+        Raises:
+            BenchFault: it is no longer remembered, or was before the opening.
+        """
+
     def capture(
         self, fire: Callable[[], None], before: float, after: float, timeout: float
     ) -> tuple[Reading, ...]:

@@ -7,26 +7,29 @@ in the core imports what lies above it.
 import importlib
 import logging
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol
 
-from harness.device import Arm, ImpactHammer, TactileCamera
-from harness.errors import BenchFault, SafetyStop, TouchstoneError, WrongUse
+from harness.acquisition import AcquisitionCalibration
+from harness.device import Arm, ImpactHammer, Microphone, TactileCamera
+from harness.errors import BenchFault, CalibrationRefused, SafetyStop, TouchstoneError, WrongUse
 from harness.gap import gap_path
 from harness.mesh import Mesh
 from harness.mock_lab import LabAddresses, MockLab
 from harness.scene import SceneFile
 from harness.station_file import Station
+from harness.station_sections import MicrophoneSection
 
 INSTRUMENTS = {
     "ur": "drivers.ur_arm:UrArm",
     "gelsight-http": "drivers.http_camera:gelsight",
     "camera-http": "drivers.http_camera:scene_camera",
     "dataq": "drivers.hammer:DataqHammer",
+    "portaudio": "drivers.microphone:PortAudioMicrophone",
 }
 """Instrument kind to driver."""
 
@@ -59,11 +62,12 @@ class Bench:
         arm: that moves.
         gel: on its flange.
         camera: that looks on; None without.
-        hammer: that strikes, with the microphone that hears it; None where the scene asks for no sound.
+        hammer: that strikes; None where the scene asks for no sound.
         station: they belong to.
         mark: see ``Mark``.
         pause: waits for so many seconds of the bench's own time.
         lab: behind a mocked bench, for cueing faults; None at a real one.
+        microphone: that hears the strikes on a clock of its own; None where the hammer's box hears them.
     """
 
     arm: Arm
@@ -74,6 +78,7 @@ class Bench:
     mark: Mark = _ignore_mark
     pause: Callable[[float], None] = time.sleep
     lab: MockLab | None = None
+    microphone: Microphone | None = None
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,7 @@ def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterato
     with ExitStack() as stack:
         lab = None
         if station.mock is not None:
+            _require_wires(station, scene)
             gap = gap_path(run.gap or station.mock.gap)
             lab = MockLab(scene, station, run.mesh, run.seed, gap, run.truth)
             stack.callback(lab.close)
@@ -119,10 +125,21 @@ def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterato
         gel = make_gel(where)
         camera = make_camera(where) if scene.sensors.camera else None
         hammer = make_hammer(where) if scene.sensors.sound else None
-        _open_all(stack, {"arm": arm, "gel": gel, "camera": camera, "hammer": hammer})
+        microphone = make_microphone(where) if scene.sensors.sound else None
+        _open_all(
+            stack, {"arm": arm, "gel": gel, "camera": camera, "hammer": hammer, "microphone": microphone}
+        )
         stack.push(_Closing("arm, stopping", arm.stop))
         mark = _ignore_mark if lab is None else lab.mark
-        yield Bench(arm, gel, camera, station, hammer, mark, lab=lab)
+        yield Bench(arm, gel, camera, station, hammer, mark, lab=lab, microphone=microphone)
+
+
+def _require_wires(station: Station, scene: SceneFile) -> None:
+    if scene.sensors.sound and own_microphone(station) is not None:
+        raise WrongUse(
+            "open_station: the mocked lab plays no sound card; set microphone.kind = 'dataq' in this mocked "
+            "station (the bench in process and a real one take 'portaudio')"
+        )
 
 
 def addressed(station: Station, where: LabAddresses) -> Station:
@@ -186,7 +203,7 @@ def make_hammer(station: Station) -> ImpactHammer:
         )
     calibration = section.acquisition
     made: ImpactHammer = _load(INSTRUMENTS[section.kind])(
-        calibration=calibration,
+        calibration=calibration if own_microphone(station) is None else without_microphone(calibration),
         port=section.port or "",
         serial=section.serial,
         model=section.model,
@@ -196,7 +213,53 @@ def make_hammer(station: Station) -> ImpactHammer:
     return made
 
 
-def _open_all(stack: ExitStack, instruments: dict[str, Arm | TactileCamera | ImpactHammer | None]) -> None:
+def own_microphone(station: Station) -> MicrophoneSection | None:
+    """The microphone that is an instrument of its own; None where the hammer's box hears the strikes."""
+    section = station.microphone
+    return section if section is not None and section.kind == "portaudio" else None
+
+
+def without_microphone(calibration: AcquisitionCalibration) -> AcquisitionCalibration:
+    """What a box's counts mean whose input 1 is shorted, because its microphone is on a sound card."""
+    return replace(
+        calibration, microphone_offset=0.0, microphone_full_scale_counts=calibration.full_scale_counts
+    )
+
+
+def make_microphone(station: Station) -> Microphone | None:
+    """The driver of a microphone of its own, not yet open; None where the hammer's box hears the strikes.
+
+    Raises:
+        WrongUse: the station has no hammer.
+        CalibrationRefused: of the hammer's box, or it is of a microphone on another converter.
+    """
+    section = own_microphone(station)
+    if section is None:
+        return None
+    if station.hammer is None:
+        raise WrongUse(
+            f"the station {station.title!r} has no [hammer], whose strikes would be heard; add one"
+        )
+    calibrated = station.hammer.acquisition.microphone_full_scale_counts
+    if calibrated != section.full_scale:
+        raise CalibrationRefused(
+            f"the calibration {station.hammer.calibration!r} is of a microphone whose converter has full "
+            f"scale {calibrated}, the station's [microphone] has {section.full_scale}: set its bits, or "
+            "calibrate it"
+        )
+    made: Microphone = _load(INSTRUMENTS[section.kind])(
+        device=section.device,
+        rate=round(section.rate or 0.0),
+        channels=section.channels or 1,
+        channel=section.channel or 0,
+        bits=section.bits or 24,
+        serial=section.serial,
+        latency=section.latency or 0.0,
+    )
+    return made
+
+
+def _open_all(stack: ExitStack, instruments: Mapping[str, "_Opened | None"]) -> None:
     failures: dict[str, TouchstoneError] = {}
     for name, instrument in instruments.items():
         if instrument is None:
@@ -214,6 +277,16 @@ def _open_all(stack: ExitStack, instruments: dict[str, Arm | TactileCamera | Imp
         unsafe = any(isinstance(error, SafetyStop) for error in failures.values())
         kind = SafetyStop if unsafe else BenchFault
         raise kind(f"{len(failures)} instruments did not open:{listed}")
+
+
+class _Opened(Protocol):
+    """What every instrument is."""
+
+    def open(self) -> None:
+        """Connect."""
+
+    def close(self) -> None:
+        """Release."""
 
 
 @dataclass(frozen=True)

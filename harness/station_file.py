@@ -120,6 +120,8 @@ class Station(StrictModel):
             given["camera.url"] = self.camera.url
         if self.hammer is not None and not (self.mock is None and self.hammer.serial):
             given["hammer.port"] = self.hammer.port
+        if self.microphone is not None and self.microphone.kind == "portaudio":
+            given["microphone.device"] = self.microphone.device
         for key, value in given.items():
             if self.mock is None and value is None:
                 raise ValueError(f"{key!r} is missing; only a station with [mock] has none")

@@ -206,24 +206,44 @@ class MicrophoneSection(StrictModel):
 
     Attributes:
         kind: ``"dataq"``, a channel of the hammer's box, on its clock; ``"portaudio"``, a sound
-            card's input.
+            card's input, on a clock of its own. All keys below but ``serial`` are for the latter.
         serial: of the microphone.
-        device: name of the sound card's input; only for ``"portaudio"``.
-        rate: Hz; only for ``"portaudio"``, the box has its own.
+        device: name of the sound card's input; None for the box, and in a mocked station.
+        rate: Hz, whole; one that the card has itself.
+        channels: inputs that the device has, exactly; None for one.
+        channel: which of them is the microphone, from 0; None for the first.
+        bits: of a count; None for 24.
+        latency: s by which the card's times are late, as measured; the same for all strikes.
     """
 
     kind: Literal["dataq", "portaudio"] = "dataq"
     serial: str = ""
     device: str | None = None
     rate: Annotated[Frequency, Positive] | None = None
+    channels: int | None = Field(default=None, gt=0)
+    channel: int | None = Field(default=None, ge=0)
+    bits: Literal[24, 32] | None = None
+    latency: Time | None = None
+
+    @property
+    def full_scale(self) -> int:
+        """Greatest count of a sound card's converter."""
+        return (1 << ((self.bits or 24) - 1)) - 1
 
     @model_validator(mode="after")
     def _belongs_to_its_kind(self) -> Self:
-        for key, value in {"device": self.device, "rate": self.rate}.items():
+        own = {name: value for name, value in self if name not in ("kind", "serial")}
+        for key, value in own.items():
             if self.kind == "dataq" and value is not None:
                 raise ValueError(f"{key!r} belongs to kind = 'portaudio'; the box has its own: remove it")
-            if self.kind == "portaudio" and value is None:
-                raise ValueError(f"{key!r} is missing; kind = 'portaudio' needs it")
+        if self.kind == "portaudio" and self.rate is None:
+            raise ValueError("'rate' is missing; kind = 'portaudio' needs it")
+        if self.rate is not None and self.rate != round(self.rate):
+            raise ValueError(f"'rate' is {self.rate:g} Hz; a sound card takes whole numbers of Hz")
+        if (self.channel or 0) >= (self.channels or 1):
+            raise ValueError(
+                f"'channel' is {self.channel}, counted from 0, and the device has {self.channels or 1}"
+            )
         return self
 
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from harness.device import Health, ImpactHammer
+from harness.device import Health, Microphone
 from harness.errors import BenchFault, WrongUse
 from harness.gap import load_gap
 from harness.reading import Channel, Reading
 from harness.scene import SceneFile
-from harness.station import Bench, RunContext
+from harness.station import Bench, RunContext, own_microphone
 from harness.station_file import Station
 from mocks.gelsight_stream import encode
 from mocks.in_process_arm import InProcessArm
@@ -26,6 +26,7 @@ from mocks.ur.hooks import LEFT_ABOVE
 from mocks.world import World
 
 if TYPE_CHECKING:
+    from mocks.in_process_hammer import InProcessHammer
     from mocks.strike_counts import StrikeCounts
 
 PACKET_RATE = 25.0
@@ -106,12 +107,31 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
             truth.append(arm.state().base_from_flange, step, sample)
 
     hammer = None if strikes is None else _hammer(strikes, arm, station, stage)
-    return Bench(arm, InProcessGel(world, arm, stage), None, station, hammer, mark, stage.pause)
+    microphone = None
+    if strikes is not None and hammer is not None and own_microphone(station) is not None:
+        microphone = _microphone(strikes, hammer, station, stage)
+    gel = InProcessGel(world, arm, stage)
+    return Bench(arm, gel, None, station, hammer, mark, stage.pause, microphone=microphone)
 
 
-def _hammer(strikes: "StrikeCounts", arm: InProcessArm, station: Station, stage: Stage) -> ImpactHammer:
+def _hammer(strikes: "StrikeCounts", arm: InProcessArm, station: Station, stage: Stage) -> "InProcessHammer":
     from mocks.in_process_hammer import InProcessHammer  # by runs that are to be heard, and by no others
 
     assert station.hammer is not None
     assert station.arm.striker_output is not None  # nobody strikes by hand at a mocked bench
     return InProcessHammer(strikes, arm, station.arm.striker_output, stage, station.hammer)
+
+
+def _microphone(
+    strikes: "StrikeCounts", hammer: "InProcessHammer", station: Station, stage: Stage
+) -> Microphone:
+    from mocks.in_process_microphone import InProcessMicrophone
+    from mocks.sound_card_counts import CardConverter
+
+    section, box = own_microphone(station), station.hammer
+    assert section is not None
+    assert box is not None
+    converter = CardConverter.of(box.acquisition)
+    made = InProcessMicrophone(strikes.sound, hammer, box.rate, stage, section, converter)
+    made.open()
+    return made

@@ -1,6 +1,7 @@
 """The hammer without a cable, in simulated time: the counts that the box would have sent."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from harness.acquisition_channels import (
     block_channel,
     judge,
 )
-from harness.arrays import AnyArray
+from harness.arrays import AnyArray, FloatArray
 from harness.device import Health
 from harness.reading import Channel, Reading
 from harness.station_sections import HammerSection
@@ -28,6 +29,23 @@ BLOCK = 500
 _REST = 2500
 
 
+@dataclass(frozen=True, eq=False)
+class Fired:
+    """The newest firing.
+
+    Attributes:
+        time: s on the simulated bench clock.
+        base_from_flange: ``(4, 4)``, where the flange was.
+        step: of the run.
+        sample: of the step.
+    """
+
+    time: float
+    base_from_flange: FloatArray
+    step: int
+    sample: int
+
+
 class InProcessHammer:
     """An ``ImpactHammer`` that is fired by an output of the arm.
 
@@ -37,6 +55,9 @@ class InProcessHammer:
         output: which of the tool's.
         stage: simulated time, step and sample.
         section: of the station: rate, threshold, calibration.
+
+    Attributes:
+        fired: what was struck last, for a microphone of its own; None where the last capture had no blow.
     """
 
     def __init__(
@@ -52,6 +73,7 @@ class InProcessHammer:
         self._full_scale = calibration.full_scale_counts
         self._identity = f"{section.model} {section.serial} in process"
         self._idle = strikes.idle()
+        self.fired: Fired | None = None
 
     def open(self) -> None:
         """Nothing to connect."""
@@ -68,10 +90,11 @@ class InProcessHammer:
         fired = [rise for rise in self._arm.rises[switched:] if rise.output == self._output]
         count = -(-round((before + after) * self._rate) // BLOCK) * BLOCK
         quiet = self._idle_counts(count)
-        record = quiet
+        record, self.fired = quiet, None
         if fired:
             pose, step, sample = fired[-1].base_from_flange, self._stage.step, self._stage.sample
             record = np.concatenate([quiet, self._strikes.record(pose, step, sample), quiet])
+            self.fired = Fired(self._stage.time, pose, step, sample)
         level = np.median(self._idle[:_REST, 0]) + self._threshold
         reached = np.flatnonzero(record[:, 0] >= level)
         began = self._stage.time - count / self._rate

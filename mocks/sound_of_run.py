@@ -41,4 +41,6 @@ def strikes_of(
 
     instrument = instrument_of(world, scene, GapDraw(gap, seed))
     sound = WorldSound(world, instrument, gap, seed, flange_from_hammer, hammer.rate)
-    return StrikeCounts(sound, hammer.acquisition)
+    microphone = station.microphone
+    on_box = microphone is None or microphone.kind == "dataq"
+    return StrikeCounts(sound, hammer.acquisition, on_box)

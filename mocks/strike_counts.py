@@ -26,14 +26,15 @@ class StrikeCounts:
     Args:
         sound: of the run.
         calibration: that is believed in; the world's force cell has a gain of its own.
+        hears: whether the microphone is on input 1; else that is shorted.
     """
 
-    def __init__(self, sound: WorldSound, calibration: AcquisitionCalibration) -> None:
+    def __init__(self, sound: WorldSound, calibration: AcquisitionCalibration, hears: bool = True) -> None:
         self.sound = sound
         self._wiring = Wiring(
             counts_per_newton=sound.force_gain / calibration.newtons_per_count,
-            counts_per_pascal=1.0 / calibration.pascals_per_count,
-            offsets=(calibration.hammer_offset, calibration.microphone_offset),
+            counts_per_pascal=1.0 / calibration.pascals_per_count if hears else 0.0,
+            offsets=(calibration.hammer_offset, calibration.microphone_offset if hears else 0.0),
             noise=(CONVERTER_NOISE, CONVERTER_NOISE),
             full_scale=calibration.full_scale_counts,
         )

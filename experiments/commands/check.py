@@ -55,7 +55,7 @@ def check(
             found = [bench.arm.health(), bench.gel.health()]
             levels = None if bench.hammer is None else rest_levels(bench)
             if bench.hammer is not None and levels is not None:
-                found.append(_with_levels(bench.hammer.health(), levels))
+                found += _heard(bench, levels)
             safety = bench.arm.state().safety
     if json:
         instruments = [asdict(health) for health in found]
@@ -97,12 +97,15 @@ def rest_levels(bench: "Bench") -> RestLevels:
         DataRefused: a channel rests where its calibration says that it cannot.
     """
     from harness.acquisition import strike_from_readings
+    from harness.listening import capture
 
     assert bench.hammer is not None
     assert bench.station.hammer is not None
-    readings = bench.hammer.capture(lambda: None, 0.0, _LISTEN, 0.0)
+    readings = capture(bench.hammer, bench.microphone, lambda: None, 0.0, _LISTEN, 0.0)
     by_name = {reading.channel.name: reading for reading in readings}
     rest = strike_from_readings(by_name, bench.station.hammer.acquisition)
+    if rest.lost:
+        raise BenchFault(f"the microphone cannot be used: {rest.lost}; close what else runs, or try again")
     pressure = float(rest.pressure.std())
     # A converter that reads one count for ever is broken, not silent.
     level = 20.0 * math.log10(pressure / _HEARING) if pressure > 0.0 else -math.inf
@@ -111,6 +114,15 @@ def rest_levels(bench: "Bench") -> RestLevels:
     return RestLevels(float(rest.force.std()), pressure, level)
 
 
-def _with_levels(health: Health, levels: RestLevels) -> Health:
-    said = f"rest {levels.force_rms_n:.3f} N rms, {levels.sound_level_db:.0f} dB SPL"
+def _heard(bench: "Bench", levels: RestLevels) -> list[Health]:
+    """How the hammer does and, where it has an instrument of its own, the microphone; each with its level."""
+    assert bench.hammer is not None
+    force, sound = f"{levels.force_rms_n:.3f} N rms", f"{levels.sound_level_db:.0f} dB SPL"
+    if bench.microphone is None:
+        return [_with_level(bench.hammer.health(), f"{force}, {sound}")]
+    return [_with_level(bench.hammer.health(), force), _with_level(bench.microphone.health(), sound)]
+
+
+def _with_level(health: Health, level: str) -> Health:
+    said = f"rest {level}"
     return replace(health, detail=f"{said}; {health.detail}" if health.detail else said)

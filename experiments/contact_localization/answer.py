@@ -11,7 +11,7 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.model_of import model_of_run
 from experiments.contact_localization.observation import Observation
 from harness.accuracy import Accuracy
-from harness.acquisition import AcquisitionCalibration, strike_from_readings
+from harness.acquisition import AcquisitionCalibration, of_one_stream, strike_from_readings
 from harness.acquisition_channels import FORCE
 from harness.arrays import FloatArray
 from harness.errors import FitRefused, RecordingDamaged, WrongUse
@@ -114,7 +114,11 @@ def prior_of(run: RunFiles) -> Prior:
 def observe(run: RunFiles) -> tuple[Observation, ...]:
     """The contacts of a run, from its images, arm poses and strikes."""
     flange_from_gel, acquisition = run.station.flange_from_gel, run.acquisition
-    return tuple(observe_step(record, flange_from_gel, acquisition) for record in run.recording.steps())
+    seen = [observe_step(record, flange_from_gel, acquisition) for record in run.recording.steps()]
+    strikes = of_one_stream([observation.strike for observation in seen])
+    return tuple(
+        replace(observation, strike=strike) for observation, strike in zip(seen, strikes, strict=True)
+    )
 
 
 def observe_step(

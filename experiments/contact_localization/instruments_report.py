@@ -3,6 +3,7 @@
 import datetime as dt
 from collections.abc import Mapping
 
+from harness import microphone_take
 from harness.acquisition import AcquisitionCalibration
 from harness.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
 from harness.device import Health
@@ -14,6 +15,9 @@ from harness.station_file import Station
 
 _IN_BLOCKS = (FORCE, PRESSURE)
 """Channels whose every reading is a block of samples."""
+
+_REMARKS = (CLOCK, FLAGS, microphone_take.CLOCK, microphone_take.FLAGS, microphone_take.CALLBACK)
+"""Channels that say something of a capture and hold no sample."""
 
 _HEARD_WITH = {"hammer": ("microphone",)}
 """Instruments whose box reads another's channels too."""
@@ -59,12 +63,16 @@ def _read_by(name: str, health: Mapping[str, Health]) -> list[str]:
 def nominal_rates(station: Station) -> dict[str, float]:
     """Hz that each instrument should have, by name; of the hammer's box, each channel."""
     rates = {"arm": station.arm.rate, "gel": station.gel.rate}
-    return rates if station.hammer is None else {**rates, "hammer": station.hammer.rate}
+    if station.hammer is not None:
+        rates["hammer"] = station.hammer.rate
+    if station.microphone is not None and station.microphone.rate is not None:
+        rates["microphone"] = station.microphone.rate
+    return rates
 
 
 def samples(reading: Reading) -> int:
     """How many samples a reading holds: each count of a block is one, a remark on a capture is none."""
-    if reading.channel.name in (CLOCK, FLAGS):
+    if reading.channel.name in _REMARKS:
         return 0
     return int(reading.values.size) if reading.channel.name in _IN_BLOCKS else len(reading.times)
 

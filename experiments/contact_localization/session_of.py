@@ -112,7 +112,11 @@ def perform_on(
     experiment = ContactLocalization(partial(way_between, twin), ask=ask)
     complete = perform(experiment, bench, recording, bench.arm.stop, progress)
     health = {"arm": bench.arm.health(), "gel": bench.gel.health()}
-    return complete, health if bench.hammer is None else {**health, "hammer": bench.hammer.health()}
+    if bench.hammer is not None:
+        health["hammer"] = bench.hammer.health()
+    if bench.microphone is not None:
+        health["microphone"] = bench.microphone.health()
+    return complete, health
 
 
 def score(recording: Recording, accuracy: Accuracy) -> Scored:

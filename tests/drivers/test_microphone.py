@@ -199,6 +199,54 @@ def test_a_back_end_without_times_is_read_by_arrival(
     assert "does not say when it sampled" in microphone.health().detail
 
 
+def test_the_sound_of_a_past_stretch_of_the_bench_clock_is_given(
+    library: FakePortAudio, microphone: PortAudioMicrophone, stream: FakeStream
+) -> None:
+    began = library.time
+    sent = [ramp(1000 + BLOCK * number) for number in range(8)]
+    delivering(stream, *sent)()
+    length = BLOCK / RATE
+    take = microphone.between(began + 2.5 * length, began + 4.5 * length)
+    # PortAudio hands a block over when it is full: the first one sent was sampled from `began` on.
+    assert take[0].times == pytest.approx(began + length * np.arange(2, 5), abs=1e-6)
+    assert np.array_equal(take[0].values.ravel(), np.concatenate(sent[2:5]))
+    assert take[3].values[0, -1] == pytest.approx(1000.0)
+    assert flags_of(take) == 0
+
+
+def test_sound_that_is_still_to_come_is_awaited(
+    library: FakePortAudio, microphone: PortAudioMicrophone, stream: FakeStream
+) -> None:
+    start = library.time + 0.05
+    thread = deliver_soon(stream, 10)
+    take = microphone.between(start, start + 0.04)
+    thread.join()
+    assert take[0].times[0] <= start + 1e-6
+    assert take[0].times[-1] + BLOCK / RATE >= start + 0.04
+
+
+def test_a_stated_latency_is_taken_off(library: FakePortAudio) -> None:
+    late = PortAudioMicrophone(MONO, RATE, block=BLOCK, latency=3e-3)
+    late.open()
+    stream = library.stream
+    assert stream is not None
+    began = library.time
+    delivering(stream, *(ramp(1000 + BLOCK * number) for number in range(4)))()
+    pressure, _, callback, clock = late.between(began, began + 0.02)
+    late.close()
+    assert pressure.values[0, 0] == 1000  # that block, by the times that it states, ended 7 ms after ``began``
+    assert pressure.times[0] == pytest.approx(began - 3e-3, abs=1e-6)
+    assert callback.values[0, 0] == pytest.approx(began + BLOCK / RATE, abs=1e-6)
+    assert clock.values[0, 1] + (0 - clock.values[0, 0]) / RATE == pytest.approx(1000.0 - 3e-3, abs=1e-4)
+
+
+def test_sound_from_before_the_opening_or_forgotten_is_refused(
+    library: FakePortAudio, microphone: PortAudioMicrophone, stream: FakeStream
+) -> None:
+    with pytest.raises(BenchFault, match=r"0\.50 s is not there any more.*30 s are kept"):
+        microphone.between(library.time - 1.0, library.time - 0.9)
+
+
 def test_no_sound_is_flagged_not_raised(microphone: PortAudioMicrophone, stream: FakeStream) -> None:
     thread = deliver_soon(stream, 12, every=0.05)
     take = microphone.capture(lambda: None, 0.1, 0.1, 0.2)

@@ -122,10 +122,10 @@ def test_the_usual_rate_is_not_changed_by_a_loss_but_by_another_rate() -> None:
 def test_a_take_about_a_gap_is_bad_and_one_well_after_it_has_a_clock_of_its_own(gap: int, begin: int) -> None:
     told = [replace(block, counts=bytes(3 * BLOCK)) for block in heard({gap: 2000})]
     first = gap + begin
-    near = readings(told, first * BLOCK, (first + 3) * BLOCK, FORM)
+    near = readings(told, first * BLOCK, (first + 3) * BLOCK, FORM, 0.0)
     assert flags_of(near) == COUNT_BROKEN
     first = gap + 2 * SETTLED + 1
-    after = readings(told, first * BLOCK, (first + 3) * BLOCK, FORM)
+    after = readings(told, first * BLOCK, (first + 3) * BLOCK, FORM, 0.0)
     assert flags_of(after) == 0
     true = told[first].arrived - told[first].age
     assert after[0].times[0] == pytest.approx(true, abs=1e-6)

@@ -18,7 +18,7 @@ from drivers.microphone import PortAudioMicrophone
 from harness.arrays import AnyArray
 from harness.clock import now
 from harness.errors import BenchFault
-from harness.microphone_take import BAD, UNTRIGGERED, flags_of
+from harness.microphone_take import BAD, UNSURE, UNTRIGGERED, flags_of
 from harness.reading import Reading
 from mocks.sound_card import SoundCard, why_not
 
@@ -107,7 +107,9 @@ def test_the_clock_is_fitted_to_the_bench_clock(card: SoundCard, microphone: Por
     played = np.full((100, card.channels), 2**30, np.int32)
     asked = now()
     pressure, _, callback, clock = heard(card, microphone, played)
-    _, _, rate, residual = clock.values[0]
+    _, _, rate, residual, uncertainty, opened = clock.values[0]
+    assert uncertainty < UNSURE
+    assert opened < asked
     # The card's timer is this computer's: its rate is the nominal one but for the fit's error.
     assert rate == pytest.approx(RATE, rel=2e-4)
     assert residual < 2e-3

@@ -1,0 +1,181 @@
+"""The sound card in simulated time: what the box would have heard, on another clock and a little late."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.contact_localization.experiment import ContactLocalization
+from experiments.contact_localization.planning import RunPlan, plan_run, way_between
+from experiments.contact_localization.sound_analysis import analyse
+from harness.acquisition import Strike, strike_from_readings
+from harness.acquisition_channels import PRESSURE
+from harness.arrays import AnyArray
+from harness.device import Microphone
+from harness.mesh import Mesh
+from harness.microphone_take import UNSURE, take_of
+from harness.reading import Reading
+from harness.recording import Recording
+from harness.run_folder import RunFiles, create_run, station_acquisition, station_calibration
+from harness.scene import SceneFile, load_scene
+from harness.sim.scene_object import known_object
+from harness.station import Bench, RunContext
+from harness.station_file import Station, load_station
+from harness.station_sections import MicrophoneSection
+from harness.step_file import Step
+from mocks.in_process import in_process_bench
+from mocks.in_process_microphone import DRIFT_PPM, JITTER, LATENCY
+
+ROOT = Path(__file__).parents[2]
+SEED, RATE = 5, 48e3
+
+
+@pytest.fixture(scope="module")
+def scene() -> SceneFile:
+    read = load_scene(ROOT / "scenes" / "mug_both.toml")
+    twice = read.localization.model_copy(update={"contacts": 2})
+    return read.model_copy(update={"localization": twice})
+
+
+@pytest.fixture(scope="module")
+def mesh(scene: SceneFile) -> Mesh:
+    return known_object(scene).mesh
+
+
+def station_of(microphone: MicrophoneSection) -> Station:
+    station = load_station(ROOT / "stations" / "mock.toml")
+    assert station.hammer is not None
+    on_card = {"calibration": "acquisition_sound_card"}
+    hammer = station.hammer.model_copy(update=on_card if microphone.kind == "portaudio" else {})
+    return station.model_copy(update={"microphone": microphone, "hammer": hammer})
+
+
+BOX = station_of(MicrophoneSection(serial="mock"))
+CARD = station_of(MicrophoneSection.model_validate({"kind": "portaudio", "rate": "48 kHz"}))
+
+
+@pytest.fixture(scope="module")
+def plan(scene: SceneFile, mesh: Mesh) -> RunPlan:
+    return plan_run(scene, BOX, mesh, 1)
+
+
+def opened(scene: SceneFile, station: Station, mesh: Mesh, folder: Path) -> Bench:
+    return in_process_bench(scene, station, RunContext(folder / "t.json", mesh, SEED, "none"))
+
+
+def performed(bench: Bench, plan: RunPlan) -> list[dict[str, Reading]]:
+    experiment = ContactLocalization(lambda here, there: way_between(plan.bench, here, there))
+    steps = [Step(index, "press", parameters) for index, parameters in enumerate(plan.parameters())]
+    return [{reading.channel.name: reading for reading in experiment.perform(s, bench)} for s in steps]
+
+
+@pytest.fixture(scope="module")
+def heard(
+    scene: SceneFile, mesh: Mesh, plan: RunPlan, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, list[dict[str, Reading]]]:
+    folder = tmp_path_factory.mktemp("heard")
+    stations = {"box": BOX, "card": CARD}
+    return {name: performed(opened(scene, s, mesh, folder), plan) for name, s in stations.items()}
+
+
+def strikes(heard: dict[str, list[dict[str, Reading]]], name: str) -> list[Strike]:
+    hammer = (CARD if name == "card" else BOX).hammer
+    assert hammer is not None
+    return [strike_from_readings(readings, hammer.acquisition) for readings in heard[name]]
+
+
+def delay(first: Strike, second: Strike, samples: int = 15000) -> tuple[float, float]:
+    """Seconds by which the second's pressure is later, and how alike the two are then."""
+
+    def spectrum(strike: Strike) -> AnyArray:
+        return np.fft.rfft(strike.pressure[strike.onset - 50 :][:samples])
+
+    frequencies = np.fft.rfftfreq(samples, 1 / first.rate)
+    here, there = spectrum(first), spectrum(second)
+    cross = there * np.conj(here) * ((frequencies > 300) & (frequencies < 8000))
+    power = float(np.linalg.norm(here[cross != 0]) * np.linalg.norm(there[cross != 0]))
+    best = 0.0
+    for reach, step in ((4e-3, 10e-6), (20e-6, 0.1e-6)):
+        tried = best + np.arange(-reach, reach, step)
+        fit = np.array([np.sum(cross * np.exp(2j * np.pi * frequencies * t)).real for t in tried])
+        best = float(tried[np.argmax(fit)])
+    return best, float(fit.max()) / power
+
+
+def test_it_is_a_microphone_that_listens_on_a_bench_of_its_own_station(
+    scene: SceneFile, mesh: Mesh, tmp_path: Path
+) -> None:
+    bench = opened(scene, CARD, mesh, tmp_path)
+    known: Microphone | None = bench.microphone
+    assert known is not None
+    assert known.health().rate == pytest.approx(RATE * (1 + 1e-6 * DRIFT_PPM))
+    assert opened(scene, BOX, mesh, tmp_path).microphone is None
+    with pytest.raises(NotImplementedError, match=r"InProcessMicrophone\.capture"):
+        known.capture(lambda: None, 0.0, 0.1, 1.0)
+
+
+def test_every_strike_has_force_and_sound_on_one_axis(heard: dict[str, list[dict[str, Reading]]]) -> None:
+    for there, here in zip(strikes(heard, "box"), strikes(heard, "card"), strict=True):
+        assert here.fault == there.fault == ""
+        assert here.rate == pytest.approx(there.rate)
+        a, b = (strike.force[strike.onset - 50 :][:2000] for strike in (there, here))
+        assert np.abs(a - b).max() < 0.1  # N: another box's noise
+        assert len(here.pressure) == len(here.force)
+
+
+def test_the_sound_is_the_box_s_but_for_one_latency(heard: dict[str, list[dict[str, Reading]]]) -> None:
+    found = [delay(a, b) for a, b in zip(strikes(heard, "box"), strikes(heard, "card"), strict=True)]
+    for late, alike in found:
+        assert late == pytest.approx(LATENCY, abs=6 * JITTER + 0.2e-6)
+        assert alike > 0.999
+
+
+def test_an_estimate_reads_the_same_shares_of_the_same_peaks(
+    heard: dict[str, list[dict[str, Reading]]],
+) -> None:
+    """The latency turns all strikes' shares of a peak by one angle, which is no part of them."""
+    there, here = (analyse(strikes(heard, name)).peaks for name in ("box", "card"))
+    assert len(there) >= 3
+    for peak in there:
+        nearest = min(here, key=lambda other: abs(other.frequency - peak.frequency))
+        assert nearest.frequency == pytest.approx(peak.frequency, abs=1.0)
+        assert abs(np.vdot(nearest.y, peak.y)) > 0.995
+
+
+def test_a_silent_bench_is_heard_in_any_stretch_of_time(scene: SceneFile, mesh: Mesh, tmp_path: Path) -> None:
+    microphone = opened(scene, CARD, mesh, tmp_path).microphone
+    assert microphone is not None
+    readings = {reading.channel.name: reading for reading in microphone.record(0.3)}
+    counts = readings[PRESSURE].values
+    assert counts.size >= 0.3 * RATE
+    assert 0 < np.abs(counts).max() < 2**20
+    take = take_of(readings)
+    assert take is not None
+    assert (take.flags, take.fault) == (0, "")
+    assert take.uncertainty < UNSURE
+
+
+def test_a_strike_by_sound_card_is_recorded_whole_and_read_back(
+    scene: SceneFile, mesh: Mesh, heard: dict[str, list[dict[str, Reading]]], plan: RunPlan, tmp_path: Path
+) -> None:
+    recording = create_run(
+        tmp_path / "run",
+        "contact-localization",
+        scene,
+        CARD,
+        mesh,
+        station_calibration(CARD),
+        {"contacts": plan.parameters()},
+        SEED,
+        None,
+        station_acquisition(scene, CARD),
+    )
+    step = Step(0, "press", plan.parameters()[0])
+    recording.commit(step, list(heard["card"][0].values()), 1.0)
+    again = RunFiles(Recording(tmp_path / "run"))
+    (record,) = again.recording.steps()
+    assert again.acquisition is not None
+    found, wanted = strike_from_readings(record.readings, again.acquisition), strikes(heard, "card")[0]
+    np.testing.assert_allclose(found.pressure, wanted.pressure, atol=1e-5)
+    assert (found.fault, found.jitter) == ("", wanted.jitter)
+    assert again.station.microphone == CARD.microphone
