@@ -46,7 +46,8 @@ def contact_localization(
 
     Try: touchstone cost contact-localization --seeds 2 --only mug --contacts 6
     """
-    from experiments.contact_localization.costing import Work, gathered, joined, measure, preparations
+    from experiments.contact_localization.cases import preparations
+    from experiments.contact_localization.costing import Work, gathered, joined, measure
     from experiments.contact_localization.dials import METHOD, SENSES, settings, settings_by_count
     from experiments.contact_localization.solving import ESTIMATOR, PROGRAM
     from experiments.contact_localization.table_cell import cells

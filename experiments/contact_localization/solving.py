@@ -4,6 +4,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from numba.core.event import install_recorder
+
 from experiments.contact_localization.dials import (
     KNOBS,
     SENSES,
@@ -151,6 +153,13 @@ def solve(readings: Readings, setting: Setting) -> Solved:
     except FitRefused as error:
         refusal = str(error)
     return Solved(estimate, time.process_time() - cpu, time.perf_counter() - wall, refusal)
+
+
+def solve_loaded(readings: Readings, setting: Setting) -> Solved:
+    """As ``solve``, once more where a kernel was compiled or loaded meanwhile: no answer costs that."""
+    with install_recorder("numba:compiler_lock") as loads:
+        solved = solve(readings, setting)
+    return solve(readings, setting) if loads.buffer else solved
 
 
 def levels_at(setting: Setting) -> Levels:

@@ -186,10 +186,11 @@ def _prepared_alike(one: Setting, other: Setting) -> bool:
 
 
 def _load_kernels(run: Run, candidates: Sequence[Point]) -> None:
-    """Answer one contact by each sense and method."""
+    """Answer two contacts by each sense and method."""
     struck = [observation for observation in run.observations if observation.strike is not None]
-    few = (struck or list(run.observations))[:1]
-    kinds = {(p.levels.get(SENSES.name), p.levels[METHOD.name]): p.levels for p in candidates}
+    few = (struck or list(run.observations))[:2]  # one strike says nothing, and is not weighed
+    dearest_last = sorted(candidates, key=lambda point: point.seconds.value)
+    kinds = {(p.levels.get(SENSES.name), p.levels[METHOD.name]): p.levels for p in dearest_last}
     for levels in kinds.values():
         solve(read(few, run.models.at(levels), run.prior, run.seed, needs_images(levels)), levels)
 

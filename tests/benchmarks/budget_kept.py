@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.costing import Case, performed, warm, workers_of
+from experiments.contact_localization.cases import Case, performed, workers_of
 from experiments.contact_localization.front import Front, Target, front_of
-from experiments.contact_localization.solving import ESTIMATOR, PROGRAM, Models, Setting
+from experiments.contact_localization.solving import ESTIMATOR, PROGRAM, Models
 from experiments.contact_localization.table import objects
 from experiments.contact_localization.table_cell import Cell, cells
 from experiments.contact_localization.within import ask
@@ -113,11 +113,9 @@ def _front(curve: Curve, cell: Cell, reasons: Sequence[str]) -> Front:
 
 def _record(case: Case, front: Front) -> dict[str, Any]:
     """One run: as asked for each budget and error, and at every setting."""
-    settings: list[Setting] = [point.levels for point in front.points]
-    warm(case, settings)
+    tried = {point.name: sample_json(case.sample(point.levels, CONTACTS)) for point in front.points}
     budgets = [_asked(case, front, Target(seconds=budget)) for budget in BUDGETS]
     errors = [_asked(case, front, Target(error=error)) for error in ERRORS]
-    tried = {point.name: sample_json(case.sample(point.levels, CONTACTS)) for point in front.points}
     return {"object": case.run.object, "budgets": budgets, "errors": errors, "tried": tried}
 
 

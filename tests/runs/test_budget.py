@@ -10,7 +10,8 @@ from whole_run import copied
 
 from experiments.commands import run as run_command
 from experiments.contact_localization import session_of
-from experiments.contact_localization.costing import Case, Work, gathered, joined, measure
+from experiments.contact_localization.cases import Case
+from experiments.contact_localization.costing import Work, gathered, joined, measure
 from experiments.contact_localization.dials import FINEST, KNOBS, METHOD, SPACING, setting_name, settings
 from experiments.contact_localization.front import Front, Target, foresee, front_for, shipped_curve
 from experiments.contact_localization.solving import ESTIMATOR, PROGRAM, object_key
@@ -252,7 +253,7 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     def again(*_: object) -> Case:
         raise AssertionError("the run was performed again")
 
-    monkeypatch.setattr("experiments.contact_localization.costing.perform", again)
+    monkeypatch.setattr("experiments.contact_localization.cases.perform", again)
     ((_, resumed),) = measure(two_settings, scenes, station, tmp_path, pytest.fail)
     assert [point.samples for point in resumed] == [point.samples for point in points]
     monkeypatch.setattr("experiments.contact_localization.costing.code", lambda _: {"sha256": "other"})
