@@ -10,8 +10,8 @@ from harness.arrays import FloatArray
 from harness.report.style import SOFT
 
 _SIZE = 8.0
-_WIDE, _HIGH = 0.62, 1.1
-"""Of a digit, in its size."""
+_WIDE, _HIGH = 0.75, 1.35
+"""Of a digit with the air about it, in its size."""
 
 _MARK = 4.0
 """pt about a mark's middle that no number should cover."""
