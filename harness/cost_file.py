@@ -1,7 +1,7 @@
 """Curves on disk: one JSON file a program and machine, under the user's cache directory."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,10 @@ from harness.errors import DataRefused, TouchstoneError
 from harness.recording import write_text_whole
 from harness.store import default_folder
 
-SCHEMA = 1
+SCHEMA = 2
+
+_DIGITS = 5
+"""Significant ones that are kept: no clock and no bench tells more."""
 
 
 def curve_path(program: str, description: Mapping[str, str] | None = None) -> Path:
@@ -24,7 +27,10 @@ def curve_path(program: str, description: Mapping[str, str] | None = None) -> Pa
 def save(curve: Curve, path: Path) -> None:
     """Write a curve whole or not at all, making its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text_whole(path, json.dumps(to_json(curve), indent=1, allow_nan=False) + "\n")
+    tree = to_json(curve)
+    points = ",\n".join(json.dumps(point, allow_nan=False) for point in tree.pop("points"))
+    head = json.dumps(tree, allow_nan=False).removesuffix("}")
+    write_text_whole(path, f'{head}, "points": [\n{points}\n]}}\n')
 
 
 def load(path: Path) -> Curve:
@@ -37,14 +43,15 @@ def load(path: Path) -> Curve:
     text = path.read_text(encoding="utf-8")
     try:
         return from_json(json.loads(text))
-    except (ValueError, KeyError, TypeError, AttributeError, TouchstoneError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, TouchstoneError) as error:
         raise DataRefused(
             f"{path} is not a cost curve of schema {SCHEMA} ({error}); delete it and measure again"
         ) from error
 
 
 def to_json(curve: Curve) -> dict[str, Any]:
-    """As JSON values; keys carry their unit."""
+    """As JSON values; keys carry their unit. Runs are named once; a point's samples are columns."""
+    runs = dict.fromkeys((sample.run, sample.object) for point in curve.points for sample in point.samples)
     return {
         "schema": SCHEMA,
         "program": curve.program,
@@ -53,7 +60,8 @@ def to_json(curve: Curve) -> dict[str, Any]:
         "machine": dict(curve.machine),
         "code": dict(curve.code),
         "notes": list(curve.notes),
-        "points": [_point_json(point) for point in curve.points],
+        "runs": [{"run": run, "object": of} for run, of in runs],
+        "points": [_point_json(point, {run: k for k, run in enumerate(runs)}) for point in curve.points],
     }
 
 
@@ -63,7 +71,7 @@ def from_json(tree: Mapping[str, Any]) -> Curve:
         raise ValueError(f"its schema is {tree['schema']!r}")
     return Curve(
         program=str(tree["program"]),
-        points=tuple(_point(point) for point in tree["points"]),
+        points=tuple(_point(point, tree["runs"]) for point in tree["points"]),
         machine={str(k): str(v) for k, v in tree["machine"].items()},
         code={str(k): str(v) for k, v in tree["code"].items()},
         made=str(tree["made"]),
@@ -95,15 +103,34 @@ def sample_from(tree: Mapping[str, Any]) -> Sample:
     return Sample(**{name: tree[key] for name, key in _KEYS.items()})
 
 
-def _point_json(point: Point) -> dict[str, Any]:
+_COLUMNS = {name: key for name, key in _KEYS.items() if name not in ("run", "object")}
+
+
+def _point_json(point: Point, numbers: Mapping[tuple[str, str], int]) -> dict[str, Any]:
+    samples = [asdict(sample) for sample in point.samples]
     return {
         "name": point.name,
         "levels": dict(point.levels),
         "condition": dict(point.condition),
-        "samples": [sample_json(sample) for sample in point.samples],
+        "runs": [numbers[sample.run, sample.object] for sample in point.samples],
+        **{key: [_rounded(sample[name]) for sample in samples] for name, key in _COLUMNS.items()},
     }
 
 
-def _point(tree: Mapping[str, Any]) -> Point:
-    samples = tuple(sample_from(sample) for sample in tree["samples"])
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.{_DIGITS}g}")
+
+
+def _point(tree: Mapping[str, Any], runs: Sequence[Mapping[str, Any]]) -> Point:
+    if min(tree["runs"]) < 0:
+        raise ValueError(f"run {min(tree['runs'])} of {len(runs)}")
+    columns = zip(*(tree[key] for key in _COLUMNS.values()), strict=True)
+    samples = tuple(
+        Sample(
+            run=str(runs[number]["run"]),
+            object=str(runs[number]["object"]),
+            **dict(zip(_COLUMNS, row, strict=True)),
+        )
+        for number, row in zip(tree["runs"], columns, strict=True)
+    )
     return Point(str(tree["name"]), tree["levels"], tree["condition"], samples)

@@ -286,7 +286,10 @@ def test_a_curve_comes_back_from_the_disk_as_it_was(tmp_path: Path) -> None:
     save(curve(), path)
     again = load(path)
     assert to_json(again) == to_json(curve())
-    assert [p.samples for p in again.points] == [p.samples for p in curve().points]
+    for one, other in zip(again.points, curve().points, strict=True):
+        assert [s.run for s in one.samples] == [s.run for s in other.samples]
+        np.testing.assert_allclose(one.cpu_seconds, other.cpu_seconds, rtol=1e-4)
+        np.testing.assert_allclose(one.errors, other.errors, rtol=1e-4)
 
 
 def test_curves_are_kept_where_the_cache_is_by_machine(
@@ -300,13 +303,17 @@ def test_curves_are_kept_where_the_cache_is_by_machine(
 
 def broken(change: str) -> str:
     tree = to_json(curve())
-    one = tree["points"][0]["samples"][0]
+    one = tree["points"][0]
     if change == "nan":
-        one["error_m"] = math.nan
+        one["error_m"][0] = math.nan
     elif change == "negative":
-        one["cpu_s"] = -1.0
+        one["cpu_s"][0] = -1.0
     elif change == "key":
         one["errors_m"] = one.pop("error_m")
+    elif change == "column":
+        one["error_m"].pop()
+    elif change == "run":
+        one["runs"][0] = len(tree["runs"])
     elif change == "schema":
         tree["schema"] = 99
     elif change == "list":
@@ -314,7 +321,7 @@ def broken(change: str) -> str:
     return json.dumps(tree)[: -40 if change == "cut" else None]
 
 
-@pytest.mark.parametrize("change", ["nan", "negative", "key", "schema", "list", "cut"])
+@pytest.mark.parametrize("change", ["nan", "negative", "key", "column", "run", "schema", "list", "cut"])
 def test_a_damaged_curve_is_refused_by_name(tmp_path: Path, change: str) -> None:
     path = tmp_path / "curve.json"
     path.write_text(broken(change))
