@@ -1,9 +1,9 @@
 """What accuracy costs: errors and seconds as measured, the settings worth taking, and which to take.
 
 A setting is a choice of levels. It is measured on many runs, the same runs for every setting, so
-that settings are compared in pairs. Error and seconds are stated as geometric means: both span
-decades, "half as long again" is a ratio, a median would not see the run in five that fails
-grossly, and a mean would see little else.
+that settings are compared in pairs. Error is stated as the mean, each counted at 20 mm at most: a
+median would not see the run in five that fails grossly, and a plain mean would see little else.
+Seconds are stated as the geometric mean: they span decades, and "half as long again" is a ratio.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,10 +16,10 @@ import numpy as np
 from harness.accuracy import Level
 from harness.arrays import FloatArray
 from harness.errors import WrongUse
-from harness.metrics import Interval, bootstrap, median
+from harness.metrics import Interval, bootstrap, mean, median
 
-LEAST_ERROR = 1.0e-5
-"""m: errors below this count as this much in geometric means; the bench resolves no less."""
+GROSS = 20.0e-3
+"""m: errors beyond this are failures, and count alike; as the estimate itself counts them."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ class Point:
 
     @cached_property
     def error(self) -> Interval:
-        """In m: geometric mean over the runs, with its 90 % bootstrap interval."""
-        return bootstrap(np.maximum(self.errors, LEAST_ERROR), geometric_mean)
+        """In m: mean over the runs, none counted beyond ``GROSS``, with its 90 % bootstrap interval."""
+        return bootstrap(np.minimum(self.errors, GROSS), mean)
 
     @cached_property
     def median_error(self) -> Interval:

@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy import stats
+from scipy.special import digamma
 
 from harness.arrays import FloatArray
 from harness.cost import Point, Sample
@@ -15,8 +16,15 @@ MET = 0.975
 
 _ENOUGH = 4
 
-_OWN = 10.0
-"""Runs that the spread of all objects counts for, beside those of an object's own."""
+_GROUPS = (0.5, 0.75, 1.0)
+"""Shares of the measured runs, the surest, that promises are made by: few, as each that is looked at
+adds a chance to be taken in by luck."""
+
+_LENT = 4.0
+"""Degrees of freedom that the usual spread counts for, beside those of an object's own runs."""
+
+_LEAST_SPREAD = 0.05
+"""Of the logarithm of seconds: clocks and other programs leave no less."""
 
 
 def predicted_at_most(values: FloatArray, share: float = KEPT) -> float:
@@ -60,8 +68,10 @@ def most_seconds(point: Point, name: str | None, speed: float = 1.0, spent: floa
 def _most_of_the_rest(point: Point, name: str | None) -> float:
     """The bound on the next run's own CPU seconds: about its object's mean, where that was measured.
 
-    Objects differ far more than runs of one object do. How much these differ is taken from all
-    objects together and from the object's own runs, which count for more the more there are.
+    Objects differ in their seconds, and in how far these differ from run to run: a wrench takes much
+    the same in every run, a tray ten times as long where places look alike. So the variance is the
+    object's own, shrunk towards the geometric mean of all objects' as if that were known from
+    ``_LENT`` degrees of freedom (Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6).
     """
     groups: dict[str, list[float]] = {}
     for sample in point.samples:
@@ -70,11 +80,21 @@ def _most_of_the_rest(point: Point, name: str | None) -> float:
     if name not in groups or pooled < _ENOUGH:
         return predicted_at_most(np.array([sample.cpu for sample in point.samples]))
     own, freedom = np.array(groups[name]), len(groups[name]) - 1
-    squares = {of: float(((np.array(logs) - np.mean(logs)) ** 2).sum()) for of, logs in groups.items()}
-    shared = min(_OWN, float(pooled))
-    variance = (shared * sum(squares.values()) / pooled + squares[name]) / (shared + freedom)
-    reach = float(stats.t.ppf(KEPT, shared + freedom)) * np.sqrt(variance * (1.0 + 1.0 / len(own)))
+    lent = np.mean([_log_variance(logs) for logs in groups.values() if len(logs) > 1])
+    squares = freedom * _variance(groups[name]) if freedom else 0.0
+    variance = (_LENT * float(np.exp(lent)) + squares) / (_LENT + freedom)
+    reach = float(stats.t.ppf(KEPT, _LENT + freedom)) * np.sqrt(variance * (1.0 + 1.0 / len(own)))
     return float(np.exp(own.mean() + reach))
+
+
+def _variance(logs: list[float]) -> float:
+    return max(float(np.var(logs, ddof=1)), _LEAST_SPREAD**2)
+
+
+def _log_variance(logs: list[float]) -> float:
+    """Of the variance that few values were drawn with; the logarithm of theirs is lower on average."""
+    half = 0.5 * (len(logs) - 1)
+    return float(np.log(_variance(logs)) + np.log(half) - digamma(half))
 
 
 def promises(point: Point, share: float = MET) -> tuple[FloatArray, FloatArray]:
@@ -99,11 +119,12 @@ def promises(point: Point, share: float = MET) -> tuple[FloatArray, FloatArray]:
     pairs = sorted((s.radius, s.error) for s in point.samples if s.radius is not None)
     radii, errors = np.array([pair[0] for pair in pairs]), [pair[1] for pair in pairs]
     limits, promised = [], []
-    for count in range(1, len(pairs) + 1):
+    for part in _GROUPS if pairs else ():
+        limit = radii[int(np.ceil(part * len(pairs))) - 1]
+        count = int(np.searchsorted(radii, limit, side="right"))
         rank = int(np.ceil((count + 1) * share - 1e-9))
-        tied = count < len(pairs) and radii[count] == radii[count - 1]
-        if rank <= count and not tied:
-            limits.append(radii[count - 1])
+        if rank <= count:
+            limits.append(limit)
             promised.append(sorted(errors[:count])[rank - 1])
     least = np.minimum.accumulate(np.array(promised)[::-1])[::-1] if promised else np.zeros(0)
     return np.array(limits), least

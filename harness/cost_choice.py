@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.accuracy import Level
-from harness.cost import Point, best_within
+from harness.cost import Point, best_within, front
 from harness.cost_bounds import like, most_seconds, promise, promise_share
 from harness.errors import WrongUse
 
@@ -53,7 +53,8 @@ def for_error(points: Sequence[Point], error: float, name: str | None) -> tuple[
     """The settings to try in turn until one promises an error: the cheapest on average first.
 
     A first try that cannot promise it is followed by the setting that most often can, so a try
-    costs its own seconds and, as often as it fails, those of the other.
+    costs its own seconds and, as often as it fails, those of the other. Only settings on the front
+    are looked at: of many, some would seem to promise well by luck.
 
     Args:
         points: of one condition, at least one.
@@ -63,6 +64,7 @@ def for_error(points: Sequence[Point], error: float, name: str | None) -> tuple[
     Returns:
         One or two settings.
     """
+    points = front(points)
     shares = {point.name: promise_share(point, name, error) for point in points}
     # Where none can promise it, the one that promises most; it is said that it does not.
     last = min(points, key=lambda p: (-shares[p.name], _typical_promise(p, name), _price(p, name)))

@@ -44,7 +44,7 @@ def cost_chart(points: Sequence[Point], families: Sequence[str], title: str, sta
             )  # fmt: skip
         axes.set_title(title, fontsize=11)
         axes.set_xlabel("seconds of CPU time, from readings to answer (geometric mean, 90 % interval)")
-        axes.set_ylabel("error in mm (geometric mean, 90 % interval)")
+        axes.set_ylabel("error in mm (mean, each at most 20 mm; 90 % interval)")
         _logarithmic(axes)
         axes.legend(frameon=False, fontsize=8)
         key(axes, [f"{number}  {point.name}" for number, point in enumerate(best, start=1)])

@@ -6,9 +6,9 @@ every budget and error as ``touchstone run`` asks, and then answered at every se
 so that the best there was is found by trying all. One file a run is kept in ``--out``: what is stopped
 resumes there. What is judged:
 
-- a budget: in how many runs it was kept, on the clock. The error, as a mean over the runs, beside the
-  least mean error of any one setting that keeps the budget in 19 of 20 of the same runs. Runs that would
-  have been refused before anything moved are counted apart.
+- a budget: in how many runs it was kept, on the clock. The error, as a mean over the runs with none
+  counted beyond 20 mm, beside the least such mean of any one setting that keeps the budget in 19 of 20
+  of the same runs. Runs that would have been refused before anything moved are counted apart.
 - an error: in how many of the runs it was promised to it was met. The seconds, as a mean over all runs,
   beside those of the cheapest one setting whose error is met in 19 of 20 of them.
 """
@@ -30,7 +30,7 @@ from experiments.contact_localization.table import objects
 from experiments.contact_localization.table_cell import Cell, cells
 from experiments.contact_localization.within import ask
 from harness.accuracy import Level
-from harness.cost import LEAST_ERROR, Curve
+from harness.cost import GROSS, Curve
 from harness.cost_choice import for_budget
 from harness.cost_file import curve_path, load, sample_json
 from harness.cost_provenance import code, machine, stale
@@ -181,7 +181,7 @@ def judged_budget(records: Sequence[Record], index: int) -> str:
     fixed = [t for t in tried_on(taken) if np.mean([s <= budget for s in t.seconds]) >= SHARE]
     return (
         f"  budget {budget:g} s: kept in {kept} of {len(ours)} runs ({by_cpu} by CPU time; {refused} refused "
-        f"before); error {1e3 * geometric(errors):.2f} mm, mean {1e3 * np.mean(errors):.2f}; "
+        f"before); error {1e3 * capped(errors):.2f} mm, plain mean {1e3 * np.mean(errors):.2f}; "
         + _beside_errors(fixed, errors)
     )
 
@@ -189,12 +189,12 @@ def judged_budget(records: Sequence[Record], index: int) -> str:
 def _beside_errors(fixed: Sequence[Tried], errors: Sequence[float]) -> str:
     if not fixed:
         return "no fixed setting keeps it in 19 of 20"
-    best = min(fixed, key=lambda t: geometric(t.errors))
+    best = min(fixed, key=lambda t: capped(t.errors))
     least = min(float(np.mean(t.errors)) for t in fixed)
-    ratio = geometric(errors) / geometric(best.errors)
+    ratio = capped(errors) / capped(best.errors)
     return (
-        f"best fixed {1e3 * geometric(best.errors):.2f} mm ({best.name}): ratio {ratio:.2f}; "
-        f"by the mean {1e3 * least:.2f} mm: ratio {np.mean(errors) / least:.2f}"
+        f"best fixed {1e3 * capped(best.errors):.2f} mm ({best.name}): ratio {ratio:.2f}; "
+        f"by the plain mean {1e3 * least:.2f} mm: ratio {np.mean(errors) / least:.2f}"
     )
 
 
@@ -219,8 +219,13 @@ def judged_error(records: Sequence[Record], index: int) -> str:
 
 
 def geometric(values: Sequence[float]) -> float:
-    """Geometric mean; errors count as the least that the bench resolves."""
-    return float(np.exp(np.mean(np.log(np.maximum(values, LEAST_ERROR)))))
+    """Geometric mean of seconds."""
+    return float(np.exp(np.mean(np.log(values))))
+
+
+def capped(errors: Sequence[float]) -> float:
+    """Mean of errors in m, none counted beyond what is gross."""
+    return float(np.mean(np.minimum(errors, GROSS)))
 
 
 if __name__ == "__main__":

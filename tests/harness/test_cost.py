@@ -51,6 +51,12 @@ def dominates(a: Point, b: Point) -> bool:
     return better and (a.seconds.value < b.seconds.value or a.error.value < b.error.value)
 
 
+def test_a_failure_counts_as_a_failure_however_far_off_it_is() -> None:
+    near = Point("p", {}, CONDITION, (sample("a", 1e-3), sample("b", 20e-3)))
+    far = Point("p", {}, CONDITION, (sample("a", 1e-3), sample("b", 0.3)))
+    assert near.error.value == far.error.value == pytest.approx(10.5e-3)
+
+
 @settings(deadline=None)
 @given(clouds)
 def test_no_point_dominates_one_of_the_front_and_each_other_is_dominated_or_equalled(
@@ -242,6 +248,25 @@ def test_the_spread_within_objects_is_learnt_from_all_of_them() -> None:
         )
         held.append(cpus[2, 3] <= most_seconds(Point("p", {}, CONDITION, known), "2", spent=0.0))
     assert np.mean(held) == pytest.approx(KEPT, abs=0.015)  # 3.7 standard errors of 1500 draws
+
+
+def test_a_steady_object_is_not_priced_by_a_wild_one_nor_the_other_way_round() -> None:
+    rng = np.random.default_rng(9)
+    held: dict[str, list[bool]] = {"steady": [], "wild": []}
+    reach = []
+    for _ in range(800):
+        known, after = [], {}
+        for name, spread in (("steady", 0.1), ("fair", 0.25), ("also fair", 0.3), ("wild", 0.9)):
+            cpus = np.exp(rng.normal(0.0, spread, 11))
+            known += [sample(f"{name}-{k}", cpu=float(cpus[k]), of=name) for k in range(10)]
+            after[name] = float(cpus[10])
+        one = Point("p", {}, CONDITION, tuple(known))
+        for name, those in held.items():
+            those.append(after[name] <= most_seconds(one, name, spent=0.0))
+        reach.append(most_seconds(one, "steady", spent=0.0))
+    assert np.mean(held["wild"]) >= 0.95
+    assert np.mean(held["steady"]) >= 0.97
+    assert np.median(reach) < 1.6  # all spreads taken as one would be 2.8
 
 
 def test_an_error_is_tried_cheaply_first_where_that_pays() -> None:
