@@ -15,7 +15,7 @@ from experiments.contact_localization.dials import (
     SPACING,
 )
 from experiments.contact_localization.levels import Levels
-from experiments.contact_localization.solving import Setting, levels_at, prepare, read, solve
+from experiments.contact_localization.solving import Setting, levels_at, prepare, read, solve_loaded
 from harness.arrays import FloatArray
 
 
@@ -84,7 +84,7 @@ def trade(found: Answer, true: FloatArray, seed: int) -> tuple[Point, ...]:
     points = []
     for name, setting in (LEVELS | BY_SENSE if readings.heard else LEVELS).items():
         prepare(found.model, setting)
-        solved = solve(readings, setting)
+        solved = solve_loaded(readings, setting)
         if solved.estimate is None:
             continue
         seconds = (readings.shared[1] + solved.wall) / len(found.observations)

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
 from harness.arrays import FloatArray
 from harness.report.style import SOFT
@@ -16,12 +18,15 @@ _WIDE, _HIGH = 0.75, 1.35
 _MARK = 4.0
 """pt about a mark's middle that no number should cover."""
 
+_LINE = 3.0
+"""pt about a line that a number should not cover either, if that can be."""
+
 _RINGS = (9.0, 15.0, 22.0, 30.0)
 _WAYS = 12
 
 
 def number_marks(figure: Figure, axes: Axes, marks: FloatArray, names: Sequence[str]) -> None:
-    """Write a number beside each mark, where it covers no mark and no other number if that can be.
+    """Write a number beside each mark, where it covers no mark, no line and no other number if that can be.
 
     Args:
         figure: laid out; what is written here does not change its layout.
@@ -33,6 +38,7 @@ def number_marks(figure: Figure, axes: Axes, marks: FloatArray, names: Sequence[
     at = axes.transData.transform(marks) * 72.0 / figure.dpi
     frame = np.asarray(axes.get_window_extent().get_points()) * 72.0 / figure.dpi
     taken = [_box(point, 2.0 * _MARK, 2.0 * _MARK) for point in at]
+    taken += [_box(point, _LINE, _LINE) for line in axes.lines for point in _along(line, axes, figure)]
     for number, (mark, point, name) in enumerate(zip(marks, at, names, strict=True)):
         wide, high = _WIDE * _SIZE * len(name), _HIGH * _SIZE
         ways = _ways()
@@ -45,7 +51,7 @@ def number_marks(figure: Figure, axes: Axes, marks: FloatArray, names: Sequence[
             name, (float(mark[0]), float(mark[1])), (float(way[0]), float(way[1])),
             textcoords="offset points", fontsize=_SIZE, fontweight="bold", ha="center", va="center",
             arrowprops={"arrowstyle": "-", "lw": 0.6, "color": SOFT, "shrinkA": 1.0, "shrinkB": 3.0},
-            zorder=5 + number,
+            zorder=5 + number, path_effects=[withStroke(linewidth=2.0, foreground="white")],
         )  # fmt: skip
         note.set_in_layout(False)
 
@@ -56,6 +62,18 @@ def key(axes: Axes, lines: Sequence[str]) -> None:
         1.02, 1.0, "\n".join(lines), transform=axes.transAxes, fontsize=7.5, ha="left", va="top",
         linespacing=1.45,
     )  # fmt: skip
+
+
+def _along(line: Line2D, axes: Axes, figure: Figure) -> FloatArray:
+    """``(n, 2)`` pt: places along a drawn line, close enough to keep a number off it."""
+    if line.get_linestyle() == "None":
+        return np.zeros((0, 2))
+    corners = axes.transData.transform(np.asarray(line.get_xydata())) * 72.0 / figure.dpi
+    if len(corners) < 2:
+        return corners
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    steps = np.arange(0.0, lengths[-1], _LINE)
+    return np.stack([np.interp(steps, lengths, corners[:, axis]) for axis in range(2)], axis=1)
 
 
 def _ways() -> FloatArray:
