@@ -8,7 +8,16 @@ import numpy as np
 
 from drivers import portaudio
 from drivers.microphone_blocks import Block, Blocks, Format
-from drivers.microphone_readings import SETTLE, clock_of, readings, states_ages, usual_rate
+from drivers.microphone_readings import (
+    SETTLE,
+    clock_of,
+    places_of_doubt,
+    readings,
+    starts,
+    states_ages,
+    unbroken,
+    usual_rate,
+)
 from drivers.microphone_trigger import Trigger
 from harness.clock import now
 from harness.device import Health
@@ -21,6 +30,9 @@ STALL = 0.5
 
 OPEN_TIMEOUT = 5.0
 """s until a stream that delivers nothing is given up."""
+
+BUFFER = 0.5
+"""s of sound that the library keeps for a computer that is late."""
 
 RATE_TOLERANCE = 1e-2
 """Largest relative difference of the measured rate from the asked one; no crystal is that far off."""
@@ -135,16 +147,17 @@ class PortAudioMicrophone:
             BenchFault: as `record`; or the sound of ``start`` is not kept, or was before the opening.
         """
         self._require(end - start)
-        newest = self._heard()
-        clock = clock_of(self._blocks.since(newest - self._samples(_CLOCK_SECONDS)), self.form)
-        first, last = (int(np.floor(clock.index_at(time + self.form.latency))) for time in (start, end))
-        oldest = self._blocks.since(0)[0].first
-        if first < oldest:
+        blocks = self._blocks.since(0)
+        # By each block's own measured time: a line through all of them is no guide across a gap.
+        began = starts(blocks, self.form) - self.form.latency
+        before = np.flatnonzero(began <= start)
+        if not len(before):
             raise BenchFault(
-                f"{self.name}: the sound of {(oldest - first) / self.form.rate:.2f} s is not there any more, "
-                f"or was before the microphone was opened; {self._keep:g} s are kept: ask for it sooner"
+                f"{self.name}: the sound of {began[0] - start:.2f} s is not there any more, or was before it "
+                f"was opened; {self._keep:g} s are kept: ask for it sooner"
             )
-        return self._readings(first, last + 1)
+        first = blocks[before[-1]].first + self._samples(max(0.0, start - began[-1]))
+        return self._readings(first, first + self._samples(end - start) + self.form.block)
 
     def capture(
         self, fire: Callable[[], None], before: float, after: float, timeout: float
@@ -184,11 +197,13 @@ class PortAudioMicrophone:
         blocks = self._blocks.since(0)
         if not blocks:
             return Health(self.name, identity, 0.0, 0, None, "nothing heard yet")
-        clock = clock_of(blocks, self.form)
+        whole = unbroken(blocks, places_of_doubt(blocks, self.form), self._next, self.form)
+        clock = clock_of(whole or blocks, self.form)
         stated = states_ages(blocks, self.form)
         latency = median(block.age for block in blocks) if stated else None
         detail = f"clock fitted to {clock.residual * 1e6:.0f} us"
         detail += "" if stated else "; the sound card does not say when it sampled"
+        detail += "" if len(whole) == len(blocks) else f"; samples were lost within {self._keep:g} s"
         return Health(self.name, identity, clock.rate, self._blocks.bad, latency, detail)
 
     def _begin(self, library: Any) -> Any:
@@ -204,12 +219,12 @@ class PortAudioMicrophone:
         }
         try:
             library.check_input_settings(**kind)
-            # High latency: a late computer then loses nothing. Clipping and dither are left off:
+            # A long buffer: a late computer then loses nothing. Clipping and dither are left off:
             # both would change counts.
             stream = library.RawInputStream(
                 **kind,
                 blocksize=self.form.block,
-                latency="high",
+                latency=BUFFER,
                 clip_off=True,
                 dither_off=True,
                 callback=self._listen,

@@ -63,7 +63,7 @@ def places_of_doubt(blocks: Sequence[Block], form: Format) -> BoolArray:
     return doubtful
 
 
-def _unbroken(blocks: Sequence[Block], doubtful: BoolArray, first: int, form: Format) -> Sequence[Block]:
+def unbroken(blocks: Sequence[Block], doubtful: BoolArray, first: int, form: Format) -> Sequence[Block]:
     """Those after the last gap that ends before sample number ``first``; a clock fits to no others."""
     bad = np.array([bool(block.flags & BAD) for block in blocks])
     before = np.array([block.first + form.block <= first for block in blocks])
@@ -118,7 +118,7 @@ def readings(
     doubtful = places_of_doubt(blocks, form)
     inside = [block.first < end and block.first + form.block > first for block in blocks]
     take = [block for block, is_inside in zip(blocks, inside, strict=True) if is_inside]
-    clock = clock_of(_unbroken(blocks, doubtful, first, form), form)
+    clock = clock_of(unbroken(blocks, doubtful, first, form), form)
     times = clock.times(firsts(take)) - form.latency
     counts = np.stack([form.counts(block.counts) for block in take])
     flags |= COUNT_BROKEN if np.any(doubtful[inside]) else 0

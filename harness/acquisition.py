@@ -138,6 +138,11 @@ class AcquisitionCalibration:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     @property
+    def without_microphone(self) -> "AcquisitionCalibration":
+        """Of the box alone, its input 1 being shorted, because the microphone is on a sound card."""
+        return replace(self, microphone_offset=0.0, microphone_full_scale_counts=self.full_scale_counts)
+
+    @property
     def newtons_per_count(self) -> float:
         """N."""
         return self.volts_per_count * self.hammer_newtons_per_volt
@@ -167,7 +172,8 @@ class Strike:
     Attributes:
         rate: Hz, of both channels, fitted on the bench clock.
         force: ``(t,)`` N, compression positive, rest taken off.
-        pressure: ``(t,)`` Pa at the same times as the force, rest taken off.
+        pressure: ``(t,)`` Pa at the same times as the force, rest taken off; zero where it is ``lost`` and
+            shares no moment with the force.
         onset: sample at which the force reached the trigger's threshold; 0 where silent.
         start: s on the bench clock, of sample 0.
         overload: full scale was read, or the calibrated range was left: amplitudes are not to be trusted.
@@ -217,8 +223,9 @@ def strike_from_readings(readings: Mapping[str, Reading], calibration: Acquisiti
     by each other, and a skew of 10 us would be 0.6 rad at 10 kHz. What the two records do not
     share in time is left out. A microphone on a clock of its own is late by a latency that nobody
     knows: common to all strikes of its stream, it turns every peak of their transfer functions by the
-    same angle, which no estimate reads. What is not common is the clocks' uncertainty (``jitter``);
-    takes in which it is too great, or samples were lost, are marked.
+    same angle, which no estimate reads. What is not common, the wandering of the two clocks against each
+    other, `harness.synchronise` takes out. Takes whose own clock is too uncertain (``jitter``), or that
+    lost samples, are marked.
 
     Args:
         readings: by channel name, as a step's record holds them; other channels are ignored.
@@ -247,18 +254,22 @@ def strike_from_readings(readings: Mapping[str, Reading], calibration: Acquisiti
     newtons = (force.counts - force_rest) * calibration.newtons_per_count
     pascals = (pressure.counts - pressure_rest) * calibration.pascals_per_count
     times = force.start + np.arange(len(newtons)) / force.rate
-    shared = (times >= pressure.start) & (times <= pressure.end)
-    if not np.any(shared):
-        raise DataRefused(f"{FORCE} and {PRESSURE} have no moment in common; they are of different strikes")
-    first, take = int(np.argmax(shared)), take_of(readings)
+    take = take_of(readings)
     lost = "" if take is None else take.fault
+    shared = (times >= pressure.start) & (times <= pressure.end)
+    if not np.any(shared) and not lost:
+        raise DataRefused(f"{FORCE} and {PRESSURE} have no moment in common; they are of different strikes")
+    if not np.any(shared):  # the clock of a take that lost samples may say anything
+        shared, pascals = np.ones(len(times), np.bool_), np.zeros(len(pascals))
+    first = int(np.argmax(shared))
+    heard = np.clip(times[shared], pressure.start, pressure.end) if lost else times[shared]
     beyond = np.abs(newtons).max() > calibration.hammer_limit or (
         np.abs(pascals).max() > calibration.microphone_limit
     )
     return Strike(
         force.rate,
         read_only(newtons[shared]),
-        read_only(resample(pascals, pressure.start, pressure.rate, times[shared], force.rate)),
+        read_only(resample(pascals, pressure.start, pressure.rate, heard, force.rate)),
         0 if flags.silent else max(0, flags.onset - first),
         float(times[first]),
         bool(flags.overload or beyond or lost),

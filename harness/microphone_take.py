@@ -33,9 +33,9 @@ UNTRIGGERED = 32
 BAD = SILENCE_INSERTED | SAMPLES_LOST | OTHER_STATUS | COUNT_BROKEN
 """A take with any of these must not be used: its sample count is not time."""
 
-UNSURE = 10e-6
-"""s, standard deviation of a take's place on the bench clock beyond which it must not be used: from strike to
-strike it turns the phase of a transfer function by 0.3 rad at 5 kHz, as much as strikes differ anyway."""
+UNSURE = 100e-6
+"""s, standard deviation of a take's place on the bench clock beyond which it must not be used: what
+`harness.synchronise` finds by the sounds of a run lies within four times this."""
 
 _WORDS = {
     SILENCE_INSERTED: "silence was inserted by the sound library (input underflow)",

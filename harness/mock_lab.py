@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -45,12 +45,16 @@ class LabAddresses:
         gel: URL of the stream.
         camera: URL of the stream, None without.
         hammer: path of its box's serial port, None where the scene asks for no sound.
+        microphone: name of a sound card's input, None where the hammer's box hears the strikes.
+        environment: what a program must have in its environment to open that input.
     """
 
     arm: str
     gel: str
     camera: str | None
     hammer: str | None
+    microphone: str | None = None
+    environment: Mapping[str, str] = field(default_factory=dict)
 
 
 class MockLab:
@@ -208,7 +212,15 @@ class MockLab:
 def _addresses(ready: Mapping[str, Any]) -> LabAddresses:
     if ready.get("ready") is not True:
         raise BenchFault(f"the mocked lab did not start: {ready.get('error', ready)}")
-    return LabAddresses(ready["arm"], ready["gel"], ready["camera"], ready["hammer"])
+    heard = ready["microphone"] or {"device": None, "environment": {}}
+    return LabAddresses(
+        arm=ready["arm"],
+        gel=ready["gel"],
+        camera=ready["camera"],
+        hammer=ready["hammer"],
+        microphone=heard["device"],
+        environment=heard["environment"],
+    )
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -6,15 +6,15 @@ in the core imports what lies above it.
 
 import importlib
 import logging
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol
 
-from harness.acquisition import AcquisitionCalibration
 from harness.device import Arm, ImpactHammer, Microphone, TactileCamera
 from harness.errors import BenchFault, CalibrationRefused, SafetyStop, TouchstoneError, WrongUse
 from harness.gap import gap_path
@@ -22,7 +22,6 @@ from harness.mesh import Mesh
 from harness.mock_lab import LabAddresses, MockLab
 from harness.scene import SceneFile
 from harness.station_file import Station
-from harness.station_sections import MicrophoneSection
 
 INSTRUMENTS = {
     "ur": "drivers.ur_arm:UrArm",
@@ -114,11 +113,12 @@ def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterato
     with ExitStack() as stack:
         lab = None
         if station.mock is not None:
-            _require_wires(station, scene)
             gap = gap_path(run.gap or station.mock.gap)
             lab = MockLab(scene, station, run.mesh, run.seed, gap, run.truth)
             stack.callback(lab.close)
-            where = addressed(station, lab.start())
+            started = lab.start()
+            _surround(stack, started.environment)
+            where = addressed(station, started)
         else:
             where = station
         arm = make_arm(where)
@@ -134,14 +134,6 @@ def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterato
         yield Bench(arm, gel, camera, station, hammer, mark, lab=lab, microphone=microphone)
 
 
-def _require_wires(station: Station, scene: SceneFile) -> None:
-    if scene.sensors.sound and own_microphone(station) is not None:
-        raise WrongUse(
-            "open_station: the mocked lab plays no sound card; set microphone.kind = 'dataq' in this mocked "
-            "station (the bench in process and a real one take 'portaudio')"
-        )
-
-
 def addressed(station: Station, where: LabAddresses) -> Station:
     """A mocked station with the addresses that its lab took."""
     camera = station.camera
@@ -150,9 +142,26 @@ def addressed(station: Station, where: LabAddresses) -> Station:
     hammer = station.hammer
     if hammer is not None:
         hammer = hammer.model_copy(update={"port": where.hammer})
+    microphone = station.microphone
+    if microphone is not None:
+        microphone = microphone.model_copy(update={"device": where.microphone})
     arm = station.arm.model_copy(update={"address": where.arm})
     gel = station.gel.model_copy(update={"url": where.gel})
-    return station.model_copy(update={"arm": arm, "gel": gel, "camera": camera, "hammer": hammer})
+    found = {"arm": arm, "gel": gel, "camera": camera, "hammer": hammer, "microphone": microphone}
+    return station.model_copy(update=found)
+
+
+def _surround(stack: ExitStack, environment: Mapping[str, str]) -> None:
+    """Have these in this process's environment until the bench is closed: sound libraries look there."""
+    before = {name: os.environ[name] for name in environment if name in os.environ}
+    os.environ.update(environment)
+
+    def restore() -> None:
+        for name in environment:
+            os.environ.pop(name, None)
+        os.environ.update(before)
+
+    stack.callback(restore)
 
 
 def make_arm(station: Station) -> Arm:
@@ -203,7 +212,7 @@ def make_hammer(station: Station) -> ImpactHammer:
         )
     calibration = section.acquisition
     made: ImpactHammer = _load(INSTRUMENTS[section.kind])(
-        calibration=calibration if own_microphone(station) is None else without_microphone(calibration),
+        calibration=calibration if station.own_microphone is None else calibration.without_microphone,
         port=section.port or "",
         serial=section.serial,
         model=section.model,
@@ -213,19 +222,6 @@ def make_hammer(station: Station) -> ImpactHammer:
     return made
 
 
-def own_microphone(station: Station) -> MicrophoneSection | None:
-    """The microphone that is an instrument of its own; None where the hammer's box hears the strikes."""
-    section = station.microphone
-    return section if section is not None and section.kind == "portaudio" else None
-
-
-def without_microphone(calibration: AcquisitionCalibration) -> AcquisitionCalibration:
-    """What a box's counts mean whose input 1 is shorted, because its microphone is on a sound card."""
-    return replace(
-        calibration, microphone_offset=0.0, microphone_full_scale_counts=calibration.full_scale_counts
-    )
-
-
 def make_microphone(station: Station) -> Microphone | None:
     """The driver of a microphone of its own, not yet open; None where the hammer's box hears the strikes.
 
@@ -233,7 +229,7 @@ def make_microphone(station: Station) -> Microphone | None:
         WrongUse: the station has no hammer.
         CalibrationRefused: of the hammer's box, or it is of a microphone on another converter.
     """
-    section = own_microphone(station)
+    section = station.own_microphone
     if section is None:
         return None
     if station.hammer is None:

@@ -81,6 +81,12 @@ class Station(StrictModel):
         return None if placement is None else placement.matrix
 
     @property
+    def own_microphone(self) -> MicrophoneSection | None:
+        """The microphone that is an instrument of its own; None where the hammer's box hears the strikes."""
+        section = self.microphone
+        return section if section is not None and section.kind == "portaudio" else None
+
+    @property
     def tool_points(self) -> FloatArray:
         """``(n, 3)`` m in the flange's frame: flange, corners of the gel's housing, the hammer's tip.
 
@@ -120,8 +126,8 @@ class Station(StrictModel):
             given["camera.url"] = self.camera.url
         if self.hammer is not None and not (self.mock is None and self.hammer.serial):
             given["hammer.port"] = self.hammer.port
-        if self.microphone is not None and self.microphone.kind == "portaudio":
-            given["microphone.device"] = self.microphone.device
+        if self.own_microphone is not None:
+            given["microphone.device"] = self.own_microphone.device
         for key, value in given.items():
             if self.mock is None and value is None:
                 raise ValueError(f"{key!r} is missing; only a station with [mock] has none")

@@ -14,7 +14,7 @@ from harness.errors import BenchFault, WrongUse
 from harness.gap import load_gap
 from harness.reading import Channel, Reading
 from harness.scene import SceneFile
-from harness.station import Bench, RunContext, own_microphone
+from harness.station import Bench, RunContext
 from harness.station_file import Station
 from mocks.gelsight_stream import encode
 from mocks.in_process_arm import InProcessArm
@@ -108,7 +108,7 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
 
     hammer = None if strikes is None else _hammer(strikes, arm, station, stage)
     microphone = None
-    if strikes is not None and hammer is not None and own_microphone(station) is not None:
+    if strikes is not None and hammer is not None and station.own_microphone is not None:
         microphone = _microphone(strikes, hammer, station, stage)
     gel = InProcessGel(world, arm, stage)
     return Bench(arm, gel, None, station, hammer, mark, stage.pause, microphone=microphone)
@@ -128,7 +128,7 @@ def _microphone(
     from mocks.in_process_microphone import InProcessMicrophone
     from mocks.sound_card_counts import CardConverter
 
-    section, box = own_microphone(station), station.hammer
+    section, box = station.own_microphone, station.hammer
     assert section is not None
     assert box is not None
     converter = CardConverter.of(box.acquisition)

@@ -9,7 +9,8 @@ It answers JSON lines on standard output with one for each on standard input:
     Something goes wrong (``mocks.faults``).
 
 The first line out says where the instruments are: ``{"ready": true, "arm": ADDRESS, "gel": URL,
-"camera": URL or null, "hammer": PATH of its box's port or null}``, or ``{"ready": false, "error": ...}``.
+"camera": URL or null, "hammer": PATH of its box's port or null, "microphone": {"device": NAME, "environment":
+what a program must have in its own to open it} or null}``, or ``{"ready": false, "error": ...}``.
 End of file ends everything.
 """
 
@@ -46,7 +47,9 @@ from mocks.ur.serve import serve
 from mocks.world import NominalBench, World
 
 if TYPE_CHECKING:
+    from mocks.sound_card import SoundCard
     from mocks.strike_counts import StrikeCounts
+    from mocks.strike_on_card import Wire
 
 READY_TIMEOUT = 30.0
 DRIFT_PPM = 40.0
@@ -72,6 +75,7 @@ class Lab:
         address: loopback, of all the instruments.
         camera: whether there is a scene camera.
         strikes: of the hammer; None where the scene asks for no sound.
+        card: of a microphone that the hammer's box does not read, and how it is wired; None without.
     """
 
     def __init__(
@@ -83,6 +87,7 @@ class Lab:
         address: str,
         camera: bool,
         strikes: "StrikeCounts | None",
+        card: "tuple[SoundCard, Wire] | None" = None,
     ) -> None:
         self._shared = shared
         self._truth = truth
@@ -97,8 +102,9 @@ class Lab:
                 "camera", lambda line: stream(address, CAMERA_PORT, seen, CAMERA_RATE, line)
             )
         self._hammer_port: str | None = None
+        self._card = None if card is None else card[0]
         if strikes is not None:
-            self._plug_in(strikes)
+            self._plug_in(strikes, card)
 
     def wait_ready(self) -> Mapping[str, Any]:
         """Where the instruments are, once all of them answer; ``BenchFault`` where one does not."""
@@ -107,7 +113,9 @@ class Lab:
         camera = f"http://{self._address}:{CAMERA_PORT}/?action=stream" if self._has_camera else None
         gel = f"http://{self._address}:{GEL_PORT}/?action=stream"
         where = {"arm": self._address, "gel": gel, "camera": camera, "hammer": self._hammer_port}
-        return {"ready": True, **where}
+        card = self._card
+        heard = None if card is None else {"device": card.microphone, "environment": card.environment}
+        return {"ready": True, **where, "microphone": heard}
 
     def answer(self, line: str) -> Mapping[str, Any]:
         """Do what one line of JSON asks; an answer with the key ``error`` where it cannot be done."""
@@ -128,15 +136,25 @@ class Lab:
         """End every process."""
         for child in self._children.values():
             child.kill()
+        if self._card is not None:
+            self._card.stop()
 
-    def _plug_in(self, strikes: "StrikeCounts") -> None:
+    def _plug_in(self, strikes: "StrikeCounts", card: "tuple[SoundCard, Wire] | None") -> None:
         """Begin the hammer's box: the last child, so that nobody else holds its end of the cable."""
-        from mocks.daq.box import DaqBox  # by runs that are to be heard, and by no others
+        from mocks.daq.box import DaqBox, Source  # by runs that are to be heard, and by no others
         from mocks.daq.source import Played
         from mocks.strike_counts import Striker
 
-        striker = Striker(strikes, lambda: self._shared.firing)
-        box = DaqBox(Played(strikes.idle(), striker.next_record), drift_ppm=DRIFT_PPM)
+        source: Source
+        if card is None:
+            striker = Striker(strikes, lambda: self._shared.firing)
+            source = Played(strikes.idle(), striker.next_record)
+        else:
+            from mocks.strike_on_card import StrikesOnCard
+
+            source = StrikesOnCard(strikes, lambda: self._shared.firing, *card, lambda: box.scan())
+            source.begin()
+        box = DaqBox(source, drift_ppm=DRIFT_PPM)
         self._hammer_port = box.port
         self._children["hammer"] = Child("hammer", box.serve)
         box.leave()
@@ -231,6 +249,11 @@ def _begin(arguments: argparse.Namespace) -> Lab:
     told, gap = read_lab_scene(arguments.scene), load_gap(arguments.gap)
     world = World(told.bench, gap, arguments.seed)
     strikes = strikes_of(world, told.scene, told.station, gap, arguments.seed)
+    card = None
+    if strikes is not None and told.station.own_microphone is not None:
+        from mocks.strike_on_card import plug_in_card  # by runs that are heard by one, and by no others
+
+        card = plug_in_card(told.station, arguments.scene.parent)
     start = forward(told.station.arm.model, np.array(LEFT_ABOVE))
     _compile(world, told.bench, start)
     shared = SharedPose(start)
@@ -242,6 +265,7 @@ def _begin(arguments: argparse.Namespace) -> Lab:
         free_address(),
         told.bench.camera is not None,
         strikes,
+        card,
     )
 
 

@@ -28,6 +28,7 @@ import numpy as np
 from harness.arrays import AnyArray
 from harness.clock import now
 from harness.errors import BenchFault
+from mocks.sound_card_player import AT_ONCE, HEADER
 from mocks.sound_card_settings import MICROPHONE, SPEAKER, ports, settings, sound_devices
 
 PACKAGES = "pipewire wireplumber pipewire-alsa libportaudio2"
@@ -65,6 +66,7 @@ class SoundCard:
         rate: samples a second.
         channels: 1 or 2.
         quantum: samples that PipeWire hands over at a time; a busy computer is late for small ones.
+        under: folder in which the card's own is made; None for the system's.
 
     Attributes:
         microphone: its name among PortAudio's devices.
@@ -73,13 +75,16 @@ class SoundCard:
 
     microphone = MICROPHONE
 
-    def __init__(self, rate: int = 48000, channels: int = 1, quantum: int = 2048) -> None:
+    def __init__(
+        self, rate: int = 48000, channels: int = 1, quantum: int = 2048, under: Path | None = None
+    ) -> None:
         if channels not in (1, 2):
             raise ValueError(f"a mocked sound card has 1 or 2 channels, not {channels}")
         self.rate = rate
         self.channels = channels
         self.environment: dict[str, str] = {}
         self._quantum = quantum
+        self._under = under
         self._folder: Path | None = None
         self._children: list[subprocess.Popen[bytes]] = []
 
@@ -101,7 +106,7 @@ class SoundCard:
         reason = why_not()
         if reason:
             raise BenchFault(f"no sound card can be mocked here: {reason}")
-        self._folder = Path(tempfile.mkdtemp(prefix="sound-card-"))
+        self._folder = Path(tempfile.mkdtemp(prefix="sound-card-", dir=self._under))
         try:
             self._begin(self._folder)
         except BaseException:
@@ -129,11 +134,14 @@ class SoundCard:
         for child in self._children:
             child.kill()
 
-    def play(self, counts: AnyArray) -> None:
-        """Let the microphone hear these samples, after what was played before; else it is silent.
+    def play(self, counts: AnyArray, at: float = AT_ONCE) -> None:
+        """Let the microphone hear these samples; else it is silent.
 
         Args:
             counts: ``(samples, channels)`` int32, of which the upper 24 bits are heard.
+            at: s on the bench clock, at which the sink is to take the first of them, to a fraction of a
+                sample; it must be far enough ahead. ``AT_ONCE`` for after what was played before, every
+                sample as it is; ``MEANWHILE`` for these to be repeated while nothing else is played.
 
         Raises:
             ValueError: another shape or type.
@@ -147,7 +155,7 @@ class SoundCard:
         if player is None or player.stdin is None:
             raise BenchFault("the mocked sound card was played on before it was started")
         try:
-            player.stdin.write(counts.tobytes())
+            player.stdin.write(HEADER.pack(at, counts.nbytes) + counts.tobytes())
             player.stdin.flush()
         except OSError as broken:
             raise BenchFault("the mocked sound card is gone") from broken

@@ -1,39 +1,124 @@
 """A program that plays on a sound device what it reads: ``python -m mocks.sound_card_player``.
 
-Arguments: the device's name, samples a second, channels, samples a block. Interleaved int32
-samples come on the standard input; where none have come, silence is played. One full stop on
-the standard output says that it plays, an exclamation mark that it came late and a gap was
-heard. It ends with its input.
+Arguments: the device's name, samples a second, channels, samples a block. What is to be played
+comes on the standard input, in messages: a header (``HEADER``), then interleaved int32 samples.
+The header's first number is the time on the bench clock at which the first of them is to be heard by the
+device; ``AT_ONCE`` for after what waits, ``MEANWHILE`` for samples to repeat while nothing else is played
+(silence until then). One full stop on the standard output says that it plays, an exclamation mark
+that it came late and a gap was heard. It ends with its input.
 """
 
 import os
+import struct
 import sys
 import threading
-from typing import Any
+from collections import deque
+from typing import Any, BinaryIO
 
-_CHUNK = 1 << 16
+import numpy as np
+
+from harness.arrays import AnyArray
+from harness.clock import now
+from harness.resampling import resample
+
+HEADER = struct.Struct("<dQ")
+"""The time, and how many bytes follow."""
+
+AT_ONCE, MEANWHILE = -1.0, -2.0
+
+_TIMELINE = 400
+_BROKEN = 1e-3
+"""s by which a block's time leaves the others' where the device lost samples, and its time begins anew."""
+
+_SURE = 5
+"""Such blocks in a row that are believed."""
+
+_LATE = b"!"
 
 
 class Queue:
-    """Bytes that wait to be played."""
+    """Samples that wait to be played.
 
-    def __init__(self) -> None:
-        self._bytes = bytearray()
+    Args:
+        rate: samples a second.
+        channels: interleaved.
+    """
+
+    def __init__(self, rate: int, channels: int) -> None:
+        self._rate = rate
+        self._channels = channels
+        self._meanwhile = np.zeros((1, channels), np.int32)
+        self._waiting: list[tuple[int, AnyArray]] = []
+        self._position = 0
+        # Bench times of sample 0 as each block tells them; their median errs by microseconds.
+        self._zeros: deque[float] = deque(maxlen=_TIMELINE)
+        self._astray: list[float] = []
         self._lock = threading.Lock()
 
-    def put(self, samples: bytes) -> None:
-        """Play these after what waits."""
+    def take(self, time: float, samples: AnyArray) -> None:
+        """Obey one message."""
         with self._lock:
-            self._bytes += samples
+            if time == MEANWHILE:
+                self._meanwhile = samples
+            elif time == AT_ONCE:
+                ends = [begin + len(waiting) for begin, waiting in self._waiting]
+                self._waiting.append((max([self._position, *ends]), samples))
+            else:
+                self._schedule(time, samples)
 
-    def fill(self, block: Any, _frames: int, _times: Any, status: Any) -> None:
-        """Fill a block for the sound library: what waits, then silence."""
+    def fill(self, block: Any, frames: int, times: Any, status: Any) -> None:
+        """Fill a block for the sound library."""
+        arrived = now()
         if status.output_underflow:
-            os.write(sys.stdout.fileno(), b"!")
+            os.write(sys.stdout.fileno(), _LATE)
         with self._lock:
-            played = bytes(self._bytes[: len(block)])
-            del self._bytes[: len(block)]
-        block[:] = played.ljust(len(block), b"\0")
+            ahead = times.outputBufferDacTime - times.currentTime
+            self._tell(arrived + ahead - self._position / self._rate)
+            block[:] = self._next(frames).tobytes()
+
+    def _tell(self, zero: float) -> None:
+        """Take in when sample 0 would have been played, by one block's time."""
+        if not self._zeros or abs(zero - float(np.median(self._zeros))) < _BROKEN:
+            self._zeros.append(zero)
+            self._astray = []
+            return
+        self._astray.append(zero)
+        if len(self._astray) == _SURE:
+            self._zeros = deque(self._astray, maxlen=_TIMELINE)
+            self._astray = []
+
+    def _next(self, frames: int) -> AnyArray:
+        numbers = self._position + np.arange(frames)
+        played: AnyArray = self._meanwhile[numbers % len(self._meanwhile)]
+        for begin, samples in self._waiting:
+            here = (numbers >= begin) & (numbers < begin + len(samples))
+            played[here] = samples[numbers[here] - begin]
+        self._position += frames
+        self._waiting = [(b, samples) for b, samples in self._waiting if b + len(samples) > self._position]
+        return played
+
+    def _schedule(self, time: float, samples: AnyArray) -> None:
+        """Between two samples of the device the sound is moved by a fraction of one."""
+        exact = (time - float(np.median(self._zeros))) * self._rate
+        begin = int(np.ceil(exact))
+        if begin < self._position:
+            os.write(sys.stdout.fileno(), _LATE)
+            begin = self._position
+        within = np.arange(len(samples) - 1) + (np.ceil(exact) - exact)
+        moved = [resample(samples[:, k].astype(np.float64), 0.0, 1.0, within, 1.0) for k in _each(samples)]
+        limits = np.iinfo(np.int32)
+        whole = np.clip(np.rint(np.stack(moved, axis=1)), limits.min, limits.max).astype(np.int32)
+        self._waiting.append((begin, whole))
+
+
+def _each(samples: AnyArray) -> range:
+    return range(samples.shape[1])
+
+
+def _messages(stream: BinaryIO, queue: Queue, channels: int) -> None:
+    while len(header := stream.read(HEADER.size)) == HEADER.size:
+        time, size = HEADER.unpack(header)
+        queue.take(time, np.frombuffer(stream.read(size), np.int32).reshape(-1, channels))
 
 
 def main(arguments: list[str]) -> None:
@@ -41,7 +126,7 @@ def main(arguments: list[str]) -> None:
     import sounddevice
 
     device, rate, channels, quantum = arguments[0], *map(int, arguments[1:])
-    queue = Queue()
+    queue = Queue(rate, channels)
     stream = sounddevice.RawOutputStream(
         device=device,
         samplerate=rate,
@@ -55,8 +140,7 @@ def main(arguments: list[str]) -> None:
     )
     with stream:
         os.write(sys.stdout.fileno(), b".")
-        while samples := os.read(sys.stdin.fileno(), _CHUNK):
-            queue.put(samples)
+        _messages(sys.stdin.buffer, queue, channels)
 
 
 if __name__ == "__main__":

@@ -41,6 +41,4 @@ def strikes_of(
 
     instrument = instrument_of(world, scene, GapDraw(gap, seed))
     sound = WorldSound(world, instrument, gap, seed, flange_from_hammer, hammer.rate)
-    microphone = station.microphone
-    on_box = microphone is None or microphone.kind == "dataq"
-    return StrikeCounts(sound, hammer.acquisition, on_box)
+    return StrikeCounts(sound, hammer.acquisition, hears=station.own_microphone is None)

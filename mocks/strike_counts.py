@@ -9,7 +9,7 @@ from harness.acquisition import AcquisitionCalibration
 from harness.arrays import AnyArray, FloatArray
 from mocks.daq.source import Wiring, skewed
 from mocks.shared_pose import Firing
-from mocks.world_sound import WorldSound
+from mocks.world_sound import StrikeTruth, WorldSound
 
 CONVERTER_NOISE = 0.7
 """Counts rms of a 16-bit converter: its data sheet's 0.5 and the conditioner's own."""
@@ -41,7 +41,10 @@ class StrikeCounts:
 
     def record(self, base_from_flange: FloatArray, step: int, sample: int) -> AnyArray:
         """``(t, 2)`` int16, from the switching of the striker's output on."""
-        truth = self.sound.strike(base_from_flange, step, sample)
+        return self.read(self.sound.strike(base_from_flange, step, sample), step, sample)
+
+    def read(self, truth: StrikeTruth, step: int, sample: int) -> AnyArray:
+        """``(t, 2)`` int16 of a strike as it was."""
         return self._counts(truth.force, truth.pressure, self.sound.converter_noise(step, sample))
 
     def idle(self) -> AnyArray:

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 _LISTEN = 0.5
 """s."""
 
+_ATTEMPTS = 3
+"""Times that is listened where samples of the sound were lost: a computer may be busy for a moment."""
+
 _HEARING = 20e-6
 """Pa, the reference of sound pressure levels (ISO 1683)."""
 
@@ -101,10 +104,13 @@ def rest_levels(bench: "Bench") -> RestLevels:
 
     assert bench.hammer is not None
     assert bench.station.hammer is not None
-    readings = capture(bench.hammer, bench.microphone, lambda: None, 0.0, _LISTEN, 0.0)
-    by_name = {reading.channel.name: reading for reading in readings}
-    rest = strike_from_readings(by_name, bench.station.hammer.acquisition)
-    if rest.lost:
+    for _ in range(_ATTEMPTS):
+        readings = capture(bench.hammer, bench.microphone, lambda: None, 0.0, _LISTEN, 0.0)
+        by_name = {reading.channel.name: reading for reading in readings}
+        rest = strike_from_readings(by_name, bench.station.hammer.acquisition)
+        if not rest.lost:
+            break
+    else:
         raise BenchFault(f"the microphone cannot be used: {rest.lost}; close what else runs, or try again")
     pressure = float(rest.pressure.std())
     # A converter that reads one count for ever is broken, not silent.

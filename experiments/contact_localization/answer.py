@@ -19,6 +19,7 @@ from harness.geometry import rotation_from_quaternion, transform
 from harness.reading import Reading
 from harness.run_folder import RunFiles
 from harness.step_file import StepRecord
+from harness.synchronise import synchronised
 
 AROUND_IMAGES = 0.1
 """s before the first frame from which the arm, at rest, is averaged too."""
@@ -115,7 +116,7 @@ def observe(run: RunFiles) -> tuple[Observation, ...]:
     """The contacts of a run, from its images, arm poses and strikes."""
     flange_from_gel, acquisition = run.station.flange_from_gel, run.acquisition
     seen = [observe_step(record, flange_from_gel, acquisition) for record in run.recording.steps()]
-    strikes = of_one_stream([observation.strike for observation in seen])
+    strikes = synchronised(of_one_stream([observation.strike for observation in seen]))
     return tuple(
         replace(observation, strike=strike) for observation, strike in zip(seen, strikes, strict=True)
     )

@@ -110,6 +110,14 @@ class DaqBox:
         """Bytes that did not fit into the memory so far; readable in every process that has the box."""
         return int(self._lost.value)
 
+    def scan(self) -> tuple[int, float, float]:
+        """Number of the next scan, its time in s on the bench clock, and scans a second of that clock.
+
+        For a source that must be in time with something else. Meaningless while the box does not scan.
+        """
+        rate = self._scan_rate
+        return self._numbered, self._began + self._taken / rate, rate
+
     def leave(self) -> None:
         """Close this process's ends of the cable; does nothing if they are closed."""
         for end in (self._master, self._slave):

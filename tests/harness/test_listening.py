@@ -161,7 +161,7 @@ def test_a_card_that_does_not_say_when_it_sampled_is_not_used_for_phases() -> No
         strike_from_readings(struck(Card(uncertainty=u)), CALIBRATION) for u in (0.9 * UNSURE, 1.1 * UNSURE)
     )
     assert sure.fault == ""
-    assert "known to 11 us and at most 10 us" in unsure.fault
+    assert "known to 110 us and at most 100 us" in unsure.fault
     assert unsure.overload
 
 

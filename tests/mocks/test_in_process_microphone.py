@@ -4,24 +4,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from heard_strikes import Readings, delay, performed, strikes_on
 
-from experiments.contact_localization.experiment import ContactLocalization
-from experiments.contact_localization.planning import RunPlan, plan_run, way_between
+from experiments.contact_localization.planning import RunPlan, plan_run
 from experiments.contact_localization.sound_analysis import analyse
 from harness.acquisition import Strike, strike_from_readings
 from harness.acquisition_channels import PRESSURE
-from harness.arrays import AnyArray
 from harness.device import Microphone
 from harness.mesh import Mesh
 from harness.microphone_take import UNSURE, take_of
-from harness.reading import Reading
 from harness.recording import Recording
 from harness.run_folder import RunFiles, create_run, station_acquisition, station_calibration
 from harness.scene import SceneFile, load_scene
 from harness.sim.scene_object import known_object
 from harness.station import Bench, RunContext
 from harness.station_file import Station, load_station
-from harness.station_sections import MicrophoneSection
 from harness.step_file import Step
 from mocks.in_process import in_process_bench
 from mocks.in_process_microphone import DRIFT_PPM, JITTER, LATENCY
@@ -42,16 +39,8 @@ def mesh(scene: SceneFile) -> Mesh:
     return known_object(scene).mesh
 
 
-def station_of(microphone: MicrophoneSection) -> Station:
-    station = load_station(ROOT / "stations" / "mock.toml")
-    assert station.hammer is not None
-    on_card = {"calibration": "acquisition_sound_card"}
-    hammer = station.hammer.model_copy(update=on_card if microphone.kind == "portaudio" else {})
-    return station.model_copy(update={"microphone": microphone, "hammer": hammer})
-
-
-BOX = station_of(MicrophoneSection(serial="mock"))
-CARD = station_of(MicrophoneSection.model_validate({"kind": "portaudio", "rate": "48 kHz"}))
+BOX = load_station(ROOT / "stations" / "mock.toml")
+CARD = load_station(ROOT / "stations" / "mock_sound_card.toml")
 
 
 @pytest.fixture(scope="module")
@@ -63,43 +52,17 @@ def opened(scene: SceneFile, station: Station, mesh: Mesh, folder: Path) -> Benc
     return in_process_bench(scene, station, RunContext(folder / "t.json", mesh, SEED, "none"))
 
 
-def performed(bench: Bench, plan: RunPlan) -> list[dict[str, Reading]]:
-    experiment = ContactLocalization(lambda here, there: way_between(plan.bench, here, there))
-    steps = [Step(index, "press", parameters) for index, parameters in enumerate(plan.parameters())]
-    return [{reading.channel.name: reading for reading in experiment.perform(s, bench)} for s in steps]
-
-
 @pytest.fixture(scope="module")
 def heard(
     scene: SceneFile, mesh: Mesh, plan: RunPlan, tmp_path_factory: pytest.TempPathFactory
-) -> dict[str, list[dict[str, Reading]]]:
+) -> dict[str, list[Readings]]:
     folder = tmp_path_factory.mktemp("heard")
     stations = {"box": BOX, "card": CARD}
     return {name: performed(opened(scene, s, mesh, folder), plan) for name, s in stations.items()}
 
 
-def strikes(heard: dict[str, list[dict[str, Reading]]], name: str) -> list[Strike]:
-    hammer = (CARD if name == "card" else BOX).hammer
-    assert hammer is not None
-    return [strike_from_readings(readings, hammer.acquisition) for readings in heard[name]]
-
-
-def delay(first: Strike, second: Strike, samples: int = 15000) -> tuple[float, float]:
-    """Seconds by which the second's pressure is later, and how alike the two are then."""
-
-    def spectrum(strike: Strike) -> AnyArray:
-        return np.fft.rfft(strike.pressure[strike.onset - 50 :][:samples])
-
-    frequencies = np.fft.rfftfreq(samples, 1 / first.rate)
-    here, there = spectrum(first), spectrum(second)
-    cross = there * np.conj(here) * ((frequencies > 300) & (frequencies < 8000))
-    power = float(np.linalg.norm(here[cross != 0]) * np.linalg.norm(there[cross != 0]))
-    best = 0.0
-    for reach, step in ((4e-3, 10e-6), (20e-6, 0.1e-6)):
-        tried = best + np.arange(-reach, reach, step)
-        fit = np.array([np.sum(cross * np.exp(2j * np.pi * frequencies * t)).real for t in tried])
-        best = float(tried[np.argmax(fit)])
-    return best, float(fit.max()) / power
+def strikes(heard: dict[str, list[Readings]], name: str) -> list[Strike]:
+    return strikes_on(CARD if name == "card" else BOX, heard[name])
 
 
 def test_it_is_a_microphone_that_listens_on_a_bench_of_its_own_station(
@@ -114,7 +77,7 @@ def test_it_is_a_microphone_that_listens_on_a_bench_of_its_own_station(
         known.capture(lambda: None, 0.0, 0.1, 1.0)
 
 
-def test_every_strike_has_force_and_sound_on_one_axis(heard: dict[str, list[dict[str, Reading]]]) -> None:
+def test_every_strike_has_force_and_sound_on_one_axis(heard: dict[str, list[Readings]]) -> None:
     for there, here in zip(strikes(heard, "box"), strikes(heard, "card"), strict=True):
         assert here.fault == there.fault == ""
         assert here.rate == pytest.approx(there.rate)
@@ -123,7 +86,7 @@ def test_every_strike_has_force_and_sound_on_one_axis(heard: dict[str, list[dict
         assert len(here.pressure) == len(here.force)
 
 
-def test_the_sound_is_the_box_s_but_for_one_latency(heard: dict[str, list[dict[str, Reading]]]) -> None:
+def test_the_sound_is_the_box_s_but_for_one_latency(heard: dict[str, list[Readings]]) -> None:
     found = [delay(a, b) for a, b in zip(strikes(heard, "box"), strikes(heard, "card"), strict=True)]
     for late, alike in found:
         assert late == pytest.approx(LATENCY, abs=6 * JITTER + 0.2e-6)
@@ -131,7 +94,7 @@ def test_the_sound_is_the_box_s_but_for_one_latency(heard: dict[str, list[dict[s
 
 
 def test_an_estimate_reads_the_same_shares_of_the_same_peaks(
-    heard: dict[str, list[dict[str, Reading]]],
+    heard: dict[str, list[Readings]],
 ) -> None:
     """The latency turns all strikes' shares of a peak by one angle, which is no part of them."""
     there, here = (analyse(strikes(heard, name)).peaks for name in ("box", "card"))
@@ -156,7 +119,7 @@ def test_a_silent_bench_is_heard_in_any_stretch_of_time(scene: SceneFile, mesh: 
 
 
 def test_a_strike_by_sound_card_is_recorded_whole_and_read_back(
-    scene: SceneFile, mesh: Mesh, heard: dict[str, list[dict[str, Reading]]], plan: RunPlan, tmp_path: Path
+    scene: SceneFile, mesh: Mesh, heard: dict[str, list[Readings]], plan: RunPlan, tmp_path: Path
 ) -> None:
     recording = create_run(
         tmp_path / "run",
