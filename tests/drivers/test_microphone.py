@@ -234,7 +234,7 @@ def test_a_stated_latency_is_taken_off(library: FakePortAudio) -> None:
     delivering(stream, *(ramp(1000 + BLOCK * number) for number in range(4)))()
     pressure, _, callback, clock = late.between(began, began + 0.02)
     late.close()
-    assert pressure.values[0, 0] == 1000  # that block, by the times that it states, ended 7 ms after ``began``
+    assert pressure.values[0, 0] == 1000  # it ends 7 ms after ``began``
     assert pressure.times[0] == pytest.approx(began - 3e-3, abs=1e-6)
     assert callback.values[0, 0] == pytest.approx(began + BLOCK / RATE, abs=1e-6)
     assert clock.values[0, 1] + (0 - clock.values[0, 0]) / RATE == pytest.approx(1000.0 - 3e-3, abs=1e-4)

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivers.microphone import PortAudioMicrophone
 from harness import station as station_module
-from harness.errors import BenchFault, ProtectiveStop, SafetyStop, WrongUse
+from harness.errors import BenchFault, CalibrationRefused, ProtectiveStop, SafetyStop, WrongUse
 from harness.mesh import Mesh
 from harness.scene import SceneFile, Sensors, scene_from_options
-from harness.station import INSTRUMENTS, LIMITS, RunContext, make_arm, open_station
+from harness.station import INSTRUMENTS, LIMITS, RunContext, make_arm, make_microphone, open_station
 from harness.station_file import Station, load_station, station_from_json, station_path
 
 STATIONS = sorted((Path(__file__).parents[2] / "stations").glob("*.toml"))
@@ -335,3 +336,40 @@ def test_the_camera_of_the_mocked_bench_looks_at_the_object() -> None:
     assert in_camera[2] > 0.0
     assert np.abs(pixel).max() < 5.0
     assert base_from_camera[2, 1] < 0.0  # image rows run downwards
+
+
+def on_card(**microphone: object) -> Station:
+    tree = json.loads(load_station(station_path("mock_sound_card")).model_dump_json(by_alias=True))
+    tree["microphone"] |= microphone
+    return station_from_json(tree, "the test")
+
+
+def test_a_microphone_on_a_sound_card_is_made_as_the_station_says() -> None:
+    station = on_card(channels=2, channel=1, latency="3 ms")
+    made = make_microphone(station)
+    assert isinstance(made, PortAudioMicrophone)
+    form = made.form
+    assert (form.rate, form.bits, form.channels, form.channel, form.latency) == (48000, 24, 2, 1, 0.003)
+    assert station.own_microphone == station.microphone
+    by_box = load_station(station_path("mock"))
+    assert make_microphone(by_box) is None
+    assert by_box.own_microphone is None
+
+
+def test_a_calibration_of_a_microphone_on_another_converter_is_refused() -> None:
+    with pytest.raises(
+        CalibrationRefused, match=r"full scale 8388607, the station's \[microphone\] has 2147483647"
+    ):
+        make_microphone(on_card(bits=32))
+    tree = json.loads(on_card().model_dump_json(by_alias=True))
+    tree["hammer"]["calibration"] = "acquisition_bench"
+    with pytest.raises(CalibrationRefused, match="full scale 32767, the station's"):
+        make_microphone(station_from_json(tree, "the test"))
+
+
+def test_the_box_of_a_hammer_heard_by_a_card_expects_its_second_input_shorted() -> None:
+    hammer = on_card().hammer
+    assert hammer is not None
+    alone = hammer.acquisition.without_microphone
+    assert (alone.microphone_offset, alone.microphone_full_scale_counts) == (0.0, alone.full_scale_counts)
+    assert alone.newtons_per_count == hammer.acquisition.newtons_per_count
