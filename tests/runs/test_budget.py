@@ -241,6 +241,12 @@ def two_settings() -> Work:
     return Work(tuple(cells(["wrench"], [5], ["spread"], ["default"], ["known"])), (COARSE, DEFAULT), (2, 3))
 
 
+def test_fewer_contacts_are_measured_at_few_settings(two_settings: Work) -> None:
+    few = replace(two_settings, contacts=(2, 4, 6), fewer=(DEFAULT,))
+    assert few.asked == ((2, DEFAULT), (4, DEFAULT), (6, COARSE), (6, DEFAULT))
+    assert few.each == 4
+
+
 def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     two_settings: Work, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,7 +4,16 @@ from dataclasses import fields
 
 import pytest
 
-from experiments.contact_localization.dials import KNOBS, chosen, levels_of
+from experiments.contact_localization.dials import (
+    FINEST,
+    KNOBS,
+    SENSES,
+    chosen,
+    levels_of,
+    needs_sound,
+    settings,
+    settings_by_count,
+)
 from experiments.contact_localization.levels import Levels
 from harness.accuracy import Accuracy, Knob
 from harness.errors import WrongUse
@@ -52,3 +61,29 @@ def test_a_mistyped_choice_is_refused(text: str) -> None:
 def test_names_are_unique() -> None:
     names = [knob.name for knob in KNOBS]
     assert len(names) == len(set(names))
+
+
+@pytest.mark.parametrize("thorough", [False, True])
+def test_what_is_measured_names_its_sense_and_only_levels_that_there_are(thorough: bool) -> None:
+    found = settings(thorough)
+    assert {setting[SENSES.name] for setting in found} == {"touch", "audio", "both"}
+    for setting in found:
+        Accuracy.default(KNOBS).with_(setting)
+    assert FINEST in found
+
+
+def test_runs_that_were_not_heard_are_measured_by_touch_alone() -> None:
+    assert not any(needs_sound(setting) for setting in (*settings(sound=False), *settings_by_count(False)))
+    assert all(setting in settings() for setting in settings(sound=False))
+
+
+def test_what_is_measured_with_fewer_contacts_is_measured_with_the_most_too() -> None:
+    for sound in (False, True):
+        assert all(setting in settings(sound=sound) for setting in settings_by_count(sound))
+
+
+def test_about_thirty_settings_are_measured_over_senses_modes_and_elements() -> None:
+    found = settings()
+    assert 25 <= len(found) <= 35
+    assert {setting.get("sound.modes") for setting in found} >= {None, 16, 32}
+    assert {setting.get("sound.edge") for setting in found} >= {None, 0.7}
