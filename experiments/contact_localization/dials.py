@@ -113,9 +113,11 @@ def settings(thorough: bool = False, sound: bool = True) -> list[dict[str, Level
 
 def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
     """The few settings that are measured with fewer contacts too."""
+    cheapest = _grid("touch", 4e-3, 0, 600, 16)
     dials = ((2e-3, 0, 600, 16), (2e-3, 3, 600, 8))
-    touch = [_grid("touch", *each) for each in dials]
-    return [*touch, *(_grid("both", *each) for each in dials), _by_sound(2e-3)] if sound else touch
+    touch = [cheapest, *(_grid("touch", *each) for each in dials)]
+    both = [_grid("both", *each) for each in dials]
+    return [*touch, *both, _by_sound(4e-3), _by_sound(2e-3)] if sound else touch
 
 
 def _other_modes() -> list[dict[str, Level]]:
