@@ -116,6 +116,8 @@ def observe(run: RunFiles) -> tuple[Observation, ...]:
     """The contacts of a run, from its images, arm poses and strikes."""
     flange_from_gel, acquisition = run.station.flange_from_gel, run.acquisition
     seen = [observe_step(record, flange_from_gel, acquisition) for record in run.recording.steps()]
+    if all(observation.strike is None for observation in seen):
+        return tuple(seen)
     strikes = synchronised(of_one_stream([observation.strike for observation in seen]))
     return tuple(
         replace(observation, strike=strike) for observation, strike in zip(seen, strikes, strict=True)

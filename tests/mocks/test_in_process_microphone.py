@@ -101,7 +101,8 @@ def test_an_estimate_reads_the_same_shares_of_the_same_peaks(
     assert len(there) >= 3
     for peak in there:
         nearest = min(here, key=lambda other: abs(other.frequency - peak.frequency))
-        assert nearest.frequency == pytest.approx(peak.frequency, abs=1.0)
+        # A latency bends the flanks of a broad peak: 1.7 ms turn 90 Hz of it by a radian.
+        assert nearest.frequency == pytest.approx(peak.frequency, rel=3e-3)
         assert abs(np.vdot(nearest.y, peak.y)) > 0.995
 
 
