@@ -22,7 +22,16 @@ HAMMER_KINDS = ("none", "stall", "overflow", "lost_byte", "lost_word", "unplug")
 """Of the hammer's box. stall: no samples and no answers. overflow: nothing leaves while samples go on.
 lost_byte, lost_word: one is missing from the stream. unplug: the cable is pulled, for good."""
 
-KINDS = {"gel": CAMERA_KINDS, "camera": CAMERA_KINDS, "arm": ARM_KINDS, "hammer": HAMMER_KINDS}
+MICROPHONE_KINDS = ("unplug",)
+"""Of a microphone on a sound card. unplug: the card is taken away, for good."""
+
+KINDS = {
+    "gel": CAMERA_KINDS,
+    "camera": CAMERA_KINDS,
+    "arm": ARM_KINDS,
+    "hammer": HAMMER_KINDS,
+    "microphone": MICROPHONE_KINDS,
+}
 
 _KEYS = ("instrument", "kind", "seconds")
 
@@ -32,7 +41,7 @@ class Fault:
     """One cue.
 
     Attributes:
-        instrument: ``"gel"``, ``"camera"``, ``"arm"`` or ``"hammer"``.
+        instrument: ``"gel"``, ``"camera"``, ``"arm"``, ``"hammer"`` or ``"microphone"``.
         kind: of the instrument's ``KINDS``.
         seconds: how long; None until it is cleared.
     """

@@ -172,6 +172,9 @@ class Lab:
 
     def _cue(self, cue: Mapping[str, object]) -> Mapping[str, object]:
         fault = parse(cue)
+        if fault.instrument == "microphone" and self._card is not None:
+            self._card.unplug()
+            return dict(cue)
         if fault.instrument not in self._children:
             raise WrongUse(f"this bench has no {fault.instrument}")
         self._children[fault.instrument].cue(fault)

@@ -32,13 +32,14 @@ def strikes_on(station: Station, contacts: Sequence[Mapping[str, Reading]]) -> l
 def delay(first: Strike, second: Strike, samples: int = 15000) -> tuple[float, float]:
     """Seconds by which the second's pressure follows later upon its force, and how alike the two then are."""
     frequencies = np.fft.rfftfreq(samples, 1 / first.rate)
-    here, there = (_spectrum(strike, samples) for strike in (first, second))
-    cross = there * np.conj(here) * ((frequencies > 300) & (frequencies < 8000))
-    power = float(np.linalg.norm(here[cross != 0]) * np.linalg.norm(there[cross != 0]))
+    band = (frequencies > 300) & (frequencies < 8000)
+    here, there = (_spectrum(strike, samples)[band] for strike in (first, second))
+    cross, turns = there * np.conj(here), 2j * np.pi * frequencies[band]
+    power = float(np.linalg.norm(here) * np.linalg.norm(there))
     best, alike = 0.0, 0.0
     for reach, step in ((4e-3, 10e-6), (20e-6, 0.1e-6)):
         tried = best + np.arange(-reach, reach, step)
-        fit = np.array([np.sum(cross * np.exp(2j * np.pi * frequencies * t)).real for t in tried])
+        fit = np.array([np.sum(cross * np.exp(turns * t)).real for t in tried])
         best, alike = float(tried[np.argmax(fit)]), float(fit.max()) / power
     return best, alike
 

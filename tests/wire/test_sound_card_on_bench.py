@@ -52,16 +52,21 @@ def plan(scene: SceneFile, mesh: Mesh) -> RunPlan:
 def wired(
     scene: SceneFile, mesh: Mesh, plan: RunPlan, tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, Any]:
-    """Two contacts over the wires, then a moment in which nothing is struck."""
+    """Two contacts over the wires, a moment in which nothing is struck, then the card is taken away."""
     folder = tmp_path_factory.mktemp("card")
     with open_station(CARD, scene, RunContext(folder / "wire.json", mesh, SEED, GAP)) as bench:
         assert bench.microphone is not None
         contacts = performed(bench, plan)
-        return {
+        found = {
             "contacts": contacts,
             "levels": rest_levels(bench),
             "health": bench.microphone.health(),
         }
+        assert bench.lab is not None
+        bench.lab.fault("microphone", "unplug")
+        with pytest.raises(BenchFault) as gone:
+            rest_levels(bench)
+        return {**found, "gone": str(gone.value)}
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +116,10 @@ def test_it_says_how_it_does_and_how_loud_it_is_at_rest(wired: dict[str, Any]) -
     assert "mock_microphone mock-378B02 by PortAudio" in health.identity
     assert 0.0 < levels.pressure_rms_pa < 0.01
     assert np.isfinite(levels.sound_level_db)
+
+
+def test_a_card_taken_away_is_named(wired: dict[str, Any]) -> None:
+    assert "'mock_microphone' has sent nothing for 0.5 s: the device is gone" in wired["gone"]
 
 
 def test_the_environment_is_as_before_when_the_bench_is_closed(wired: dict[str, Any]) -> None:
