@@ -71,8 +71,9 @@ def _delays(strikes: Sequence[Strike]) -> list[float | None]:
     frequencies, transfer = _transfers(strikes)
     turns = np.exp(4j * np.pi * np.outer(_TRIED, frequencies))
     known = list(range(len(strikes)))
+    delays = _one_by_one(transfer, frequencies, turns)
     while len(known) > 1:
-        delays, fits = _together(transfer[known], frequencies, turns)
+        delays, fits = _together(delays, transfer[known], frequencies, turns)
         doubt = [_doubt(fit) for fit in fits]
         worst = int(np.argmax(doubt))
         if doubt[worst] <= 0.0:
@@ -80,14 +81,25 @@ def _delays(strikes: Sequence[Strike]) -> list[float | None]:
             found = dict(zip(known, delays, strict=True))
             return [float(found[k]) - middle if k in found else None for k in range(len(strikes))]
         del known[worst]
+        delays = np.delete(delays, worst)
     return [None] * len(strikes)
 
 
+def _one_by_one(transfer: ComplexArray, frequencies: FloatArray, turns: ComplexArray) -> FloatArray:
+    """``(k,)`` s by which each strike fits those before it best: a place to start from."""
+    delays = np.zeros(len(transfer))
+    for k in range(1, len(transfer)):
+        fit = _fit(k, delays[: k + 1], transfer[: k + 1], frequencies, turns)
+        delays[k] = _TRIED[np.argmax(fit)]
+    return delays
+
+
 def _together(
-    transfer: ComplexArray, frequencies: FloatArray, turns: ComplexArray
+    start: FloatArray, transfer: ComplexArray, frequencies: FloatArray, turns: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
     """``(k,)`` s by which each strike fits the others best, and ``(k, d)`` how well for every delay tried."""
-    delays, fits = np.zeros(len(transfer)), np.zeros((len(transfer), len(_TRIED)))
+    delays = start - np.median(start)
+    fits = np.zeros((len(transfer), len(_TRIED)))
     for _ in range(_ROUNDS):
         for k in range(len(transfer)):
             fits[k] = _fit(k, delays, transfer, frequencies, turns)
