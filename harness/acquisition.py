@@ -183,7 +183,7 @@ class Strike:
         lost: why the sound of a microphone on a clock of its own must not be used; empty where it may.
         jitter: s, standard deviation of the sound's place against the force's, from strike to strike; 0 on
             one clock. A latency common to all strikes is not in it: see ``opened``.
-        opened: s on the bench clock, when the microphone's own stream was opened; 0 on one clock. Between
+        opened: s on the bench clock, when the microphone's own stream was opened; None on one clock. Between
             strikes of two streams the latency may differ.
     """
 
@@ -197,7 +197,7 @@ class Strike:
     silent: bool
     lost: str = ""
     jitter: float = 0.0
-    opened: float = 0.0
+    opened: float | None = None
 
     @property
     def fault(self) -> str:
@@ -277,7 +277,7 @@ def strike_from_readings(readings: Mapping[str, Reading], calibration: Acquisiti
         flags.silent,
         lost,
         0.0 if take is None else take.uncertainty,
-        0.0 if take is None else take.opened,
+        None if take is None else take.opened,
     )
 
 
@@ -293,7 +293,7 @@ def of_one_stream(strikes: Sequence[Strike | None]) -> tuple[Strike | None, ...]
     streams = [strike.opened for strike in strikes if strike is not None and not strike.fault]
     if len(set(streams)) < 2:
         return tuple(strikes)
-    most = max(sorted(set(streams)), key=streams.count)
+    most = max(streams, key=streams.count)
     why = "the microphone was opened anew in between: its latency may be another"
     return tuple(
         strike if strike is None or strike.fault or strike.opened == most else _lost(strike, why)

@@ -54,7 +54,7 @@ def synchronised(strikes: Sequence[Strike | None]) -> tuple[Strike | None, ...]:
         In order. Strikes on one clock, and those that must not be used anyway, are as they were. One whose
         place among the others cannot be told is marked lost.
     """
-    own = [k for k, one in enumerate(strikes) if one is not None and one.opened and not one.fault]
+    own = [k for k, one in enumerate(strikes) if one is not None and one.opened is not None and not one.fault]
     if len(own) < 2:
         return tuple(strikes)
     chosen = {k: strike for k in own if (strike := strikes[k]) is not None}

@@ -25,8 +25,11 @@ DRIFT_PPM = -25.0
 LATENCY = 1.7e-3
 """s by which the card's times are late, in every strike: its converter's filters, and what nobody states."""
 
-JITTER = 1e-6
-"""s, standard deviation of the fitted clock from strike to strike: as measured of a PipeWire null sink."""
+WANDER = 80e-6
+"""s, standard deviation of the two clocks' difference from strike to strike, as seen over the wires."""
+
+UNCERTAINTY = 3e-6
+"""s, of the card's own clock, as a fit to a PipeWire null sink says: most of the wandering is the box's."""
 
 _RESIDUAL = 10e-6
 _SPARE = 0.01
@@ -83,7 +86,7 @@ class InProcessMicrophone:
         fired = self._hammer.fired
         step, sample = (-1, -1) if fired is None else (fired.step, fired.sample)
         noise = self._sound.converter_noise(step, sample).spawn(1)[0]
-        late = LATENCY - (self._section.latency or 0.0) + JITTER * float(noise.standard_normal())
+        late = LATENCY - (self._section.latency or 0.0) + WANDER * float(noise.standard_normal())
         first = int(np.floor((start - late) * self._true_rate / BLOCK))
         last = int(np.ceil((end - late) * self._true_rate / BLOCK))
         numbers = np.arange(first * BLOCK, last * BLOCK)
@@ -125,7 +128,7 @@ class InProcessMicrophone:
             "time": float(times[-1]),
             "rate": self._true_rate,
             "residual": _RESIDUAL,
-            "uncertainty": JITTER,
+            "uncertainty": UNCERTAINTY,
             "opened": self._opened,
         }
         callbacks = np.stack(

@@ -1,6 +1,6 @@
 """From a run folder to its answer; the bench is not needed, and the truth is not looked at."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -115,7 +115,11 @@ def prior_of(run: RunFiles) -> Prior:
 def observe(run: RunFiles) -> tuple[Observation, ...]:
     """The contacts of a run, from its images, arm poses and strikes."""
     flange_from_gel, acquisition = run.station.flange_from_gel, run.acquisition
-    seen = [observe_step(record, flange_from_gel, acquisition) for record in run.recording.steps()]
+    return in_time([observe_step(record, flange_from_gel, acquisition) for record in run.recording.steps()])
+
+
+def in_time(seen: Sequence[Observation]) -> tuple[Observation, ...]:
+    """The contacts of one run, the sounds of a microphone on a clock of its own in time with each other."""
     if all(observation.strike is None for observation in seen):
         return tuple(seen)
     strikes = synchronised(of_one_stream([observation.strike for observation in seen]))

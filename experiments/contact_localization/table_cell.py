@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.answer import observe_step
+from experiments.contact_localization.answer import in_time, observe_step
 from experiments.contact_localization.baselines import geometry_and_axis, geometry_only, mean_random_error
 from experiments.contact_localization.estimate import Estimate, estimate
 from experiments.contact_localization.experiment import ContactLocalization
@@ -128,7 +128,7 @@ def perform_cell(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> 
             observations.append(observe_step(record, station.flange_from_gel, acquisition))
         true = _truth(context.truth)
     model = model_of_scene(scene, station, mesh, station_calibration(station))
-    return PerformedRun(tuple(observations), model, scene.base_from_object(mesh), true, cell.seed)
+    return PerformedRun(in_time(observations), model, scene.base_from_object(mesh), true, cell.seed)
 
 
 def _truth(path: Path) -> FloatArray:

@@ -182,7 +182,7 @@ def test_flags_without_a_clock_are_refused() -> None:
         strike_from_readings(readings, CALIBRATION)
 
 
-def strike_at(opened: float, lost: str = "") -> Strike:
+def strike_at(opened: float | None, lost: str = "") -> Strike:
     found = strike_from_readings(struck(Card()), CALIBRATION)
     return replace(found, opened=opened, lost=lost, overload=bool(lost))
 
@@ -201,6 +201,6 @@ def test_only_strikes_heard_by_one_stream_are_compared() -> None:
 
 
 def test_strikes_of_one_stream_or_of_the_box_are_left_alone() -> None:
-    for opened in (0.0, 5.0):
+    for opened in (None, 0.0, 5.0):
         strikes = [strike_at(opened), None, strike_at(opened)]
         assert all(a is b for a, b in zip(of_one_stream(strikes), strikes, strict=True))

@@ -85,7 +85,7 @@ def test_signs_are_left_alone() -> None:
 
 def test_strikes_of_one_clock_and_missing_ones_are_as_they_were() -> None:
     strikes, _ = struck(3, 5, 50e-6)
-    on_box = [replace(one, opened=0.0, jitter=0.0) for one in strikes]
+    on_box = [replace(one, opened=None, jitter=0.0) for one in strikes]
     given_back = synchronised([*on_box, None])
     assert all(a is b for a, b in zip(given_back, [*on_box, None], strict=True))
     alone = [strikes[0], None, replace(strikes[1], silent=True)]

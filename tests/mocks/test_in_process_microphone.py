@@ -20,8 +20,9 @@ from harness.sim.scene_object import known_object
 from harness.station import Bench, RunContext
 from harness.station_file import Station, load_station
 from harness.step_file import Step
+from harness.synchronise import synchronised
 from mocks.in_process import in_process_bench
-from mocks.in_process_microphone import DRIFT_PPM, JITTER, LATENCY
+from mocks.in_process_microphone import DRIFT_PPM, LATENCY, WANDER
 
 ROOT = Path(__file__).parents[2]
 SEED, RATE = 5, 48e3
@@ -30,8 +31,8 @@ SEED, RATE = 5, 48e3
 @pytest.fixture(scope="module")
 def scene() -> SceneFile:
     read = load_scene(ROOT / "scenes" / "mug_both.toml")
-    twice = read.localization.model_copy(update={"contacts": 2})
-    return read.model_copy(update={"localization": twice})
+    thrice = read.localization.model_copy(update={"contacts": 3})
+    return read.model_copy(update={"localization": thrice})
 
 
 @pytest.fixture(scope="module")
@@ -87,23 +88,32 @@ def test_every_strike_has_force_and_sound_on_one_axis(heard: dict[str, list[Read
 
 
 def test_the_sound_is_the_box_s_but_for_one_latency(heard: dict[str, list[Readings]]) -> None:
-    found = [delay(a, b) for a, b in zip(strikes(heard, "box"), strikes(heard, "card"), strict=True)]
+    """The two clocks wander between strikes; by their sounds the strikes are brought together."""
+    there, here = strikes(heard, "box"), strikes(heard, "card")
+    together = [strike for strike in synchronised(here) if strike is not None]
+    found = [delay(a, b) for a, b in zip(there, here, strict=True)]
     for late, alike in found:
-        assert late == pytest.approx(LATENCY, abs=6 * JITTER + 0.2e-6)
+        assert late == pytest.approx(LATENCY, abs=5 * WANDER)
         assert alike > 0.999
+    assert np.ptp([late for late, _ in found]) > 20e-6
+    placed = [delay(a, b)[0] for a, b in zip(there, together, strict=True) if not b.fault]
+    assert len(placed) >= 2
+    assert np.ptp(placed) < 8e-6
 
 
 def test_an_estimate_reads_the_same_shares_of_the_same_peaks(
     heard: dict[str, list[Readings]],
 ) -> None:
     """The latency turns all strikes' shares of a peak by one angle, which is no part of them."""
-    there, here = (analyse(strikes(heard, name)).peaks for name in ("box", "card"))
+    together = [strike for strike in synchronised(strikes(heard, "card")) if strike is not None]
+    pairs = [(a, b) for a, b in zip(strikes(heard, "box"), together, strict=True) if not b.fault]
+    there, here = (analyse(found).peaks for found in zip(*pairs, strict=True))
     assert len(there) >= 3
     for peak in there:
         nearest = min(here, key=lambda other: abs(other.frequency - peak.frequency))
         # A latency bends the flanks of a broad peak: 1.7 ms turn 90 Hz of it by a radian.
         assert nearest.frequency == pytest.approx(peak.frequency, rel=3e-3)
-        assert abs(np.vdot(nearest.y, peak.y)) > 0.995
+        assert abs(np.vdot(nearest.y, peak.y)) > 0.98
 
 
 def test_a_silent_bench_is_heard_in_any_stretch_of_time(scene: SceneFile, mesh: Mesh, tmp_path: Path) -> None:
@@ -140,6 +150,6 @@ def test_a_strike_by_sound_card_is_recorded_whole_and_read_back(
     (record,) = again.recording.steps()
     assert again.acquisition is not None
     found, wanted = strike_from_readings(record.readings, again.acquisition), strikes(heard, "card")[0]
-    np.testing.assert_allclose(found.pressure, wanted.pressure, atol=1e-5)
+    np.testing.assert_allclose(found.pressure, wanted.pressure, atol=1e-4)
     assert (found.fault, found.jitter) == ("", wanted.jitter)
     assert again.station.microphone == CARD.microphone
