@@ -99,7 +99,7 @@ def _weighed(
     heard: Heard | None,
 ) -> FloatArray:
     total = search.weigh(gels, yaws, members, step=step, rings=rings)
-    return total if heard is None else np.asarray(total + heard.nats(search, gels, yaws))
+    return total if heard is None else np.asarray(total + heard.nats(search, gels, yaws, between=True))
 
 
 def _turn(search: Search) -> float:

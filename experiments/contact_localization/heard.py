@@ -27,9 +27,9 @@ class Heard:
     term: SoundTerm
     struck: IntArray
 
-    def nats(self, search: Search, gels: FloatArray, yaws: FloatArray) -> FloatArray:
-        """``(n,)`` nats of hypotheses, see ``Hypotheses``; 0 where the sound says nothing."""
-        return sound_nats(search, self.term, self.struck, gels, yaws)
+    def nats(self, search: Search, gels: FloatArray, yaws: FloatArray, between: bool = False) -> FloatArray:
+        """``(n,)`` nats of hypotheses, see ``Hypotheses`` and ``sound_nats``; 0 where sound says nothing."""
+        return sound_nats(search, self.term, self.struck, gels, yaws, between)
 
 
 def hear(strikes: Sequence[Strike | None], model: Model, spacing: float) -> Heard | None:

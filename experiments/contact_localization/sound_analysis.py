@@ -12,66 +12,19 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
-from scipy.fft import next_fast_len, rfft, rfftfreq
 from scipy.signal import find_peaks
 
+from experiments.contact_localization.sound_spectra import Analysis, ComplexArray, Spectra, spectra_of
 from harness.acquisition import Strike
 from harness.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.errors import DataRefused
 
-ComplexArray = npt.NDArray[np.complex128]
 _Values = TypeVar("_Values", FloatArray, ComplexArray)
 
-_RATE_TOLERANCE = 1.0e-3
-_LEAST_NOISE_SAMPLES = 64
 _LEAST_BINS = 5
-
-
-@dataclass(frozen=True)
-class Analysis:
-    """How strikes are read.
-
-    Attributes:
-        decay: 1/s of the exponential window, against late reverberation. It is put on the force too:
-            an exponential passes through a convolution, so that it changes no transfer function
-            but by adding to the damping of every mode.
-        duration: s of each strike that are read.
-        before: s before the trigger at which reading begins.
-        pulse: s of force that are read; what the cell shows later is its own noise (ISO 7626-5).
-        force_floor: share of its greatest spectral value below which a force excites nothing: 26 dB
-            against the 20 of ISO 7626-5, because what is too noisy is found out by itself.
-        lowest: Hz; below it are the room and the object rocking on its stand.
-        prominence: dB that a peak stands above its surroundings.
-        above_noise: dB that it stands above what was heard before the strikes.
-        above_floor: dB that it stands above the median about it: between resonances a room's echoes make
-            peaks out of what all modes together answer, seldom 10 dB above their median.
-        floor_reach: Hz to each side over which that median is taken.
-        edge: share of a peak's power down to which its band reaches.
-        residual: share of a band's energy that may differ from one waveform.
-        skirt: dB that a peak must stand above the skirts of stronger ones, on which a room's echoes make
-            peaks of their own.
-        shared_skirt: the same for a peak whose shares are those of the stronger ones.
-        shared: share of a peak's energy beyond which its shares are its own.
-        most: peaks kept at most, strongest first.
-    """
-
-    decay: float = 20.0
-    duration: float = 0.3
-    before: float = 1.0e-3
-    pulse: float = 4.0e-3
-    force_floor: float = 0.05
-    lowest: float = 150.0
-    prominence: float = 6.0
-    above_noise: float = 10.0
-    above_floor: float = 9.0
-    floor_reach: float = 250.0
-    edge: float = 0.25
-    residual: float = 0.12
-    skirt: float = 6.0
-    shared_skirt: float = 14.0
-    shared: float = 0.1
-    most: int = 40
+_WIDTHS = 3
+_LEAST_DECAY = 1.0
+"""1/s: the scatter of a fit can bring a sharp peak's decay below zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,16 +70,6 @@ class SoundEvidence:
     band: tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class _Spectra:
-    """Of the strikes that count: rows are strikes, columns frequencies."""
-
-    frequencies: FloatArray
-    transfer: ComplexArray
-    excited: BoolArray
-    noise: FloatArray
-
-
 def analyse(strikes: Sequence[Strike], settings: Analysis | None = None) -> SoundEvidence:
     """The resonances that the strikes have in common, and each strike's share of every one.
 
@@ -147,22 +90,19 @@ def analyse(strikes: Sequence[Strike], settings: Analysis | None = None) -> Soun
     if used.sum() < 2:
         return SoundEvidence(read_only(used), reasons, (), (), (0.0, 0.0))
     heard = [strike for strike, counts in zip(strikes, used, strict=True) if counts]
-    spectra = _spectra(heard, settings)
+    spectra = spectra_of(heard, settings)
     usable = spectra.frequencies[spectra.excited.sum(axis=0) >= 2]
     if len(usable) == 0:
         return SoundEvidence(read_only(used), reasons, (), (), (0.0, 0.0))
     found = [_peak(spectra, low, top, high, used, settings) for low, top, high in _bands(spectra, settings)]
     kept, rejected = _sorted_out([peak for peak in found if peak is not None], settings)
-    return SoundEvidence(read_only(used), reasons, kept, rejected, (float(usable[0]), float(usable[-1])))
+    band = (float(usable[0]), float(usable[-1]))
+    return SoundEvidence(read_only(used), reasons, kept, rejected, band)
 
 
 def _why_not(strike: Strike, settings: Analysis) -> str:
-    if strike.silent:
-        return "no strike came"
-    if strike.overload:
-        return "a channel was overloaded"
-    if strike.double_hit:
-        return "the hammer hit twice"
+    if strike.fault:
+        return strike.fault
     if not (np.isfinite(strike.force).all() and np.isfinite(strike.pressure).all()):
         raise DataRefused("a strike's force or pressure is not finite; calibrate the channels again")
     if len(strike.pressure) - strike.onset < 0.25 * settings.duration * strike.rate:
@@ -170,53 +110,7 @@ def _why_not(strike: Strike, settings: Analysis) -> str:
     return ""
 
 
-def _common_rate(strikes: Sequence[Strike]) -> float:
-    rates = np.array([strike.rate for strike in strikes])
-    rate = float(np.median(rates))
-    if np.max(np.abs(rates / rate - 1.0)) > _RATE_TOLERANCE:
-        raise DataRefused(
-            f"the strikes were sampled at {rates.min():g} to {rates.max():g} Hz; "
-            "strikes of one run must share one rate, to one part in a thousand"
-        )
-    return rate
-
-
-def _spectra(strikes: Sequence[Strike], settings: Analysis) -> _Spectra:
-    rate = _common_rate(strikes)
-    samples = round(settings.duration * rate)
-    size = int(next_fast_len(2 * samples, real=True))
-    frequencies = rfftfreq(size, 1.0 / rate)
-    window = np.exp(-settings.decay * np.arange(samples) / rate)
-    force, pressure, noise = [], [], []
-    for strike in strikes:
-        start = max(0, strike.onset - round(settings.before * rate))
-        pulse = round((settings.before + settings.pulse) * rate)
-        force.append(rfft(_windowed(strike.force, start, window, pulse), size))
-        pressure.append(rfft(_windowed(strike.pressure, start, window, samples), size))
-        noise.append(_noise_density(strike.pressure[:start], window))
-    forces = np.array(force)
-    strength = np.abs(forces)
-    excited = strength >= settings.force_floor * strength.max(axis=1, keepdims=True)
-    excited &= (strength > 0.0) & (frequencies >= settings.lowest)
-    safe = np.where(excited, forces, 1.0)
-    transfer = np.where(excited, np.array(pressure) / safe, 0.0)
-    return _Spectra(frequencies, transfer, excited, np.array(noise)[:, None] / np.abs(safe))
-
-
-def _windowed(signal: FloatArray, start: int, window: FloatArray, length: int) -> FloatArray:
-    rest = signal[:start].mean() if start >= _LEAST_NOISE_SAMPLES else 0.0
-    piece = signal[start : start + min(length, len(window))] - rest
-    return np.asarray(piece * window[: len(piece)])
-
-
-def _noise_density(before: FloatArray, window: FloatArray) -> float:
-    """Expected magnitude of a spectral line of what was heard before the strike, as if white."""
-    if len(before) < _LEAST_NOISE_SAMPLES:
-        return 0.0
-    return float(before.std() * np.sqrt(np.sum(window**2)))
-
-
-def _bands(spectra: _Spectra, settings: Analysis) -> list[tuple[int, int, int]]:
+def _bands(spectra: Spectra, settings: Analysis) -> list[tuple[int, int, int]]:
     """First, highest and last bin of every peak, strongest peak first."""
     excited = spectra.excited
     count = np.maximum(excited.sum(axis=0), 1)
@@ -225,13 +119,33 @@ def _bands(spectra: _Spectra, settings: Analysis) -> list[tuple[int, int, int]]:
     open_bins = excited.sum(axis=0) >= 2
     level = np.where(open_bins, 10.0 * np.log10(np.maximum(power, 1e-300)), -3000.0)
     loudest = float(level.max())
-    tops, _ = find_peaks(np.maximum(level, loudest - 120.0), prominence=settings.prominence)
-    loud = power[tops] > noise[tops] * 10.0 ** (settings.above_noise / 10.0)
-    reach = round(settings.floor_reach / float(spectra.frequencies[1]))
-    floor = np.array([np.median(level[max(0, top - reach) : top + reach + 1]) for top in tops])
-    tops = tops[loud & open_bins[tops] & (level[tops] > floor + settings.above_floor)]
-    tops = tops[np.argsort(-power[tops], kind="stable")][: 2 * settings.most]
-    return [_reach(power, int(top), settings.edge) for top in tops]
+    tops, found = find_peaks(np.maximum(level, loudest - settings.range), prominence=min(settings.prominence))
+    heard = (power[tops] > noise[tops] * 10.0 ** (settings.above_noise / 10.0)) & open_bins[tops]
+    step = float(spectra.frequencies[1])
+    bands = [
+        _reach(power, int(top), settings.edge)
+        for top, stands, loud in zip(tops, found["prominences"], heard, strict=True)
+        if loud and _stands_out(level, power, int(top), float(stands), step, settings)
+    ]
+    bands.sort(key=lambda band: -power[band[1]])
+    return bands[: 2 * settings.most]
+
+
+def _stands_out(
+    level: FloatArray, power: FloatArray, top: int, prominence: float, step: float, settings: Analysis
+) -> bool:
+    """Whether a peak is too high, for its breadth, to be an echo's."""
+    low, _, high = _reach(power, top, settings.edge)
+    broad = int((high - low) * step > settings.broad)
+    # Several of its own widths where it is broad, or the floor would be its flanks.
+    reach = max(settings.floor_reach / step, broad * _WIDTHS * (high - low))
+    above = level[top] - _floor(level, top, round(reach))
+    return prominence >= settings.prominence[broad] and above > settings.above_floor[broad]
+
+
+def _floor(level: FloatArray, top: int, bins: int) -> float:
+    """dB: the median about a peak."""
+    return float(np.median(level[max(0, top - bins) : top + bins + 1]))
 
 
 def _reach(power: FloatArray, top: int, edge: float) -> tuple[int, int, int]:
@@ -244,7 +158,7 @@ def _reach(power: FloatArray, top: int, edge: float) -> tuple[int, int, int]:
 
 
 def _peak(
-    spectra: _Spectra, low: int, top: int, high: int, used: BoolArray, settings: Analysis
+    spectra: Spectra, low: int, top: int, high: int, used: BoolArray, settings: Analysis
 ) -> Peak | None:
     band = slice(max(low, 0), high + 1)
     heard = spectra.excited[:, band].all(axis=1)
@@ -253,18 +167,17 @@ def _peak(
     noise = spectra.noise[heard, top]
     # Rows of equal noise, so that a weak strike's noise does not pose as signal.
     whitening = noise.min() / noise if noise.min() > 0.0 else np.ones(len(noise))
-    left, strengths, right = np.linalg.svd(
-        whitening[:, None] * spectra.transfer[heard, band], full_matrices=False
-    )
-    y = left[:, 0] / whitening
+    transfer = spectra.transfer[heard, band]
+    _, strengths, waves = np.linalg.svd(whitening[:, None] * transfer, full_matrices=False)
+    frequency, damping = _resonance(spectra.frequencies[band], waves[0], settings.decay)
+    y, unit = _residues(spectra.frequencies[band], transfer, frequency, damping + settings.decay)
     length = np.linalg.norm(y)
-    frequency, damping = _resonance(spectra.frequencies[band], right[0], settings.decay)
     everyone = np.nonzero(used)[0][heard]
     return Peak(
         frequency=frequency,
         damping=damping,
         y=read_only(_spread(y / length, everyone, len(used))),
-        sigma=read_only(_spread(noise / (strengths[0] * length), everyone, len(used))),
+        sigma=read_only(_spread(noise * unit / length, everyone, len(used))),
         heard=read_only(np.isin(np.arange(len(used)), everyone)),
         residual=float(1.0 - strengths[0] ** 2 / np.sum(strengths**2)),
         level=float(10.0 * np.log10(np.mean(np.abs(spectra.transfer[heard, top]) ** 2))),
@@ -290,6 +203,21 @@ def _resonance(frequencies: FloatArray, wave: ComplexArray, decay: float) -> tup
     if not frequencies[0] <= frequency <= frequencies[-1]:
         frequency = float(frequencies[int(np.argmax(np.abs(wave)))])
     return frequency, float(2.0 * np.pi * pole.imag - decay)
+
+
+def _residues(
+    frequencies: FloatArray, transfer: ComplexArray, frequency: float, decay: float
+) -> tuple[ComplexArray, float]:
+    """``(K,)``: each strike's ``r`` in ``r / (f - z) + b``, and its deviation for lines of deviation 1.
+
+    What the neighbours' skirts add to a strike, ``b``, differs from strike to strike, and is not the
+    peak's; on a broad peak it is as large as the peak (Ewins, Modal Testing, 2000, section 4.4).
+    """
+    pole = frequency + 1j * max(decay, _LEAST_DECAY) / (2.0 * np.pi)
+    wave = 1.0 / (frequencies - pole)
+    wave /= np.linalg.norm(wave)
+    inverse = np.linalg.pinv(np.column_stack([wave, np.ones(len(wave))]))[0]
+    return np.asarray(transfer @ inverse), float(np.linalg.norm(inverse))
 
 
 def _sorted_out(peaks: list[Peak], settings: Analysis) -> tuple[tuple[Peak, ...], tuple[Peak, ...]]:

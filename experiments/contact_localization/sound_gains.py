@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.sound_kernels import nearest_in_table
+from experiments.contact_localization.sound_kernels import blend_of_samples, nearest_in_table
 from experiments.contact_localization.surface import Surface
 from harness.arrays import AnyArray, FloatArray, IntArray, read_only
 from harness.sim.modes import Modes
@@ -32,6 +32,24 @@ class GainTable:
         if len(far):
             found[far] = self.surface.tree.query(points[far])[1]
         return found
+
+    def about(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        """``(n, 7)`` samples about ``(n, 3)`` points in metres and their shares, smooth in the point."""
+        surface = self.surface
+        return blend_of_samples(
+            np.ascontiguousarray(points),
+            self.nearest(points),
+            surface.points,
+            surface.normals,
+            surface.neighbours,
+            _ABOUT,
+            _WIDTH * surface.spacing,
+        )
+
+
+_ABOUT = 7
+_WIDTH = 0.5
+"""Of the Gaussian between samples, in units of their spacing."""
 
 
 def gain_table(modes: Modes, surface: Surface) -> GainTable:

@@ -12,6 +12,10 @@ from harness.sim.compiled import compiled
 
 MOST_RANK = 4
 _TINY = 1.0e-12
+_FACING = 0.5
+"""Cosine between normals below which a sample is on another face."""
+
+_LITTLE = 1.0e-3
 
 
 @compiled
@@ -25,6 +29,76 @@ def nearest_in_table(points: FloatArray, nearest: AnyArray, origin: FloatArray, 
         if 0 <= a < nearest.shape[0] and 0 <= b < nearest.shape[1] and 0 <= c < nearest.shape[2]:
             found[i] = nearest[a, b, c]
     return found
+
+
+@compiled
+def blend_of_samples(
+    points: FloatArray,
+    nearest: IntArray,
+    places: FloatArray,
+    normals: FloatArray,
+    neighbours: AnyArray,
+    count: int,
+    width: float,
+) -> tuple[IntArray, FloatArray]:
+    """Samples about each place and their shares: a Gaussian of the distance, facing the same way.
+
+    Args:
+        points: ``(n, 3)`` metres.
+        nearest: ``(n,)`` the sample nearest to each.
+        places: ``(s, 3)`` metres, of the samples.
+        normals: ``(s, 3)`` unit, of the samples.
+        neighbours: ``(s, >= count - 1)`` of the samples, nearest first.
+        count: samples that share a place.
+        width: metres, one sigma of the Gaussian.
+
+    Returns:
+        ``(n, count)`` samples and ``(n, count)`` shares that sum to 1.
+    """
+    samples = np.empty((len(points), count), np.int64)
+    shares = np.zeros((len(points), count))
+    gaps = np.empty(count)
+    for i in range(len(points)):
+        first = nearest[i]
+        for j in range(count):
+            sample = first if j == 0 else neighbours[first, j - 1]
+            samples[i, j] = sample
+            facing, gap = 0.0, 0.0
+            for d in range(3):
+                facing += normals[first, d] * normals[sample, d]
+                gap += (points[i, d] - places[sample, d]) ** 2
+            gaps[j] = gap if facing > _FACING else np.inf
+        closest = gaps.min()
+        for j in range(count):
+            shares[i, j] = np.exp(-0.5 * (gaps[j] - closest) / width**2)
+        shares[i] /= shares[i].sum()
+    return samples, shares
+
+
+@compiled
+def gains_at(shapes: AnyArray, samples: IntArray, blend: FloatArray, directions: FloatArray) -> FloatArray:
+    """``(h, K, m)`` 1/sqrt(kg): how strongly each strike of each hypothesis moves each mode.
+
+    Args:
+        shapes: ``(n, m, 3)`` modes at the surface's samples.
+        samples: ``(h, K, J)`` samples about the place that each strike of a hypothesis hit.
+        blend: ``(h, K, J)`` their shares in it.
+        directions: ``(h or 1, K, 3)`` unit, of the strikes.
+    """
+    hypotheses, strikes, about = samples.shape
+    modes = shapes.shape[1]
+    gains = np.zeros((hypotheses, strikes, modes))
+    for h in range(hypotheses):
+        g = h if len(directions) > 1 else 0
+        for k in range(strikes):
+            x, y, z = directions[g, k, 0], directions[g, k, 1], directions[g, k, 2]
+            for j in range(about):
+                share = blend[h, k, j]
+                if share > _LITTLE:
+                    for m in range(modes):
+                        shape = shapes[samples[h, k, j], m]
+                        gains[h, k, m] += share * (shape[0] * x + shape[1] * y + shape[2] * z)
+    return gains
 
 
 @compiled
@@ -76,14 +150,13 @@ def angular_gaussian(
 
 @compiled
 def sound_scores(
-    shapes: AnyArray,
-    samples: IntArray,
-    directions: FloatArray,
+    struck: FloatArray,
     scales: FloatArray,
     rows: FloatArray,
     real: FloatArray,
     imaginary: FloatArray,
     counts: IntArray,
+    offsets: FloatArray,
     pair_starts: IntArray,
     pair_groups: IntArray,
     group_starts: IntArray,
@@ -95,14 +168,13 @@ def sound_scores(
     """``(h,)`` nats of hypotheses.
 
     Args:
-        shapes: ``(n, m, 3)`` modes at the surface's samples, groups of modes side by side.
-        samples: ``(h, K)`` sample that each strike of a hypothesis hit.
-        directions: ``(h or 1, K, 3)`` unit, of the strikes.
-        scales: ``(m,)`` what makes a gain one of unit noise.
-        rows: ``(P, K)`` further factor of each strike at each peak.
-        real: ``(P, K)`` of the peaks' directions.
-        imaginary: ``(P, K)``.
+        struck: ``(h, K, m)`` gains of the modes, groups of modes side by side.
+        scales: ``(C, m)`` what makes a gain one of unit noise, under each of the spreads.
+        rows: ``(C, P, K)`` further factor of each strike at each peak.
+        real: ``(C, P, K)`` of the peaks' directions.
+        imaginary: ``(C, P, K)``.
         counts: ``(P,)`` strikes that each peak was heard in.
+        offsets: ``(C, P)`` nats of a spread at a peak, with the logarithm of the spread's own share.
         pair_starts: ``(P + 1,)`` first pair of each peak.
         pair_groups: ``(Q,)`` group of modes of each pair.
         group_starts: ``(G + 1,)`` first mode of each group.
@@ -111,32 +183,32 @@ def sound_scores(
         weights: ``(P,)`` of the peaks.
         log_scale_shares: ``(S,)`` nats of each frequency scale.
     """
-    hypotheses, strikes = samples.shape
-    modes, peaks, scenarios = shapes.shape[1], len(counts), len(log_scale_shares)
+    hypotheses, strikes, modes = struck.shape
+    spreads = len(scales)
+    peaks, scenarios = len(counts), len(log_scale_shares)
     result = np.empty(hypotheses)
-    gains = np.empty((strikes, modes))
-    fits = np.empty(len(pair_groups))
+    gains = np.empty((spreads, strikes, modes))
+    fits = np.empty((len(pair_groups), spreads))
     totals = np.empty(scenarios)
     for h in range(hypotheses):
-        g = h if len(directions) > 1 else 0
-        for k in range(strikes):
-            x, y, z = directions[g, k, 0], directions[g, k, 1], directions[g, k, 2]
-            for m in range(modes):
-                shape = shapes[samples[h, k], m]
-                gains[k, m] = (shape[0] * x + shape[1] * y + shape[2] * z) * scales[m]
+        for c in range(spreads):
+            gains[c] = struck[h] * scales[c]
         totals[:] = log_scale_shares
         for p in range(peaks):
             best = 0.0
             for q in range(pair_starts[p], pair_starts[p + 1]):
                 first, last = group_starts[pair_groups[q]], group_starts[pair_groups[q] + 1]
-                fits[q] = angular_gaussian(gains[:, first:last], rows[p], real[p], imaginary[p], counts[p])
-                best = max(best, fits[q])
+                for c in range(spreads):
+                    fits[q, c] = offsets[c, p] + angular_gaussian(
+                        gains[c, :, first:last], rows[c, p], real[c, p], imaginary[c, p], counts[p]
+                    )
+                    best = max(best, fits[q, c])
             for q in range(pair_starts[p], pair_starts[p + 1]):
-                fits[q] = np.exp(fits[q] - best)
+                fits[q, 0] = np.sum(np.exp(fits[q] - best))
             for s in range(scenarios):
                 total = clutter[s, p] * np.exp(-best)
                 for q in range(pair_starts[p], pair_starts[p + 1]):
-                    total += shares[s, q] * fits[q]
+                    total += shares[s, q] * fits[q, 0]
                 totals[s] += weights[p] * (best + np.log(total))
         most = totals.max()
         result[h] = most + np.log(np.sum(np.exp(totals - most)))

@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments.contact_localization.sound_analysis import Peak, SoundEvidence
 from experiments.contact_localization.sound_gains import GainTable
-from experiments.contact_localization.sound_kernels import MOST_RANK, sound_scores
+from experiments.contact_localization.sound_kernels import MOST_RANK, gains_at, sound_scores
 from experiments.contact_localization.sound_matching import (
     Scales,
     SoundNoise,
@@ -69,6 +69,17 @@ class _Pairs:
     clutter: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Heard:
+    """Peaks as ``sound_scores`` takes them."""
+
+    rows: FloatArray
+    real: FloatArray
+    imaginary: FloatArray
+    counts: IntArray
+    offsets: FloatArray
+
+
 class SoundTerm:
     """The sounds of one run as a term of its posterior.
 
@@ -114,12 +125,14 @@ class SoundTerm:
         """Whether any peak can set places apart."""
         return len(self._pairs.groups) > 0
 
-    def log_likelihood(self, points: FloatArray, directions: FloatArray) -> FloatArray:
+    def log_likelihood(self, points: FloatArray, directions: FloatArray, between: bool = False) -> FloatArray:
         """``(h,)`` nats of hypotheses, 0 for sounds that say nothing.
 
         Args:
             points: ``(h, K, 3)`` metres, in the object's frame: where each strike fell.
             directions: ``(h, K, 3)`` or ``(K, 3)`` unit, in the object's frame: where the hammer went.
+            between: whether gains are interpolated between samples, which takes longer, or are the
+                nearest sample's.
 
         Raises:
             WrongUse: shapes that are not those of the evidence's strikes.
@@ -135,7 +148,8 @@ class SoundTerm:
             )
         if not self.says_something or len(points) == 0:
             return np.zeros(len(points))
-        return self._scores(points, directions, self._peaks, self._pairs, self._noise.weight)
+        gains = self._gains(points, directions, between)
+        return self._by_peaks(gains, self._peaks, self._pairs, self._noise.weight)
 
     def mode_table(self, points: FloatArray, directions: FloatArray) -> tuple[ModeRow, ...]:
         """Every peak with the group of modes that explains it best at one set of places.
@@ -146,26 +160,34 @@ class SoundTerm:
         """
         return tuple(self._row(index, points, directions) for index in range(len(self._peaks)))
 
-    def _scores(
-        self,
-        points: FloatArray,
-        directions: FloatArray,
-        peaks: tuple[Peak, ...],
-        pairs: _Pairs,
-        weight: float,
-    ) -> FloatArray:
+    def _gains(self, points: FloatArray, directions: FloatArray, between: bool) -> FloatArray:
+        """``(h, K, m)`` 1/sqrt(kg)."""
         strikes = len(self.evidence.used)
-        samples = self._table.nearest(points.reshape(-1, 3)).reshape(-1, strikes)
-        rows, real, imaginary, counts = _whitened(peaks, self._noise.spread)
-        return sound_scores(
+        flat = points.reshape(-1, 3)
+        if between:
+            samples, blend = self._table.about(flat)
+        else:
+            samples, blend = self._table.nearest(flat)[:, None], np.ones((len(flat), 1))
+        about = samples.shape[1]
+        return gains_at(
             self._table.shapes,
-            samples,
+            samples.reshape(-1, strikes, about),
+            blend.reshape(-1, strikes, about),
             np.ascontiguousarray(directions.reshape(-1, strikes, 3)),
+        )
+
+    def _by_peaks(
+        self, gains: FloatArray, peaks: tuple[Peak, ...], pairs: _Pairs, weight: float
+    ) -> FloatArray:
+        heard = _whitened(peaks, self._noise.spreads)
+        return sound_scores(
+            gains,
             self._gain_scales,
-            rows,
-            real,
-            imaginary,
-            counts,
+            heard.rows,
+            heard.real,
+            heard.imaginary,
+            heard.counts,
+            heard.offsets,
             pairs.starts,
             pairs.groups,
             self._starts,
@@ -182,12 +204,12 @@ class SoundTerm:
         )
 
     def _unit_gains(self) -> FloatArray:
-        """``(m,)``: one over the noise of each mode's gain; one figure a group, so that any basis will do."""
+        """``(C, m)``: one over the noise of a mode's gain; one figure a group, so that any basis will do."""
         squares = self._table.mean_squares
         result = np.empty(len(squares))
         for a, b in zip(self._starts[:-1], self._starts[1:], strict=True):
-            result[a:b] = 1.0 / (np.sqrt(squares[a:b].mean()) * self._noise.spread)
-        return result
+            result[a:b] = 1.0 / np.sqrt(squares[a:b].mean())
+        return np.asarray(result / np.array(self._noise.spreads)[:, None])
 
     def _row(self, index: int, points: FloatArray, directions: FloatArray) -> ModeRow:
         peak, pairs = self._peaks[index], self._pairs
@@ -221,7 +243,8 @@ class SoundTerm:
             np.ones((len(self.scales.factors), 1)),
             np.zeros((len(self.scales.factors), 1)),
         )
-        return float(self._scores(points[None], directions, (peak,), sure, 1.0)[0])
+        gains = self._gains(points[None], directions, True)
+        return float(self._by_peaks(gains, (peak,), sure, 1.0)[0])
 
 
 def _pair(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> _Pairs:
@@ -245,14 +268,24 @@ def _pair(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: Sou
     )
 
 
-def _whitened(peaks: tuple[Peak, ...], spread: float) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
-    """Rows' factors, ``y`` of unit length in two parts, and how many strikes heard each peak."""
-    rows, ys = [], []
-    for peak in peaks:
-        unit = np.sqrt(np.mean(np.abs(peak.y[peak.heard]) ** 2))
-        row = peak.heard / np.hypot(1.0, peak.sigma / (spread * unit))
-        rows.append(row)
-        ys.append(row * peak.y / np.linalg.norm(row * peak.y))
-    y = np.array(ys)
-    counts = np.array([peak.heard.sum() for peak in peaks], dtype=np.int64)
-    return np.array(rows), np.ascontiguousarray(y.real), np.ascontiguousarray(y.imag), counts
+def _whitened(peaks: tuple[Peak, ...], spreads: tuple[float, ...]) -> _Heard:
+    """The peaks' shares divided by what each spread leaves of them, and the nats of that division."""
+    rows, ys, offsets = [], [], []
+    for spread in spreads:
+        for peak in peaks:
+            unit = np.sqrt(np.mean(np.abs(peak.y[peak.heard]) ** 2))
+            row = peak.heard / np.hypot(1.0, peak.sigma / (spread * unit))
+            length = float(np.linalg.norm(row * peak.y))
+            rows.append(row)
+            ys.append(row * peak.y / length)
+            logs = 2.0 * np.log(row[peak.heard])
+            offsets.append(float(np.sum(logs - 2.0 * np.log(length / np.linalg.norm(peak.y)))))
+    shape = (len(spreads), len(peaks))
+    y = np.array(ys).reshape(*shape, -1)
+    return _Heard(
+        np.array(rows).reshape(y.shape),
+        np.ascontiguousarray(y.real),
+        np.ascontiguousarray(y.imag),
+        np.array([peak.heard.sum() for peak in peaks], dtype=np.int64),
+        np.array(offsets).reshape(shape) - np.log(len(spreads)),
+    )

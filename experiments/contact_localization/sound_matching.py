@@ -17,7 +17,8 @@ class SoundNoise:
     """How far sound may differ from what the modes say.
 
     Attributes:
-        spread: of a strike's share at a peak, in units of the mode's rms gain over the surface.
+        spreads: of a strike's share at a peak, in units of the mode's rms gain over the surface; some
+            modes are as they were computed and some hardly, and each peak is weighed under every one.
         frequency: relative, one sigma of a mode's frequency about the common scale.
         scale: relative, one sigma of the common scale.
         scale_limits: within which a common scale is looked for.
@@ -29,7 +30,7 @@ class SoundNoise:
         most: modes in one group at most; at most ``sound_kernels.MOST_RANK``.
     """
 
-    spread: float = 0.3
+    spreads: tuple[float, ...] = (0.1, 0.4)
     frequency: float = 0.02
     scale: float = 0.05
     scale_limits: tuple[float, float] = (0.85, 1.15)

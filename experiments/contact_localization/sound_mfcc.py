@@ -111,7 +111,7 @@ class MfccTable:
 
         Zeros for a strike that cannot be used.
         """
-        if strike.silent or strike.overload or strike.double_hit:
+        if strike.fault:
             return np.zeros(len(self._features))
         heard = mfcc(strike.pressure[strike.onset :], strike.rate, self._settings).ravel()
         length = float(np.linalg.norm(heard))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
-from experiments.contact_localization.sound_analysis import Analysis
+from experiments.contact_localization.sound_spectra import Analysis
 from harness.acquisition import Strike
 from harness.arrays import FloatArray, read_only
 from harness.materials import Material

@@ -32,7 +32,12 @@ def strike_places(
 
 
 def sound_nats(
-    search: Search, term: SoundTerm, struck: IntArray, gels: FloatArray, yaws: FloatArray
+    search: Search,
+    term: SoundTerm,
+    struck: IntArray,
+    gels: FloatArray,
+    yaws: FloatArray,
+    between: bool = False,
 ) -> FloatArray:
     """``(h,)`` nats of hypotheses by a run's sounds, 0 for sounds that say nothing.
 
@@ -42,10 +47,11 @@ def sound_nats(
         struck: ``(K,)`` indices of the contacts that were struck.
         gels: ``(h, 3)`` metres, see ``Hypotheses``.
         yaws: ``(h,)`` rad.
+        between: whether the places lie between samples, see ``SoundTerm.log_likelihood``.
     """
     if not term.says_something:
         return np.zeros(len(gels))
-    return term.log_likelihood(*strike_places(search, struck, gels, yaws))
+    return term.log_likelihood(*strike_places(search, struck, gels, yaws), between)
 
 
 def by_sound(

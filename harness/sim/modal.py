@@ -15,7 +15,7 @@ from harness.mesh import Mesh
 from harness.sim.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
 from harness.sim.modal_lanczos import EigenPairs, modes_below
 from harness.sim.modal_mesh import QuadraticMesh, least_determinant, middles_of, quadratic_mesh
-from harness.sim.modal_snap import snapped
+from harness.sim.modal_snap import snapped, straightened
 from harness.sim.modal_system import ModalSystem, modal_system
 from harness.sim.modes import Modes
 from harness.sim.surface_measure import enclosed_volume, thin_wall
@@ -172,7 +172,7 @@ def _curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra
     way = np.zeros_like(mesh.nodes)
     way[: len(tetrahedra.nodes)] = tetrahedra.nodes - undeformed.nodes
     way[len(tetrahedra.nodes) :] = middles_of(way, mesh.cells, len(way))[len(tetrahedra.nodes) :]
-    moved = QuadraticMesh(mesh.nodes + way, mesh.cells, mesh.faces)
+    moved = straightened(QuadraticMesh(mesh.nodes + way, mesh.cells, mesh.faces))
     if least_determinant(moved).min() <= 0.0:
         raise MeshRefused("the deformation turns an element inside out; deform the object less")
     return moved

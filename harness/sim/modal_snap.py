@@ -49,6 +49,26 @@ def snapped(mesh: QuadraticMesh, surface: Mesh) -> QuadraticMesh:
     return mesh
 
 
+def straightened(mesh: QuadraticMesh) -> QuadraticMesh:
+    """The same cells, straight where bending turned them inside out: corners stay, middle nodes go back.
+
+    Args:
+        mesh: with corners whose straight cells are not inside out.
+    """
+    corners = int(mesh.cells[:, :4].max()) + 1
+    straight = _with_middles(mesh, mesh.nodes, corners)
+    loose = np.zeros(len(mesh.nodes), dtype=np.bool_)
+    # A node that goes back bends its other cells, which may have to follow.
+    while True:
+        nodes = np.where(loose[:, None], straight.nodes, mesh.nodes)
+        trialled = QuadraticMesh(nodes, mesh.cells, mesh.faces)
+        bad = least_determinant(trialled) <= 0.0
+        bad &= ~loose[mesh.cells[:, 4:]].all(axis=1)
+        if not bad.any():
+            return trialled
+        loose[mesh.cells[bad, 4:]] = True
+
+
 def _with_middles(mesh: QuadraticMesh, nodes: FloatArray, corners: int) -> QuadraticMesh:
     """Straight cells on moved corners."""
     moved = nodes.copy()

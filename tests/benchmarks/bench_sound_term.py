@@ -22,12 +22,13 @@ from experiments.contact_localization.nearest import nearest_point
 from experiments.contact_localization.posterior import best_point
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.sites import Steps, plan_sites
-from experiments.contact_localization.sound_analysis import Analysis, analyse
+from experiments.contact_localization.sound_analysis import analyse
 from experiments.contact_localization.sound_gains import GainTable, gain_table
 from experiments.contact_localization.sound_likelihood import SoundTerm
 from experiments.contact_localization.sound_matching import SoundNoise
 from experiments.contact_localization.sound_mfcc import MfccTable, mfcc_filter
 from experiments.contact_localization.sound_places import by_sound, sound_nats
+from experiments.contact_localization.sound_spectra import Analysis
 from harness.acquisition import Strike
 from harness.arrays import FloatArray
 from harness.gap import Gap, load_gap

@@ -95,4 +95,4 @@ def test_calls_of_sound_would_be_counted() -> None:
     with pytest.MonkeyPatch.context() as patch:
         calls = count_calls(patch)
         sound_analysis.analyse([strike, strike])
-    assert calls["experiments.contact_localization.sound_analysis._spectra"] == 1
+    assert calls["experiments.contact_localization.sound_spectra.spectra_of"] == 1
