@@ -64,11 +64,23 @@ COMMANDS = {
         "experiments.commands.cost:contact_localization",
         "Error against seconds of the estimate; `run --budget` and `run --error` go by it.",
     ),
+    "object info": Command(
+        "experiments.commands.object:info", "Say what an ObjectFile holds: modes, networks, sources, licence."
+    ),
+    "object verify": Command(
+        "experiments.commands.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
+    ),
+    "sim modes": Command(
+        "experiments.commands.sim:modes",
+        "Frequencies and dampings of a mesh, counted so that none is missing.",
+    ),
 }
 
 GROUPS = {
     "tables": "The tables a paper would print, measured on the mocked bench.",
     "cost": "What accuracy costs in seconds, measured on this machine.",
+    "object": "ObjectFiles: what is known of one object, in a folder of open files.",
+    "sim": "What the simulators compute, one at a time.",
 }
 
 EPILOG = (

@@ -9,8 +9,9 @@ from collections.abc import Mapping
 from harness.materials import Material, material
 from harness.mesh import Mesh
 from harness.scene import SceneFile
-from harness.sim.modal import Elasticity, default_edge, from_arrays, solve_modes, to_arrays
+from harness.sim.modal import default_edge, from_arrays, solve_modes, to_arrays
 from harness.sim.modal_radiation import radiation
+from harness.sim.modal_solve import Elasticity
 from harness.sim.modes import Modes, dampings
 from harness.sim.tetrahedra import Tetrahedra, tetrahedra, tetrahedralize
 from harness.sim.walls import walled

@@ -10,7 +10,7 @@ from harness.arrays import FloatArray, IntArray
 from harness.errors import MeshRefused
 from harness.materials import Material
 from harness.mesh import Mesh
-from harness.sim.modal import Elasticity
+from harness.sim.modal_solve import Elasticity
 from harness.sim.surface_measure import wall_thickness
 from harness.sim.tetrahedra import Tetrahedra, tetrahedra
 

@@ -2,21 +2,19 @@
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from harness.arrays import AnyArray, FloatArray
-from harness.errors import MeshRefused, WrongUse
+from harness.arrays import AnyArray
+from harness.errors import MeshRefused
 from harness.materials import Material
 from harness.mesh import Mesh
 from harness.sim.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
-from harness.sim.modal_lanczos import EigenPairs, modes_below
 from harness.sim.modal_mesh import QuadraticMesh, least_determinant, middles_of, quadratic_mesh
 from harness.sim.modal_snap import snapped, straightened
-from harness.sim.modal_system import ModalSystem, modal_system
+from harness.sim.modal_solve import Elasticity, check_limit, solve_mesh
 from harness.sim.modes import Modes
 from harness.sim.surface_measure import enclosed_volume, thin_wall
 from harness.sim.tetrahedra import Tetrahedra, tetrahedralize
@@ -33,34 +31,6 @@ ELEMENT_SHARE = 0.35
 
 _VOLUME_GATE = 0.03
 """Relative: frequencies of bending follow the wall, and so the volume."""
-
-
-@dataclass(frozen=True, eq=False)
-class Elasticity:
-    """What each cell is made of.
-
-    Attributes:
-        young: ``(c,)`` Pa.
-        poisson: ``(c,)``.
-        density: ``(c,)`` kg/m^3.
-    """
-
-    young: FloatArray
-    poisson: FloatArray
-    density: FloatArray
-
-    @classmethod
-    def uniform(cls, material: Material, cells: int) -> "Elasticity":
-        """The same everywhere."""
-        one = np.ones(cells)
-        return cls(material.young * one, material.poisson * one, material.density * one)
-
-    @property
-    def lame(self) -> FloatArray:
-        """``(c, 2)`` Pa: Lame's lambda and mu."""
-        young, poisson = self.young, self.poisson
-        first = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
-        return np.stack([first, young / (2.0 * (1.0 + poisson))], axis=1)
 
 
 def modes_of(
@@ -109,7 +79,7 @@ def default_edge(
     many (its modal density is ``sqrt(3) area / (wall speed)``; Cremer, Heckl and Petersson,
     Structure-Borne Sound, 3rd edition, 2005).
     """
-    _check_limit(limit, most)
+    check_limit(limit, most)
     wall = thin_wall(mesh, 0.5)
     speed = np.sqrt(material.young / (material.density * (1.0 - material.poisson**2)))
     if most is not None:
@@ -145,23 +115,26 @@ def solve_modes(
         WrongUse: a limit or a count that cannot be, or elasticity that is not one.
         MeshRefused: the system cannot be solved.
     """
-    _check_limit(limit, most)
     cells = len(tetrahedra.cells)
     elasticity = Elasticity.uniform(material, cells) if isinstance(material, Material) else material
-    _check_elasticity(elasticity, cells)
     with threadpool_limits(limits=1, user_api="blas"):
         begun = time.perf_counter()
-        mesh = _curved(tetrahedra, surface, undeformed or tetrahedra)
-        system = modal_system(mesh, elasticity.lame, elasticity.density)
-        assembled = time.perf_counter()
-        pairs, reached = modes_below(system, limit, most)
-        solved = time.perf_counter()
-    seconds = {"tetrahedra": meshed, "assembly": assembled - begun, "solve": solved - assembled}
-    return _modes(mesh, system, pairs, reached, seconds)
+        mesh = curved(tetrahedra, surface, undeformed or tetrahedra)
+        spent = {"tetrahedra": meshed, "assembly": time.perf_counter() - begun}
+        return solve_mesh(mesh, elasticity, limit, most, spent=spent).modes
 
 
-def _curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra) -> QuadraticMesh:
-    """Ten-node cells on ``surface``, moved on to where the tetrahedra are now."""
+def curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra) -> QuadraticMesh:
+    """Ten-node cells on ``surface``, moved on to where the tetrahedra are now.
+
+    Args:
+        tetrahedra: as they are to be solved.
+        surface: as in ``solve_modes``.
+        undeformed: the cells where ``surface`` belongs to them; ``tetrahedra`` if they never moved.
+
+    Raises:
+        MeshRefused: unused nodes, inverted elements, or another volume than the surface encloses.
+    """
     _check_cells(undeformed)
     mesh = quadratic_mesh(undeformed.nodes, undeformed.cells)
     if surface is not None:
@@ -199,28 +172,6 @@ def _check_volume(mesh: QuadraticMesh, surface: Mesh) -> None:
         )
 
 
-def _modes(
-    mesh: QuadraticMesh, system: ModalSystem, pairs: EigenPairs, limit: float, seconds: Mapping[str, float]
-) -> Modes:
-    used, triangles = np.unique(mesh.triangles, return_inverse=True)
-    outer = Mesh(mesh.nodes[used], triangles.reshape(-1, 3))
-    vectors = pairs.vectors.reshape(len(mesh.nodes), 3, -1)[used]
-    return Modes(
-        frequencies=np.sqrt(pairs.values) / (2.0 * np.pi),
-        points=outer.vertices,
-        normals=outer.vertex_normals,
-        faces=outer.faces,
-        shapes=np.ascontiguousarray(vectors.transpose(0, 2, 1)),
-        limit=limit,
-        mass=system.total,
-        rigid=system.rigid.shape[1],
-        nodes=len(mesh.nodes),
-        elements=len(mesh.cells),
-        residual=pairs.residual,
-        seconds=dict(seconds),
-    )
-
-
 def to_arrays(modes: Modes) -> dict[str, AnyArray]:
     """What a store can keep."""
     numbers = ("limit", "mass", "rigid", "nodes", "elements", "residual")
@@ -251,25 +202,3 @@ def from_arrays(kept: Mapping[str, AnyArray]) -> Modes:
         residual=float(kept["residual"]),
         seconds=seconds,
     )
-
-
-def _check_limit(limit: float, most: int | None) -> None:
-    if not (np.isfinite(limit) and limit > 0.0):
-        raise WrongUse(f"modes up to {limit:g} Hz cannot be found; say a frequency above 0")
-    if most is not None and most < 1:
-        raise WrongUse(f"{most} modes are none; say 1 or more, or leave the number out")
-
-
-def _check_elasticity(elasticity: Elasticity, cells: int) -> None:
-    for name, field in vars(elasticity).items():
-        if field.shape != (cells,) or not np.isfinite(field).all():
-            raise WrongUse(
-                f"{name} of shape {field.shape} must be one finite number for each of {cells} cells"
-            )
-    if elasticity.young.min() <= 0.0 or elasticity.density.min() <= 0.0:
-        raise WrongUse("Young's modulus and density must be above 0 in every cell")
-    if elasticity.poisson.max() >= 0.5 or elasticity.poisson.min() <= -1.0:
-        worst = elasticity.poisson[np.argmax(np.abs(elasticity.poisson - 0.0))]
-        raise WrongUse(
-            f"a Poisson's ratio of {worst:g} is outside -1 to 0.5; an incompressible solid is 0.49"
-        )

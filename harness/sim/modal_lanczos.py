@@ -33,7 +33,7 @@ class EigenPairs:
 
     Attributes:
         values: ``(m,)`` (rad/s)^2, ascending.
-        vectors: ``(3 n, m)`` 1/sqrt(kg), mass-orthonormal.
+        vectors: ``(u, m)`` 1/sqrt(kg), mass-orthonormal, of the system's unknowns.
         residual: the worst ``|K x - w^2 M x| / (w^2 |M x|)``.
         certified: whether an inertia count confirmed that none is missing.
     """
@@ -49,8 +49,14 @@ def modes_below(
 ) -> tuple[EigenPairs, float]:
     """Every elastic mode up to ``limit`` Hz, or the lowest ``most`` of them.
 
+    Args:
+        system: free or held.
+        limit: Hz; infinite for as many as ``most`` says.
+        most: modes at most; fewer where that would part modes of one frequency.
+        certify: whether to count them by the inertia of the system.
+
     Returns:
-        The modes, and up to which frequency in Hz they are all.
+        The modes, and up to which frequency in Hz they are all; infinite where the system has no more.
 
     Raises:
         MeshRefused: the stiffness cannot be factorised, or modes were missed twice.
@@ -76,6 +82,8 @@ def modes_below(
 
 def _count_below(system: ModalSystem, ceiling: float) -> int | None:
     """How many elastic eigenvalues are below ``ceiling``; None where the factors cannot say."""
+    if not np.isfinite(ceiling):
+        return int(system.rigid.shape[0] - system.rigid.shape[1])
     negative = negative_pivots(factorised(system.shifted(-ceiling)))
     return None if negative is None else negative - system.rigid.shape[1]
 

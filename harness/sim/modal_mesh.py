@@ -8,7 +8,7 @@ from harness.arrays import FloatArray, IntArray
 from harness.errors import MeshRefused
 from harness.sim.modal_kernels import EDGES, MASS_POINTS, STIFFNESS_POINTS, determinants, shape_slopes
 
-_FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
+FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
 """Corners of the face opposite each corner, outward where the cell is positively oriented."""
 
 _CHECKED_AT = np.vstack([STIFFNESS_POINTS, MASS_POINTS, np.eye(4)])
@@ -49,7 +49,7 @@ def quadratic_mesh(nodes: FloatArray, cells: IntArray) -> QuadraticMesh:
     ends = np.stack(np.divmod(unique, len(nodes)), axis=1)
     middles = nodes[ends].mean(axis=1)
     whole = np.concatenate([cells, len(nodes) + which.reshape(-1, 6)], axis=1)
-    return QuadraticMesh(np.concatenate([nodes, middles]), whole, _surface(cells, unique, len(nodes)))
+    return QuadraticMesh(np.concatenate([nodes, middles]), whole, six_node_faces(whole))
 
 
 def boundary_faces(cells: IntArray) -> IntArray:
@@ -58,7 +58,7 @@ def boundary_faces(cells: IntArray) -> IntArray:
     Raises:
         MeshRefused: a face that more than two cells share.
     """
-    faces = cells[:, _FACES].reshape(-1, 3)
+    faces = cells[:, FACES].reshape(-1, 3)
     _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     if (counts > 2).any():
         raise MeshRefused(
@@ -68,10 +68,18 @@ def boundary_faces(cells: IntArray) -> IntArray:
     return np.asarray(faces[np.sort(first[counts == 1])], dtype=np.int64)
 
 
-def _surface(cells: IntArray, edges: IntArray, corners: int) -> IntArray:
-    faces = boundary_faces(cells)
+def six_node_faces(cells: IntArray) -> IntArray:
+    """``(f, 6)``: the faces that belong to one of ``(c, 10)`` cells only, as ``QuadraticMesh.faces``.
+
+    Raises:
+        MeshRefused: a face that more than two cells share.
+    """
+    count = int(cells.max()) + 1
+    ends = np.sort(cells[:, EDGES], axis=2).reshape(-1, 2)
+    edges, first = np.unique(ends[:, 0] * count + ends[:, 1], return_index=True)
+    faces = boundary_faces(cells[:, :4])
     sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)
-    middles = corners + np.searchsorted(edges, sides[..., 0] * corners + sides[..., 1])
+    middles = cells[:, 4:].ravel()[first[np.searchsorted(edges, sides[..., 0] * count + sides[..., 1])]]
     return np.concatenate([faces, middles], axis=1)
 
 

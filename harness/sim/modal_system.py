@@ -1,14 +1,14 @@
 """Stiffness, mass and rigid motions of a finite-element mesh, and the factor that solves with them."""
 
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import SuperLU, splu
 
-from harness.arrays import FloatArray
+from harness.arrays import BoolArray, FloatArray, IntArray
 from harness.errors import MeshRefused
 from harness.sim.modal_kernels import (
     MASS_POINTS,
@@ -23,25 +23,34 @@ from harness.sim.modal_mesh import QuadraticMesh
 
 SparseColumns: TypeAlias = "sp.csc_array[Any]"
 SparseRows: TypeAlias = "sp.csr_array[Any]"
+MassRule: TypeAlias = Literal["consistent", "four points"]
+"""How mass is integrated: as it is, or at four points as CalculiX does for this element, which is
+up to a percent off and here to compare with it."""
 
 _SHIFT = 1e-9
 """The shift as a share of ``tr K / tr M``: above the rounding of the rigid modes (1e-16 of the
 largest eigenvalue) and, for any object that is not thinner than a thousandth of its size,
 below the first elastic mode."""
 
+_LOOSE = 1e-8
+"""Of the greatest motion of a held place, what counts as none."""
+
 
 @dataclass(frozen=True, eq=False)
 class ModalSystem:
-    """``K x = w^2 M x`` of one free object.
+    """``K x = w^2 M x`` of one object, free or held.
 
-    Unknown ``3 i + d`` is the displacement of node ``i`` along axis ``d``.
+    Unknown ``3 i + d`` of a free object is the displacement of node ``i`` along axis ``d``; of one
+    that is held, the unknowns are those of ``free``.
 
     Attributes:
-        stiffness: ``(3 n, 3 n)`` N/m.
+        stiffness: ``(u, u)`` N/m, of the unknowns.
         mass: ``(n, n)`` kg, the same for each axis.
-        rigid: ``(3 n, 6 bodies)`` 1/sqrt(kg), mass-orthonormal motions without deformation.
+        rigid: ``(u, r)`` 1/sqrt(kg), mass-orthonormal motions without deformation: six for each
+            body that nothing holds.
         shift: ``(rad/s)^2``, added to the eigenvalues so that the matrix can be factorised.
         total: kg.
+        free: ``(u,)`` which of the ``3 n`` displacements are unknown; None for all.
     """
 
     stiffness: SparseColumns
@@ -49,20 +58,51 @@ class ModalSystem:
     rigid: FloatArray
     shift: float
     total: float
+    free: IntArray | None = None
 
     def weighted(self, block: FloatArray) -> FloatArray:
-        """The mass matrix times ``(3 n, b)`` vectors."""
-        count = self.mass.shape[0]
-        return np.asarray(self.mass @ block.reshape(count, -1)).reshape(block.shape)
+        """The mass matrix times ``(u, b)`` vectors."""
+        whole = self.whole(block)
+        heavy = np.asarray(self.mass @ whole.reshape(self.mass.shape[0], -1)).reshape(whole.shape)
+        return heavy if self.free is None else heavy[self.free]
+
+    def whole(self, block: FloatArray) -> FloatArray:
+        """``(3 n, b)``: vectors of the unknowns ``(u, b)`` with zero where the object is held."""
+        if self.free is None:
+            return block
+        whole = np.zeros((3 * self.mass.shape[0], block.shape[1]))
+        whole[self.free] = block
+        return whole
 
     def shifted(self, shift: float) -> SparseColumns:
-        """``K + shift M``, ``(3 n, 3 n)``; the shift in ``(rad/s)^2`` may be negative."""
-        return sp.csc_array(self.stiffness + shift * sp.kron(self.mass, sp.eye_array(3), format="csc"))
+        """``K + shift M``, ``(u, u)``; the shift in ``(rad/s)^2`` may be negative."""
+        mass = sp.kron(self.mass, sp.eye_array(3), format="csc")
+        if self.free is not None:
+            mass = mass[self.free][:, self.free]
+        return sp.csc_array(self.stiffness + shift * mass)
+
+    def held(self, held: BoolArray) -> "ModalSystem":
+        """This free system with some displacements held at zero.
+
+        Args:
+            held: ``(n, 3)``, which displacement of which node.
+        """
+        free = np.flatnonzero(~held.ravel())
+        _, extent, turned = np.linalg.svd(np.linalg.qr(self.rigid[held.ravel()], mode="r"))
+        extent = np.pad(extent, (0, len(turned) - len(extent)))
+        left = turned[extent <= _LOOSE * extent.max()].T
+        stiffness = sp.csc_array(self.stiffness[free][:, free])
+        return replace(self, stiffness=stiffness, rigid=self.rigid[free] @ left, free=free)
 
 
-def modal_system(mesh: QuadraticMesh, lame: FloatArray, density: FloatArray) -> ModalSystem:
-    """Assemble a mesh of ``(c, 2)`` Pa Lame constants and ``(c,)`` kg/m^3 density."""
+def modal_system(
+    mesh: QuadraticMesh, lame: FloatArray, density: FloatArray, rule: MassRule = "consistent"
+) -> ModalSystem:
+    """Assemble a mesh of ``(c, 2)`` Pa Lame constants and ``(c,)`` kg/m^3 density, free."""
     count = len(mesh.nodes)
+    points, weights_at = (MASS_POINTS, MASS_WEIGHTS)
+    if rule == "four points":
+        points, weights_at = (STIFFNESS_POINTS, np.full(4, 0.25))
     rows, columns = pattern(mesh.cells, count)
     stiffness, mass = assemble(
         mesh.nodes,
@@ -72,9 +112,9 @@ def modal_system(mesh: QuadraticMesh, lame: FloatArray, density: FloatArray) -> 
         rows,
         columns,
         shape_slopes(STIFFNESS_POINTS),
-        shape_slopes(MASS_POINTS),
-        shape_values(MASS_POINTS),
-        MASS_WEIGHTS,
+        shape_slopes(points),
+        shape_values(points),
+        weights_at,
     )
     whole = sp.bsr_array((stiffness, columns, rows), shape=(3 * count, 3 * count)).tocsc()
     weights = sp.csr_array((mass, columns, rows), shape=(count, count))

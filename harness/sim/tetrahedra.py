@@ -25,7 +25,7 @@ _ENVELOPE_OF_SIZE = 2e-3
 _ENVELOPE_OF_EDGE = 0.03
 """Of the edge aimed at: smaller elements follow the surface more closely, or they gain nothing."""
 
-_FLATTEST = 1e-8
+FLATTEST = 1e-8
 """Least volume of a cell as a share of its edges' root mean square cubed: below it, stiffness
 grows so large that the eigenvalues lose their digits."""
 
@@ -59,7 +59,7 @@ class Tetrahedra:
     @cached_property
     def volumes(self) -> FloatArray:
         """``(c,)`` m^3."""
-        return read_only(_signed_volumes(self.nodes, self.cells))
+        return read_only(signed_volumes(self.nodes, self.cells))
 
     @cached_property
     def body(self) -> IntArray:
@@ -96,9 +96,9 @@ def tetrahedra(nodes: FloatArray, cells: IntArray) -> Tetrahedra:
         raise MeshRefused(
             f"a volume mesh of {len(cells)} cells with finite corners makes no sound; export it again"
         )
-    volumes = _signed_volumes(nodes, cells)
+    volumes = signed_volumes(nodes, cells)
     cells[volumes < 0.0] = cells[volumes < 0.0][:, [0, 2, 1, 3]]
-    _check_slivers(nodes, cells, np.abs(volumes))
+    _check_slivers(nodes, cells)
     boundary_faces(cells)
     return Tetrahedra(read_only(nodes), read_only(cells))
 
@@ -165,21 +165,27 @@ def _simplified(mesh: Mesh, tolerance: float) -> Mesh:
     return Mesh(fewer.vertices * _MM, fewer.faces)
 
 
-def _signed_volumes(nodes: FloatArray, cells: IntArray) -> FloatArray:
+def signed_volumes(nodes: FloatArray, cells: IntArray) -> FloatArray:
+    """``(c,)`` m^3, below zero where a cell is numbered the other way round."""
     a, b, c, d = (nodes[cells[:, corner]] for corner in range(4))
     volumes: FloatArray = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6.0
     return volumes
 
 
-def _check_slivers(nodes: FloatArray, cells: IntArray, volumes: FloatArray) -> None:
+def fullness(nodes: FloatArray, cells: IntArray) -> FloatArray:
+    """``(c,)``: volume over the cube of the edges' root mean square; 0.118 where regular, 0 where flat."""
     pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
     squares = sum(((nodes[cells[:, a]] - nodes[cells[:, b]]) ** 2).sum(axis=1) for a, b in pairs) / 6.0
-    quality = volumes / np.where(squares > 0.0, squares, 1.0) ** 1.5
-    bad = int(np.count_nonzero(quality < _FLATTEST))
+    return np.abs(signed_volumes(nodes, cells)) / np.where(squares > 0.0, squares, 1.0) ** 1.5
+
+
+def _check_slivers(nodes: FloatArray, cells: IntArray) -> None:
+    quality = fullness(nodes, cells)
+    bad = int(np.count_nonzero(quality < FLATTEST))
     if bad:
         raise MeshRefused(
             f"{bad} of {len(cells)} tetrahedra are flat (the worst has {quality.min():.1e} of its edges' "
-            f"volume, the least is {_FLATTEST:g}); mesh the object again, or collapse them"
+            f"volume, the least is {FLATTEST:g}); mesh the object again, or collapse them"
         )
 
 

@@ -16,8 +16,9 @@ from harness.errors import MeshRefused, WrongUse
 from harness.geometry import rotation_about
 from harness.materials import MATERIALS, Material
 from harness.mesh import Mesh
-from harness.sim.modal import Elasticity, from_arrays, solve_modes, to_arrays
+from harness.sim.modal import from_arrays, solve_modes, to_arrays
 from harness.sim.modal_mesh import quadratic_mesh
+from harness.sim.modal_solve import Elasticity
 from harness.sim.modal_system import modal_system
 from harness.sim.modes import Modes, dampings
 from harness.sim.tetrahedra import Tetrahedra, tetrahedra

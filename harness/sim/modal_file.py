@@ -1,0 +1,190 @@
+"""The modes of what a file holds: a surface that is filled, or tetrahedra on their own nodes."""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.arrays import BoolArray, IntArray
+from harness.errors import WrongUse
+from harness.materials import Material
+from harness.mesh import Mesh
+from harness.sim.intake import take_in
+from harness.sim.modal import HEARING, curved, default_edge
+from harness.sim.modal_mesh import QuadraticMesh
+from harness.sim.modal_solve import Elasticity, Solution, check_elasticity, check_limit, solve_mesh
+from harness.sim.tetrahedra import tetrahedralize
+from harness.sim.volume_mesh import read_volume
+from harness.sim.walls import walled
+from harness.toml_file import nearest
+
+SHARE = 0.35
+"""Of the shortest wave below the limit, the edge of an element where none is asked for."""
+
+_UNLIMITED = 1e12
+"""Hz: beyond the modes of anything; where only their number is asked for, that decides the edge."""
+
+_ON_SIDE = 1e-4
+"""Of the diagonal, how near to its bounding box a node is on a side of the object."""
+
+_SIDES = {f"{axis}-{end}": (number, end) for number, axis in enumerate("xyz") for end in ("min", "max")}
+
+
+@dataclass(frozen=True, eq=False)
+class FileModes:
+    """The modes of a file, and how they came about.
+
+    Attributes:
+        solution: the modes.
+        volume: whether the file held tetrahedra.
+        units: the unit that the file's numbers were taken in.
+        bodies: separate ones.
+        edge: m, longest edge of an element aimed at; None for a volume mesh.
+        held: nodes that are held.
+        seconds: of ``"intake"``, ``"mesh"``, ``"assemble"`` and ``"solve"``.
+        said: what was done to the mesh and what to look at, a sentence each.
+    """
+
+    solution: Solution
+    volume: bool
+    units: str
+    bodies: int
+    edge: float | None
+    held: int
+    seconds: Mapping[str, float]
+    said: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    """A mesh that can be solved."""
+
+    mesh: QuadraticMesh
+    sets: Mapping[str, IntArray]
+    units: str
+    bodies: int
+    edge: float | None
+    said: tuple[str, ...]
+
+
+def modes_of_file(
+    path: Path,
+    material: Material,
+    units: str | None = None,
+    wall: float | None = None,
+    limit: float | None = None,
+    count: int | None = None,
+    edge: float | None = None,
+    fixed: Sequence[str] = (),
+) -> FileModes:
+    """The modes of an object given by a file.
+
+    Args:
+        path: of a surface or of tetrahedra.
+        material: of all of it.
+        units: "m", "cm", "mm" or "in"; None to take the only one that makes sense.
+        wall: m, of a hollow thing of which the file has the outside; not for tetrahedra.
+        limit: Hz, up to which all modes are found; None for ``HEARING``, or none if a count is given.
+        count: modes wanted, the lowest; a few more may come with them.
+        edge: m, longest edge of an element; None for a share of the shortest wave; not for tetrahedra.
+        fixed: sides of the object ("x-min", ..., "z-max") or sets of nodes that the file names,
+            held in all axes or, as "z-min:z", in those after the colon.
+
+    Raises:
+        WrongUse: options that cannot be, or that do not go together.
+        MeshRefused: the file holds nothing that can be solved.
+    """
+    check_limit(HEARING if limit is None else limit, count)
+    check_elasticity(Elasticity.uniform(material, 1), 1)
+    seconds = dict.fromkeys(("intake", "mesh"), 0.0)
+    taken = _volume(path, units, wall, edge, seconds)
+    volume = taken is not None
+    if taken is None:
+        taken = _surface(path, units, wall, edge, material, _highest(limit, count), count, seconds)
+    held = _held(taken, fixed)
+    highest = np.inf if limit is None and count is not None else _highest(limit, count)
+    solution = solve_mesh(taken.mesh, material, highest, least=count, held=held)
+    spent = solution.modes.seconds
+    return FileModes(
+        solution=solution,
+        volume=volume,
+        units=taken.units,
+        bodies=taken.bodies,
+        edge=taken.edge,
+        held=int(held.any(axis=1).sum()),
+        seconds={**seconds, "assemble": spent["assembly"], "solve": spent["solve"]},
+        said=taken.said,
+    )
+
+
+def _highest(limit: float | None, count: int | None) -> float:
+    if limit is not None:
+        return limit
+    return HEARING if count is None else _UNLIMITED
+
+
+def _volume(
+    path: Path, units: str | None, wall: float | None, edge: float | None, seconds: dict[str, float]
+) -> _Taken | None:
+    with _timed(seconds, "intake"):
+        found = read_volume(path, units)
+    if found is None:
+        return None
+    for name, value in (("--wall", wall), ("--edge", edge)):
+        if value is not None:
+            raise WrongUse(f"{path.name} holds tetrahedra, which are solved as they are; leave {name} out")
+    return _Taken(found.mesh, found.sets, found.units, found.bodies, None, found.said)
+
+
+def _surface(
+    path: Path,
+    units: str | None,
+    wall: float | None,
+    edge: float | None,
+    material: Material,
+    limit: float,
+    count: int | None,
+    seconds: dict[str, float],
+) -> _Taken:
+    with _timed(seconds, "intake"):
+        intake = take_in(path, units, wall=wall)
+        surface: Mesh = walled(intake.mesh, wall)
+        edge = default_edge(surface, material, limit, count, SHARE) if edge is None else edge
+    with _timed(seconds, "mesh"):
+        filled = tetrahedralize(surface, edge)
+        mesh = curved(filled, surface, filled)
+    said = (*intake.report.repairs, *intake.report.warnings)
+    return _Taken(mesh, {}, intake.report.units, filled.bodies, edge, said)
+
+
+def _held(taken: _Taken, fixed: Sequence[str]) -> BoolArray:
+    """``(n, 3)``: which displacement of which node is held."""
+    nodes = taken.mesh.nodes
+    held = np.zeros(nodes.shape, dtype=np.bool_)
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    near = _ON_SIDE * float(np.linalg.norm(high - low))
+    for text in fixed:
+        name, _, axes = text.partition(":")
+        if not set(axes or "xyz") <= set("xyz"):
+            raise WrongUse(f"what is held of {name!r} is {axes!r}; say some of x, y and z, as {name}:xy")
+        if name in _SIDES:
+            axis, end = _SIDES[name]
+            side = low if end == "min" else high
+            there = np.abs(nodes[:, axis] - side[axis]) <= near
+        elif name in taken.sets and len(taken.sets[name]):
+            there = np.isin(np.arange(len(nodes)), taken.sets[name])
+        else:
+            known = [*_SIDES, *(of for of, nodes_of in taken.sets.items() if len(nodes_of))]
+            raise WrongUse(f"no side or set of nodes {name!r} to hold; {nearest(name, known)}")
+        held[np.ix_(there, ["xyz".index(axis) for axis in axes or "xyz"])] = True
+    return held
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    begun = time.perf_counter()
+    yield
+    seconds[stage] += time.perf_counter() - begun
