@@ -1,0 +1,133 @@
+"""``object.json``: strict, with a unit in every key that has one, made to be read by people."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from harness.errors import DataRefused, WrongUse
+from harness.objectfile.entries import (
+    AudioEntry,
+    Entry,
+    FileEntry,
+    MaterialEntry,
+    MeshEntry,
+    NetworkEntry,
+    Provenance,
+)
+from harness.toml_file import validate
+
+SCHEMA = 1
+
+_MOST_BYTES = 16 * 2**20
+"""Of ``object.json``; a thousand modes with their self-test are a tenth of it."""
+
+
+class Description(Entry):
+    """All of ``object.json``."""
+
+    schema_number: Literal[1] = Field(alias="schema")
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    units: Literal["m"] = "m"
+    frame: Literal["as the mesh"] = "as the mesh"
+    material: MaterialEntry
+    mesh: MeshEntry
+    provenance: Provenance
+    audio: AudioEntry | None = None
+    touch: NetworkEntry | None = None
+    vision: NetworkEntry | None = None
+
+    @property
+    def files(self) -> tuple[FileEntry, ...]:
+        """Every file that the folder must hold, each once."""
+        audio = self.audio
+        table = None if audio is None else audio.table
+        network = None if audio is None else audio.network
+        surface = None if table is None else table.surface
+        listed = (self.mesh, network, table, surface, self.touch, self.vision)
+        return tuple(entry for entry in listed if entry is not None)
+
+    @property
+    def networks(self) -> Mapping[str, NetworkEntry]:
+        """By modality, those that there are."""
+        audio = None if self.audio is None else self.audio.network
+        every = {"audio": audio, "touch": self.touch, "vision": self.vision}
+        return {name: entry for name, entry in every.items() if entry is not None}
+
+    @model_validator(mode="after")
+    def _own_files(self) -> Self:
+        names = [entry.file for entry in self.files]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"{twice[0]!r} is named twice")
+        return self
+
+
+def read_description(path: Path) -> Description:
+    """Read ``object.json``.
+
+    Raises:
+        DataRefused: it is missing, damaged, of another schema, or says something unknown; every
+            mistake is named, an unknown key with the nearest known one.
+    """
+    if not path.is_file():
+        raise DataRefused(f"{path.parent} is no ObjectFile: there is no {path.name} in it; give its folder")
+    if path.stat().st_size > _MOST_BYTES:
+        raise DataRefused(f"{path} has {path.stat().st_size} bytes, more than {_MOST_BYTES}; build it again")
+    try:
+        tree = json.loads(
+            path.read_text(encoding="utf-8"), parse_constant=_no_constant, object_pairs_hook=_no_twins
+        )
+    except (ValueError, RecursionError) as error:
+        raise DataRefused(
+            f"{path} is not JSON ({error}); copy it again, or build the object again"
+        ) from error
+    return description_from(tree, str(path))
+
+
+def description_from(tree: Any, where: str) -> Description:
+    """JSON values as a description.
+
+    Raises:
+        DataRefused: as ``read_description``.
+    """
+    number = tree.get("schema") if isinstance(tree, dict) else None
+    if number != SCHEMA:
+        raise DataRefused(
+            f"{where} is of schema {number!r}, this program reads {SCHEMA}; use the program that made it, "
+            "or build the object again"
+        )
+    try:
+        return validate(tree, Description, where)
+    except WrongUse as error:
+        raise DataRefused(str(error)) from error
+
+
+def description_text(description: Description) -> str:
+    """``object.json``: the same description is always the same text."""
+    return _text(description.model_dump(mode="json", by_alias=True), "") + "\n"
+
+
+def _text(value: Any, indent: str) -> str:
+    """JSON with a line for each key, and lists of numbers on one line."""
+    inner = indent + "  "
+    if isinstance(value, dict) and value:
+        items = [f"{inner}{json.dumps(key)}: {_text(item, inner)}" for key, item in value.items()]
+        return "{\n" + ",\n".join(items) + f"\n{indent}}}"
+    if isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
+        return "[\n" + ",\n".join(inner + _text(item, inner) for item in value) + f"\n{indent}]"
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def _no_constant(text: str) -> Any:
+    raise ValueError(f"{text} is no number of JSON")
+
+
+def _no_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    tree = dict(pairs)
+    if len(tree) != len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"the key {next(n for n in names if names.count(n) > 1)!r} is there twice")
+    return tree

@@ -1,0 +1,197 @@
+"""An ObjectFile on disk: a folder with ``object.json`` and the files that it names.
+
+Files are read on first use, each against its hash. Reading runs nothing of what is read.
+"""
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+from harness.errors import DataRefused, WrongUse
+from harness.materials import Material
+from harness.mesh import Mesh
+from harness.objectfile.description import (
+    SCHEMA,
+    Description,
+    description_from,
+    description_text,
+    read_description,
+)
+from harness.objectfile.entries import (
+    DESCRIPTION,
+    AudioEntry,
+    FileEntry,
+    MaterialEntry,
+    MeshEntry,
+    NetworkEntry,
+    Provenance,
+)
+from harness.objectfile.surface_file import mesh_from_ply, ply_bytes
+
+MESH = "mesh.ply"
+
+Modality = Literal["audio", "touch", "vision"]
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectFile:
+    """What is known of one object.
+
+    Attributes:
+        folder: it lies in.
+        description: what its ``object.json`` says.
+    """
+
+    folder: Path
+    description: Description
+
+    @classmethod
+    def open(cls, folder: Path) -> "ObjectFile":
+        """Read ``object.json``; the files are read when they are used.
+
+        Raises:
+            DataRefused: it is missing or damaged; what is wrong is named.
+        """
+        return cls(folder, read_description(folder / DESCRIPTION))
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The object's surface, in metres.
+
+        Raises:
+            DataRefused: the file is not the one described.
+        """
+        entry = self.description.mesh
+        return mesh_from_ply(self.read(entry), entry.file, entry.metres_per_unit)
+
+    @property
+    def material(self) -> Material:
+        """As the modes were computed with."""
+        return self.description.material.material()
+
+    def read(self, entry: FileEntry) -> bytes:
+        """A file's bytes, which are those that were written.
+
+        Raises:
+            DataRefused: it is missing, leads out of the folder, or its size or hash differs.
+        """
+        path = self.folder / entry.file
+        if not path.is_file():
+            raise DataRefused(f"{path} is missing; copy the whole folder again, or build the object again")
+        if path.resolve().parent != self.folder.resolve():
+            raise DataRefused(
+                f"{path} leads out of its folder, to {path.resolve()}; put the file itself there"
+            )
+        size = path.stat().st_size
+        if size != entry.bytes:
+            raise DataRefused(
+                f"{path} has {size} bytes where object.json says {entry.bytes}; "
+                "copy it again, or build the object again"
+            )
+        data = path.read_bytes()
+        found = hashlib.sha256(data).hexdigest()
+        if found != entry.sha256:
+            raise DataRefused(
+                f"{path} was changed: its sha256 is {found[:12]}... where object.json says "
+                f"{entry.sha256[:12]}...; copy it again, or build the object again"
+            )
+        return data
+
+
+def file_entry(name: str, data: bytes) -> FileEntry:
+    """What ``object.json`` says of a file with these bytes."""
+    return FileEntry(file=name, sha256=hashlib.sha256(data).hexdigest(), bytes=len(data))
+
+
+def create_object(
+    folder: Path, name: str, mesh: Mesh, material: Material, provenance: Provenance
+) -> ObjectFile:
+    """A new ObjectFile without any modality yet.
+
+    Args:
+        folder: made where it is not there.
+        name: of the object.
+        mesh: its surface in metres.
+        material: it is made of.
+        provenance: of the mesh.
+
+    Raises:
+        WrongUse: the folder holds an ObjectFile already.
+    """
+    if (folder / DESCRIPTION).exists():
+        raise WrongUse(f"{folder} holds an ObjectFile already; open it, or name another folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    data = ply_bytes(mesh)
+    low, high = mesh.bounds.tolist()
+    entry = MeshEntry(
+        **file_entry(MESH, data).model_dump(),
+        metres_per_unit=1.0,
+        vertices=len(mesh.vertices),
+        faces=len(mesh.faces),
+        low_m=tuple(low),
+        high_m=tuple(high),
+    )
+    described: dict[str, Any] = {
+        "schema": SCHEMA,
+        "name": name,
+        "material": MaterialEntry.of(material).model_dump(mode="json"),
+        "mesh": entry.model_dump(mode="json"),
+        "provenance": provenance.model_dump(mode="json"),
+    }
+    description = description_from(described, str(folder / DESCRIPTION))
+    _write(folder, description, {MESH: data})
+    return ObjectFile(folder, description)
+
+
+def with_part(
+    of: ObjectFile, modality: Modality, entry: AudioEntry | NetworkEntry, contents: Mapping[str, bytes]
+) -> ObjectFile:
+    """The ObjectFile with a modality written, in place of what there was of it.
+
+    Files are written before ``object.json``: whoever reads meanwhile gets the old part, the new
+    one, or a refusal by hash.
+
+    Args:
+        of: written to.
+        modality: the key in ``object.json``.
+        entry: what is said of it.
+        contents: bytes of every file that the entry names, by name.
+
+    Raises:
+        DataRefused: entry and contents do not belong together.
+    """
+    tree = of.description.model_dump(mode="json", by_alias=True)
+    tree[modality] = entry.model_dump(mode="json")
+    description = description_from(tree, str(of.folder / DESCRIPTION))
+    before = set(of.description.files)
+    for file in description.files:
+        data = contents.get(file.file)
+        if data is None and file not in before:
+            raise DataRefused(f"{modality} names {file.file!r}, of which no bytes were given")
+        if data is not None and file_entry(file.file, data).sha256 != file.sha256:
+            raise DataRefused(f"{modality} names another {file.file!r} than the bytes that were given")
+    unnamed = sorted(set(contents) - {file.file for file in description.files})
+    if unnamed:
+        raise DataRefused(f"{modality} does not name {unnamed}; it would never be read")
+    _write(of.folder, description, contents)
+    return ObjectFile(of.folder, description)
+
+
+def _write(folder: Path, description: Description, contents: Mapping[str, bytes]) -> None:
+    for name, data in contents.items():
+        _write_whole(folder / name, data)
+    _write_whole(folder / DESCRIPTION, description_text(description).encode())
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """Aside, flushed, renamed: readers see the old file or the new one."""
+    part = path.with_name(f".{path.name}.part")
+    with part.open("wb") as stream:
+        stream.write(data)
+        stream.flush()
+        os.fsync(stream.fileno())
+    part.replace(path)

@@ -1,0 +1,153 @@
+"""A graph from a file is believed only after it was looked through; looking runs nothing of it.
+
+What is refused: numbers kept in other files, operations beyond a list (so no loops, no code of
+others), weights that are not finite, results whose size cannot be known or is absurd.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+import onnx
+from google.protobuf.message import DecodeError
+from onnx import GraphProto, ModelProto, TensorProto, TypeProto, helper, numpy_helper
+
+from harness.errors import DataRefused
+
+MOST_NUMBERS = 2**24
+"""In any one value that a graph computes for one query."""
+
+OPERATIONS = frozenset({
+    "Abs", "Add", "And", "Cast", "Ceil", "Clip", "Concat", "Constant", "Conv", "Cos", "Div", "Elu",
+    "Equal", "Exp", "Expand", "Flatten", "Floor", "Gather", "GatherElements", "GatherND", "Gemm",
+    "Greater", "GreaterOrEqual", "Identity", "LeakyRelu", "Less", "LessOrEqual", "Log", "MatMul", "Max",
+    "Min", "Mul", "Neg", "Not", "Or", "Pow", "ReduceMax", "ReduceMean", "ReduceMin", "ReduceSum",
+    "Relu", "Reshape", "Shape", "Sigmoid", "Sin", "Slice", "Softmax", "Softplus", "Split", "Sqrt",
+    "Squeeze", "Sub", "Tanh", "Transpose", "Unsqueeze", "Where",
+})  # fmt: skip
+_KINDS = (
+    *(TensorProto.FLOAT, TensorProto.DOUBLE, TensorProto.FLOAT16),
+    *(TensorProto.INT32, TensorProto.INT64, TensorProto.UINT8, TensorProto.INT8, TensorProto.BOOL),
+)
+_AGAIN = "build the object again, or get it from where it was built"
+
+
+def checked_graph(data: bytes, name: str) -> ModelProto:
+    """The graph in a file's bytes.
+
+    Args:
+        data: of the file.
+        name: of the file, for messages.
+
+    Raises:
+        DataRefused: it is no graph, or one that must not be run, with the reason.
+    """
+    try:
+        model = onnx.load_model_from_string(data)
+    except DecodeError as error:
+        raise DataRefused(f"{name} is not ONNX ({error}); copy it again") from error
+    _check_nodes(model, name)
+    for tensor in _tensors(model.graph):
+        _check_tensor(tensor, name)
+    try:
+        onnx.checker.check_model(model, full_check=True)
+    except (onnx.checker.ValidationError, onnx.shape_inference.InferenceError, ValueError) as error:
+        raise DataRefused(f"{name} is not a valid graph ({_first_line(error)}); {_AGAIN}") from error
+    _check_sizes(model, name)
+    return model
+
+
+def _check_nodes(model: ModelProto, name: str) -> None:
+    graph = model.graph
+    if model.functions or model.training_info or graph.sparse_initializer or not graph.node:
+        raise DataRefused(f"{name} holds functions, training or sparse numbers, or no operation; {_AGAIN}")
+    for node in graph.node:
+        if node.domain not in ("", "ai.onnx") or node.op_type not in OPERATIONS:
+            asked = f"{node.domain}.{node.op_type}" if node.domain else node.op_type
+            raise DataRefused(
+                f"{name} asks for the operation {asked!r}, which no network here uses; {_AGAIN}"
+            )
+        if any(item.HasField("g") or item.graphs for item in node.attribute):
+            raise DataRefused(f"{name} has a graph within its operation {node.op_type!r}; {_AGAIN}")
+
+
+def _tensors(graph: GraphProto) -> Iterator[TensorProto]:
+    yield from graph.initializer
+    for node in graph.node:
+        for item in node.attribute:
+            yield from (item.t, *item.tensors) if item.HasField("t") else item.tensors
+
+
+def _check_tensor(tensor: TensorProto, name: str) -> None:
+    if tensor.data_location == TensorProto.EXTERNAL or tensor.external_data:
+        places = [item.value for item in tensor.external_data if item.key == "location"]
+        raise DataRefused(
+            f"{name} keeps its numbers {tensor.name!r} in another file, {places}, which is not read: "
+            "everything of a graph must be inside it; export it with its weights inside"
+        )
+    if tensor.data_type not in _KINDS:
+        kind = TensorProto.DataType.Name(tensor.data_type)
+        raise DataRefused(f"{name}: {tensor.name!r} holds {kind}, which no network here uses; {_AGAIN}")
+    try:
+        array = numpy_helper.to_array(tensor)
+    except (ValueError, TypeError, MemoryError, OverflowError) as error:
+        raise DataRefused(
+            f"{name}: {tensor.name!r} does not fill its shape ({error}); copy it again"
+        ) from error
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        bad = int(np.count_nonzero(~np.isfinite(array)))
+        raise DataRefused(
+            f"{name}: {bad} of the {array.size} numbers {tensor.name!r} are not finite; {_AGAIN}"
+        )
+
+
+def _check_sizes(model: ModelProto, name: str) -> None:
+    """Every value's size for one query, known before anything is computed."""
+    single = ModelProto()
+    single.CopyFrom(model)
+    for value in single.graph.input:
+        for size in value.type.tensor_type.shape.dim:
+            if not size.HasField("dim_value"):
+                size.dim_value = 1
+    del single.graph.value_info[:]
+    for value in single.graph.output:  # what a file claims of its results is not what they are
+        value.type.tensor_type.ClearField("shape")
+    shaped = onnx.shape_inference.infer_shapes(single, strict_mode=True, data_prop=True)
+    known = {value.name: value.type.tensor_type for value in shaped.graph.value_info}
+    known |= {value.name: value.type.tensor_type for value in shaped.graph.output}
+    for node in shaped.graph.node:
+        for output in node.output:
+            count = _numbers(known.get(output))
+            if count is None:
+                raise DataRefused(
+                    f"{name}: how large {output!r} becomes is not known before it runs; {_AGAIN}"
+                )
+            if count > MOST_NUMBERS:
+                raise DataRefused(
+                    f"{name}: one query computes {count:.3g} numbers {output!r}, more than "
+                    f"{MOST_NUMBERS}; {_AGAIN}"
+                )
+
+
+def _numbers(tensor: TypeProto.Tensor | None) -> float | None:
+    if tensor is None or not tensor.HasField("shape"):
+        return None
+    sizes = list(tensor.shape.dim)
+    if not all(size.HasField("dim_value") for size in sizes):
+        return None
+    return float(np.prod([float(size.dim_value) for size in sizes]))
+
+
+def declared(model: ModelProto) -> dict[str, tuple[str, tuple[int | str, ...]]]:
+    """Type and shape of each input and output of a graph by its name; free sizes by theirs."""
+    found: dict[str, tuple[str, tuple[int | str, ...]]] = {}
+    for value in (*model.graph.input, *model.graph.output):
+        tensor = value.type.tensor_type
+        sizes = tuple(
+            int(size.dim_value) if size.HasField("dim_value") else size.dim_param for size in tensor.shape.dim
+        )
+        found[value.name] = (str(np.dtype(helper.tensor_dtype_to_np_dtype(tensor.elem_type))), sizes)
+    return found
+
+
+def _first_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]

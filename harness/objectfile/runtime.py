@@ -1,0 +1,93 @@
+"""Running a graph: onnxruntime on the processor, one thread unless told otherwise.
+
+One thread, because a bench has other work for its cores and small networks gain nothing from a
+second. Subnormal numbers are kept out at the source, where weights are written
+(``graph.Nodes.weight``), and not by onnxruntime's ``session.set_denormal_as_zero``: that flag is
+set for the whole thread that makes the first session, and makes numpy lose subnormal float64 from
+then on.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import onnxruntime
+
+from harness.arrays import AnyArray
+from harness.errors import DataRefused, WrongUse
+from harness.objectfile.entries import Input, NetworkEntry, Tensor
+from harness.objectfile.graph_check import checked_graph, declared
+
+_FATAL = 4
+"""onnxruntime's severity; what goes wrong is raised, and said once."""
+
+
+class Network:
+    """A graph that was looked through, ready to run.
+
+    Args:
+        data: of the file.
+        name: of the file, for messages.
+        inputs: it must take.
+        outputs: it must give.
+        threads: that one run may use.
+
+    Raises:
+        DataRefused: the graph must not be run, or is not the one described.
+    """
+
+    def __init__(
+        self, data: bytes, name: str, inputs: Sequence[Input], outputs: Sequence[Tensor], threads: int = 1
+    ) -> None:
+        if threads < 1:
+            raise WrongUse(f"{threads} threads compute nothing; say 1 or more")
+        _check_declared(declared(checked_graph(data, name)), (*inputs, *outputs), name)
+        self.name, self.inputs, self.outputs = name, tuple(inputs), tuple(outputs)
+        self._session = _session(data, name, threads)
+
+    def __call__(self, inputs: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
+        """The outputs by name.
+
+        Raises:
+            DataRefused: onnxruntime cannot compute them.
+        """
+        names = [tensor.name for tensor in self.outputs]
+        try:
+            return dict(zip(names, self._session.run(names, dict(inputs)), strict=True))
+        except Exception as error:
+            raise _failed(self.name, error) from error
+
+
+def open_network(data: bytes, entry: NetworkEntry, threads: int = 1) -> Network:
+    """The network of an entry, from its file's bytes; as ``Network``."""
+    return Network(data, entry.file, entry.inputs, entry.outputs, threads)
+
+
+def _session(data: bytes, name: str, threads: int) -> "onnxruntime.InferenceSession":
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+    options.log_severity_level = _FATAL
+    # A thread that waits by spinning takes a core from the bench.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    try:
+        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    except Exception as error:
+        raise _failed(name, error) from error
+
+
+def _failed(name: str, error: Exception) -> DataRefused:
+    """Its exceptions are classes of its own for each kind of failure, with no common base."""
+    reason = " ".join(str(error).split())[:200]
+    return DataRefused(f"{name} cannot be run by onnxruntime ({reason}); build the object again")
+
+
+def _check_declared(
+    found: Mapping[str, tuple[str, tuple[int | str, ...]]], tensors: Sequence[Tensor], name: str
+) -> None:
+    described = {tensor.name: (tensor.dtype, tuple(tensor.shape)) for tensor in tensors}
+    for value in dict.fromkeys((*described, *found)):
+        if described.get(value) != found.get(value):
+            raise DataRefused(
+                f"{name}: {value!r} is {found.get(value, 'not')} in the graph and "
+                f"{described.get(value, 'not')} in object.json; they were not built together, build again"
+            )

@@ -1,0 +1,116 @@
+"""A small object whose sound is known in closed form: its network is the truth, computed in float64."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from harness.arrays import FloatArray
+from harness.materials import MATERIALS
+from harness.mesh import Mesh
+from harness.objectfile.audio_graph import OutputScales, audio_graph
+from harness.objectfile.audio_part import AudioPart, with_audio
+from harness.objectfile.entries import Provenance
+from harness.objectfile.file import ObjectFile, create_object
+from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
+from harness.sim.modes import Modes, dampings
+
+MODES = 7
+NEAR = 2e-3
+ENCODING = Encoding.octaves(4)
+PROVENANCE = Provenance(licence="CC0-1.0", seeds={"weights": 0}, code={"module": "tests.object_bench"})
+
+
+def egg() -> Mesh:
+    """An ellipsoid of 60 x 80 x 100 mm, off its origin so that no two axes are alike."""
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    return Mesh(ball.vertices * [0.03, 0.04, 0.05] + [0.11, -0.02, 0.05], ball.faces)
+
+
+def perceptron(
+    seed: int, outputs: int, width: int = 32, depth: int = 3, skips: tuple[int, ...] = ()
+) -> MlpWeights:
+    """Random layers that keep the size of what passes."""
+    random, layers, before = np.random.default_rng(seed), [], 0
+    for layer in range(depth + 1):
+        taken = before + (ENCODING.width(3) if layer == 0 or layer in skips else 0)
+        given = outputs if layer == depth else width
+        weight = random.normal(size=(taken, given)) * np.sqrt(2.0 / taken)
+        layers.append((weight, 0.1 * random.normal(size=given)))
+        before = given
+    return MlpWeights(tuple(layers), skips)
+
+
+def normaliser(mesh: Mesh) -> Normaliser:
+    """Of the mesh's box."""
+    return Normaliser.unit_box(mesh.bounds[0], mesh.bounds[1])
+
+
+def scales(modes: int = MODES) -> OutputScales:
+    """Another for each mode and direction, so that none can be taken for another."""
+    numbers = np.arange(1.0, 3.0 * modes + 1.0).reshape(modes, 3)
+    return OutputScales(numbers, -0.1 * numbers)
+
+
+def computed(
+    branches: Sequence[MlpWeights],
+    points: FloatArray,
+    normal: Normaliser,
+    scale: OutputScales,
+    encoding: Encoding = ENCODING,
+) -> FloatArray:
+    """``(n, m, 3)``: what the graph should give, by the definitions, in float64."""
+    inside = (points - normal.shift) * normal.factor
+    waves = [wave(rate * inside) for rate in encoding.frequencies for wave in (np.sin, np.cos)]
+    encoded = np.concatenate([inside, *waves], axis=1)
+    outputs = []
+    for branch in branches:
+        hidden = np.zeros((len(points), 0))
+        for number, (weight, bias) in enumerate(branch.layers):
+            if number == 0 or number in branch.skips:
+                hidden = np.concatenate([encoded, hidden], axis=1)
+            hidden = hidden @ weight + bias
+            if number < len(branch.layers) - 1:
+                hidden = np.maximum(hidden, 0.0)
+        outputs.append(hidden)
+    stacked = outputs[0].reshape(len(points), -1, 3) if len(outputs) == 1 else np.stack(outputs, axis=2)
+    return np.asarray(stacked * scale.factor + scale.offset)
+
+
+def egg_modes(mesh: Mesh) -> Modes:
+    """The modes whose shapes the network of ``egg_part`` gives."""
+    shapes = computed([perceptron(0, 3 * MODES)], mesh.vertices, normaliser(mesh), scales())
+    return Modes(
+        frequencies=np.linspace(900.0, 9000.0, MODES),
+        points=mesh.vertices,
+        normals=mesh.vertex_normals,
+        faces=mesh.faces,
+        shapes=shapes,
+        limit=1e4,
+        mass=0.3,
+        rigid=6,
+        nodes=5000,
+        elements=3000,
+        residual=1e-9,
+        seconds={},
+    )
+
+
+def egg_part(mesh: Mesh) -> AudioPart:
+    """Its sound, by network and table."""
+    modes = egg_modes(mesh)
+    return AudioPart(
+        modes=modes,
+        dampings=dampings(modes.frequencies, MATERIALS["ceramic"]),
+        near_surface=NEAR,
+        provenance=PROVENANCE,
+        graph=audio_graph([perceptron(0, 3 * MODES)], normaliser(mesh), scales(), ENCODING),
+        measured={"network": {"gain_error_median": 0.01}},
+    )
+
+
+def egg_file(folder: Path) -> ObjectFile:
+    """The object, written."""
+    mesh = egg()
+    return with_audio(create_object(folder, "egg", mesh, MATERIALS["ceramic"], PROVENANCE), egg_part(mesh))
