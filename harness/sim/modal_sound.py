@@ -46,13 +46,18 @@ def audible(frequencies: FloatArray, rate: float) -> BoolArray:
     return np.asarray(frequencies < 0.5 * rate)
 
 
+def is_heavy(frequencies: FloatArray, dampings: FloatArray) -> BoolArray:
+    """``(m,)``: the modes damped by more than half of critical: short, or no wave at all."""
+    return np.asarray(dampings > _HEAVY * 2.0 * np.pi * frequencies)
+
+
 def half_sine(rate: float, duration: float, peak: float) -> FloatArray:
     """``(t,)`` N, a blow of ``duration`` s that rises to ``peak`` N and falls as half a sine.
 
     Raises:
         WrongUse: a rate or a duration that is not above zero.
     """
-    _check_rate(rate)
+    check_rate(rate)
     if not (np.isfinite(duration) and duration > 0.0):
         raise WrongUse(f"a blow of {duration:g} s is none; say a duration above 0")
     times = np.arange(int(np.floor(duration * rate)) + 1) / rate
@@ -111,7 +116,7 @@ def ring(
     """
     _check(frequencies, dampings, amplitudes, force, rate)
     heard = audible(frequencies, rate)
-    heavy = heard & (dampings > _HEAVY * 2.0 * np.pi * frequencies)
+    heavy = heard & is_heavy(frequencies, dampings)
     light = heard & ~heavy
     sound = _blocks(frequencies[light], dampings[light], amplitudes[:, light], force, rate)
     if heavy.any():
@@ -186,19 +191,37 @@ def _direct(
 def _check(
     frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray, force: FloatArray, rate: float
 ) -> None:
-    _check_rate(rate)
-    modes = (len(frequencies),)
-    if dampings.shape != modes or amplitudes.shape != (len(force), *modes) or force.ndim != 2:
+    check_rate(rate)
+    if force.ndim != 2 or len(amplitudes) != len(force):
         raise WrongUse(
-            f"{len(frequencies)} frequencies, dampings {dampings.shape}, amplitudes {amplitudes.shape} and "
-            f"force {force.shape} do not belong together; they are (m,), (m,), (k, m) and (k, t)"
+            f"amplitudes {amplitudes.shape} and force {force.shape} do not belong together; they are "
+            "(k, m) and (k, t)"
         )
-    if not all(np.isfinite(part).all() for part in (frequencies, dampings, amplitudes, force)):
-        raise WrongUse("a frequency, damping, amplitude or force is not a finite number; nothing rings")
+    if not np.isfinite(force).all():
+        raise WrongUse("a force is not a finite number; nothing rings")
+    check_modes(frequencies, dampings, amplitudes)
+
+
+def check_modes(frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray) -> None:
+    """Refuse modes that cannot ring.
+
+    Raises:
+        WrongUse: shapes other than ``(m,)``, ``(m,)`` and ``(k, m)``, numbers that are not finite,
+            a frequency that is not above zero or a damping below zero.
+    """
+    modes = (len(frequencies),)
+    if dampings.shape != modes or amplitudes.ndim != 2 or amplitudes.shape[1:] != modes:
+        raise WrongUse(
+            f"{len(frequencies)} frequencies, dampings {dampings.shape} and amplitudes {amplitudes.shape} do "
+            "not belong together; they are (m,), (m,) and (k, m)"
+        )
+    if not all(np.isfinite(part).all() for part in (frequencies, dampings, amplitudes)):
+        raise WrongUse("a frequency, damping or amplitude is not a finite number; nothing rings")
     if (frequencies <= 0.0).any() or (dampings < 0.0).any():
         raise WrongUse("a mode has a frequency above 0 and a damping of 0 or more; rigid modes do not ring")
 
 
-def _check_rate(rate: float) -> None:
+def check_rate(rate: float) -> None:
+    """Refuse a rate that is not above zero, with ``WrongUse``."""
     if not (np.isfinite(rate) and rate > 0.0):
         raise WrongUse(f"{rate:g} samples per second make no sound; say a rate above 0")
