@@ -1,0 +1,174 @@
+"""A sum of decaying sines as products of two tables: underdamped modes after one impulse.
+
+The kernels of ``harness.sim.synthesis_kernels`` make the tables; here is which modes are in them, for how
+long, and in which order they are multiplied.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.linalg.blas import dgemm, sgemm
+
+from harness.arrays import AnyArray, FloatArray, IntArray
+from harness.sim.synthesis_kernels import TILE, block_counts, fill, largest_rest
+
+TableLevel = Literal["fast", "double"]
+"""Tables in single precision, from phases in double; or tables in double precision."""
+
+CUTS: Mapping[TableLevel, float] = {"fast": 100.0, "double": 260.0}
+"""dB: all modes that are left out late together stay that far below the root of the sum of squares of
+all first amplitudes. Few are ever near their share of it: with random amplitudes of a hundred modes
+or more it comes to 25 dB more."""
+
+_FLOORS: Mapping[TableLevel, float] = {"fast": 1e-12, "double": 1e-140}
+"""Entries of a table below are zero: neither a product nor a difference of two is then subnormal."""
+
+_MULTIPLE = 16
+"""Blocks in which a mode sounds are rounded up to it, so that few products of matrices are needed."""
+
+_SEGMENT = 2048
+"""Blocks of one table, which is made anew for each segment of a long sound."""
+
+_LIKE = 0.75
+"""Modes are multiplied together that sound for at least this share of the longest among them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Underdamped modes, and how each turns from sample to sample.
+
+    Attributes:
+        dampings: ``(m,)`` 1/s.
+        turns: ``(m,)`` turns of the phase per sample.
+        rate: samples per second.
+    """
+
+    dampings: FloatArray
+    turns: FloatArray
+    rate: float
+
+    def take(self, order: IntArray) -> "Steps":
+        """Some of the modes, in an order."""
+        return Steps(self.dampings[order], self.turns[order], self.rate)
+
+    def over(self, samples: int) -> AnyArray:
+        """``(m,)`` complex factor of some samples; the phase loses no whole turns to rounding."""
+        turns = samples * self.turns
+        decay = np.exp(-self.dampings * (samples / self.rate))
+        return np.asarray(decay * np.exp(2j * np.pi * (turns - np.rint(turns))))
+
+
+def fill_sound(steps: Steps, weights: AnyArray, sound: FloatArray, level: TableLevel) -> float:
+    """Write ``(blocks, block)`` samples of one sound that is all zero.
+
+    Args:
+        steps: of the modes.
+        weights: ``(m,)`` complex, of each at time zero.
+        sound: written to; its second length is a power of two.
+        level: precision.
+
+    Returns:
+        The most that any sample lacks of modes left out because they were nearly over.
+    """
+    sizes = np.abs(weights)
+    loudest = float(sizes.max())
+    if loudest == 0.0:
+        return 0.0
+    sizes /= loudest
+    blocks, length = sound.shape
+    seconds = length / steps.rate
+    quiet = 10.0 ** (-CUTS[level] / 20.0) * float(np.linalg.norm(sizes)) / len(sizes)
+    counts = block_counts(sizes, steps.dampings, quiet, seconds, blocks, _MULTIPLE)
+    rest = largest_rest(sizes, steps.dampings, counts, seconds, blocks, _MULTIPLE)
+    order = np.argsort(-counts, kind="stable")[: np.count_nonzero(counts)]
+    tables = _Tables(steps.take(order), weights[order] / loudest, counts[order], level, length)
+    for first in range(0, int(counts[order[0]]), _SEGMENT):
+        tables.multiply(first, loudest, sound[first : first + _SEGMENT])
+    return loudest * (rest + 4.0 * len(sizes) * _FLOORS[level])
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Modes that fall silent at about the same time.
+
+    Attributes:
+        modes: of the ordered ones, from and to.
+        counts: ``(tiles,)`` blocks in which each tile sounds.
+        within: ``(block, 2 TILE tiles)`` table of one block.
+    """
+
+    modes: slice
+    counts: IntArray
+    within: AnyArray
+
+
+class _Tables:
+    """The tables of one sound, its modes in the order in which they fall silent, last first.
+
+    Each group is multiplied for as many blocks as its longest mode sounds and added to the sum, so
+    that every entry of a table is read once.
+    """
+
+    def __init__(
+        self, steps: Steps, weights: AnyArray, counts: IntArray, level: TableLevel, block: int
+    ) -> None:
+        self._steps, self._weights, self._block = steps, weights, block
+        self._type = np.dtype(np.float32 if level == "fast" else np.float64)
+        self._floor = _FLOORS[level]
+        self._gemm = sgemm if level == "fast" else dgemm
+        self._ahead = steps.over(block)
+        sample = steps.over(1)
+        self._groups = tuple(self._group(modes, counts, sample[modes]) for modes in _together(counts))
+
+    def _group(self, modes: slice, counts: IntArray, sample: AnyArray) -> _Group:
+        within = np.empty((self._block, _width(len(sample))), self._type)
+        whole = np.full(within.shape[1] // (2 * TILE), self._block)
+        fill(within, whole, _in_tiles(np.ones_like(sample)), _in_tiles(sample), self._floor, True)
+        return _Group(modes, counts[modes][::TILE].copy(), within)
+
+    def multiply(self, begin: int, scale: float, sound: FloatArray) -> None:
+        """Write the blocks of a segment that begins at block ``begin``."""
+        product: AnyArray = np.empty(0)
+        for group in self._groups:
+            counts = np.minimum(group.counts - begin, len(sound))
+            rows = int(counts[0])
+            if rows <= 0:
+                break
+            if not product.size:
+                product = np.zeros((rows, self._block), self._type)
+            starts = self._starts(group, begin, counts)
+            self._gemm(1.0, group.within.T, starts.T, 1.0, product[:rows].T, trans_a=True, overwrite_c=True)
+        np.multiply(product, scale, out=sound[: len(product)], dtype=np.float64)
+
+    def _starts(self, group: _Group, begin: int, counts: IntArray) -> AnyArray:
+        """``(rows, 2 TILE tiles)``: where each block begins."""
+        weights = self._weights[group.modes]
+        if begin:
+            weights = weights * self._steps.over(begin * self._block)[group.modes]
+        starts = np.zeros((int(counts[0]), group.within.shape[1]), self._type)
+        fill(starts, counts, _in_tiles(weights), _in_tiles(self._ahead[group.modes]), self._floor, False)
+        return starts
+
+
+def _together(counts: IntArray) -> list[slice]:
+    """Runs of whole tiles whose counts are like, of descending counts."""
+    groups, first = [], 0
+    for tile in range(TILE, len(counts), TILE):
+        if counts[tile] < _LIKE * counts[first]:
+            groups.append(slice(first, tile))
+            first = tile
+    return [*groups, slice(first, len(counts))]
+
+
+def _width(modes: int) -> int:
+    """Columns of a table."""
+    return 2 * TILE * -(-modes // TILE)
+
+
+def _in_tiles(values: AnyArray) -> FloatArray:
+    """``(2, TILE tiles)`` real and imaginary parts, zero beyond the values."""
+    parts = np.zeros((2, _width(len(values)) // 2))
+    parts[0, : len(values)], parts[1, : len(values)] = values.real, values.imag
+    return parts
