@@ -1,7 +1,10 @@
 """A small object whose sound is known in closed form: its network is the truth, computed in float64."""
 
-from collections.abc import Sequence
+import hashlib
+import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -11,7 +14,7 @@ from harness.materials import MATERIALS
 from harness.mesh import Mesh
 from harness.objectfile.audio_graph import OutputScales, audio_graph
 from harness.objectfile.audio_part import AudioPart, with_audio
-from harness.objectfile.entries import Provenance
+from harness.objectfile.entries import DESCRIPTION, Provenance
 from harness.objectfile.file import ObjectFile, create_object
 from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
 from harness.sim.modes import Modes, dampings
@@ -114,3 +117,26 @@ def egg_file(folder: Path) -> ObjectFile:
     """The object, written."""
     mesh = egg()
     return with_audio(create_object(folder, "egg", mesh, MATERIALS["ceramic"], PROVENANCE), egg_part(mesh))
+
+
+def rewrite(folder: Path, change: Callable[[dict[str, Any]], None]) -> ObjectFile:
+    """Change ``object.json`` as a person with an editor would, and open it again."""
+    path = folder / DESCRIPTION
+    tree = json.loads(path.read_text())
+    change(tree)
+    path.write_text(json.dumps(tree))
+    return ObjectFile.open(folder)
+
+
+def exchange(folder: Path, name: str, data: bytes) -> ObjectFile:
+    """Put other bytes in a file's place, hash and all, so that only looking inside can tell."""
+    (folder / name).write_bytes(data)
+
+    def change(tree: Any) -> None:
+        if isinstance(tree, dict):
+            if tree.get("file") == name:
+                tree |= {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
+            for item in tree.values():
+                change(item)
+
+    return rewrite(folder, change)

@@ -94,7 +94,7 @@ def description_from(tree: Any, where: str) -> Description:
         DataRefused: as ``read_description``.
     """
     number = tree.get("schema") if isinstance(tree, dict) else None
-    if number != SCHEMA:
+    if type(number) is not int or number != SCHEMA:
         raise DataRefused(
             f"{where} is of schema {number!r}, this program reads {SCHEMA}; use the program that made it, "
             "or build the object again"

@@ -167,7 +167,7 @@ def with_part(
     tree = of.description.model_dump(mode="json", by_alias=True)
     tree[modality] = entry.model_dump(mode="json")
     description = description_from(tree, str(of.folder / DESCRIPTION))
-    before = set(of.description.files)
+    before = of.description.files
     for file in description.files:
         data = contents.get(file.file)
         if data is None and file not in before:

@@ -114,7 +114,8 @@ class Nodes:
         Raises:
             WrongUse: a number that is not finite, or that the storage cannot hold.
         """
-        stored = np.asarray(array, np.float32).astype(self.storage)
+        with np.errstate(over="ignore", under="ignore"):  # said below, or meant
+            stored = np.asarray(array, np.float64).astype(self.storage)
         if not np.isfinite(stored).all():
             bad = int(np.count_nonzero(~np.isfinite(stored)))
             raise WrongUse(

@@ -1,0 +1,146 @@
+"""A graph from a stranger is looked through before it is run; what could do harm is refused by name."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from object_bench import ENCODING, MODES, egg, normaliser, perceptron, scales
+from onnx import ModelProto, NodeProto, TensorProto, helper, numpy_helper
+
+from harness.arrays import AnyArray
+from harness.errors import DataRefused
+from harness.objectfile.audio_graph import audio_graph
+from harness.objectfile.graph_check import checked_graph, declared
+
+
+def good() -> ModelProto:
+    return audio_graph([perceptron(0, 3 * MODES)], normaliser(egg()), scales(), ENCODING)
+
+
+def tiny(nodes: list[NodeProto], constants: dict[str, AnyArray] | None = None, axes: int = 2) -> ModelProto:
+    """A graph from ``x``, float32 ``(n, 3)``, to ``y`` of as many axes, of any sizes."""
+    graph = helper.make_graph(
+        nodes,
+        "tiny",
+        [helper.make_tensor_value_info("x", TensorProto.FLOAT, ["n", 3])],
+        [helper.make_tensor_value_info("y", TensorProto.FLOAT, list("abcd"[:axes]))],
+        [numpy_helper.from_array(array, name) for name, array in (constants or {}).items()],
+    )
+    return helper.make_model(graph, ir_version=8, opset_imports=[helper.make_opsetid("", 17)])
+
+
+def refused(model: ModelProto) -> str:
+    with pytest.raises(DataRefused) as caught:
+        checked_graph(model.SerializeToString(), "x.onnx")
+    return str(caught.value)
+
+
+def test_a_network_of_ours_passes() -> None:
+    model = checked_graph(good().SerializeToString(), "audio.onnx")
+    assert declared(model) == {
+        "points": ("float64", ("n", 3)),
+        "gains": ("float32", ("n", MODES, 3)),
+    }
+
+
+@pytest.mark.parametrize("location", ["/etc/passwd", "../secret.bin", "weights.bin"])
+def test_weights_in_another_file_are_refused_wherever_it_is(location: str) -> None:
+    model = good()
+    tensor = model.graph.initializer[2]
+    tensor.ClearField("raw_data")
+    tensor.data_location = TensorProto.EXTERNAL
+    tensor.external_data.add(key="location", value=location)
+    said = refused(model)
+    assert location in said
+    assert "another file" in said
+
+
+def test_weights_outside_are_refused_inside_an_attribute_too() -> None:
+    value = helper.make_tensor("t", TensorProto.FLOAT, [3], [1.0, 2.0, 3.0])
+    value.data_location = TensorProto.EXTERNAL
+    value.external_data.add(key="location", value="/dev/zero")
+    nodes = [helper.make_node("Constant", [], ["c"]), helper.make_node("Add", ["x", "c"], ["y"])]
+    nodes[0].attribute.add(name="value", type=onnx.AttributeProto.TENSOR).t.CopyFrom(value)
+    assert "/dev/zero" in refused(tiny(nodes))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_weights_that_are_not_finite_are_refused(bad: float) -> None:
+    model = good()
+    index = next(i for i, t in enumerate(model.graph.initializer) if t.data_type == TensorProto.FLOAT)
+    array = numpy_helper.to_array(model.graph.initializer[index]).copy()
+    array.flat[0] = bad
+    model.graph.initializer[index].CopyFrom(
+        numpy_helper.from_array(array, model.graph.initializer[index].name)
+    )
+    assert "1 of the" in refused(model)
+
+
+@pytest.mark.parametrize("domain", ["com.microsoft", "evil.corp"])
+def test_operations_of_others_are_refused(domain: str) -> None:
+    node = helper.make_node("Relu", ["x"], ["y"], domain=domain)
+    assert f"{domain}.Relu" in refused(tiny([node]))
+
+
+def test_loops_are_refused() -> None:
+    body = helper.make_graph([helper.make_node("Identity", ["a"], ["b"])], "body", [], [])
+    node = helper.make_node("Loop", ["", "", "x"], ["y"], body=body)
+    assert "'Loop'" in refused(tiny([node]))
+
+
+def test_functions_of_the_files_own_are_refused() -> None:
+    model = tiny([helper.make_node("Relu", ["x"], ["y"])])
+    model.functions.add(name="Relu", domain="evil")
+    assert "functions" in refused(model)
+
+
+def test_a_result_larger_than_any_memory_is_refused_before_it_is_computed() -> None:
+    shape = np.array([2**20, 2**20, 3])
+    node = helper.make_node("Expand", ["x", "s"], ["y"])
+    said = refused(tiny([node], {"s": shape}, axes=3))
+    assert "3.3e+12 numbers" in said
+
+
+def test_an_outer_product_of_small_weights_that_becomes_huge_is_refused() -> None:
+    side = np.zeros((8192, 1), np.float32)
+    nodes = [helper.make_node("MatMul", ["a", "b"], ["big"]), helper.make_node("ReduceSum", ["big"], ["y"])]
+    assert "6.71e+07 numbers" in refused(tiny(nodes, {"a": side, "b": side.T.copy()}))
+
+
+def test_a_size_that_depends_on_the_numbers_asked_is_refused() -> None:
+    nodes = [
+        helper.make_node("Cast", ["x"], ["i"], to=TensorProto.INT64),
+        helper.make_node("Gather", ["i", "zero"], ["shape"], axis=0),
+        helper.make_node("Expand", ["x", "shape"], ["y"]),
+    ]
+    assert "not known before" in refused(tiny(nodes, {"zero": np.array(0)}, axes=3))
+
+
+def test_numbers_that_do_not_fill_their_shape_are_refused() -> None:
+    model = good()
+    model.graph.initializer[1].dims[0] = 10**9
+    assert "does not fill its shape" in refused(model)
+
+
+def test_a_pickle_is_not_a_graph(tmp_path: Path) -> None:
+    class Runs:
+        def __reduce__(self) -> tuple[object, tuple[str]]:
+            return (Path.touch, (Path(tmp_path / "ran"),))  # type: ignore[return-value]
+
+    with pytest.raises(DataRefused):
+        checked_graph(pickle.dumps(Runs()), "audio.onnx")
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.999])
+def test_a_file_cut_short_is_refused(share: float) -> None:
+    data = good().SerializeToString()
+    with pytest.raises(DataRefused):
+        checked_graph(data[: int(share * len(data))], "audio.onnx")
+
+
+def test_a_graph_whose_operations_do_not_fit_together_is_refused() -> None:
+    node = helper.make_node("MatMul", ["x", "w"], ["y"])
+    assert "not a valid graph" in refused(tiny([node], {"w": np.zeros((4, 2), np.float32)}))

@@ -1,0 +1,173 @@
+"""Verifying finds each kind of damage in its own check, and says what to do; a sound object passes all."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from object_bench import ENCODING, MODES, egg, exchange, normaliser, perceptron, rewrite, scales
+from onnx import TensorProto, helper, load_model_from_string, numpy_helper
+
+from harness.mesh import Mesh
+from harness.objectfile.audio_graph import OutputScales, audio_graph
+from harness.objectfile.audio_table import table_bytes
+from harness.objectfile.entries import Domain, Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
+from harness.objectfile.file import ObjectFile, file_entry, with_part
+from harness.objectfile.surface_file import ply_bytes
+from harness.objectfile.verify import verify
+
+
+def failures(of: ObjectFile) -> dict[str, str]:
+    return {check.name: check.said for check in verify(of) if not check.passed}
+
+
+def test_an_object_as_it_was_built_passes_every_check(egg_object: ObjectFile) -> None:
+    checks = verify(egg_object)
+    assert all(check.passed for check in checks), checks
+    assert [check.name for check in checks] == [
+        *(f"{name}: bytes" for name in ("mesh.ply", "audio.onnx", "audio_table.npy", "audio_surface.ply")),
+        *("folder: nothing else", "mesh"),
+        *("audio: graph", "audio: domain", "audio: self-test", "audio: table"),
+    ]
+
+
+def test_a_changed_file_fails_and_the_rest_is_still_looked_at(spoiled: Path) -> None:
+    data = bytearray((spoiled / "audio_table.npy").read_bytes())
+    data[-1] ^= 1
+    (spoiled / "audio_table.npy").write_bytes(data)
+    found = failures(ObjectFile.open(spoiled))
+    assert set(found) == {"audio_table.npy: bytes", "audio: table"}
+    assert "copy it again" in found["audio_table.npy: bytes"]
+
+
+def test_a_missing_network_fails_where_it_is_used(spoiled: Path) -> None:
+    (spoiled / "audio.onnx").unlink()
+    found = failures(ObjectFile.open(spoiled))
+    assert set(found) == {
+        "audio.onnx: bytes",
+        *(f"audio: {c}" for c in ("graph", "domain", "self-test", "table")),
+    }
+
+
+def test_a_file_that_nothing_names_is_pointed_at(spoiled: Path) -> None:
+    (spoiled / "audio.onnx.data").write_bytes(b"weights")
+    assert "audio.onnx.data" in failures(ObjectFile.open(spoiled))["folder: nothing else"]
+
+
+def test_another_network_of_the_same_shape_fails_the_self_test(spoiled: Path) -> None:
+    other = audio_graph([perceptron(99, 3 * MODES)], normaliser(egg()), scales(), ENCODING)
+    found = failures(exchange(spoiled, "audio.onnx", other.SerializeToString()))
+    assert "when it was made" in found["audio: self-test"]
+    assert "audio: graph" not in found
+
+
+def test_a_network_of_another_size_is_not_the_one_described(spoiled: Path) -> None:
+    other = audio_graph([perceptron(0, 3 * MODES + 3)], normaliser(egg()), scales(MODES + 1), ENCODING)
+    found = failures(exchange(spoiled, "audio.onnx", other.SerializeToString()))
+    assert "they were not built together" in found["audio: graph"]
+
+
+def test_a_network_that_overflows_within_its_domain_fails_there(spoiled: Path) -> None:
+    scale = OutputScales(np.full((MODES, 3), 3e38), np.zeros((MODES, 3)))
+    other = audio_graph([perceptron(0, 3 * MODES)], normaliser(egg()), scale, ENCODING)
+    found = failures(exchange(spoiled, "audio.onnx", other.SerializeToString()))
+    assert "not finite within the domain" in " ".join(found["audio: domain"].split())
+
+
+def test_weights_that_are_not_finite_fail_before_they_are_run(spoiled: Path) -> None:
+    model = load_model_from_string((spoiled / "audio.onnx").read_bytes())
+    index = next(i for i, t in enumerate(model.graph.initializer) if t.data_type == TensorProto.FLOAT)
+    kept = model.graph.initializer[index]
+    array = numpy_helper.to_array(kept).copy()
+    array.flat[:2] = np.nan
+    kept.CopyFrom(numpy_helper.from_array(array, kept.name))
+    found = failures(exchange(spoiled, "audio.onnx", model.SerializeToString()))
+    assert "2 of the" in found["audio: graph"]
+
+
+def test_weights_outside_of_the_folder_are_not_fetched(spoiled: Path) -> None:
+    secret = spoiled.parent / "secret.bin"
+    model = load_model_from_string((spoiled / "audio.onnx").read_bytes())
+    kept = model.graph.initializer[-1]
+    secret.write_bytes(kept.raw_data)  # even the right numbers
+    kept.ClearField("raw_data")
+    kept.data_location = TensorProto.EXTERNAL
+    kept.external_data.add(key="location", value="../secret.bin")
+    found = failures(exchange(spoiled, "audio.onnx", model.SerializeToString()))
+    assert "../secret.bin" in found["audio: graph"]
+
+
+def test_a_table_of_another_object_is_told_from_the_network(spoiled: Path) -> None:
+    random = np.random.default_rng(0).uniform(-1.0, 1.0, (642, MODES, 3)).astype(np.float16)
+    found = failures(exchange(spoiled, "audio_table.npy", table_bytes(random)))
+    assert "different objects" in " ".join(found["audio: table"].split())
+
+
+def test_a_surface_in_other_units_is_told_from_the_description(spoiled: Path) -> None:
+    mesh = egg()
+    found = failures(exchange(spoiled, "mesh.ply", ply_bytes(Mesh(1e3 * mesh.vertices, mesh.faces))))
+    assert "build the object again" in found["mesh"]
+
+
+def shorten(tree: dict[str, Any]) -> None:
+    tree["audio"]["network"]["self_test"]["inputs"][0]["values"] = [0.1, 0.2]
+
+
+def reach_beyond(tree: dict[str, Any]) -> None:
+    tree["audio"]["network"]["self_test"]["outputs"][0]["at"][-1] = 10**6
+
+
+@pytest.mark.parametrize(
+    ("change", "said"), [(shorten, "2 numbers 'points'"), (reach_beyond, "number 1000000 of")]
+)
+def test_a_self_test_that_cannot_be_asked_is_said(spoiled: Path, change: Any, said: str) -> None:
+    assert said in failures(rewrite(spoiled, change))["audio: self-test"]
+
+
+def squares(low: tuple[float, ...], high: tuple[float, ...], data: bytes) -> NetworkEntry:
+    pose = Input(
+        name="pose",
+        dtype="float32",
+        shape=("n", 2),
+        unit="1",
+        meaning="anything",
+        domain=Domain(low=low, high=high),
+        normaliser="in the graph",
+    )
+    depth = Tensor(name="depth", dtype="float32", shape=("n", 2), unit="m", meaning="its square root")
+    return NetworkEntry(
+        **file_entry("touch.onnx", data).model_dump(),
+        inputs=(pose,),
+        outputs=(depth,),
+        self_test=SelfTest(
+            rows=2,
+            inputs=(Whole(name="pose", values=(1.0, 4.0, 9.0, 16.0)),),
+            outputs=(Sampled(name="depth", at=(0, 1, 3), values=(1.0, 2.0, 4.0)),),
+            tolerance=1e-5,
+        ),
+    )
+
+
+def root_graph() -> bytes:
+    graph = helper.make_graph(
+        [helper.make_node("Sqrt", ["pose"], ["depth"])],
+        "root",
+        [helper.make_tensor_value_info("pose", TensorProto.FLOAT, ["n", 2])],
+        [helper.make_tensor_value_info("depth", TensorProto.FLOAT, ["n", 2])],
+    )
+    model = helper.make_model(graph, ir_version=8, opset_imports=[helper.make_opsetid("", 17)])
+    return model.SerializeToString()
+
+
+@pytest.mark.parametrize("modality", ["touch", "vision"])
+def test_any_modality_is_verified_over_its_own_domain(spoiled: Path, modality: Any) -> None:
+    data = root_graph()
+    of = with_part(
+        ObjectFile.open(spoiled), modality, squares((0.0, 0.0), (1.0, 20.0), data), {"touch.onnx": data}
+    )
+    assert not failures(of)
+    assert sum(check.name.startswith(f"{modality}:") for check in verify(of)) == 3
+    of = with_part(of, modality, squares((-0.1, 0.0), (1.0, 20.0), data), {"touch.onnx": data})
+    assert set(failures(of)) == {f"{modality}: domain"}
+    of = with_part(of, modality, squares((0.0,), (1.0,), data), {"touch.onnx": data})
+    assert "1 numbers for queries of 2" in failures(of)[f"{modality}: domain"]
