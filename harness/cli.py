@@ -64,6 +64,10 @@ COMMANDS = {
         "experiments.commands.cost:contact_localization",
         "Error against seconds of the estimate; `run --budget` and `run --error` go by it.",
     ),
+    "object build": Command(
+        "experiments.commands.object_build:build",
+        "Build an object's sound: modes, a network of their shapes, and its errors.",
+    ),
     "object info": Command(
         "experiments.commands.object:info", "Say what an ObjectFile holds: modes, networks, sources, licence."
     ),

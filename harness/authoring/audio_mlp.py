@@ -1,0 +1,246 @@
+"""The perceptrons of sound: the paper's three and one for all, trained by Adam, resumed exactly."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from harness.arrays import AnyArray, FloatArray, IntArray
+from harness.authoring.audio_data import between_nodes
+from harness.authoring.audio_profiles import PerceptronSpec
+from harness.authoring.audio_readout import error_shares, solve_readout
+from harness.errors import DataRefused, WrongUse
+from harness.objectfile.audio_graph import OutputScales
+from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
+from harness.sim.modes import Modes
+from harness.store import digest
+
+VERSION = 1
+"""Raised with every change of what training computes, so that no old checkpoint is gone on from."""
+
+_CHUNK = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedMlp:
+    """Plain arrays, as ``harness.objectfile.audio_graph.audio_graph`` takes them."""
+
+    branches: tuple[MlpWeights, ...]
+    normaliser: Normaliser
+    scales: OutputScales
+    encoding: Encoding
+
+
+class Perceptrons(nn.Module):
+    """Branches side by side on one encoded input: ``(k, e)`` to ``(k, m, 3)``."""
+
+    def __init__(self, spec: PerceptronSpec, modes: int, seed: int) -> None:
+        super().__init__()
+        self._skip = spec.skip
+        self._encoded = Encoding.octaves(spec.octaves).width(3)
+        random = np.random.default_rng([seed, 4])
+        outputs = 3 * modes // spec.branches
+        self.branches = nn.ModuleList(self._branch(spec, outputs, random) for _ in range(spec.branches))
+
+    def forward(self, encoded: Tensor) -> Tensor:
+        """Outputs of all modes and directions."""
+        last: list[Tensor] = [branch[-1](self.hidden(encoded, branch)) for branch in self.layers()]
+        if len(last) == 1:
+            return last[0].reshape(len(encoded), -1, 3)
+        return torch.stack(last, dim=2)
+
+    def hidden(self, encoded: Tensor, branch: list[nn.Linear]) -> Tensor:
+        """``(k, width)``: what the last layer of a branch takes."""
+        hidden = encoded
+        for index, layer in enumerate(branch[:-1]):
+            if index and index == self._skip:
+                hidden = torch.cat([encoded, hidden], dim=1)
+            hidden = torch.relu(layer(hidden))
+        return hidden
+
+    def layers(self) -> Iterator[list[nn.Linear]]:
+        """The linear layers of each branch."""
+        for branch in self.branches:
+            assert isinstance(branch, nn.ModuleList)
+            yield [layer for layer in branch if isinstance(layer, nn.Linear)]
+
+    def _branch(self, spec: PerceptronSpec, outputs: int, random: np.random.Generator) -> nn.ModuleList:
+        layers = nn.ModuleList()
+        width = self._encoded
+        for index in range(spec.depth + 1):
+            taken = width + (self._encoded if index and index == spec.skip else 0)
+            width = spec.width if index < spec.depth else outputs
+            layer = nn.Linear(taken, width)
+            with torch.no_grad():
+                weight = random.standard_normal((width, taken)) * np.sqrt(2.0 / taken)
+                layer.weight.copy_(torch.from_numpy(np.float32(weight)))
+                layer.bias.zero_()
+            layers.append(layer)
+        return layers
+
+
+class Training:
+    """A training that can stop after any epoch and go on from its checkpoint, bit for bit.
+
+    Nothing random has a state: the order of an epoch and its places between nodes are drawn from the
+    seed and the epoch's number.
+    """
+
+    def __init__(self, spec: PerceptronSpec, modes: Modes, trained: IntArray, seed: int) -> None:
+        _check(spec)
+        self._spec, self._modes, self._trained, self._seed = spec, modes, trained, seed
+        self.epoch = 0
+        self.losses: list[float] = []
+        self._allowed = np.zeros(len(modes.points), dtype=np.bool_)
+        self._allowed[trained] = True
+        shapes = modes.shapes[trained]
+        low, high = modes.points.min(axis=0), modes.points.max(axis=0)
+        self._normaliser = Normaliser.unit_box(low, high)
+        self._scales = np.sqrt((shapes**2).mean(axis=0))
+        self._scales[self._scales == 0.0] = 1.0
+        self._encoding = Encoding.octaves(spec.octaves)
+        self._network = Perceptrons(spec, len(modes.frequencies), seed)
+        self._adam = torch.optim.Adam(self._network.parameters(), lr=spec.rate)
+        self._identity = digest(
+            ["audio mlp", VERSION, list(astuple(spec)), seed, modes.points, modes.shapes, trained]
+        )
+
+    @property
+    def done(self) -> bool:
+        """Whether all epochs were trained."""
+        return self.epoch >= self._spec.epochs
+
+    def step_epoch(self) -> float:
+        """Train one epoch; the mean of the squared relative error on the way."""
+        extra = between_nodes(self._modes, self._allowed, 1, self._seed + 1000 * self.epoch)
+        points = np.concatenate([self._modes.points[self._trained], extra.points])
+        shapes = np.concatenate([self._modes.shapes[self._trained], extra.shapes])
+        shares = error_shares(shapes.reshape(len(shapes), -1))
+        scales = torch.from_numpy(np.float32(self._scales))
+        order = np.random.default_rng([self._seed, 5, self.epoch]).permutation(len(points))
+        batches = np.array_split(order, max(1, len(order) // self._spec.batch))
+        total = 0.0
+        for number, batch in enumerate(batches):
+            self._set_rate((self.epoch + number / len(batches)) / self._spec.epochs)
+            wanted = torch.from_numpy(np.float32(shapes[batch] * shares[batch, None, None]))
+            weights = scales * torch.from_numpy(np.float32(shares[batch]))[:, None, None]
+            self._adam.zero_grad()
+            wrong = self._network(self._encoded(points[batch])) * weights - wanted
+            loss = (wrong**2).sum(dim=(1, 2)).mean()
+            torch.autograd.backward(loss)
+            self._adam.step()
+            total += float(loss.detach()) * len(batch)
+        self.epoch += 1
+        self.losses.append(total / len(points))
+        return self.losses[-1]
+
+    def finish(self) -> TrainedMlp:
+        """The network, its last layers solved exactly for what the layers before them give."""
+        points = self._modes.points[self._trained]
+        shapes = self._modes.shapes[self._trained]
+        shares = error_shares(shapes.reshape(len(shapes), -1))
+        spec, modes = self._spec, len(self._modes.frequencies)
+        branches = []
+        for number, layers in enumerate(self._network.layers()):
+            targets = shapes[:, :, number] if spec.branches == 3 else shapes.reshape(len(shapes), -1)
+
+            def features(at: FloatArray, layers: list[nn.Linear] = layers) -> AnyArray:
+                return self._features(at, layers)
+
+            readout = solve_readout(features, points, targets, np.arange(len(points)), shares)
+            inner = [_arrays(layer) for layer in layers[:-1]]
+            last = readout.weights[:-1], readout.weights[-1]
+            branches.append(MlpWeights((*inner, last), (spec.skip,) if spec.skip else ()))
+        scales = OutputScales(np.ones((modes, 3)), np.zeros((modes, 3)))
+        return TrainedMlp(tuple(branches), self._normaliser, scales, self._encoding)
+
+    def save(self, path: Path) -> None:
+        """Write a checkpoint: weights, both moments of Adam, its steps, the epoch and the losses."""
+        arrays: dict[str, AnyArray] = {
+            "identity": np.array(self._identity),
+            "epoch": np.array(self.epoch),
+            "losses": np.array(self.losses),
+        }
+        for number, parameter in enumerate(self._network.parameters()):
+            arrays[f"weight.{number}"] = parameter.detach().numpy()
+            for name, value in self._adam.state[parameter].items():
+                arrays[f"{name}.{number}"] = value.numpy()
+        part = path.with_name(f".{path.name}.part")
+        with part.open("wb") as stream:
+            np.savez(stream, allow_pickle=False, **arrays)
+            stream.flush()
+            os.fsync(stream.fileno())
+        part.replace(path)
+
+    def load(self, path: Path) -> None:
+        """Go on from a checkpoint.
+
+        Raises:
+            DataRefused: it cannot be read, or is of another network, object, split or seed.
+        """
+        try:
+            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+                arrays = {name: archive[name] for name in archive.files}
+        except (OSError, ValueError, BadZipFile, EOFError, KeyError) as error:
+            raise DataRefused(
+                f"checkpoint {path} cannot be read ({error}); delete it to begin anew"
+            ) from error
+        if str(arrays.get("identity")) != self._identity:
+            raise DataRefused(
+                f"checkpoint {path} is of another network, object, split or seed; "
+                "delete it to begin anew, or build into another folder"
+            )
+        state = self._adam.state_dict()
+        moments = {}
+        for number, parameter in enumerate(self._network.parameters()):
+            with torch.no_grad():
+                parameter.copy_(torch.from_numpy(arrays[f"weight.{number}"]))
+            names = [name for name in ("step", "exp_avg", "exp_avg_sq") if f"{name}.{number}" in arrays]
+            moments[number] = {name: torch.from_numpy(arrays[f"{name}.{number}"]) for name in names}
+        state["state"] = {number: values for number, values in moments.items() if values}
+        self._adam.load_state_dict(state)
+        self.epoch = int(arrays["epoch"])
+        self.losses = arrays["losses"].tolist()
+
+    def predict(self, points: FloatArray) -> FloatArray:
+        """``(k, m, 3)`` 1/sqrt(kg), of the network as it is trained so far."""
+        with torch.no_grad():
+            found = self._network(self._encoded(points)).numpy()
+        shapes: FloatArray = found * self._scales
+        return shapes
+
+    def _set_rate(self, share: float) -> None:
+        for group in self._adam.param_groups:
+            group["lr"] = 0.5 * self._spec.rate * (1.0 + np.cos(np.pi * share))
+
+    def _encoded(self, points: FloatArray) -> Tensor:
+        place = np.float32((points - self._normaliser.shift) * self._normaliser.factor)
+        angles = [np.float32(frequency) * place for frequency in self._encoding.frequencies]
+        parts = [place, *(wave for angle in angles for wave in (np.sin(angle), np.cos(angle)))]
+        return torch.from_numpy(np.concatenate(parts, axis=1))
+
+    def _features(self, points: FloatArray, layers: list[nn.Linear]) -> AnyArray:
+        found = []
+        with torch.no_grad():
+            for first in range(0, len(points), _CHUNK):
+                found.append(
+                    self._network.hidden(self._encoded(points[first : first + _CHUNK]), layers).numpy()
+                )
+        hidden = np.concatenate(found)
+        return np.concatenate([hidden, np.ones((len(hidden), 1), np.float32)], axis=1)
+
+
+def _arrays(layer: nn.Linear) -> tuple[AnyArray, AnyArray]:
+    return layer.weight.detach().numpy().T.copy(), layer.bias.detach().numpy().copy()
+
+
+def _check(spec: PerceptronSpec) -> None:
+    if spec.branches not in (1, 3):
+        raise WrongUse(f"{spec.branches} branches; there are three, for x, y and z, or one for all")
+    if min(spec.depth, spec.width, spec.epochs, spec.batch) < 1 or not 0 <= spec.skip < max(spec.depth, 1):
+        raise WrongUse(f"no network is {spec}; sizes are 1 or more, and skip is a hidden layer or 0")

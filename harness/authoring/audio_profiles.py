@@ -1,0 +1,82 @@
+"""Which network of sound is made, and at what price: the profiles of ``touchstone object build``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from harness.authoring.audio_waves import REACHES
+from harness.errors import WrongUse
+from harness.toml_file import nearest
+
+
+@dataclass(frozen=True)
+class WavesSpec:
+    """Plane waves and a linear layer, found without training.
+
+    Attributes:
+        width: waves.
+        reaches: that are tried.
+    """
+
+    width: int
+    reaches: tuple[float, ...] = REACHES
+
+
+@dataclass(frozen=True)
+class PerceptronSpec:
+    """Perceptrons trained by Adam; the defaults are the paper's.
+
+    Attributes:
+        branches: 3, one for each direction of force, or 1 for all.
+        depth: hidden layers.
+        width: of each.
+        octaves: of the encoding.
+        skip: the layer, counted from 0, that takes the encoded input too; 0 for none.
+        epochs: passes over the samples.
+        batch: samples in a step.
+        rate: of Adam's first steps; it falls to zero as half a cosine.
+    """
+
+    branches: int = 3
+    depth: int = 8
+    width: int = 256
+    octaves: int = 10
+    skip: int = 5
+    epochs: int = 60
+    batch: int = 256
+    rate: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Profile:
+    """One trade of time for accuracy.
+
+    Attributes:
+        network: that is made.
+        sounds: held-out nodes whose sounds are compared.
+    """
+
+    network: WavesSpec | PerceptronSpec
+    sounds: int
+
+
+PROFILES: Mapping[str, Profile] = MappingProxyType({
+    "smoke": Profile(WavesSpec(768, (1.0,)), sounds=8),
+    "standard": Profile(WavesSpec(1536), sounds=40),
+    "small": Profile(PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epochs=80), sounds=40),
+    "paper": Profile(PerceptronSpec(), sounds=40),
+})  # fmt: skip
+"""``smoke`` and ``standard`` need no torch; ``paper`` is the network of ObjectFolder 2.0, ``small`` one
+trunk for all three directions."""
+
+
+def profile(name: str) -> Profile:
+    """The profile of that name.
+
+    Raises:
+        WrongUse: there is none.
+    """
+    found = PROFILES.get(name)
+    if found is None:
+        raise WrongUse(f"no profile {name!r}; {nearest(name, PROFILES)}")
+    return found
