@@ -99,12 +99,19 @@ class ObjectAudio:
         Raises:
             WrongUse: points that are not finite numbers of that shape.
             OutOfDomain: a point farther than ``most`` from the surface.
+            DataRefused: a shape that is not finite.
         """
         points = checked_points(points)
         self.surface.require_within(points, self.most, f"the sound's {self.level}")
         found = np.empty((len(points), len(self.frequencies), 3))
         for first in range(0, len(points), CHUNK):
             found[first : first + CHUNK] = self.shapes(points[first : first + CHUNK])
+        if not np.isfinite(found).all():
+            bad = int(np.count_nonzero(~np.isfinite(found).all(axis=(1, 2))))
+            raise DataRefused(
+                f"the sound's {self.level} gives numbers that are not finite at {bad} of {len(points)} "
+                "points; train it again, or take its other level"
+            )
         return found
 
     def gains(self, points: FloatArray, directions: FloatArray) -> FloatArray:

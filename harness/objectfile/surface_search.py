@@ -8,6 +8,7 @@ import numpy as np
 from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.errors import OutOfDomain, WrongUse
 from harness.mesh import Mesh
+from harness.objectfile.near_kernel import near_surface
 from harness.sim.face_grid import FaceGrid, build_face_grid
 from harness.sim.modes import nearest_shares
 from harness.sim.surface_kernels import nearest_places
@@ -47,8 +48,9 @@ class SurfaceSearch:
             OutOfDomain: it names the farthest one, its distance and the limit.
         """
         # A point at the very limit counts as within it.
-        faces = self.within(points, most * (1.0 + 1e-9))[1]
-        out = np.nonzero(faces < 0)[0]
+        grid, limit = self._grid, most * (1.0 + 1e-9)
+        lists = (grid.origin, grid.cell, grid.shape, grid.starts, grid.faces)
+        out = np.nonzero(~near_surface(points, limit, self.mesh.corners, *lists))[0]
         if out.size:
             places = self.nearest(points[out], most)[0]
             gaps = np.linalg.norm(places - points[out], axis=1)

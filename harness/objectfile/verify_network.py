@@ -88,9 +88,13 @@ def _gap(found: AnyArray, kept: Sampled) -> float:
             f"the self-test knows number {max(kept.at)} of {kept.name!r}, which has {found.size}; "
             "build it again"
         )
-    values = np.array(kept.values)
+    chosen, values = found[list(kept.at)].astype(np.float64), np.array(kept.values)
+    if not np.isfinite(chosen).all():
+        raise DataRefused(
+            f"{kept.name!r} is not finite where it was when it was made; build the object again"
+        )
     scale = float(np.abs(values).max()) or 1.0
-    return float(np.abs(found[list(kept.at)] - values).max()) / scale
+    return float(np.abs(chosen - values).max()) / scale
 
 
 def _array(item: Input, kept: Whole, rows: int) -> AnyArray:

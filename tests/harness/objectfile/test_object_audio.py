@@ -32,7 +32,7 @@ from harness.objectfile.audio_table import scaled, table_bytes, table_from
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.sim.modal_radiation import radiation
-from harness.sim.modes import dampings
+from harness.sim.modes import dampings, nearest_shares
 
 HALF = 2.0**-10
 """Of a mode's greatest number: half precision rounds to 2^-11, and a little is lost in between."""
@@ -222,3 +222,24 @@ def test_a_mode_at_rest_stays_at_rest() -> None:
     kept, scale = scaled(np.zeros((5, 2, 3)))
     assert not kept.any()
     assert scale.tolist() == [1.0, 1.0]
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), most=st.floats(1e-5, 0.05), far=st.floats(0.0, 0.2))
+def test_near_is_what_the_nearest_place_of_any_face_says(seed: int, most: float, far: float) -> None:
+    mesh, random = egg(), np.random.default_rng(seed)
+    points = (
+        mesh.bounds[0]
+        + random.random((8, 3)) * (mesh.bounds[1] - mesh.bounds[0])
+        + far * random.normal(size=3)
+    )
+    shares = nearest_shares(points[:, None], mesh.corners[None])
+    feet = np.einsum("nfc,fcd->nfd", shares, mesh.corners)
+    distances = np.linalg.norm(feet - points[:, None], axis=2).min(axis=1)
+    search = SurfaceSearch(mesh)
+    for point, distance in zip(points, distances, strict=True):
+        if distance <= most:
+            search.require_within(point[None], most, "it")
+        else:
+            with pytest.raises(OutOfDomain, match=f"by {distance * 1e3:.3g} mm"):
+                search.require_within(point[None], most, "it")
