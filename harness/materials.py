@@ -107,11 +107,11 @@ _TABLE = (
     (Material("ceramic", 2700.0, 7.2e10, 0.19, 6.0, 1e-7), (0.07, 0.20, 0.15),
      "judged: tableware from earthenware to porcelain has 2000 to 2600 kg/m^3, and softens with its pores"),
     (Material("glass", 2600.0, 6.2e10, 0.20, 1.0, 1e-7), (0.05, 0.08, 0.07),
-     "two thirds of the way to soda-lime glass: 2440 to 2490 kg/m^3, 69 to 72 GPa, 0.22 (Callister, Materials "
-     "Science and Engineering, 7th edition, 2007, appendix B)"),
+     "two thirds of the way to soda-lime glass: 2440 to 2490 kg/m^3, 69 to 72 GPa, 0.22 (Callister, "
+     "Materials Science and Engineering, 7th edition, 2007, appendix B)"),
     (Material("wood", 750.0, 1.1e10, 0.25, 60.0, 2e-6), (0.10, 0.22, 0.30),
-     "clear wood of one species along the grain (Wood Handbook, Forest Products Laboratory, 2010, chapter 5), "
-     "Poisson's ratio judged; across the grain wood is ten times as soft, as no isotropic material can be"),
+     "clear wood of one species along the grain (Forest Products Laboratory, Wood Handbook, 2010, chapter "
+     "5), Poisson's ratio judged; across the grain it is ten times as soft, as no isotropic material can be"),
     (Material("plastic", 1070.0, 1.4e9, 0.35, 30.0, 1e-6), (0.05, 0.25, 0.06),
      "judged: ABS of all grades has 1010 to 1210 kg/m^3 and 1.1 to 2.9 GPa; other plastics differ more"),
     (Material("iron", 8000.0, 2.1e11, 0.28, 5.0, 1e-7), (0.05, 0.35, 0.05),

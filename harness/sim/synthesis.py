@@ -96,7 +96,7 @@ def synthesize(
     if direct.any():
         sound += _summed(f[direct], d[direct], parts[:, direct], samples, rate)
     peaks = np.maximum(sound.max(axis=1), -sound.min(axis=1))
-    errors += _phase_errors(f, d, parts, samples / rate) + _rounding(parts, peaks, level)
+    errors += _phase_errors(f, d, parts, samples / rate) + _rounding(parts, peaks, samples, level)
     return Synthesis(
         read_only(sound), rate, read_only(~heard), decibels(errors, peaks), time.perf_counter() - begun
     )
@@ -161,17 +161,24 @@ def _phase_errors(
     return np.asarray(np.abs(amplitudes) @ off)
 
 
-def _rounding(amplitudes: AnyArray, peaks: FloatArray, level: SynthesisLevel) -> FloatArray:
-    """``(k,)``: what single roundings add up to, as a random walk along the sum of two terms a mode.
+def _rounding(amplitudes: AnyArray, peaks: FloatArray, samples: int, level: SynthesisLevel) -> FloatArray:
+    """``(k,)``: what roundings add up to.
 
-    A partial sum is as large as independent phases make it, or as the sound itself where they agree
-    (Higham and Mary, A New Approach to Probabilistic Rounding Error Analysis, SIAM J. Sci. Comput.
-    41(5), 2019, for why a walk and not the sum of all roundings).
+    Those of the tables and of the sum are a random walk along two terms a mode, its partial sums as
+    large as independent phases make them, or as the sound itself where they agree (Higham and Mary,
+    A New Approach to Probabilistic Rounding Error Analysis, SIAM J. Sci. Comput. 41(5), 2019, for why
+    a walk and not the sum of all roundings). Those of the powers in the tables are bounded: each
+    complex product is off by the square root of five units (Brent, Percival and Zimmermann, Error
+    Bounds on Complex Floating-Point Multiplication, Math. Comp. 76, 2007).
     """
-    unit = float(np.finfo(np.float32 if level == "fast" else np.float64).eps) / 2.0
-    typical = np.sqrt(0.5 * np.sum(np.abs(amplitudes) ** 2, axis=1))
-    walk = np.sqrt((2.0 + amplitudes.shape[1]) / 3.0)
-    return np.asarray(unit * walk * np.maximum(_SIGMAS * typical, peaks))
+    double = float(np.finfo(np.float64).eps) / 2.0
+    unit = float(np.finfo(np.float32).eps) / 2.0 if level == "fast" else double
+    sizes = np.abs(amplitudes)
+    whole = np.sqrt(np.sum(sizes**2, axis=1))
+    walk = np.sqrt((2.0 + amplitudes.shape[1]) / 3.0) * np.maximum(_SIGMAS * np.sqrt(0.5) * whole, peaks)
+    block = _block_length(samples)
+    powers = np.sqrt(5.0) * (block + samples / block) * sizes.sum(axis=1)
+    return np.asarray(unit * (walk + 6.0 * whole) + double * powers)
 
 
 def decibels(errors: FloatArray, peaks: FloatArray) -> float:
