@@ -27,6 +27,9 @@ AudioLevel = Literal["network", "table"]
 CHUNK = 256
 """Points to a run: what a layer gives for as many stays in the cache of one core."""
 
+_LIKELY = 1.0 / 16.0
+"""Of the farthest a point may be from the surface: most queries are of places on it."""
+
 _UNIT_ERROR = 1e-6
 
 
@@ -49,17 +52,17 @@ class TableShapes:
         table: ``(nodes, m, 3)``.
         scales: ``(m,)`` 1/sqrt(kg).
         search: over the surface of the nodes.
-        most: m, where the surface may well be from a point.
+        near: m, where the surface may well be from a point.
     """
 
     table: HalfArray
     scales: FloatArray
     search: SurfaceSearch
-    most: float
+    near: float
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """``(n, m, 3)`` at ``(n, 3)`` points."""
-        places, faces = self.search.nearest(points, self.most)
+        places, faces = self.search.nearest(points, self.near)
         nodes = self.search.mesh.faces[faces]
         return interpolated(self.table, self.scales, nodes, self.search.shares(places, faces))
 
@@ -203,4 +206,4 @@ def _table(of: ObjectFile, entry: TableEntry, most: float) -> TableShapes:
     surface = mesh_from_ply(of.read(entry.surface), entry.surface.file)
     shape = (len(surface.vertices), len(entry.scales), 3)
     table = table_from(of.read(entry), entry.file, shape)
-    return TableShapes(table, np.array(entry.scales), SurfaceSearch(surface), most)
+    return TableShapes(table, np.array(entry.scales), SurfaceSearch(surface), _LIKELY * most)

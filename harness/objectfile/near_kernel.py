@@ -1,4 +1,4 @@
-"""Whether a surface is near a point, in machine code that stops at the first face that is."""
+"""Whether a surface is near a point, and where on a face a place is, in machine code."""
 
 import numpy as np
 
@@ -56,3 +56,40 @@ def near_surface(
             if near[n]:
                 break
     return near
+
+
+@compiled
+def shares_on_faces(places: FloatArray, corners: FloatArray, chosen: IntArray) -> FloatArray:
+    """``(n, 3)`` barycentric coordinates, from 0 to 1, of ``(n, 3)`` places on chosen faces.
+
+    A face without area counts as its longest edge.
+
+    Args:
+        places: ``(n, 3)`` m, each on its face.
+        corners: ``(m, 3, 3)`` of all faces.
+        chosen: ``(n,)`` faces.
+    """
+    shares = np.zeros((len(places), 3))
+    for n in range(len(places)):
+        face = corners[chosen[n]]
+        u, v, w = face[1] - face[0], face[2] - face[0], places[n] - face[0]
+        uu, uv, vv = np.sum(u * u), np.sum(u * v), np.sum(v * v)
+        wu, wv = np.sum(w * u), np.sum(w * v)
+        area = uu * vv - uv * uv
+        if area > 1e-14 * uu * vv:
+            shares[n, 1] = min(max((vv * wu - uv * wv) / area, 0.0), 1.0)
+            shares[n, 2] = min(max((uu * wv - uv * wu) / area, 0.0), 1.0 - shares[n, 1])
+            shares[n, 0] = 1.0 - shares[n, 1] - shares[n, 2]
+            continue
+        longest = -1.0
+        for first in range(3):
+            second = (first + 1) % 3
+            along = face[second] - face[first]
+            length = np.sum(along * along)
+            if length > longest:
+                longest = length
+                share = np.sum((places[n] - face[first]) * along) / length if length > 0.0 else 0.0
+                share = min(max(share, 0.0), 1.0)
+                shares[n] = 0.0
+                shares[n, first], shares[n, second] = 1.0 - share, share
+    return shares

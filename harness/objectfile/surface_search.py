@@ -8,9 +8,8 @@ import numpy as np
 from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.errors import OutOfDomain, WrongUse
 from harness.mesh import Mesh
-from harness.objectfile.near_kernel import near_surface
+from harness.objectfile.near_kernel import near_surface, shares_on_faces
 from harness.sim.face_grid import FaceGrid, build_face_grid
-from harness.sim.modes import nearest_shares
 from harness.sim.surface_kernels import nearest_places
 
 
@@ -39,7 +38,7 @@ class SurfaceSearch:
 
     def shares(self, places: FloatArray, faces: IntArray) -> FloatArray:
         """``(n, 3)`` of each corner of the faces at places on them."""
-        return nearest_shares(places, self.mesh.corners[faces])
+        return shares_on_faces(places, self.mesh.corners, faces)
 
     def require_within(self, points: FloatArray, most: float, what: str) -> None:
         """Refuse points that are farther than ``most`` m.

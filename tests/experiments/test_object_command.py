@@ -37,7 +37,7 @@ def test_info_as_json_is_the_description(folder: Path, capsys: pytest.CaptureFix
 
 def test_verify_ends_with_0_where_all_holds(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert invoke(["object", "verify", str(folder)]) == 0
-    assert "all 10 checks hold" in capsys.readouterr().out
+    assert "all 11 checks hold" in capsys.readouterr().out
 
 
 def test_verify_ends_with_1_and_says_which_failed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,6 +30,7 @@ from harness.mesh import Mesh
 from harness.objectfile.audio import CHUNK, ObjectAudio, open_audio
 from harness.objectfile.audio_table import scaled, table_bytes, table_from
 from harness.objectfile.file import ObjectFile
+from harness.objectfile.near_kernel import shares_on_faces
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.sim.modal_radiation import radiation
 from harness.sim.modes import dampings, nearest_shares
@@ -243,3 +244,15 @@ def test_near_is_what_the_nearest_place_of_any_face_says(seed: int, most: float,
         else:
             with pytest.raises(OutOfDomain, match=f"by {distance * 1e3:.3g} mm"):
                 search.require_within(point[None], most, "it")
+
+
+def test_shares_rebuild_every_place_on_needles_and_points_too() -> None:
+    random = np.random.default_rng(0)
+    corners = random.normal(size=(60, 3, 3))
+    corners[20:40, 2] = corners[20:40, 0] + 0.3 * (corners[20:40, 1] - corners[20:40, 0])  # needles
+    corners[40:50, 1:] = corners[40:50, :1]  # points
+    places = np.einsum("nc,ncd->nd", random.dirichlet(np.ones(3), 60), corners)
+    shares = shares_on_faces(places, corners, np.arange(60))
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=1e-12)
+    assert shares.min() >= 0.0
+    np.testing.assert_allclose(np.einsum("nc,ncd->nd", shares, corners), places, atol=1e-9)
