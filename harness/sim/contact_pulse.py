@@ -21,7 +21,7 @@ from harness.arrays import AnyArray, FloatArray, read_only
 from harness.errors import WrongUse
 from harness.materials import Material
 from harness.sim.modal_sound import check_modes, check_rate, impulse_response, is_heavy
-from harness.sim.synthesis import Synthesis, SynthesisLevel, decibels, faded_after, synthesize
+from harness.sim.synthesis import Synthesis, SynthesisLevel, decibels, faded_after, loudest, synthesize
 
 _A, _B = 0.4, 0.5
 """With ``s = (x / x1)^(5/2)`` the time is ``x1 / V`` times 2/5 of the incomplete beta function of s."""
@@ -253,5 +253,5 @@ def _quadrature(pulse: HertzPulse, rate: float, count: int) -> tuple[FloatArray,
 
 def _worst(free: Synthesis, sound: FloatArray) -> float:
     """dB: what rings on is in error as it says, and the quadratures by what they miss."""
-    peaks, rings = np.abs(sound).max(axis=1), np.abs(free.sound).max(axis=1)
-    return decibels(rings * 10.0 ** (free.error / 20.0) + _MISSED * peaks, peaks)
+    peaks = loudest(sound)
+    return decibels(loudest(free.sound) * 10.0 ** (free.error / 20.0) + _MISSED * peaks, peaks)

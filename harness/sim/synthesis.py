@@ -8,9 +8,11 @@ damping, see ``modal_sound.impulse_response``.
 
 import time
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from harness.arrays import AnyArray, BoolArray, FloatArray, read_only
 from harness.errors import WrongUse
@@ -63,7 +65,8 @@ def synthesize(
 ) -> Synthesis:
     """The sounds of modes that all start with one impulse at the first sample.
 
-    One core serves best: call it under ``threadpool_limits(1)`` where other programs run.
+    It runs on one core: the products are too small for a second one, which would wait for them
+    where anything else runs.
 
     Args:
         frequencies: ``(m,)`` Hz, undamped, above zero; those at or above half of ``rate`` are left
@@ -92,14 +95,21 @@ def synthesize(
     heard = audible(frequencies, rate)
     f, d, parts = frequencies[heard], dampings[heard], amplitudes[:, heard]
     direct = np.full(len(f), True) if level == "exact" else is_heavy(f, d)
-    sound, errors = _blocks(f[~direct], d[~direct], parts[:, ~direct], samples, rate, level)
-    if direct.any():
-        sound += _summed(f[direct], d[direct], parts[:, direct], samples, rate)
-    peaks = np.maximum(sound.max(axis=1), -sound.min(axis=1))
+    with _one_core().limit(limits=1):
+        sound, errors = _blocks(f[~direct], d[~direct], parts[:, ~direct], samples, rate, level)
+        if direct.any():
+            sound += _summed(f[direct], d[direct], parts[:, direct], samples, rate)
+    peaks = loudest(sound)
     errors += _phase_errors(f, d, parts, samples / rate) + _rounding(parts, peaks, samples, level)
     return Synthesis(
         read_only(sound), rate, read_only(~heard), decibels(errors, peaks), time.perf_counter() - begun
     )
+
+
+@cache
+def _one_core() -> ThreadpoolController:
+    """Looked for once: finding the libraries takes longer than a sound."""
+    return ThreadpoolController().select(user_api="blas")
 
 
 def _blocks(
@@ -179,6 +189,11 @@ def _rounding(amplitudes: AnyArray, peaks: FloatArray, samples: int, level: Synt
     block = _block_length(samples)
     powers = np.sqrt(5.0) * (block + samples / block) * sizes.sum(axis=1)
     return np.asarray(unit * (walk + 6.0 * whole) + double * powers)
+
+
+def loudest(sound: FloatArray) -> FloatArray:
+    """``(k,)``: the largest sample of each of ``(k, t)`` sounds, of either sign."""
+    return np.asarray(np.maximum(sound.max(axis=1), -sound.min(axis=1)))
 
 
 def decibels(errors: FloatArray, peaks: FloatArray) -> float:
