@@ -14,6 +14,7 @@ from experiments.contact_localization.answer import Answer, answer
 from experiments.contact_localization.baselines import geometry_only
 from experiments.contact_localization.comparison import compare
 from experiments.contact_localization.dials import levels_of
+from experiments.contact_localization.estimate import Estimate
 from experiments.contact_localization.experiment import ContactLocalization
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.planning import RunPlan, plan_run, twin_of, way_between
@@ -179,7 +180,10 @@ def _trade(scored: Scored) -> Any:
 
 
 def _doubts(found: Answer) -> tuple[str, ...]:
+    by_sound = found.by_sense.get("audio")
     of_sound = doubts_of_sound(found.observations)
+    if isinstance(by_sound, Estimate):
+        of_sound += by_sound.doubts
     if len(found.last.modes) < 2:
         return of_sound
     shares = ", ".join(f"{100 * mode.weight:.0f} %" for mode in found.last.modes)

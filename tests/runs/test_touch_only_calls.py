@@ -35,6 +35,7 @@ OF_SOUND = (
     "experiments.contact_localization.sound_matching",
     "experiments.contact_localization.sound_mfcc",
     "experiments.contact_localization.sound_places",
+    "experiments.contact_localization.sound_spectra",
     "mocks.strike_counts",
     "mocks.world_instrument",
     "mocks.world_modes",
