@@ -102,14 +102,20 @@ class MeshEntry(FileEntry):
 
 
 class Tensor(Entry):
-    """An input or output of a graph; ``"n"`` in its shape is the number of queries."""
+    """An input or output of a graph; the first number of its shape is ``"n"``, that of queries."""
 
     name: str
     dtype: Literal["float16", "float32", "float64", "int32", "int64"]
-    shape: tuple[Annotated[int, Field(ge=1)] | Literal["n"], ...]
+    shape: Annotated[tuple[Annotated[int, Field(ge=1)] | Literal["n"], ...], Field(min_length=1)]
     unit: str
     meaning: str
     frame: str = ""
+
+    @model_validator(mode="after")
+    def _by_queries(self) -> Self:
+        if [size == "n" for size in self.shape] != [True] + [False] * (len(self.shape) - 1):
+            raise ValueError(f"its shape {self.shape} must begin with 'n' and have no other")
+        return self
 
 
 class Domain(Entry):

@@ -16,6 +16,9 @@ from harness.errors import DataRefused
 MOST_NUMBERS = 2**24
 """In any one value that a graph computes for one query."""
 
+MOST_ASKED = 2**16
+"""In any one input of one query."""
+
 OPERATIONS = frozenset({
     "Abs", "Add", "And", "Cast", "Ceil", "Clip", "Concat", "Constant", "Conv", "Cos", "Div", "Elu",
     "Equal", "Exp", "Expand", "Flatten", "Floor", "Gather", "GatherElements", "GatherND", "Gemm",
@@ -108,6 +111,11 @@ def _check_sizes(model: ModelProto, name: str) -> None:
         for size in value.type.tensor_type.shape.dim:
             if not size.HasField("dim_value"):
                 size.dim_value = 1
+        asked = _numbers(value.type.tensor_type)
+        if asked is None or asked > MOST_ASKED:
+            raise DataRefused(
+                f"{name}: one query takes {asked} numbers {value.name!r}; at most {MOST_ASKED} do"
+            )
     del single.graph.value_info[:]
     for value in single.graph.output:  # what a file claims of its results is not what they are
         value.type.tensor_type.ClearField("shape")

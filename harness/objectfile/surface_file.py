@@ -23,6 +23,8 @@ _READ = re.compile(
 _LONGEST_HEADER = 400
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 _VERTEX_BYTES = 24
+_FARTHEST = 1e6
+"""Metres from the origin; beyond it the digits of a millimetre are gone."""
 
 
 def ply_bytes(mesh: Mesh) -> bytes:
@@ -60,7 +62,10 @@ def mesh_from_ply(data: bytes, name: str, metres_per_unit: float = 1.0) -> Mesh:
     points = np.frombuffer(data, "<f8", 3 * vertices, head.end()).reshape(-1, 3) * metres_per_unit
     triangles = np.frombuffer(data, _FACE, faces, middle)
     _check(points, triangles, name)
-    return Mesh(points, triangles["corners"])
+    mesh = Mesh(points, triangles["corners"])
+    if not mesh.face_areas.sum() > 0.0:
+        raise MeshRefused(f"{name} has no surface: every face has zero area; build the object again")
+    return mesh
 
 
 def _check(points: AnyArray, triangles: AnyArray, name: str) -> None:
@@ -71,5 +76,5 @@ def _check(points: AnyArray, triangles: AnyArray, name: str) -> None:
         raise MeshRefused(
             f"{name} has a face that is no triangle of its {len(points)} vertices; copy it again"
         )
-    if not np.isfinite(points).all():
-        raise MeshRefused(f"{name} has a vertex that is not finite; build the object again")
+    if not (np.abs(points) <= _FARTHEST).all():
+        raise MeshRefused(f"{name} has a vertex that is not within {_FARTHEST:g} m; build the object again")

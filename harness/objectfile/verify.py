@@ -98,7 +98,8 @@ def _table(of: ObjectFile) -> str:
 def _agreement(of: ObjectFile) -> str:
     points = SurfaceSearch(of.mesh).spread(_SAMPLES)[0]
     exact, learned = (open_audio(of, level).at(points) for level in ("table", "network"))
-    gaps = np.linalg.norm(learned - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))
+    with np.errstate(divide="ignore", invalid="ignore"):  # a place at rest in every mode agrees with nothing
+        gaps = np.linalg.norm(learned - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))
     middle, high = float(np.median(gaps)), float(np.quantile(gaps, 0.95))
     if not middle <= _AGREE:
         raise DataRefused(

@@ -118,6 +118,12 @@ def test_a_size_that_depends_on_the_numbers_asked_is_refused() -> None:
     assert "not known before" in refused(tiny(nodes, {"zero": np.array(0)}, axes=3))
 
 
+def test_a_query_larger_than_any_sensor_is_refused() -> None:
+    model = tiny([helper.make_node("Relu", ["x"], ["y"])])
+    model.graph.input[0].type.tensor_type.shape.dim[1].dim_value = 10**9
+    assert "at most 65536 may be" in refused(model)
+
+
 def test_numbers_that_do_not_fill_their_shape_are_refused() -> None:
     model = good()
     model.graph.initializer[1].dims[0] = 10**9

@@ -11,6 +11,7 @@ from object_bench import MODES, PROVENANCE, egg, egg_file, egg_part, rewrite
 
 from harness.errors import DataRefused, MeshRefused, WrongUse
 from harness.materials import MATERIALS
+from harness.mesh import Mesh
 from harness.objectfile.audio_part import with_audio
 from harness.objectfile.description import description_from, description_text
 from harness.objectfile.file import ObjectFile, create_object, with_part
@@ -115,6 +116,7 @@ def put(*keys: str | int, value: Any) -> Any:
         (put("audio", "frequencies_hz", 2, value=1.0), "must ascend"),
         (put("audio", "near_surface_m", value=0.005), "near_surface_m = 0.005"),
         (put("audio", "network", "outputs", 0, "shape", value=["n", 8, 3]), "gains \\(n, 7, 3\\)"),
+        (put("audio", "network", "inputs", 0, "shape", value=[4, 3]), "must begin with 'n'"),
         (put("audio", "network", "self_test", "outputs", 0, "name", value="gain"), "self_test is of"),
         (put("audio", "network", "self_test", "tolerance", value=10.0), "tolerance"),
         (put("audio", "table", "scales", value=[1.0]), "scales of the table"),
@@ -170,6 +172,15 @@ def test_a_part_is_written_with_its_own_bytes_only(egg_object: ObjectFile, spoil
     with pytest.raises(DataRefused, match="of which no bytes were given"):
         with_part(bare, "audio", audio, {})
     assert ObjectFile.open(bare.folder).description.audio is None
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(0.0, "no surface"), (1e9, "within 1e.06 m"), (np.nan, "within")]
+)
+def test_a_surface_that_is_none_is_refused(factor: float, said: str) -> None:
+    mesh = egg()
+    with pytest.raises(MeshRefused, match=said):
+        mesh_from_ply(ply_bytes(Mesh(factor * mesh.vertices, mesh.faces)), "mesh.ply")
 
 
 def test_a_surface_reads_back_in_metres() -> None:
