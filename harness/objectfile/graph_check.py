@@ -111,10 +111,10 @@ def _check_sizes(model: ModelProto, name: str) -> None:
         for size in value.type.tensor_type.shape.dim:
             if not size.HasField("dim_value"):
                 size.dim_value = 1
-        asked = _numbers(value.type.tensor_type)
-        if asked is None or asked > MOST_ASKED:
+        asked = _numbers(value.type.tensor_type) or 0.0
+        if not 0.0 < asked <= MOST_ASKED:
             raise DataRefused(
-                f"{name}: one query takes {asked} numbers {value.name!r}; at most {MOST_ASKED} do"
+                f"{name}: one query takes {asked:.3g} numbers {value.name!r}, at most {MOST_ASKED} may be; {_AGAIN}"
             )
     del single.graph.value_info[:]
     for value in single.graph.output:  # what a file claims of its results is not what they are
