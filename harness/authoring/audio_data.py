@@ -70,20 +70,20 @@ def canonical(modes: Modes, gap: float = REPEATED) -> Modes:
     Within a cluster of frequencies any rotation of the shapes solves the same equations. Here the
     basis is that of the singular vectors of the cluster's products with fixed fields over the
     surface, which are integrals and so the same however the surface is cut into triangles. A sign is
-    that of the product with the fields' sum. A frequency of a turned basis is its Rayleigh quotient.
+    that of the product with the fields' sum. All of a cluster get the root of the mean of its squares.
     """
     if len(modes.frequencies) == 0:
         return modes
     products = _products(modes)
-    turn = np.zeros((len(modes.frequencies), len(modes.frequencies)))
+    frequencies, shapes = modes.frequencies.copy(), modes.shapes.copy()
     for members in clusters(modes.frequencies, gap):
         basis = np.linalg.svd(products[:, members], full_matrices=False)[2].T
         signs = np.sign(products[:, members].sum(axis=0) @ basis)
-        turn[np.ix_(members, members)] = basis * np.where(signs == 0.0, 1.0, signs)
-    squares = modes.frequencies**2 @ turn**2
-    shapes = np.einsum("nmd,mk->nkd", modes.shapes, turn, optimize=True)
-    order = np.argsort(squares, kind="stable")
-    return replace(modes, frequencies=np.sqrt(squares[order]), shapes=np.ascontiguousarray(shapes[:, order]))
+        turn = basis * np.where(signs == 0.0, 1.0, signs)
+        shapes[:, members] = np.einsum("nmd,mk->nkd", modes.shapes[:, members], turn)
+        if len(members) > 1:
+            frequencies[members] = np.sqrt((modes.frequencies[members] ** 2).mean())
+    return replace(modes, frequencies=frequencies, shapes=shapes)
 
 
 def _products(modes: Modes) -> FloatArray:

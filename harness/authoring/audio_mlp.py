@@ -159,6 +159,16 @@ class Training:
         scales = OutputScales(np.ones((modes, 3)), np.zeros((modes, 3)))
         return TrainedMlp(tuple(branches), self._normaliser, scales, self._encoding)
 
+    def solved(self, points: FloatArray, trained: TrainedMlp) -> FloatArray:
+        """``(k, m, 3)`` 1/sqrt(kg), of the network as ``finish`` gave it, to compare a graph with."""
+        found = []
+        for branch, layers in zip(trained.branches, self._network.layers(), strict=True):
+            weight, bias = branch.layers[-1]
+            found.append(self._features(points, layers)[:, :-1] @ weight + bias)
+        if len(found) == 1:
+            return np.asarray(found[0]).reshape(len(points), -1, 3)
+        return np.stack(found, axis=2)
+
     def save(self, path: Path) -> None:
         """Write a checkpoint: weights, both moments of Adam, its steps, the epoch and the losses."""
         arrays: dict[str, AnyArray] = {

@@ -12,12 +12,13 @@ from harness.authoring.audio import CHECKPOINT, AuthoredAudio, Report, author_au
 from harness.authoring.audio_data import canonical
 from harness.authoring.audio_profiles import profile
 from harness.code_version import content_hash
-from harness.errors import MeshRefused
+from harness.errors import MeshRefused, WrongUse
 from harness.materials import Material
 from harness.mesh import Mesh
 from harness.objectfile.audio_part import AudioPart, with_audio
 from harness.objectfile.entries import DESCRIPTION, Provenance, Source
-from harness.objectfile.file import ObjectFile, create_object
+from harness.objectfile.file import MESH, ObjectFile, create_object, file_entry
+from harness.objectfile.surface_file import ply_bytes
 from harness.objects.household import build
 from harness.sim.intake import take_in
 from harness.sim.modal import HEARING, default_edge, modes_of
@@ -109,7 +110,7 @@ def build_audio(
     modes = _lowest(canonical(found), wanted.most)
     rates = dampings(modes.frequencies, wanted.material)
     solved = time.perf_counter() - begun
-    out.mkdir(parents=True, exist_ok=True)
+    created = _created(wanted, mesh, out, source)
     audio = author_audio(modes, rates, chosen, wanted.seed, out, report, threads)
     begun = time.perf_counter()
     report("writing", 0.0)
@@ -128,7 +129,7 @@ def build_audio(
         graph=audio.graph,
         measured={"network": audio.errors["network"], "table": audio.errors["table_float16"]},
     )
-    made = with_audio(_object(wanted, mesh, out, provenance), part)
+    made = with_audio(created, part)
     (out / CHECKPOINT).unlink(missing_ok=True)
     seconds = {"modes": solved, **audio.seconds, "write": time.perf_counter() - begun}
     return BuiltAudio(made, modes, audio, said, seconds)
@@ -180,9 +181,17 @@ def _lowest(modes: Modes, most: int) -> Modes:
     )
 
 
-def _object(wanted: ObjectRequest, mesh: Mesh, out: Path, provenance: Provenance) -> ObjectFile:
-    if (out / DESCRIPTION).exists():
-        return ObjectFile.open(out)
-    name = wanted.mesh.removeprefix(BUILTIN)
-    made = Provenance(code=provenance.code, sources=provenance.sources, licence=wanted.licence)
-    return create_object(out, Path(name).stem, mesh, wanted.material, made)
+def _created(wanted: ObjectRequest, mesh: Mesh, out: Path, source: Source) -> ObjectFile:
+    """The folder's object, made where there is none."""
+    if not (out / DESCRIPTION).exists():
+        name = Path(wanted.mesh.removeprefix(BUILTIN)).stem
+        provenance = Provenance(sources=(source,), licence=wanted.licence)
+        return create_object(out, name, mesh, wanted.material, provenance)
+    there = ObjectFile.open(out)
+    same_mesh = there.description.mesh.sha256 == file_entry(MESH, ply_bytes(mesh)).sha256
+    if not same_mesh or there.material != wanted.material:
+        other = "material" if same_mesh else "mesh"
+        raise WrongUse(
+            f"{out} holds {there.description.name}, of another {other}; name another folder, or delete that one"
+        )
+    return there
