@@ -25,9 +25,9 @@ ENCODING = Encoding.octaves(4)
 PROVENANCE = Provenance(licence="CC0-1.0", seeds={"weights": 0}, code={"module": "tests.object_bench"})
 
 
-def egg() -> Mesh:
+def egg(subdivisions: int = 3) -> Mesh:
     """An ellipsoid of 60 x 80 x 100 mm, off its origin so that no two axes are alike."""
-    ball = trimesh.creation.icosphere(subdivisions=3)
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
     return Mesh(ball.vertices * [0.03, 0.04, 0.05] + [0.11, -0.02, 0.05], ball.faces)
 
 
@@ -113,9 +113,9 @@ def egg_part(mesh: Mesh) -> AudioPart:
     )
 
 
-def egg_file(folder: Path) -> ObjectFile:
+def egg_file(folder: Path, subdivisions: int = 3) -> ObjectFile:
     """The object, written."""
-    mesh = egg()
+    mesh = egg(subdivisions)
     return with_audio(create_object(folder, "egg", mesh, MATERIALS["ceramic"], PROVENANCE), egg_part(mesh))
 
 

@@ -114,7 +114,8 @@ def _check_sizes(model: ModelProto, name: str) -> None:
         asked = _numbers(value.type.tensor_type) or 0.0
         if not 0.0 < asked <= MOST_ASKED:
             raise DataRefused(
-                f"{name}: one query takes {asked:.3g} numbers {value.name!r}, at most {MOST_ASKED} may be; {_AGAIN}"
+                f"{name}: one query takes {asked:.3g} numbers {value.name!r}, at most {MOST_ASKED} may be; "
+                f"{_AGAIN}"
             )
     del single.graph.value_info[:]
     for value in single.graph.output:  # what a file claims of its results is not what they are

@@ -9,12 +9,15 @@ from object_bench import ENCODING, MODES, egg, exchange, normaliser, perceptron,
 from onnx import TensorProto, helper, load_model_from_string, numpy_helper
 
 from harness.mesh import Mesh
+from harness.objectfile.audio import open_audio
 from harness.objectfile.audio_graph import OutputScales, audio_graph
 from harness.objectfile.audio_table import table_bytes
 from harness.objectfile.entries import Domain, Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
 from harness.objectfile.file import ObjectFile, file_entry, with_part
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.verify import verify
+
+SAMPLES = Path(__file__).parent / "samples"
 
 
 def failures(of: ObjectFile) -> dict[str, str]:
@@ -30,6 +33,14 @@ def test_an_object_as_it_was_built_passes_every_check(egg_object: ObjectFile) ->
         *("audio: graph", "audio: domain", "audio: self-test", "audio: table"),
         "audio: network and table",
     ]
+
+
+@pytest.mark.parametrize("sample", sorted(SAMPLES.iterdir()), ids=lambda path: path.name)
+def test_an_object_of_every_schema_so_far_is_read_and_verified(sample: Path) -> None:
+    """A sample is written once, when its schema is new, and never again."""
+    of = ObjectFile.open(sample)
+    assert not failures(of)
+    assert open_audio(of, "network").at(of.mesh.vertices[:2]).shape == (2, MODES, 3)
 
 
 def test_a_changed_file_fails_and_the_rest_is_still_looked_at(spoiled: Path) -> None:
