@@ -192,6 +192,7 @@ def _created(wanted: ObjectRequest, mesh: Mesh, out: Path, source: Source) -> Ob
     if not same_mesh or there.material != wanted.material:
         other = "material" if same_mesh else "mesh"
         raise WrongUse(
-            f"{out} holds {there.description.name}, of another {other}; name another folder, or delete that one"
+            f"{out} holds {there.description.name}, of another {other}; "
+            "name another folder, or delete that one"
         )
     return there

@@ -17,7 +17,7 @@ from harness.objectfile.verify import verify
 def block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("TOUCHSTONE_CACHE", str(tmp_path / "cache"))
     path = tmp_path / "block.stl"
-    trimesh.creation.box([0.12, 0.05, 0.03]).export(path)
+    trimesh.creation.box([0.2, 0.05, 0.02]).export(path)
     return path
 
 
@@ -25,7 +25,6 @@ def build(block: Path, *more: str) -> int:
     out = str(block.parent / "object")
     return invoke(
         ["object", "build", str(block), "--units", "m", "--material", "wood", "--edge", "15mm",
-         "--up-to", "60kHz",
          "--profile", "smoke", "--only", "audio", "--modes", "12", "--out", out, "--json", *more]
     )  # fmt: skip
 
@@ -60,7 +59,7 @@ def test_a_folder_of_another_object_is_refused(block: Path, capsys: pytest.Captu
     before = (block.parent / "object" / "object.json").read_bytes()
     assert build(block, "--material", "steel") == 2
     assert "name another folder" in capsys.readouterr().err
-    trimesh.creation.box([0.12, 0.05, 0.031]).export(block)
+    trimesh.creation.box([0.2, 0.05, 0.021]).export(block)
     assert build(block) == 2
     assert (block.parent / "object" / "object.json").read_bytes() == before
 
