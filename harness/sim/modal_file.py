@@ -16,13 +16,23 @@ from harness.sim.intake import take_in
 from harness.sim.modal import HEARING, curved, default_edge
 from harness.sim.modal_mesh import QuadraticMesh
 from harness.sim.modal_solve import Elasticity, Solution, check_elasticity, check_limit, solve_mesh
-from harness.sim.tetrahedra import tetrahedralize
+from harness.sim.surface_measure import enclosed_volume, thin_wall
+from harness.sim.tetrahedra import check_closed, tetrahedralize
 from harness.sim.volume_mesh import read_volume
 from harness.sim.walls import walled
 from harness.toml_file import nearest
 
-SHARE = 0.35
+SHARE = 0.25
 """Of the shortest wave below the limit, the edge of an element where none is asked for."""
+
+_ACROSS = 0.45
+"""Of the wall, an element's edge if the budget allows it: a bar that twists warps across its section."""
+
+_BUDGET = 3e4
+"""Unknowns, about, up to which elements become as small as the wall wants them."""
+
+_UNKNOWNS = 40.0
+"""Unknowns in a cube of the edge's side, as filling makes them."""
 
 _UNLIMITED = 1e12
 """Hz: beyond the modes of anything; where only their number is asked for, that decides the edge."""
@@ -152,12 +162,20 @@ def _surface(
     with _timed(seconds, "intake"):
         intake = take_in(path, units, wall=wall)
         surface: Mesh = walled(intake.mesh, wall)
-        edge = default_edge(surface, material, limit, count, SHARE) if edge is None else edge
+        check_closed(surface)
+        edge = _fine_edge(surface, material, limit, count) if edge is None else edge
     with _timed(seconds, "mesh"):
         filled = tetrahedralize(surface, edge)
         mesh = curved(filled, surface, filled)
     said = (*intake.report.repairs, *intake.report.warnings)
     return _Taken(mesh, {}, intake.report.units, filled.bodies, edge, said)
+
+
+def _fine_edge(surface: Mesh, material: Material, limit: float, count: int | None) -> float:
+    """Metres: small against the wave, and against the wall as far as the budget allows."""
+    across = _ACROSS * thin_wall(surface, 0.5)
+    afforded = (_UNKNOWNS * enclosed_volume(surface) / _BUDGET) ** (1.0 / 3.0)
+    return float(min(default_edge(surface, material, limit, count, SHARE), max(across, afforded)))
 
 
 def _held(taken: _Taken, fixed: Sequence[str]) -> BoolArray:

@@ -23,6 +23,9 @@ _TOLERANCE = 1e-9
 _BEYOND = 1e-2
 """The same for the first mode beyond the limit, which only has to be known to be beyond."""
 
+DENSE = 600
+"""Unknowns up to which every mode of the system is computed at once."""
+
 _SAME = 1e-4
 """Relative distance of squared frequencies below which two modes are taken as a pair."""
 
@@ -61,6 +64,8 @@ def modes_below(
     Raises:
         MeshRefused: the stiffness cannot be factorised, or modes were missed twice.
     """
+    if system.rigid.shape[0] <= DENSE:
+        return _dense(system, (2 * np.pi * limit) ** 2, most)
     factor = factorised(system.shifted(system.shift))
     lowest = float(factor.U.diagonal().min())
     if lowest <= 0.0:
@@ -80,10 +85,23 @@ def modes_below(
     )
 
 
+def _dense(system: ModalSystem, ceiling: float, most: int | None) -> tuple[EigenPairs, float]:
+    """As ``modes_below`` for a small system."""
+    values, vectors = eigh(system.stiffness.toarray(), system.inertia().toarray())
+    rigid = system.rigid.shape[1]
+    values, vectors = values[rigid:], vectors[:, rigid:]
+    number = int(np.count_nonzero(values <= ceiling))
+    if most is not None and number > most:
+        number = _whole_group(1.0 / values, most)
+        ceiling = 0.5 * float(values[number - 1] + values[number])
+    kept, shapes = values[:number], vectors[:, :number]
+    return EigenPairs(kept, shapes, _residual(system, kept, shapes), True), float(
+        np.sqrt(ceiling) / (2 * np.pi)
+    )
+
+
 def _count_below(system: ModalSystem, ceiling: float) -> int | None:
     """How many elastic eigenvalues are below ``ceiling``; None where the factors cannot say."""
-    if not np.isfinite(ceiling):
-        return int(system.rigid.shape[0] - system.rigid.shape[1])
     negative = negative_pivots(factorised(system.shifted(-ceiling)))
     return None if negative is None else negative - system.rigid.shape[1]
 

@@ -11,10 +11,13 @@ from harness.arrays import BoolArray, FloatArray
 from harness.errors import WrongUse
 from harness.materials import Material
 from harness.mesh import Mesh
-from harness.sim.modal_lanczos import EigenPairs, modes_below
+from harness.sim.modal_lanczos import DENSE, EigenPairs, modes_below
 from harness.sim.modal_mesh import QuadraticMesh
 from harness.sim.modal_system import MassRule, ModalSystem, modal_system
 from harness.sim.modes import Modes
+
+_SHARE_OF_UNKNOWNS = 0.1
+"""Above it, the modes of a mesh are those of its elements and not of the object."""
 
 _SPARE = 6
 """Modes beyond the last one asked for: enough that a group of one frequency seldom ends beyond them."""
@@ -124,6 +127,12 @@ def _found(
     """As many as asked for; ``modes_below`` gives fewer where a group of one frequency is at the end."""
     if least is None:
         return modes_below(system, limit, most)
+    unknowns = system.rigid.shape[0]
+    if unknowns > DENSE and least > _SHARE_OF_UNKNOWNS * unknowns:
+        raise WrongUse(
+            f"{least} modes are too many for a mesh of {unknowns} unknowns, of which only "
+            f"{_SHARE_OF_UNKNOWNS:.0%} or so mean anything; ask for fewer, or refine the mesh"
+        )
     asked = least + _SPARE
     while True:
         pairs, reached = modes_below(system, limit, asked if most is None else min(asked, most))

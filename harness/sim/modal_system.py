@@ -76,10 +76,12 @@ class ModalSystem:
 
     def shifted(self, shift: float) -> SparseColumns:
         """``K + shift M``, ``(u, u)``; the shift in ``(rad/s)^2`` may be negative."""
-        mass = sp.kron(self.mass, sp.eye_array(3), format="csc")
-        if self.free is not None:
-            mass = mass[self.free][:, self.free]
-        return sp.csc_array(self.stiffness + shift * mass)
+        return sp.csc_array(self.stiffness + shift * self.inertia())
+
+    def inertia(self) -> SparseColumns:
+        """``(u, u)`` kg: the mass matrix of the unknowns."""
+        mass = sp.csc_array(sp.kron(self.mass, sp.eye_array(3), format="csc"))
+        return mass if self.free is None else sp.csc_array(mass[self.free][:, self.free])
 
     def held(self, held: BoolArray) -> "ModalSystem":
         """This free system with some displacements held at zero.

@@ -116,7 +116,7 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
         WrongUse: an edge or an envelope that cannot be.
         MeshRefused: the surface is open, or what fills it is not what it encloses.
     """
-    _check_closed(mesh)
+    check_closed(mesh)
     if not (np.isfinite(edge) and 0.0 < edge < mesh.diagonal):
         raise WrongUse(
             f"an element edge of {edge * 1e3:g} mm is outside 0 to {mesh.diagonal * 1e3:.4g} mm, the "
@@ -189,7 +189,12 @@ def _check_slivers(nodes: FloatArray, cells: IntArray) -> None:
         )
 
 
-def _check_closed(mesh: Mesh) -> None:
+def check_closed(mesh: Mesh) -> None:
+    """Refuse a surface without an inside.
+
+    Raises:
+        MeshRefused: it is open.
+    """
     rim = boundary_edges(mesh.faces)
     if len(rim) and _open_area(mesh, rim) > _SLIT * float(mesh.face_areas.sum()):
         raise MeshRefused(

@@ -163,7 +163,8 @@ def _oriented(nodes: FloatArray, cells: IntArray) -> tuple[QuadraticMesh, tuple[
         said.append(f"the cells have four nodes, too stiff to be solved; {added} middle nodes were added")
     else:
         mesh = QuadraticMesh(nodes, cells, six_node_faces(cells))
-    return mesh, tuple(said), check_curved(mesh, said)
+    quality = check_curved(mesh, said)
+    return mesh, tuple(said), quality
 
 
 def _unit(asked: str | None, size: float, name: str) -> str:

@@ -77,10 +77,10 @@ def check_overlap(cells: IntArray, reversed_: BoolArray) -> None:
     if not involved.any():
         return
     blamed = involved & (reversed_ if 2 * int(reversed_.sum()) <= len(cells) else ~reversed_)
+    wrong = named(np.asarray(blamed if blamed.any() else involved))
     raise MeshRefused(
-        f"{named(np.asarray(blamed if blamed.any() else involved))} of {len(cells)} are inverted: they overlap "
-        "the elements beside them, so that a node lies on the wrong side of a face; mesh the object again, or "
-        "move the node back"
+        f"{wrong} of {len(cells)} are inverted: they overlap the elements beside them, so a node lies on "
+        "the wrong side of a face; mesh the object again, or move the node back"
     )
 
 
