@@ -12,6 +12,9 @@ REPEATED = 1e-5
 """Relative: frequencies nearer than this count as one. Two of 10 kHz then beat slower than 0.1 Hz, so
 that a mixture of them sounds the same; farther apart the mesh itself says which vectors they are."""
 
+_FIELDS = 32
+"""Fixed waves that shapes of equal frequency are told apart by."""
+
 _CHUNK = 4096
 """Edges at a time: all of them with all modes would not fit into memory."""
 
@@ -87,19 +90,24 @@ def canonical(modes: Modes, gap: float = REPEATED) -> Modes:
 
 
 def _products(modes: Modes) -> FloatArray:
-    """``(30, m)``: integrals of each shape with linear and quadratic fields along x, y and z.
+    """``(3 _FIELDS, m)``: integrals of each shape with waves along x, y and z.
 
-    The weights of the fields are no simple fractions of each other, so that no symmetry of an object
-    makes two singular values equal.
+    Waves in directions spread over a sphere, from longer than the object to a tenth of it, so that
+    shapes that go round an object many times have products too; their weights are no simple
+    fractions of each other, so that no symmetry of an object makes two singular values equal.
     """
     areas = node_areas(modes)
     middle = areas @ modes.points / areas.sum()
     place = modes.points - middle
     place = place / np.sqrt(areas @ (place**2).sum(axis=1) / areas.sum())
-    x, y, z = place.T
-    fields = np.stack([np.ones(len(x)), x, y, z, x * y, y * z, z * x, x * x, y * y, z * z])
-    weights = np.sqrt(np.arange(2.0, 2.0 + 3 * len(fields))).reshape(len(fields), 3)
-    integrals = np.einsum("fn,n,nmd->fdm", fields, areas, modes.shapes, optimize=True)
+    number = np.arange(_FIELDS) + 0.5
+    height, turn = 1.0 - 2.0 * number / _FIELDS, np.pi * (1.0 + np.sqrt(5.0)) * number
+    across = np.sqrt(1.0 - height**2)
+    directions = np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
+    lengths = 0.5 * 20.0 ** (np.modf(number * np.sqrt(2.0))[0])
+    fields = np.sin(place @ (directions * lengths[:, None]).T + number)
+    weights = np.sqrt(np.arange(2.0, 2.0 + 3 * _FIELDS)).reshape(_FIELDS, 3)
+    integrals = np.einsum("nf,n,nmd->fdm", fields, areas, modes.shapes, optimize=True)
     products: FloatArray = (integrals * weights[:, :, None]).reshape(-1, len(modes.frequencies))
     return products
 

@@ -40,6 +40,22 @@ def test_signs_and_bases_of_a_solver_leave_no_trace(egg: Modes, seed: int) -> No
     assert found.frequencies == pytest.approx(wanted.frequencies, rel=1e-14)
 
 
+@pytest.mark.parametrize("order", [2, 4, 6, 9])
+def test_a_pair_that_goes_round_many_times_has_one_basis(egg: Modes, order: int) -> None:
+    radius = np.linalg.norm(egg.points[:, :2], axis=1, keepdims=True)
+    outward = np.concatenate([egg.points[:, :2] / np.maximum(radius, 1e-9), np.zeros_like(radius)], axis=1)
+    angle = np.arctan2(egg.points[:, 1], egg.points[:, 0])
+    pair = np.stack([np.cos(order * angle), np.sin(order * angle)], axis=1) * radius
+    shapes = pair[:, :, None] * outward[:, None, :]
+    found = []
+    for turn in (0.0, 0.7, 2.0):
+        rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        given_ = np.einsum("nmd,mk->nkd", shapes, rotation)
+        found.append(canonical(replace(egg, frequencies=np.full(2, 900.0), shapes=given_)).shapes)
+    assert np.abs(found[1] - found[0]).max() < 1e-9 * np.abs(shapes).max()
+    assert np.abs(found[2] - found[0]).max() < 1e-9 * np.abs(shapes).max()
+
+
 def test_numbering_of_nodes_leaves_no_trace(egg: Modes) -> None:
     order = np.random.default_rng(3).permutation(len(egg.points))
     back = np.argsort(order)

@@ -1,0 +1,68 @@
+"""What a network of sound costs and is worth, beside what needs no training.
+
+``python tests/benchmarks/bench_audionet.py [object ...]`` prints, for each profile, process seconds on
+one core, size, microseconds for a point, and errors on vertices that were held out. The profiles
+``small`` and ``paper`` train for minutes; name them with ``--profile``.
+"""
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from harness.authoring.audio import author_audio
+from harness.authoring.audio_data import canonical
+from harness.authoring.audio_profiles import profile
+from harness.materials import material
+from harness.objects.household import MATERIALS, build
+from harness.sim.modal import HEARING, modes_of
+from harness.sim.modes import dampings
+from harness.store import Store, default_folder
+
+HEADINGS = ("object", "shapes from", "s", "MB", "us", "gain %", "95th", "STFT e-5", "envelope e-4", "dB")
+COLUMNS = (
+    ("bytes", 1e-6),
+    ("seconds_per_vertex", 1e6),
+    ("gain_error_median", 1e2),
+    ("gain_error_p95", 1e2),
+    ("stft_distance", 1e5),
+    ("envelope_distance", 1e4),
+    ("spectral_error_db", 1.0),
+)
+
+
+def main() -> None:
+    """Print one table."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("objects", nargs="*", default=list(MATERIALS))
+    parser.add_argument("--profile", action="append")
+    parser.add_argument("--modes", type=int, default=128)
+    asked = parser.parse_args()
+    table = Table(*HEADINGS, title=f"up to {asked.modes} modes below {HEARING / 1e3:g} kHz, one thread")
+    for name in asked.objects:
+        _measure(table, name, asked.profile or ["smoke", "standard"], asked.modes)
+    Console(width=140).print(table)
+
+
+def _measure(table: Table, name: str, profiles: list[str], most: int) -> None:
+    of = material(MATERIALS[name])
+    modes = canonical(modes_of(build(name), of, most=most, store=Store(default_folder())))
+    rates = dampings(modes.frequencies, of)
+    for number, wanted in enumerate(profiles):
+        with tempfile.TemporaryDirectory() as folder:
+            begun = time.process_time()
+            made = author_audio(modes, rates, profile(wanted), 0, Path(folder), lambda _doing, _share: None)
+            took = time.process_time() - begun
+        rows = {wanted: made.errors["network"]}
+        if number == 0:
+            rows |= {row: errors for row, errors in made.errors.items() if row != "network"}
+        for row, errors in rows.items():
+            said = [f"{errors[key] * scale:.3g}" if key in errors else "" for key, scale in COLUMNS]
+            table.add_row(f"{name}, {len(modes.frequencies)}", row, f"{took:.1f}" * (row == wanted), *said)
+
+
+if __name__ == "__main__":
+    main()
