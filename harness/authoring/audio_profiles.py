@@ -60,10 +60,12 @@ class Profile:
     sounds: int
 
 
+_SMALL = PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epochs=300)
+
 PROFILES: Mapping[str, Profile] = MappingProxyType({
     "smoke": Profile(WavesSpec(768, (1.0,)), sounds=8),
     "standard": Profile(WavesSpec(1536), sounds=40),
-    "small": Profile(PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epochs=300), sounds=40),
+    "small": Profile(_SMALL, sounds=40),
     "paper": Profile(PerceptronSpec(epochs=120), sounds=40),
 })  # fmt: skip
 """``smoke`` and ``standard`` need no torch; ``paper`` is the network of ObjectFolder 2.0, ``small`` one
