@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -160,15 +160,19 @@ def locate(
             top = int(np.argmax(found.hypotheses.log_weights))
             best = found.hypotheses.gels[top], float(found.hypotheses.yaws[top])
             refuse_inside_out(search, *best, found.members)
-        answers.append(
-            replace(
-                _answer(search, k, found, seconds, FLOORS[levels.senses if heard else "touch"]), doubts=doubts
-            )
-        )
+        floor = FLOORS[levels.senses if heard else "touch"]
+        answers.append(_answer(search, k, found, seconds, floor, doubts))
     return tuple(answers)
 
 
-def _answer(search: Search, count: int, found: Solution, seconds: dict[str, float], floor: float) -> Estimate:
+def _answer(
+    search: Search,
+    count: int,
+    found: Solution,
+    seconds: dict[str, float],
+    floor: float,
+    doubts: tuple[str, ...],
+) -> Estimate:
     start = time.perf_counter()
     mesh, hypotheses = search.model.mesh, found.hypotheses
     weights = hypotheses.weights
@@ -192,6 +196,7 @@ def _answer(search: Search, count: int, found: Solution, seconds: dict[str, floa
         points=read_only(points),
         weights=read_only(weights),
         seconds=seconds,
+        doubts=doubts,
     )
     lap(seconds, "answer", start)
     return result

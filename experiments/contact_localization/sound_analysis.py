@@ -122,20 +122,21 @@ def _bands(spectra: Spectra, settings: Analysis) -> list[tuple[int, int, int]]:
     tops, found = find_peaks(np.maximum(level, loudest - settings.range), prominence=min(settings.prominence))
     heard = (power[tops] > noise[tops] * 10.0 ** (settings.above_noise / 10.0)) & open_bins[tops]
     step = float(spectra.frequencies[1])
+    reached = [_reach(power, int(top), settings.edge) for top in tops[heard]]
     bands = [
-        _reach(power, int(top), settings.edge)
-        for top, stands, loud in zip(tops, found["prominences"], heard, strict=True)
-        if loud and _stands_out(level, power, int(top), float(stands), step, settings)
+        band
+        for band, stands in zip(reached, found["prominences"][heard], strict=True)
+        if _stands_out(level, band, float(stands), step, settings)
     ]
     bands.sort(key=lambda band: -power[band[1]])
     return bands[: 2 * settings.most]
 
 
 def _stands_out(
-    level: FloatArray, power: FloatArray, top: int, prominence: float, step: float, settings: Analysis
+    level: FloatArray, band: tuple[int, int, int], prominence: float, step: float, settings: Analysis
 ) -> bool:
     """Whether a peak is too high, for its breadth, to be an echo's."""
-    low, _, high = _reach(power, top, settings.edge)
+    low, top, high = band
     broad = int((high - low) * step > settings.broad)
     # Several of its own widths where it is broad, or the floor would be its flanks.
     reach = max(settings.floor_reach / step, broad * _WIDTHS * (high - low))

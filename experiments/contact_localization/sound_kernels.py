@@ -77,27 +77,24 @@ def blend_of_samples(
 
 @compiled
 def gains_at(shapes: AnyArray, samples: IntArray, blend: FloatArray, directions: FloatArray) -> FloatArray:
-    """``(h, K, m)`` 1/sqrt(kg): how strongly each strike of each hypothesis moves each mode.
+    """``(K, m)`` 1/sqrt(kg): how strongly each strike of one hypothesis moves each mode.
 
     Args:
         shapes: ``(n, m, 3)`` modes at the surface's samples.
-        samples: ``(h, K, J)`` samples about the place that each strike of a hypothesis hit.
-        blend: ``(h, K, J)`` their shares in it.
-        directions: ``(h or 1, K, 3)`` unit, of the strikes.
+        samples: ``(K, J)`` samples about the place that each strike hit.
+        blend: ``(K, J)`` their shares in it.
+        directions: ``(K, 3)`` unit, of the strikes.
     """
-    hypotheses, strikes, about = samples.shape
-    modes = shapes.shape[1]
-    gains = np.zeros((hypotheses, strikes, modes))
-    for h in range(hypotheses):
-        g = h if len(directions) > 1 else 0
-        for k in range(strikes):
-            x, y, z = directions[g, k, 0], directions[g, k, 1], directions[g, k, 2]
-            for j in range(about):
-                share = blend[h, k, j]
-                if share > _LITTLE:
-                    for m in range(modes):
-                        shape = shapes[samples[h, k, j], m]
-                        gains[h, k, m] += share * (shape[0] * x + shape[1] * y + shape[2] * z)
+    strikes, about = samples.shape
+    gains = np.zeros((strikes, shapes.shape[1]))
+    for k in range(strikes):
+        x, y, z = directions[k, 0], directions[k, 1], directions[k, 2]
+        for j in range(about):
+            share = blend[k, j]
+            if share > _LITTLE:
+                for m in range(shapes.shape[1]):
+                    shape = shapes[samples[k, j], m]
+                    gains[k, m] += share * (shape[0] * x + shape[1] * y + shape[2] * z)
     return gains
 
 
@@ -150,7 +147,10 @@ def angular_gaussian(
 
 @compiled
 def sound_scores(
-    struck: FloatArray,
+    shapes: AnyArray,
+    samples: IntArray,
+    blend: FloatArray,
+    directions: FloatArray,
     scales: FloatArray,
     rows: FloatArray,
     real: FloatArray,
@@ -168,7 +168,10 @@ def sound_scores(
     """``(h,)`` nats of hypotheses.
 
     Args:
-        struck: ``(h, K, m)`` gains of the modes, groups of modes side by side.
+        shapes: ``(n, m, 3)`` modes at the surface's samples, groups of modes side by side.
+        samples: ``(h, K, J)`` samples about the place that each strike of a hypothesis hit.
+        blend: ``(h, K, J)`` their shares in it.
+        directions: ``(h or 1, K, 3)`` unit, of the strikes.
         scales: ``(C, m)`` what makes a gain one of unit noise, under each of the spreads.
         rows: ``(C, P, K)`` further factor of each strike at each peak.
         real: ``(C, P, K)`` of the peaks' directions.
@@ -183,16 +186,17 @@ def sound_scores(
         weights: ``(P,)`` of the peaks.
         log_scale_shares: ``(S,)`` nats of each frequency scale.
     """
-    hypotheses, strikes, modes = struck.shape
-    spreads = len(scales)
+    hypotheses, strikes = samples.shape[0], samples.shape[1]
+    spreads, modes = scales.shape
     peaks, scenarios = len(counts), len(log_scale_shares)
     result = np.empty(hypotheses)
     gains = np.empty((spreads, strikes, modes))
     fits = np.empty((len(pair_groups), spreads))
     totals = np.empty(scenarios)
     for h in range(hypotheses):
+        struck = gains_at(shapes, samples[h], blend[h], directions[h if len(directions) > 1 else 0])
         for c in range(spreads):
-            gains[c] = struck[h] * scales[c]
+            gains[c] = struck * scales[c]
         totals[:] = log_scale_shares
         for p in range(peaks):
             best = 0.0

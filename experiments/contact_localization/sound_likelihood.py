@@ -8,12 +8,13 @@ shapes and images, JSPI 57, 1997). The microphone's gains need not be known and 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from experiments.contact_localization.sound_analysis import Peak, SoundEvidence
 from experiments.contact_localization.sound_gains import GainTable
-from experiments.contact_localization.sound_kernels import MOST_RANK, gains_at, sound_scores
+from experiments.contact_localization.sound_kernels import MOST_RANK, sound_scores
 from experiments.contact_localization.sound_matching import (
     Scales,
     SoundNoise,
@@ -78,6 +79,15 @@ class _Heard:
     imaginary: FloatArray
     counts: IntArray
     offsets: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Struck:
+    """Places and ways of strikes as ``sound_scores`` takes them."""
+
+    samples: IntArray
+    blend: FloatArray
+    directions: FloatArray
 
 
 class SoundTerm:
@@ -148,8 +158,8 @@ class SoundTerm:
             )
         if not self.says_something or len(points) == 0:
             return np.zeros(len(points))
-        gains = self._gains(points, directions, between)
-        return self._by_peaks(gains, self._peaks, self._pairs, self._noise.weight)
+        struck = self._struck(points, directions, between)
+        return self._scores(struck, self._heard, self._pairs, self._noise.weight)
 
     def mode_table(self, points: FloatArray, directions: FloatArray) -> tuple[ModeRow, ...]:
         """Every peak with the group of modes that explains it best at one set of places.
@@ -158,30 +168,34 @@ class SoundTerm:
             points: ``(K, 3)`` metres, in the object's frame.
             directions: ``(K, 3)`` unit.
         """
-        return tuple(self._row(index, points, directions) for index in range(len(self._peaks)))
+        struck = self._struck(points[None], directions, between=True)
+        return tuple(self._row(index, struck) for index in range(len(self._peaks)))
 
-    def _gains(self, points: FloatArray, directions: FloatArray, between: bool) -> FloatArray:
-        """``(h, K, m)`` 1/sqrt(kg)."""
+    @cached_property
+    def _heard(self) -> _Heard:
+        return _whitened(self._peaks, self._noise.spreads)
+
+    def _struck(self, points: FloatArray, directions: FloatArray, between: bool) -> _Struck:
+        """Of ``(h, K, 3)`` points and ``(h, K, 3)`` or ``(K, 3)`` directions."""
         strikes = len(self.evidence.used)
         flat = points.reshape(-1, 3)
         if between:
             samples, blend = self._table.about(flat)
         else:
             samples, blend = self._table.nearest(flat)[:, None], np.ones((len(flat), 1))
-        about = samples.shape[1]
-        return gains_at(
-            self._table.shapes,
-            samples.reshape(-1, strikes, about),
-            blend.reshape(-1, strikes, about),
+        shape = (len(points), strikes, samples.shape[1])
+        return _Struck(
+            samples.reshape(shape),
+            blend.reshape(shape),
             np.ascontiguousarray(directions.reshape(-1, strikes, 3)),
         )
 
-    def _by_peaks(
-        self, gains: FloatArray, peaks: tuple[Peak, ...], pairs: _Pairs, weight: float
-    ) -> FloatArray:
-        heard = _whitened(peaks, self._noise.spreads)
+    def _scores(self, struck: _Struck, heard: _Heard, pairs: _Pairs, weight: float) -> FloatArray:
         return sound_scores(
-            gains,
+            self._table.shapes,
+            struck.samples,
+            struck.blend,
+            struck.directions,
             self._gain_scales,
             heard.rows,
             heard.real,
@@ -193,7 +207,7 @@ class SoundTerm:
             self._starts,
             pairs.shares,
             pairs.clutter,
-            np.full(len(peaks), weight),
+            np.full(len(heard.counts), weight),
             self.scales.log_shares,
         )
 
@@ -211,12 +225,12 @@ class SoundTerm:
             result[a:b] = 1.0 / np.sqrt(squares[a:b].mean())
         return np.asarray(result / np.array(self._noise.spreads)[:, None])
 
-    def _row(self, index: int, points: FloatArray, directions: FloatArray) -> ModeRow:
+    def _row(self, index: int, struck: _Struck) -> ModeRow:
         peak, pairs = self._peaks[index], self._pairs
         span = range(int(pairs.starts[index]), int(pairs.starts[index + 1]))
         prior = np.exp(self.scales.log_shares)
         odds = np.array([prior @ pairs.clutter[:, index]] + [prior @ pairs.shares[:, q] for q in span])
-        fits = np.array([0.0] + [self._fit_of(peak, int(pairs.groups[q]), points, directions) for q in span])
+        fits = np.array([0.0] + [self._fit_of(peak, int(pairs.groups[q]), struck) for q in span])
         total = float(np.sum(odds * np.exp(fits)))
         chances = odds * np.exp(fits) / total
         best = int(np.argmax(chances))
@@ -235,7 +249,7 @@ class SoundTerm:
             float(np.log(total)),
         )
 
-    def _fit_of(self, peak: Peak, group: int, points: FloatArray, directions: FloatArray) -> float:
+    def _fit_of(self, peak: Peak, group: int, struck: _Struck) -> float:
         """Nats of one peak if one group of modes made it."""
         sure = _Pairs(
             np.array([0, 1], dtype=np.int64),
@@ -243,8 +257,8 @@ class SoundTerm:
             np.ones((len(self.scales.factors), 1)),
             np.zeros((len(self.scales.factors), 1)),
         )
-        gains = self._gains(points[None], directions, True)
-        return float(self._by_peaks(gains, (peak,), sure, 1.0)[0])
+        heard = _whitened((peak,), self._noise.spreads)
+        return float(self._scores(struck, heard, sure, 1.0)[0])
 
 
 def _pair(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> _Pairs:
