@@ -8,7 +8,7 @@ DEV := $(VENV)/.installed-dev
 # A microphone on a sound card, and a sound card to test it with; all else works without.
 SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 
-.PHONY: help install demo test lint types contracts bench tables sound clean
+.PHONY: help install demo test hunt lint types contracts bench tables sound clean
 
 help: ## what can be asked for
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -42,6 +42,9 @@ demo: $(RUN) ## localize a contact on the mocked bench, and write the report
 
 test: $(DEV) sound lint types contracts ## everything CI checks
 	@$(BIN)/python -m pytest -m "not benchmark"
+
+hunt: $(DEV) ## the property tests on cases drawn anew
+	@$(BIN)/python -m pytest -m "not benchmark" --hypothesis-profile=hunt -k "$(or $(K),test)"
 
 lint: $(DEV)
 	@$(BIN)/ruff check .

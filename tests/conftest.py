@@ -3,12 +3,18 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from real_data import WHY_NOT, find_shared_data
 
 from harness.scene import SceneFile, load_scene
 from harness.station_file import Station, load_station
 
 ROOT = Path(__file__).parents[1]
+
+# One commit gets one verdict; `make hunt` draws other cases every time.
+settings.register_profile("verdict", derandomize=True)
+settings.register_profile("hunt", derandomize=False, print_blob=True)
+settings.load_profile("verdict")
 
 
 @pytest.fixture(scope="session")
