@@ -80,11 +80,14 @@ class Noise:
 
     Attributes:
         geometry: of places and tool axes.
+        unread: the same where no image is read: how far the gel was pressed in, and past which edge, is not
+            known there.
         touch: of the images.
         temperature: factor on the images' share: their errors are shared between contacts.
     """
 
     geometry: GeometryNoise = field(default_factory=GeometryNoise)
+    unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3))
     touch: TouchNoise = field(default_factory=TouchNoise)
     temperature: float = 0.3
 

@@ -44,6 +44,8 @@ class Search:
         self.model = model
         self.prior = prior
         self.noise = noise
+        read = any(contact.touch is not None for contact in contacts)
+        self.geometry = noise.geometry if read else noise.unread
         self.surface: Surface = model.surface(spacing)
         self.turning = model.turning(prior.up) if prior.yaw == "unknown" else None
         self.yaws = _KNOWN_YAWS if self.turning is None else _yaws_over(self.turning.period)
@@ -223,7 +225,7 @@ class Search:
         points = self.positions[members] - indentations[:, None] * self.axes[members]
         index = int(np.nonzero(members == anchor)[0][0])
         arrangement = arrange(rotations, points, self.axes[members], index)
-        geometry = self.noise.geometry
+        geometry = self.geometry
         samples, yaws = possible_anchors(self.surface, arrangement, geometry, use_axis)
         prior = np.log(self.surface.areas[samples]) + self.log_yaw_prior(self.yaws)[yaws]
         log_weights = geometry_scores(
@@ -234,7 +236,7 @@ class Search:
     def _place_sigmas(self, members: IntArray) -> FloatArray:
         centre = self.positions[members].mean(axis=0)
         reach = np.linalg.norm(self.positions[members] - centre, axis=1)
-        return np.asarray(np.hypot(self.noise.touch.shift, self.noise.geometry.gap_per_metre * reach))
+        return np.asarray(np.hypot(self.noise.touch.shift, self.geometry.gap_per_metre * reach))
 
     def _temperatures(self, members: IntArray) -> FloatArray:
         """A press repeated at one place shares its errors: its images together count as one."""
