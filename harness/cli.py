@@ -71,6 +71,10 @@ COMMANDS = {
     "object info": Command(
         "experiments.commands.object:info", "Say what an ObjectFile holds: modes, networks, sources, licence."
     ),
+    "object render": Command(
+        "experiments.commands.object_render:render",
+        "Render the sound of a strike at a place: a WAV, and a picture of it and of the modes.",
+    ),
     "object verify": Command(
         "experiments.commands.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
     ),
