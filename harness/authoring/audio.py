@@ -24,8 +24,8 @@ from harness.authoring.audio_metrics import (
 from harness.authoring.audio_profiles import PerceptronSpec, Profile
 from harness.authoring.audio_waves import fit_waves
 from harness.objectfile.audio_graph import audio_graph
+from harness.objectfile.audio_part import NETWORK, network_tensors
 from harness.objectfile.audio_table import scaled
-from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.runtime import Network
 from harness.sim.modal_sound import audible
 from harness.sim.modes import Modes
@@ -39,6 +39,9 @@ CHECKPOINT = ".audio_training.npz"
 
 _TIMED = 200
 _CHUNK = 256
+
+_ANYWHERE = 1.0
+"""m: a graph that belongs to no object yet is not asked how near to its surface a point is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,18 +176,8 @@ def measure_audio(
 
 def opened(graph: ModelProto, modes: int) -> Network:
     """A graph that can be asked, before it is part of an ObjectFile."""
-    points = Input(
-        name="points",
-        dtype="float64",
-        shape=("n", 3),
-        unit="m",
-        meaning="where the object is struck",
-        frame="object",
-        domain=Domain(near_surface_m=1.0),
-        normaliser="in the graph",
-    )
-    gains = Tensor(name="gains", dtype="float32", shape=("n", modes, 3), unit="1/sqrt(kg)", meaning="shapes")
-    return Network(graph.SerializeToString(), "audio.onnx", [points], [gains])
+    points, gains = network_tensors(modes, _ANYWHERE)
+    return Network(graph.SerializeToString(), NETWORK, [points], [gains])
 
 
 def _in_chunks(network: Network, points: FloatArray) -> FloatArray:

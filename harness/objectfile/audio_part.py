@@ -98,9 +98,13 @@ def with_audio(of: ObjectFile, part: AudioPart) -> ObjectFile:
     return with_part(of, "audio", entry, contents)
 
 
-def _network(mesh: Mesh, part: AudioPart, graph: ModelProto, contents: dict[str, bytes]) -> NetworkEntry:
-    data = graph.SerializeToString(deterministic=True)
-    contents[NETWORK] = data
+def network_tensors(modes: int, near_surface: float) -> tuple[Input, Tensor]:
+    """What every network of sound takes and gives.
+
+    Args:
+        modes: that it knows the shapes of.
+        near_surface: m, the farthest from the object's surface that a query may be.
+    """
     points = Input(
         name="points",
         dtype="float64",
@@ -108,17 +112,24 @@ def _network(mesh: Mesh, part: AudioPart, graph: ModelProto, contents: dict[str,
         unit="m",
         meaning="where the object is struck",
         frame="object",
-        domain=Domain(near_surface_m=part.near_surface),
+        domain=Domain(near_surface_m=near_surface),
         normaliser="in the graph",
     )
     gains = Tensor(
         name="gains",
         dtype="float32",
-        shape=("n", len(part.modes.frequencies), 3),
+        shape=("n", modes, 3),
         unit="1/sqrt(kg)",
         meaning="mass-normalised shape of each mode: its gain for a unit force along x, y, z",
         frame="object",
     )
+    return points, gains
+
+
+def _network(mesh: Mesh, part: AudioPart, graph: ModelProto, contents: dict[str, bytes]) -> NetworkEntry:
+    data = graph.SerializeToString(deterministic=True)
+    contents[NETWORK] = data
+    points, gains = network_tensors(len(part.modes.frequencies), part.near_surface)
     return NetworkEntry(
         **file_entry(NETWORK, data).model_dump(),
         inputs=(points,),
