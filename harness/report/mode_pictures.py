@@ -7,6 +7,7 @@ import trimesh
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 from scipy.signal import stft
 
 from harness.arrays import FloatArray, IntArray
@@ -40,7 +41,7 @@ _SHAPES = colormaps["RdBu_r"]
 _FALL_60_DB = 6.9078
 _LEGEND = (
     "Lowest modes: red and blue are what a push into the surface gives each, of either sign; white gives it "
-    "nothing. Dot: the strike."
+    "nothing. Dot: the strike, pale where it is behind."
 )
 
 
@@ -71,6 +72,16 @@ class ShownStrike:
     pushes: FloatArray
 
 
+@dataclass(frozen=True)
+class _Crop:
+    """Pixels of a picture that are shown."""
+
+    left: float
+    right: float
+    top: float
+    bottom: float
+
+
 def strike_figure(shown: ShownStrike) -> Figure:
     """The spectrogram, each mode's part in it, and the lowest modes' shapes on the object.
 
@@ -80,7 +91,10 @@ def strike_figure(shown: ShownStrike) -> Figure:
     """
     count = min(SHOWN, shown.pushes.shape[2])
     rows = -(-count // _COLUMNS)
-    width, below = _COLUMNS * _TILE, rows * (_TILE + _CAPTION) + _FOOT
+    shot = _seen(shown)
+    crop = _cropped(shot.picture())
+    high = _TILE * (crop.bottom - crop.top) / (crop.right - crop.left)
+    width, below = _COLUMNS * _TILE, rows * (high + _CAPTION) + _FOOT
     height = _TITLE + _SOUND + below
     with styled():
         figure = blank(width, height)
@@ -89,13 +103,13 @@ def strike_figure(shown: ShownStrike) -> Figure:
         heard = figure.add_axes((0.06, bottom, 0.60, top - bottom))
         _spectrogram(heard, shown)
         _levels(figure.add_axes((0.70, bottom, 0.27, top - bottom), sharey=heard), shown, count)
-        shot = _seen(shown)
         colours = _Shapes(shown.mesh, shown.pushes)
         for mode in range(count):
             row, column = divmod(mode, _COLUMNS)
-            low = (below - (row + 1) * (_TILE + _CAPTION) + _CAPTION) / height
-            box = (column / _COLUMNS, low, 1.0 / _COLUMNS, _TILE / height)
-            _tile(figure.add_axes(box), shot, colours.paint(mode), shown, mode)
+            low = (below - (row + 1) * (high + _CAPTION) + _CAPTION) / height
+            axes = figure.add_axes((column / _COLUMNS, low, 1.0 / _COLUMNS, high / height))
+            axes.imshow(shot.picture(0, colours.paint(mode)))
+            _label(axes, shot, crop, shown, mode)
         figure.text(0.5, 0.4 * _FOOT / height, _LEGEND, ha="center", va="center", fontsize=8.0, color=SOFT)
     return figure
 
@@ -140,15 +154,21 @@ def _spectrogram(axes: Axes, shown: ShownStrike) -> None:
     times, frequencies, levels = spectrogram(shown.sound, shown.rate)
     axes.pcolormesh(
         times,
-        1e-3 * frequencies,
-        levels,
+        1e-3 * frequencies[1:],
+        levels[1:],
         cmap="magma",
         vmin=FLOOR,
         vmax=0.0,
         shading="nearest",
         rasterized=True,
     )
-    axes.set_ylim(0.0, 1e-3 * min(1.08 * float(shown.frequencies[-1]), 0.5 * shown.rate))
+    # A logarithm, as ears have it; the lowest modes, which are drawn, else lie on each other.
+    axes.set_yscale("log")
+    highest = min(1.1 * float(shown.frequencies[-1]), 0.5 * shown.rate)
+    axes.set_ylim(0.7e-3 * float(shown.frequencies[0]), 1e-3 * highest)
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
     axes.set_xlim(0.0, float(times[-1]))
     axes.set_xlabel("s from the first touch")
     axes.set_ylabel("frequency in kHz")
@@ -177,20 +197,30 @@ def _seen(shown: ShownStrike) -> Shot:
     return next((shot for shot in sides.shots if not _hidden(shot, shown.place)), sides.shots[0])
 
 
+def _cropped(picture: FloatArray) -> _Crop:
+    """Where something is, with a margin, and no higher than wide."""
+    seen = np.any(picture < 0.995, axis=2)
+    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+    margin = _MARGIN * float(max(np.ptp(rows), np.ptp(columns)))
+    top, bottom = float(rows[0]) - margin, float(rows[-1]) + margin
+    middle, half = 0.5 * float(columns[0] + columns[-1]), 0.5 * float(np.ptp(columns)) + margin
+    half = max(half, 0.5 * (bottom - top))
+    return _Crop(middle - half, middle + half, top, bottom)
+
+
 def _hidden(shot: Shot, place: FloatArray) -> bool:
     return bool(shot.hidden(place[None], _LIFT)[0])
 
 
-def _tile(axes: Axes, shot: Shot, paint: Paint, shown: ShownStrike, mode: int) -> None:
+def _label(axes: Axes, shot: Shot, crop: _Crop, shown: ShownStrike, mode: int) -> None:
     axes.set_axis_off()
-    axes.imshow(shot.picture(0, paint))
     pixel = shot.camera.project(shown.place[None])[0][0]
     strength = 0.3 if _hidden(shot, shown.place) else 1.0
     axes.scatter(
         float(pixel[0]), float(pixel[1]), s=34.0, c=INK, edgecolors="white", linewidths=1.0, alpha=strength
     )
-    axes.set_xlim(_MARGIN * _PIXELS, (1.0 - _MARGIN) * _PIXELS)
-    axes.set_ylim((1.0 - _MARGIN) * _PIXELS, _MARGIN * _PIXELS)
+    axes.set_xlim(crop.left, crop.right)
+    axes.set_ylim(crop.bottom, crop.top)
     axes.text(0.5, 0.0, _caption(shown, mode), transform=axes.transAxes, ha="center", va="top", fontsize=8.5)
 
 
@@ -198,7 +228,7 @@ def _caption(shown: ShownStrike, mode: int) -> str:
     rate = float(shown.dampings[mode])
     lasting = f"60 dB in {_FALL_60_DB / rate:.2g} s" if rate > 0.0 else "undamped"
     level = float(_decibels(shown.amplitudes)[mode])
-    said = f"here at {level:.0f} dB" if level > FLOOR else "not struck here"
+    said = f"here at {round(level)} dB" if level > FLOOR else "not struck here"
     return f"{mode + 1}:  {shown.frequencies[mode]:,.0f} Hz\n{lasting}, {said}"
 
 
