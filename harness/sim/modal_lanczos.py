@@ -10,18 +10,25 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh, solve_triangular
-from scipy.sparse.linalg import SuperLU
 
 from harness.arrays import FloatArray
 from harness.errors import MeshRefused
-from harness.sim.modal_system import ModalSystem, factorised, negative_pivots
+from harness.sim.factorisation import Factor, factorised, inertia
+from harness.sim.modal_system import ModalSystem
 
 _BLOCK = 8
+_PER_MODE = 6
+"""Vectors of the basis for each mode wanted: mostly four are enough."""
+
 _TOLERANCE = 1e-9
 """Of a Ritz pair's residual against its own value."""
 
 _BEYOND = 1e-2
 """The same for the first mode beyond the limit, which only has to be known to be beyond."""
+
+_GROWTH = 1e6
+"""Of the pivots' size, up to which their signs are taken for those of the eigenvalues: the matrix
+that they belong to is then within about 1e-10 of the one asked about."""
 
 DENSE = 600
 """Unknowns up to which every mode of the system is computed at once."""
@@ -66,8 +73,8 @@ def modes_below(
     """
     if system.rigid.shape[0] <= DENSE:
         return _dense(system, (2 * np.pi * limit) ** 2, most)
-    factor = factorised(system.shifted(system.shift))
-    lowest = float(factor.U.diagonal().min())
+    factor = factorised(system.shifted(system.shift), system.plan)
+    lowest = float(factor.pivots.values.min())
     if lowest <= 0.0:
         raise MeshRefused(
             f"the stiffness of the object has a pivot of {lowest:.2g}, which must be above 0; its "
@@ -102,8 +109,10 @@ def _dense(system: ModalSystem, ceiling: float, most: int | None) -> tuple[Eigen
 
 def _count_below(system: ModalSystem, ceiling: float) -> int | None:
     """How many elastic eigenvalues are below ``ceiling``; None where the factors cannot say."""
-    negative = negative_pivots(factorised(system.shifted(-ceiling)))
-    return None if negative is None else negative - system.rigid.shape[1]
+    pivots = inertia(system.shifted(-ceiling), system.plan)
+    if pivots is None or pivots.growth > _GROWTH:
+        return None
+    return pivots.negative - int(system.rigid.shape[1])
 
 
 def _residual(system: ModalSystem, values: FloatArray, vectors: FloatArray) -> float:
@@ -117,10 +126,9 @@ def _residual(system: ModalSystem, values: FloatArray, vectors: FloatArray) -> f
 class _Lanczos:
     """One run from one random block."""
 
-    def __init__(self, system: ModalSystem, factor: SuperLU, seed: int, block: int = _BLOCK) -> None:
+    def __init__(self, system: ModalSystem, factor: Factor, seed: int, block: int = _BLOCK) -> None:
         self.system = system
         self.factor = factor
-        self.rigid_weighted = system.weighted(system.rigid)
         size = system.rigid.shape[0]
         self.block = min(block, size - system.rigid.shape[1])
         self.most = size - system.rigid.shape[1]
@@ -134,8 +142,9 @@ class _Lanczos:
 
         Also returns the ceiling below which these are all.
         """
+        self._reserve(24 * self.block if most is None else _PER_MODE * most)
         start = self._cleared(self.random.standard_normal((self.basis.shape[0], self.block)))
-        current, _ = self._normalised(start)
+        current, _ = self._orthonormal(start)
         check_at = 6 * self.block
         while True:
             self._append(current)
@@ -145,53 +154,50 @@ class _Lanczos:
                 found = self._converged(coupling, ceiling, most, last)
                 if found is not None:
                     return found
-                check_at = int(1.15 * self.used) + self.block
+                check_at = int(1.05 * self.used) + 1
             current = step
 
     def _append(self, current: FloatArray) -> None:
         """Take a block into the basis, which doubles when it is full."""
         end = self.used + current.shape[1]
         if end > self.basis.shape[1]:
-            room = min(max(2 * self.basis.shape[1], 24 * self.block), self.most + self.block)
-            grown = np.empty((self.basis.shape[0], room), order="F")
-            grown[:, : self.used] = self.basis[:, : self.used]
-            projected = np.zeros((room, room))
-            projected[: self.used, : self.used] = self.projected[: self.used, : self.used]
-            self.basis, self.projected = grown, projected
+            self._reserve(2 * self.basis.shape[1])
         self.basis[:, self.used : end] = current
         self.used = end
+
+    def _reserve(self, room: int) -> None:
+        """Room for so many vectors; memory is taken only as it is written to."""
+        room = min(max(room, 2 * self.block), self.most + self.block)
+        basis, projected = np.empty((self.basis.shape[0], room), order="F"), np.zeros((room, room))
+        basis[:, : self.used] = self.basis[:, : self.used]
+        projected[: self.used, : self.used] = self.projected[: self.used, : self.used]
+        self.basis, self.projected = basis, projected
 
     def _step(self, current: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The next block, and ``(b, b)`` what couples it to this one."""
         image = self.factor.solve(self.system.weighted(current))
-        image -= self.system.rigid @ (self.rigid_weighted.T @ image)
-        known = self.basis[:, : self.used]
-        first = known.T @ self.system.weighted(image)
-        image -= known @ first
-        second = known.T @ self.system.weighted(image)
-        image -= known @ second
+        image, known = self._without(image)
+        unit, size = self._orthonormal(image)
+        unit, missed = self._without(unit)
+        unit, again = self._orthonormal(unit)
         span = slice(self.used - current.shape[1], self.used)
-        self.projected[: self.used, span] = first + second
+        self.projected[: self.used, span] = known + missed @ size
         self.projected[span, : self.used] = self.projected[: self.used, span].T
-        image -= self.system.rigid @ (self.rigid_weighted.T @ image)
-        return self._normalised(image)
+        return unit, again @ size
+
+    def _without(self, block: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What of a block is neither rigid motion nor in the basis, and ``(used, b)`` of the basis."""
+        known = self.basis[:, : self.used]
+        weighted = self.system.weighted(block)
+        rigid = self.system.rigid.T @ weighted
+        share = known.T @ weighted
+        return block - known @ share - self.system.rigid @ rigid, share
 
     def _cleared(self, block: FloatArray) -> FloatArray:
         """Without rigid motion and without what the basis already holds."""
-        known = self.basis[:, : self.used]
         for _ in range(2):
-            block = block - self.system.rigid @ (self.rigid_weighted.T @ block)
-            block = block - known @ (known.T @ self.system.weighted(block))
+            block, _ = self._without(block)
         return block
-
-    def _normalised(self, block: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mass-orthonormal columns and ``(b, b)`` their combination that is ``block``.
-
-        Columns that the others or the basis already span are replaced by random ones.
-        """
-        unit, first = self._orthonormal(block)
-        again, second = self._orthonormal(self._cleared(unit))
-        return again, second @ first
 
     def _orthonormal(self, block: FloatArray) -> tuple[FloatArray, FloatArray]:
         gram = block.T @ self.system.weighted(block)

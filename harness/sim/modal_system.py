@@ -1,15 +1,17 @@
-"""Stiffness, mass and rigid motions of a finite-element mesh, and the factor that solves with them."""
+"""Stiffness, mass and rigid motions of a finite-element mesh."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import SuperLU, splu
 
-from harness.arrays import BoolArray, FloatArray, IntArray
-from harness.errors import MeshRefused
+from harness.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from harness.sim.compiled import compiled
+from harness.sim.elimination import Elimination, elimination
+from harness.sim.factorisation import SparseColumns
 from harness.sim.modal_kernels import (
     MASS_POINTS,
     MASS_WEIGHTS,
@@ -21,7 +23,6 @@ from harness.sim.modal_kernels import (
 )
 from harness.sim.modal_mesh import QuadraticMesh
 
-SparseColumns: TypeAlias = "sp.csc_array[Any]"
 SparseRows: TypeAlias = "sp.csr_array[Any]"
 MassRule: TypeAlias = Literal["consistent", "four points"]
 """How mass is integrated: as it is, or at four points as CalculiX does for this element, which is
@@ -76,12 +77,33 @@ class ModalSystem:
 
     def shifted(self, shift: float) -> SparseColumns:
         """``K + shift M``, ``(u, u)``; the shift in ``(rad/s)^2`` may be negative."""
-        return sp.csc_array(self.stiffness + shift * self.inertia())
+        data = self.stiffness.data + shift * self._masses
+        return sp.csc_array((data, self.stiffness.indices, self.stiffness.indptr), shape=self.stiffness.shape)
+
+    @cached_property
+    def _masses(self) -> FloatArray:
+        """The mass that belongs to each entry of the stiffness."""
+        free = np.arange(3 * self.mass.shape[0]) if self.free is None else self.free
+        return _masses_of_entries(
+            self.stiffness.indptr,
+            self.stiffness.indices,
+            free,
+            self.mass.indptr,
+            self.mass.indices,
+            self.mass.data,
+        )
 
     def inertia(self) -> SparseColumns:
         """``(u, u)`` kg: the mass matrix of the unknowns."""
         mass = sp.csc_array(sp.kron(self.mass, sp.eye_array(3), format="csc"))
         return mass if self.free is None else sp.csc_array(mass[self.free][:, self.free])
+
+    @cached_property
+    def plan(self) -> Elimination:
+        """Of every ``K + shift M``: the unknowns of a node are eliminated together."""
+        unknowns = np.arange(3 * self.mass.shape[0]) if self.free is None else self.free
+        nodes, together = np.unique(unknowns // 3, return_inverse=True)
+        return elimination(self.mass[nodes][:, nodes], together)
 
     def held(self, held: BoolArray) -> "ModalSystem":
         """This free system with some displacements held at zero.
@@ -118,42 +140,36 @@ def modal_system(
         shape_values(points),
         weights_at,
     )
-    whole = sp.bsr_array((stiffness, columns, rows), shape=(3 * count, 3 * count)).tocsc()
+    by_rows = sp.bsr_array((stiffness, columns, rows), shape=(3 * count, 3 * count)).tocsr()
+    # Symmetric, so that its rows are its columns.
+    whole = sp.csc_array((by_rows.data, by_rows.indices, by_rows.indptr), shape=by_rows.shape)
     weights = sp.csr_array((mass, columns, rows), shape=(count, count))
     shift = _SHIFT * float(whole.trace()) / (3.0 * float(weights.trace()))
     return ModalSystem(whole, weights, _rigid_motions(mesh, weights), shift, float(weights.sum()))
 
 
-def factorised(matrix: SparseColumns) -> SuperLU:
-    """The triangular factors of a symmetric matrix, rows and columns in one order.
-
-    Raises:
-        MeshRefused: a pivot is zero, as at a node that no element holds.
-    """
-    try:
-        return splu(
-            matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError as error:
-        raise MeshRefused(
-            f"the stiffness of the object cannot be factorised ({error}); its volume mesh has a node that no "
-            "element holds, or an element without volume: mesh the object again"
-        ) from error
-
-
-def negative_pivots(factor: SuperLU) -> int | None:
-    """How many eigenvalues of a symmetric matrix are below zero (Sylvester's law of inertia).
-
-    Returns:
-        The number of negative pivots; None where a pivot was taken off the diagonal, so that
-        the factors say nothing.
-    """
-    if not np.array_equal(factor.perm_r, factor.perm_c):
-        return None
-    return int(np.count_nonzero(factor.U.diagonal() < 0.0))
+@compiled
+def _masses_of_entries(
+    starts: AnyArray,
+    rows: AnyArray,
+    free: IntArray,
+    node_starts: AnyArray,
+    others: AnyArray,
+    mass: FloatArray,
+) -> FloatArray:
+    """Mass couples equal axes: that of two nodes where the unknowns' axes agree, else 0."""
+    spread = np.zeros(len(rows))
+    here = np.zeros(len(node_starts) - 1)
+    for column in range(len(starts) - 1):
+        node, axis = free[column] // 3, free[column] % 3
+        for p in range(node_starts[node], node_starts[node + 1]):
+            here[others[p]] = mass[p]
+        for p in range(starts[column], starts[column + 1]):
+            if free[rows[p]] % 3 == axis:
+                spread[p] = here[free[rows[p]] // 3]
+        for p in range(node_starts[node], node_starts[node + 1]):
+            here[others[p]] = 0.0
+    return spread
 
 
 def _rigid_motions(mesh: QuadraticMesh, mass: SparseRows) -> FloatArray:
