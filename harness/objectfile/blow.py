@@ -89,8 +89,8 @@ class Blow:
         step = self.pulse.duration / (_PIECES + int(np.ceil(_PER_TURN * turns)))
         times = np.arange(0.5 * step, self.pulse.duration, step)
         impulses = np.diff(self.pulse.delivered(np.append(times - 0.5 * step, times[-1] + 0.5 * step)))
-        turned = np.exp(np.outer(-2j * np.pi * frequencies, times))
-        return np.asarray(np.abs(turned @ impulses))
+        sizes = [abs(np.exp(-2j * np.pi * frequency * times) @ impulses) for frequency in frequencies]
+        return np.array(sizes)
 
 
 def checked_force(force: ArrayLike, unit: str) -> tuple[FloatArray, float]:

@@ -20,6 +20,9 @@ from harness.sim.synthesis import SynthesisLevel, synthesize
 MOST_SAMPLES = 2**27
 """Of one sound: 50 minutes at 44.1 kHz, a gigabyte while it is computed."""
 
+MOST_TOUCHING = 2**16
+"""Samples while a pulse lasts: each is an integral for every mode."""
+
 _CREASE = 0.8
 """Cosine between the normals of a face and of its corner, below which there is an edge."""
 
@@ -143,7 +146,7 @@ def strike(
         OutOfDomain: a place off the surface.
         DataRefused: gains that are not finite, or a sound too loud or too faint for its numbers.
     """
-    _check_length(duration, rate)
+    _check_length(duration, rate, blow)
     begun = time.perf_counter()
     gains: FloatArray = audio.at(place.point[None])[0] @ blow.direction
     found = time.perf_counter() - begun
@@ -193,7 +196,7 @@ def _corner_normals(mesh: Mesh) -> FloatArray:
     return np.where(bent[..., None], at_vertices, own)
 
 
-def _check_length(duration: float, rate: float) -> None:
+def _check_length(duration: float, rate: float, blow: Blow) -> None:
     check_rate(rate)
     if not (np.isfinite(duration) and duration > 0.0):
         raise WrongUse(f"a sound of {duration:g} s is none; say a length above 0 s")
@@ -201,6 +204,11 @@ def _check_length(duration: float, rate: float) -> None:
         raise WrongUse(
             f"{duration:g} s at {rate:g} Hz are more than {MOST_SAMPLES} samples; say at most "
             f"{MOST_SAMPLES / rate:.4g} s, or a lower rate"
+        )
+    if blow.pulse is not None and blow.pulse.duration * rate > MOST_TOUCHING:
+        raise WrongUse(
+            f"a contact of {blow.pulse.duration:g} s has more than {MOST_TOUCHING} samples at {rate:g} Hz; "
+            "say a shorter one, or a lower rate"
         )
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.errors import WrongUse
@@ -65,6 +65,7 @@ def test_softer_tips_stay_longer() -> None:
     assert steel < 0.1e-3 < nylon < 1e-3 < rubber < 0.1
 
 
+@settings(deadline=None)  # it integrates a force of thousands of samples
 @given(st.floats(1e-5, LONGEST), st.floats(1e-3, 1.0), st.floats(0.01, 1e3))
 def test_a_contact_time_is_kept_with_the_force_and_the_impulse_of_its_history(
     duration: float, mass: float, peak: float

@@ -30,7 +30,7 @@ def counts(path: Path) -> FloatArray:
     return np.where(unsigned >= 1 << 23, unsigned - (1 << 24), unsigned).astype(np.float64)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.floats(-200.0, 200.0))
 def test_counts_times_the_scale_are_the_sound(tmp_path: Path, exponent: float) -> None:
     wanted = sound(10.0**exponent)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from object_bench import MODES, NEAR, egg, egg_modes, egg_part
 
@@ -43,6 +43,7 @@ def summed(audio: ObjectAudio, amplitudes: FloatArray, samples: int, rate: float
     return amplitudes @ impulse_response(times, audio.frequencies, audio.dampings)
 
 
+@settings(deadline=None)  # the first case loads compiled code
 @given(st.tuples(*3 * [st.floats(-5.0, 5.0)]).filter(lambda force: np.linalg.norm(force) > 0.1))
 def test_the_sound_is_the_direct_sum_of_the_modes_to_the_error_it_states(
     audio: ObjectAudio, force: tuple[float, float, float]
@@ -56,6 +57,7 @@ def test_the_sound_is_the_direct_sum_of_the_modes_to_the_error_it_states(
     assert len(struck.sound) == round(DURATION * RATE)
 
 
+@settings(deadline=None)
 @given(st.floats(-3.0, 3.0), st.floats(0.1, 3.0), st.integers(0, 600))
 def test_the_sound_is_linear_in_the_force(audio: ObjectAudio, a: float, b: float, vertex: int) -> None:
     one, other = np.array([0.3, -1.0, 0.4]), np.array([1.0, 0.2, 0.7])
@@ -163,6 +165,12 @@ def test_lengths_and_rates_that_make_no_sound_are_refused(
 ) -> None:
     with pytest.raises(WrongUse, match=said):
         strike(audio, place(audio), Blow.instant([1.0, 0.0, 0.0]), duration, rate)
+
+
+def test_a_contact_of_too_many_samples_is_refused(audio: ObjectAudio) -> None:
+    long = Blow.lasting([0.0, 0.0, -1.0], pulse_lasting(0.1, 0.01, 0.5))
+    with pytest.raises(WrongUse, match=r"a contact of 0\.1 s has more than 65536 samples at 1e"):
+        strike(audio, place(audio), long, 0.2, 1e6)
 
 
 def test_a_point_is_moved_onto_the_surface_and_says_how_far(audio: ObjectAudio) -> None:
