@@ -152,20 +152,23 @@ def _lasting(sound: FloatArray, rate: float) -> int:
 
 def _spectrogram(axes: Axes, shown: ShownStrike) -> None:
     times, frequencies, levels = spectrogram(shown.sound, shown.rate)
+    lowest, highest = 0.7 * float(shown.frequencies[0]), 1.1 * float(shown.frequencies[-1])
+    seen = (frequencies >= lowest) & (frequencies <= highest)
+    # The push of a long blow lies below every mode, and louder.
+    loudest = float(levels[seen].max()) if seen.any() else 0.0
     axes.pcolormesh(
         times,
         1e-3 * frequencies[1:],
         levels[1:],
         cmap="magma",
         vmin=FLOOR,
-        vmax=0.0,
+        vmax=loudest,
         shading="nearest",
         rasterized=True,
     )
     # A logarithm, as ears have it; the lowest modes, which are drawn, else lie on each other.
     axes.set_yscale("log")
-    highest = min(1.1 * float(shown.frequencies[-1]), 0.5 * shown.rate)
-    axes.set_ylim(0.7e-3 * float(shown.frequencies[0]), 1e-3 * highest)
+    axes.set_ylim(1e-3 * lowest, 1e-3 * min(highest, 0.5 * shown.rate))
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_locator(NullLocator())
