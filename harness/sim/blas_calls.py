@@ -35,7 +35,9 @@ def _fortran_code(_typing: Any, address: Any, values: Any) -> Any:
     def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
         number = ir.DoubleType().as_pointer()
         references = [
-            builder.inttoptr(value, number) if kind == types.int64 else _stored(builder, value)
+            builder.inttoptr(value, number)
+            if kind in (types.int64, types.uint64)
+            else _stored(builder, value)
             for kind, value in zip(values.types, _parts(builder, given[1]), strict=True)
         ]
         kind = ir.FunctionType(ir.VoidType(), [reference.type for reference in references])
@@ -49,33 +51,26 @@ _fortran: Any = intrinsic(_fortran_code)
 
 
 @compiled
-def add_product(
+def subtract_product(
     routines: IntArray,
     shape: tuple[int, int, int],
-    scale: float,
     left: FloatArray,
     left_at: int,
     left_step: int,
     right: FloatArray,
     right_at: int,
     right_step: int,
-    turned: bool,
-    kept: float,
     out: FloatArray,
     out_at: int,
     out_step: int,
 ) -> None:
-    """``out = kept out + scale left right`` of ``(m, k)`` and ``(k, n)``, given as ``(m, n, k)``.
-
-    With ``turned`` the right one stands as ``(n, k)``.
-    """
-    letter = _YES if turned else _NO
+    """``out -= left right^T`` of ``(m, k)`` and ``(n, k)``, given as ``(m, n, k)``."""
     _fortran(
         routines[0],
         (
-            types.int8(_NO), types.int8(letter), types.int32(shape[0]), types.int32(shape[1]),
-            types.int32(shape[2]), scale, left.ctypes.data + 8 * left_at, types.int32(left_step),
-            right.ctypes.data + 8 * right_at, types.int32(right_step), kept,
+            types.int8(_NO), types.int8(_YES), types.int32(shape[0]), types.int32(shape[1]),
+            types.int32(shape[2]), -1.0, left.ctypes.data + 8 * left_at, types.int32(left_step),
+            right.ctypes.data + 8 * right_at, types.int32(right_step), 1.0,
             out.ctypes.data + 8 * out_at, types.int32(out_step),
         ),
     )  # fmt: skip
@@ -89,20 +84,18 @@ def divide_right(
     lower: FloatArray,
     lower_at: int,
     lower_step: int,
-    turned: bool,
     out: FloatArray,
     out_at: int,
     out_step: int,
 ) -> None:
-    """``out = out inverse(lower)`` of ``(rows, columns)``, or by ``lower`` turned.
+    """``out = out inverse(lower^T)`` of ``(rows, columns)``.
 
     The diagonal of ``lower`` is taken as one and not read.
     """
-    letter = _YES if turned else _NO
     _fortran(
         routines[1],
         (
-            types.int8(_RIGHT), types.int8(_LOWER), types.int8(letter), types.int8(_UNIT),
+            types.int8(_RIGHT), types.int8(_LOWER), types.int8(_YES), types.int8(_UNIT),
             types.int32(rows), types.int32(columns), 1.0, lower.ctypes.data + 8 * lower_at,
             types.int32(lower_step), out.ctypes.data + 8 * out_at, types.int32(out_step),
         ),

@@ -1,7 +1,7 @@
 """``L D L^T`` of the dense panel of one supernode, in place and without exchanges."""
 
 from harness.arrays import FloatArray, IntArray
-from harness.sim.blas_calls import add_product, divide_right
+from harness.sim.blas_calls import divide_right, subtract_product
 from harness.sim.compiled import compiled
 
 _STRIP = 64
@@ -32,9 +32,9 @@ def subtract_lower(
     """``out -= left right^T`` on and below the diagonal; above it, what comes."""
     for begin in range(0, columns, _WIDE):
         wide = min(_WIDE, columns - begin)
-        add_product(
-            routines, (rows - begin, wide, inner), -1.0, left, left_at + begin, left_step,
-            right, begin, right_step, True, 1.0, out, out_at + begin * (out_step + 1), out_step,
+        subtract_product(
+            routines, (rows - begin, wide, inner), left, left_at + begin, left_step,
+            right, begin, right_step, out, out_at + begin * (out_step + 1), out_step,
         )  # fmt: skip
 
 
@@ -79,7 +79,7 @@ def eliminate(
         below = high - end
         if below == 0:
             break
-        divide_right(routines, below, width, panel, corner, high, True, panel, corner + width, high)
+        divide_right(routines, below, width, panel, corner, high, panel, corner + width, high)
         for j in range(width):
             column, pivot = corner + width + j * high, pivots[begin + j]
             for i in range(below):

@@ -1,4 +1,4 @@
-"""Loops of a multifrontal ``L D L^T`` without exchanges, and of the solves with it.
+"""Loops of a multifrontal ``L D L^T`` without exchanges.
 
 Duff and Reid, The Multifrontal Solution of Indefinite Sparse Symmetric Linear Equations, ACM
 TOMS 9(3), 1983. Each supernode is a dense panel ``(k + r, k)``, column by column: its own rows,
@@ -8,7 +8,6 @@ then the rows below. What it takes from the rows below is the front ``(r, r)`` t
 import numpy as np
 
 from harness.arrays import FloatArray, IntArray
-from harness.sim.blas_calls import add_product, divide_right
 from harness.sim.compiled import compiled
 from harness.sim.dense_elimination import DONE, eliminate, subtract_lower
 from harness.sim.elimination import Elimination
@@ -205,57 +204,3 @@ def factorise(
             waiting[depth] = s
             depth, top = depth + 1, top + rest * rest
     return DONE
-
-
-@compiled
-def solve(
-    routines: IntArray,
-    plan: Elimination,
-    panels: FloatArray,
-    panel_at: IntArray,
-    pivots: FloatArray,
-    block: FloatArray,
-    count: int,
-    work: FloatArray,
-) -> None:
-    """``block``, ``(u, count)`` row by row in the new order, becomes the solution.
-
-    Args:
-        routines: of ``blas_addresses``.
-        plan: of the elimination.
-        panels: as ``factorise`` filled them.
-        panel_at: where each begins.
-        pivots: ``(u,)``.
-        block: right sides, flat.
-        count: of right sides.
-        work: ``count`` times the most rows below a supernode.
-    """
-    supernodes = len(plan.children)
-    for s in range(supernodes):
-        first, begin, rest = plan.firsts[s], plan.starts[s], plan.starts[s + 1] - plan.starts[s]
-        wide = plan.firsts[s + 1] - first
-        high, at = wide + rest, panel_at[s]
-        divide_right(routines, count, wide, panels, at, high, True, block, first * count, count)
-        add_product(
-            routines, (count, rest, wide), 1.0, block, first * count, count, panels, at + wide, high,
-            True, 0.0, work, 0, count,
-        )  # fmt: skip
-        for i in range(rest):
-            to = plan.rows[begin + i] * count
-            for c in range(count):
-                block[to + c] -= work[i * count + c]
-    for i in range(len(pivots)):
-        block[i * count : (i + 1) * count] /= pivots[i]
-    for s in range(supernodes - 1, -1, -1):
-        first, begin, rest = plan.firsts[s], plan.starts[s], plan.starts[s + 1] - plan.starts[s]
-        wide = plan.firsts[s + 1] - first
-        high, at = wide + rest, panel_at[s]
-        for i in range(rest):
-            source = plan.rows[begin + i] * count
-            for c in range(count):
-                work[i * count + c] = block[source + c]
-        add_product(
-            routines, (count, wide, rest), -1.0, work, 0, count, panels, at + wide, high, False,
-            1.0, block, first * count, count,
-        )  # fmt: skip
-        divide_right(routines, count, wide, panels, at, high, False, block, first * count, count)

@@ -14,8 +14,10 @@ from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.errors import MeshRefused, WrongUse
 from harness.sim.blas_calls import blas_addresses
 from harness.sim.dense_elimination import DONE
+from harness.sim.eight_wide import EIGHT
 from harness.sim.elimination import Elimination
-from harness.sim.factor_kernels import OUTSIDE, factorise, solve
+from harness.sim.factor_kernels import OUTSIDE, factorise
+from harness.sim.solve_kernels import solve
 
 SparseColumns: TypeAlias = "sp.csc_array[Any]"
 
@@ -68,14 +70,13 @@ class Factor:
                 f"a block of shape {block.shape} and type {block.dtype} was to be solved; it must be "
                 f"({unknowns}, columns) of float64"
             )
-        count = block.shape[1]
-        turned = block[self.plan.order].ravel()
-        work = np.empty(max(1, count * int(self.plan.heights.max(initial=0))))
-        if count:
-            places, pivots = _places(self.plan), self.pivots.values
-            solve(blas_addresses(), self.plan, self.panels, places, pivots, turned, count, work)
-        solved = np.empty_like(block, order="C")
-        solved[self.plan.order] = turned.reshape(block.shape)
+        solved, places = np.empty(block.shape), _places(self.plan)
+        for begin in range(0, block.shape[1], EIGHT):
+            part = block[:, begin : begin + EIGHT]
+            eight = np.zeros((unknowns, EIGHT))
+            eight[:, : part.shape[1]] = part[self.plan.order]
+            solve(self.plan, self.panels, places, self.pivots.values, eight)
+            solved[self.plan.order, begin : begin + EIGHT] = eight[:, : part.shape[1]]
         return solved
 
 

@@ -174,20 +174,32 @@ class _Lanczos:
         self.basis, self.projected = basis, projected
 
     def _step(self, current: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The next block, and ``(b, b)`` what couples it to this one."""
+        """The next block, and ``(b, b)`` what couples it to this one.
+
+        But for rounding an image holds of the basis only the last two blocks; these are taken out
+        first, and what rounding left of all of them once its size is known.
+        """
         image = self.factor.solve(self.system.weighted(current))
-        image, known = self._without(image)
+        wide = current.shape[1]
+        recent = max(0, self.used - wide - self.block)
+        image, known = self._without(image, recent)
         unit, size = self._orthonormal(image)
         unit, missed = self._without(unit)
         unit, again = self._orthonormal(unit)
-        span = slice(self.used - current.shape[1], self.used)
-        self.projected[: self.used, span] = known + missed @ size
+        coupled = missed @ size
+        coupled[recent:] += known
+        span = slice(self.used - wide, self.used)
+        self.projected[: self.used, span] = coupled
         self.projected[span, : self.used] = self.projected[: self.used, span].T
         return unit, again @ size
 
-    def _without(self, block: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What of a block is neither rigid motion nor in the basis, and ``(used, b)`` of the basis."""
-        known = self.basis[:, : self.used]
+    def _without(self, block: FloatArray, first: int = 0) -> tuple[FloatArray, FloatArray]:
+        """What of a block is neither rigid motion nor in the basis from ``first`` on.
+
+        Returns:
+            That, and ``(used - first, b)`` what was of the basis.
+        """
+        known = self.basis[:, first : self.used]
         weighted = self.system.weighted(block)
         rigid = self.system.rigid.T @ weighted
         share = known.T @ weighted
