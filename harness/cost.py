@@ -159,7 +159,10 @@ def front(points: Iterable[Point]) -> tuple[Point, ...]:
 
 
 def best_within(
-    points: Sequence[Point], seconds: float, prices: Mapping[str, float] | None = None
+    points: Sequence[Point],
+    seconds: float,
+    prices: Mapping[str, float] | None = None,
+    errors: Mapping[str, float] | None = None,
 ) -> Point | None:
     """The setting of least error that costs at most ``seconds``; None where none does.
 
@@ -167,11 +170,13 @@ def best_within(
         points: of one condition.
         seconds: above zero.
         prices: s by name of a point, instead of its measured mean.
+        errors: m by name of a point, instead of its measured mean: of one object, where one is touched.
     """
     _refuse_odd(seconds, "a budget", "s")
     price = {p.name: p.seconds.value for p in points} if prices is None else prices
+    loss = {p.name: p.error.value for p in points} if errors is None else errors
     within = [point for point in points if price[point.name] <= seconds]
-    return min(within, key=lambda p: (p.error.value, price[p.name]), default=None)
+    return min(within, key=lambda p: (loss[p.name], price[p.name]), default=None)
 
 
 def cheapest_within(

@@ -5,7 +5,7 @@ from scipy import stats
 from scipy.special import digamma
 
 from harness.arrays import FloatArray
-from harness.cost import Point, Sample
+from harness.cost import GROSS, Point, Sample
 from harness.errors import WrongUse
 
 KEPT = 0.975
@@ -22,6 +22,10 @@ adds a chance to be taken in by luck."""
 
 _LENT = 4.0
 """Degrees of freedom that the usual spread counts for, beside those of an object's own runs."""
+
+_LENT_ERRORS = 15.0
+"""Runs that the mean error over all objects counts for, beside an object's own ten: of 0 to 30 and of no
+regard to the object it chose best for runs left out of the curve of six objects, one seed at a time."""
 
 _LEAST_SPREAD = 0.05
 """Of the logarithm of seconds: clocks and other programs leave no less."""
@@ -50,6 +54,16 @@ def like(point: Point, name: str | None) -> tuple[Sample, ...]:
     """The runs of a point that tell about one object: its own where there are enough, else all."""
     own = tuple(sample for sample in point.samples if sample.object == name)
     return own if len(own) >= _ENOUGH else point.samples
+
+
+def likely_error(point: Point, name: str | None) -> float:
+    """m: the mean error to be expected of one object, none counted beyond ``GROSS``.
+
+    What is precise on one object fails on another: by touch alone a tray's floor is the same everywhere.
+    The mean of the object's own runs is shrunk towards all runs' as if that were so many of its own.
+    """
+    own = [min(sample.error, GROSS) for sample in point.samples if sample.object == name]
+    return (_LENT_ERRORS * point.error.value + sum(own)) / (_LENT_ERRORS + len(own))
 
 
 def most_seconds(point: Point, name: str | None, speed: float = 1.0, spent: float | None = None) -> float:

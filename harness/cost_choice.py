@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.accuracy import Level
 from harness.cost import Point, best_within, front
-from harness.cost_bounds import like, most_seconds, promise, promise_share
+from harness.cost_bounds import like, likely_error, most_seconds, promise, promise_share
 from harness.errors import WrongUse
 
 
@@ -32,7 +32,7 @@ class Budgeted:
 def for_budget(
     points: Sequence[Point], budget: float, name: str | None, speed: float = 1.0, spent: float | None = None
 ) -> Budgeted:
-    """The setting of least error whose seconds, at most, keep a budget.
+    """The setting of least error on this object whose seconds, at most, keep a budget.
 
     Args:
         points: of one condition, at least one.
@@ -42,7 +42,7 @@ def for_budget(
         spent: s already taken by what settings share; predicted where None.
     """
     prices = {point.name: most_seconds(point, name, speed, spent) for point in points}
-    best = best_within(points, budget, prices)
+    best = best_within(points, budget, prices, {point.name: likely_error(point, name) for point in points})
     if best is not None:
         return Budgeted(best, prices[best.name], fits=True)
     cheapest = min(points, key=lambda point: prices[point.name])

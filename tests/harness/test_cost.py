@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from harness.accuracy import Level
 from harness.code_version import closure, content_hash
 from harness.cost import Curve, Point, Sample, best_within, cheapest_within, front
-from harness.cost_bounds import KEPT, most_seconds, predicted_at_most, promise, promise_share
+from harness.cost_bounds import KEPT, likely_error, most_seconds, predicted_at_most, promise, promise_share
 from harness.cost_choice import for_budget, for_error, nearest_condition
 from harness.cost_file import curve_path, from_json, load, save, to_json
 from harness.cost_provenance import machine, stale
@@ -235,6 +235,28 @@ def test_an_object_that_was_measured_goes_by_its_own_seconds() -> None:
     assert for_budget([one], 0.3, "mug").fits
     assert not for_budget([one], 0.3, "plate").fits
     assert not for_budget([one], 0.3, "something else").fits
+
+
+def of_two(name: str, on_mug: float, on_tray: float, runs: int = 30) -> Point:
+    """A setting with an error on each of two objects."""
+    errors = {"mug": on_mug, "tray": on_tray}
+    samples = tuple(sample(f"{o} {k}", error, of=o) for o, error in errors.items() for k in range(runs))
+    return Point(name, {"level": name}, CONDITION, samples)
+
+
+def test_a_budget_takes_what_is_best_on_the_object_at_hand() -> None:
+    touch, sound = of_two("touch", 1e-3, 15e-3), of_two("sound", 4e-3, 4e-3)
+    assert for_budget([touch, sound], 10.0, "mug").point is touch
+    assert for_budget([touch, sound], 10.0, "tray").point is sound
+    assert for_budget([touch, sound], 10.0, "a stranger").point is sound
+
+
+@given(errors, errors, st.integers(1, 200))
+def test_an_object_s_own_runs_count_the_more_the_more_there_are(mug: float, tray: float, runs: int) -> None:
+    few, many = of_two("p", mug, tray, runs), of_two("p", mug, tray, runs + 1)
+    assert likely_error(few, None) == likely_error(few, "a stranger") == few.error.value
+    own = min(tray, 20e-3)
+    assert abs(likely_error(many, "tray") - own) <= abs(likely_error(few, "tray") - own) + 1e-15
 
 
 def test_the_spread_within_objects_is_learnt_from_all_of_them() -> None:
