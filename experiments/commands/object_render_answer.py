@@ -78,7 +78,7 @@ def _blow_said(blow: "Blow") -> str:
 
 def _title(rendered: Rendered) -> str:
     description = rendered.of.description
-    x, y, z = (1e3 * float(value) for value in rendered.place.point)
+    x, y, z = (round(1e3 * float(value), 1) + 0.0 for value in rendered.place.point)
     return (
         f"{description.name}, {description.material.name}, struck at ({x:.1f}, {y:.1f}, {z:.1f}) mm: "
         f"{_blow_said(rendered.blow)}; gains from the {rendered.audio.level}"

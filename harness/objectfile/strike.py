@@ -88,17 +88,22 @@ def place_near(surface: SurfaceSearch, point: ArrayLike, most: float) -> Place:
     """
     asked = checked_points(np.array(point, dtype=np.float64)[None])
     low, high = surface.mesh.bounds
-    # First by the box: nothing that is searched for may be so far away that squares overflow.
     outside = float(np.maximum(low - asked[0], asked[0] - high).max())
+    # What lies far out of the box is not searched for: its squares may overflow.
     if outside > most:
-        raise OutOfDomain(
-            f"the place to strike is {outside * 1e3:.3g} mm or more off the surface; the limit is "
-            f"{most * 1e3:.3g} mm. Is it in metres and in the mesh's frame? Else move it onto the surface"
-        )
-    surface.require_within(asked, most, "the place to strike")
+        raise _too_far(f"{outside * 1e3:.3g} mm or more", most)
     places, faces = surface.nearest(asked, most)
     moved = float(np.linalg.norm(places[0] - asked[0]))
+    if moved > most:
+        raise _too_far(f"{moved * 1e3:.3g} mm", most)
     return Place(read_only(places[0]), surface.mesh.face_normals[faces[0]], moved)
+
+
+def _too_far(gap: str, most: float) -> OutOfDomain:
+    return OutOfDomain(
+        f"the place to strike is {gap} off the surface; the limit is {most * 1e3:.3g} mm. Is it in metres "
+        "and in the mesh's frame? Else move it onto the surface"
+    )
 
 
 def place_of_vertex(mesh: Mesh, vertex: int) -> Place:
