@@ -7,7 +7,7 @@ then the rows below. What it takes from the rows below is the front ``(r, r)`` t
 
 import numpy as np
 
-from harness.arrays import FloatArray, IntArray
+from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.sim.compiled import compiled
 from harness.sim.dense_elimination import DONE, eliminate, subtract_lower
 from harness.sim.elimination import Elimination
@@ -39,8 +39,8 @@ def _subtract_front(
 @compiled
 def _add_original(
     data: FloatArray,
-    indices: IntArray,
-    indptr: IntArray,
+    indices: AnyArray,
+    indptr: AnyArray,
     plan: Elimination,
     first: int,
     wide: int,
@@ -143,8 +143,8 @@ def _add_children(
 def factorise(
     routines: IntArray,
     data: FloatArray,
-    indices: IntArray,
-    indptr: IntArray,
+    indices: AnyArray,
+    indptr: AnyArray,
     plan: Elimination,
     panels: FloatArray,
     panel_at: IntArray,

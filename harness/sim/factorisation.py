@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import scipy.sparse as sp
 
-from harness.arrays import AnyArray, FloatArray, IntArray
+from harness.arrays import FloatArray, IntArray
 from harness.errors import MeshRefused, WrongUse
 from harness.sim.blas_calls import blas_addresses
 from harness.sim.dense_elimination import DONE
@@ -129,8 +129,8 @@ def _eliminated(
     bad = factorise(
         blas_addresses(),
         matrix.data,
-        _long(matrix.indices),
-        _long(matrix.indptr),
+        matrix.indices,
+        matrix.indptr,
         plan,
         panels,
         places,
@@ -145,7 +145,8 @@ def _eliminated(
         raise WrongUse("the matrix has entries where its plan has none; make the plan of its own pattern")
     if bad != DONE:
         return Pivots(values, np.inf), int(plan.order[bad])
-    return Pivots(values, float((sums / diagonal).max(initial=1.0))), None
+    growth = np.divide(sums, diagonal, out=np.full(unknowns, np.inf), where=diagonal > 0.0)
+    return Pivots(values, float(growth.max(initial=1.0))), None
 
 
 def _deepest(plan: Elimination) -> int:
@@ -160,10 +161,6 @@ def _deepest(plan: Elimination) -> int:
             held += left
         most = max(most, held)
     return max(most, 1)
-
-
-def _long(indices: AnyArray) -> IntArray:
-    return np.asarray(indices, dtype=np.int64)
 
 
 def _check(matrix: SparseColumns, plan: Elimination) -> None:

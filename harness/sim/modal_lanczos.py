@@ -123,6 +123,21 @@ def _residual(system: ModalSystem, values: FloatArray, vectors: FloatArray) -> f
     return float((gap / np.linalg.norm(inertia, axis=0)).max())
 
 
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Mass-orthonormal columns.
+
+    Attributes:
+        unit: ``(u, b)``.
+        weighted: the mass matrix times them.
+        combination: ``(b, b)``, by which they give the block that they were made of.
+    """
+
+    unit: FloatArray
+    weighted: FloatArray
+    combination: FloatArray
+
+
 class _Lanczos:
     """One run from one random block."""
 
@@ -144,10 +159,10 @@ class _Lanczos:
         """
         self._reserve(24 * self.block if most is None else _PER_MODE * most)
         start = self._cleared(self.random.standard_normal((self.basis.shape[0], self.block)))
-        current, _ = self._orthonormal(start)
+        current = self._orthonormal(start, self.system.weighted(start))
         check_at = 6 * self.block
         while True:
-            self._append(current)
+            self._append(current.unit)
             last = self.used + self.block > self.most
             step, coupling = self._step(current)
             if self.used >= check_at or last:
@@ -173,34 +188,35 @@ class _Lanczos:
         projected[: self.used, : self.used] = self.projected[: self.used, : self.used]
         self.basis, self.projected = basis, projected
 
-    def _step(self, current: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _step(self, current: "_Block") -> tuple["_Block", FloatArray]:
         """The next block, and ``(b, b)`` what couples it to this one.
 
         But for rounding an image holds of the basis only the last two blocks; these are taken out
         first, and what rounding left of all of them once its size is known.
         """
-        image = self.factor.solve(self.system.weighted(current))
-        wide = current.shape[1]
+        image = self.factor.solve(current.weighted)
+        wide = image.shape[1]
         recent = max(0, self.used - wide - self.block)
-        image, known = self._without(image, recent)
-        unit, size = self._orthonormal(image)
-        unit, missed = self._without(unit)
-        unit, again = self._orthonormal(unit)
-        coupled = missed @ size
+        image, known = self._without(image, self.system.weighted(image), recent)
+        unit = self._orthonormal(image, self.system.weighted(image))
+        image, missed = self._without(unit.unit, unit.weighted)
+        again = self._orthonormal(image, self.system.weighted(image))
+        coupled = missed @ unit.combination
         coupled[recent:] += known
         span = slice(self.used - wide, self.used)
         self.projected[: self.used, span] = coupled
         self.projected[span, : self.used] = self.projected[: self.used, span].T
-        return unit, again @ size
+        return again, again.combination @ unit.combination
 
-    def _without(self, block: FloatArray, first: int = 0) -> tuple[FloatArray, FloatArray]:
+    def _without(
+        self, block: FloatArray, weighted: FloatArray, first: int = 0
+    ) -> tuple[FloatArray, FloatArray]:
         """What of a block is neither rigid motion nor in the basis from ``first`` on.
 
         Returns:
             That, and ``(used - first, b)`` what was of the basis.
         """
         known = self.basis[:, first : self.used]
-        weighted = self.system.weighted(block)
         rigid = self.system.rigid.T @ weighted
         share = known.T @ weighted
         return block - known @ share - self.system.rigid @ rigid, share
@@ -208,22 +224,27 @@ class _Lanczos:
     def _cleared(self, block: FloatArray) -> FloatArray:
         """Without rigid motion and without what the basis already holds."""
         for _ in range(2):
-            block, _ = self._without(block)
+            block, _ = self._without(block, self.system.weighted(block))
         return block
 
-    def _orthonormal(self, block: FloatArray) -> tuple[FloatArray, FloatArray]:
-        gram = block.T @ self.system.weighted(block)
+    def _orthonormal(self, block: FloatArray, weighted: FloatArray) -> "_Block":
+        """Mass-orthonormal columns that span a block.
+
+        Columns that the others already span are replaced by random ones.
+        """
+        gram = block.T @ weighted
         scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
         safe = np.where(scale > 0.0, scale, 1.0)
         values, turned = np.linalg.eigh(gram / np.outer(safe, safe))
         if values[0] > 1e-12:
             upper = np.linalg.cholesky(gram / np.outer(safe, safe)).T * safe
-            return solve_triangular(upper, block.T, trans="T").T, upper
+            unit, heavy = (solve_triangular(upper, part.T, trans="T").T for part in (block, weighted))
+            return _Block(unit, heavy, upper)
         return self._refilled(block / safe, values, turned, safe)
 
     def _refilled(
         self, block: FloatArray, values: FloatArray, turned: FloatArray, scale: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> "_Block":
         """As ``_orthonormal`` where the columns depend on each other."""
         kept = values > 1e-12
         roots = np.sqrt(np.where(kept, values, 1.0))
@@ -235,7 +256,7 @@ class _Lanczos:
             upper = np.linalg.cholesky(fresh.T @ self.system.weighted(fresh)).T
             unit[:, ~kept] = solve_triangular(upper, fresh.T, trans="T").T
         combination = np.where(kept, roots, 0.0)[:, None] * turned.T * scale
-        return unit, combination
+        return _Block(unit, self.system.weighted(unit), combination)
 
     def _converged(
         self, coupling: FloatArray, ceiling: float, most: int | None, last: bool

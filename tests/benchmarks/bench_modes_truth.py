@@ -1,7 +1,8 @@
 """Errors of the modes against what is known without a finite element, and the CPU seconds they cost.
 
-``python tests/benchmarks/bench_modes_truth.py [--fine]`` prints one row a case: unknowns, process
-seconds of assembly and solve on one thread, and the worst relative error of the modes named.
+``PYTHONPATH=tests python tests/benchmarks/bench_modes_truth.py [--fine]`` prints one row a case:
+unknowns, process seconds of assembly and solve on one thread, and the worst relative error of the
+modes named.
 """
 
 import sys

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import splu
 from harness.arrays import FloatArray, IntArray
 from harness.errors import MeshRefused, WrongUse
 from harness.materials import MATERIALS
-from harness.sim.elimination import elimination
+from harness.sim.elimination import Elimination, elimination
 from harness.sim.factorisation import Pivots, SparseColumns, factorised, inertia
 from harness.sim.modal_mesh import QuadraticMesh, quadratic_mesh
 from harness.sim.modal_solve import Elasticity
@@ -139,6 +139,16 @@ def test_blocks_in_either_order_of_memory_are_left_alone() -> None:
 def test_a_positive_definite_matrix_grows_by_nothing() -> None:
     """Then ``sum_j L_ij^2 d_j`` is the diagonal itself."""
     assert signs(grid(9)).growth == pytest.approx(1.0, abs=1e-13)
+
+
+def test_a_zero_on_the_diagonal_is_no_zero_pivot() -> None:
+    """Eliminated after its neighbour it has one; what it grew from is nothing."""
+    matrix = sp.csc_array(np.array([[0.0, 1.0, 0.0], [1.0, 5.0, 1.0], [0.0, 1.0, 3.0]]))
+    swapped = np.array([1, 0, 2])
+    plan: Elimination = elimination(matrix)._replace(order=swapped, rank=swapped)
+    pivots = inertia(matrix, plan)
+    assert pivots is not None
+    assert (pivots.negative, pivots.growth) == (1, np.inf)
 
 
 def test_growth_tells_of_a_small_pivot() -> None:
