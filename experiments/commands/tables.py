@@ -21,7 +21,10 @@ def localization(
     ] = None,
     only: Annotated[list[str] | None, typer.Option(help="Only this object; may be given again.")] = None,
     spacing: Annotated[list[str] | None, typer.Option(help="close or spread; both if left out.")] = None,
-    gap: Annotated[list[str] | None, typer.Option(help="default or none; both if left out.")] = None,
+    gap: Annotated[
+        list[str] | None,
+        typer.Option(help="default, none, another shipped one or a file; the first two if left out."),
+    ] = None,
     yaw: Annotated[list[str] | None, typer.Option(help="known or unknown; both if left out.")] = None,
     sound: Annotated[
         bool, typer.Option(help="Whether every place is struck too, with the rows that hear it.")
@@ -36,6 +39,7 @@ def localization(
 
     Every run is planned, rehearsed and performed on the mocked bench in process, then answered by every
     method. Errors are in millimetres, with 90 % bootstrap intervals; gross is the share above 20 mm.
+    A refused answer counts as a random one. Region is the share of runs whose 90 % region holds the truth.
 
     Try: touchstone tables localization --seeds 2 --only mug
     """
@@ -97,6 +101,10 @@ def _data_folder() -> Path | None:
     return next((path for path in candidates if (path / "meshes").is_dir()), None)
 
 
+_HEADINGS = ("method", "median", "mean", "gross", "refused", "modulo symmetry", "region", "s")
+_GAPS = {"default": "on", "none": "off"}
+
+
 def _print(table: list[Any]) -> None:
     from experiments.contact_localization.table import PAPER_CM
 
@@ -104,10 +112,19 @@ def _print(table: list[Any]) -> None:
     for spacing, gap, yaw in conditions:
         chosen = [row for row in table if (row.spacing, row.gap, row.yaw) == (spacing, gap, yaw)]
         drawn = Table(
-            title=f"mock: {spacing} steps, gap {'on' if gap == 'default' else 'off'}, yaw {yaw}; "
+            title=f"mock: {spacing} steps, gap {_GAPS.get(gap, gap)}, yaw {yaw}; "
             f"{chosen[0].runs} runs; mm [5 to 95 %]"
         )
-        for heading in ("method", "median", "mean", "gross", "modulo symmetry", "in 90 % region", "s"):
+        for heading in (
+            "method",
+            "median",
+            "mean",
+            "gross",
+            "refused",
+            "modulo symmetry",
+            "in 90 % region",
+            "s",
+        ):
             drawn.add_column(heading, no_wrap=True)
         for row in chosen:
             drawn.add_row(*_cells(row))
@@ -129,6 +146,7 @@ def _cells(row: Any) -> list[str]:
         _interval(median, 1e3, 1),
         _interval(mean, 1e3, 1),
         _interval(gross, 100, 0) + " %",
+        str(row.refused or ""),
         symmetric,
         "" if row.held is None else f"{100 * row.held:.0f} %",
         f"{row.seconds:.2f}",

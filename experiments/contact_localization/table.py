@@ -56,6 +56,7 @@ class Row:
         symmetric: the same, modulo the object's symmetry; None for a random point.
         held: share of runs whose 90 % region holds the truth; None where there is no region.
         seconds: median of an answer; for the six contacts together.
+        refused: of the runs, how many were not answered; each counts as a random answer.
     """
 
     spacing: str
@@ -67,6 +68,7 @@ class Row:
     symmetric: tuple[Interval, Interval, Interval] | None
     held: float | None
     seconds: float
+    refused: int = 0
 
 
 def objects(data: Path | None, builtin_only: bool = False) -> dict[str, SceneFile]:
@@ -176,6 +178,7 @@ def _row(performed: Mapping[Cell, Mapping[str, Any]], condition: tuple[str, str,
         None if None in symmetric else _statistics(np.array(symmetric)),
         float(np.mean(held)) if held and method in ("touch", "audio", "both") else None,
         float(np.median([one["seconds"] for one in found])),
+        sum("refused" in one for one in found),
     )
 
 

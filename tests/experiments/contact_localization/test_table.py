@@ -111,6 +111,13 @@ def test_a_run_that_could_not_be_performed_is_no_localization_and_none_at_all_is
         rows(failed)
 
 
+def test_a_row_counts_the_answers_that_were_refused() -> None:
+    found = dict(runs(ERRORS))
+    found[Cell("mug", "close", "default", "known", 99)] = result({"touch": 70e-3}, refused="it does not fit")
+    assert row(rows(found), "touch").refused == 1
+    assert row(rows(runs(ERRORS)), "touch").refused == 0
+
+
 def test_a_refused_fit_of_the_right_object_is_a_failure_at_the_value_of_a_guess(
     block: Model, prior: Prior
 ) -> None:
