@@ -115,16 +115,7 @@ def _print(table: list[Any]) -> None:
             title=f"mock: {spacing} steps, gap {_GAPS.get(gap, gap)}, yaw {yaw}; "
             f"{chosen[0].runs} runs; mm [5 to 95 %]"
         )
-        for heading in (
-            "method",
-            "median",
-            "mean",
-            "gross",
-            "refused",
-            "modulo symmetry",
-            "in 90 % region",
-            "s",
-        ):
+        for heading in _HEADINGS:
             drawn.add_column(heading, no_wrap=True)
         for row in chosen:
             drawn.add_row(*_cells(row))
