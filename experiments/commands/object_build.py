@@ -61,21 +61,20 @@ def build(
     from harness.authoring.object_audio import ObjectRequest, build_audio
     from harness.errors import WrongUse
     from harness.materials import material as named
+    from harness.quantities import FREQUENCY, LENGTH
     from harness.store import Store, default_folder
 
     if only != "audio":
         raise WrongUse(f"--only {only} cannot be built; there is audio")
-    limit = _quantity("--up-to", up_to)
-    assert limit is not None
     wanted = ObjectRequest(
         mesh=mesh,
         material=named(material),
         profile=profile,
         units=units,
-        wall=_quantity("--wall", wall),
-        limit=limit,
+        wall=options.quantity("--wall", wall, LENGTH),
+        limit=options.quantity("--up-to", up_to, FREQUENCY),
         most=modes,
-        edge=_quantity("--edge", edge),
+        edge=options.quantity("--edge", edge, LENGTH),
         licence=licence,
         seed=seed,
     )
@@ -94,18 +93,6 @@ def build(
     else:
         _print(built)
     return 0
-
-
-def _quantity(option: str, text: str | None) -> float | None:
-    from harness.errors import WrongUse
-    from harness.quantities import FREQUENCY, LENGTH
-
-    if text is None:
-        return None
-    try:
-        return (FREQUENCY if option == "--up-to" else LENGTH).parse(text)
-    except ValueError as refused:
-        raise WrongUse(f"{option}: {refused}") from None
 
 
 def _as_json(built: "BuiltAudio") -> dict[str, Any]:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from harness.objectfile.blow import Blow
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.strike import Place
-    from harness.quantities import Dimension
 
 Three = tuple[float, float, float]
 
@@ -109,12 +108,12 @@ def render(
     wav_rate(rate)
     given = _Pulse(
         hammer,
-        _quantity("--contact-time", contact_time, TIME),
-        _quantity("--tip-radius", tip_radius, LENGTH),
-        _quantity("--hammer-mass", hammer_mass, MASS),
-        _quantity("--speed", speed, SPEED),
+        options.quantity("--contact-time", contact_time, TIME),
+        options.quantity("--tip-radius", tip_radius, LENGTH),
+        options.quantity("--hammer-mass", hammer_mass, MASS),
+        options.quantity("--speed", speed, SPEED),
     )
-    far = _quantity("--distance", distance, LENGTH)
+    far = options.quantity("--distance", distance, LENGTH)
     rendered = _rendered(folder, level, at, vertex, force, given, seconds, rate, far)
     scale = write_wav(out, rendered.made.sound, rate, full_scale)
     if picture is not None:
@@ -211,14 +210,3 @@ def _blow(of: "ObjectFile", mass: float, place: "Place", force: Three | None, gi
         raise WrongUse("--contact-time stands for the tip, and --tip-radius is one; say one or the other")
     with_what = hammer(given.hammer or _ANY_TIP, given.tip_radius, given.hammer_mass)
     return hammered(along, with_what, of.material, mass, given.speed, given.contact_time)
-
-
-def _quantity(option: str, text: str | None, kind: "Dimension") -> float | None:
-    from harness.errors import WrongUse
-
-    if text is None:
-        return None
-    try:
-        return kind.parse(text)
-    except ValueError as refused:
-        raise WrongUse(f"{option}: {refused}") from None

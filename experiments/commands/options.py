@@ -1,9 +1,12 @@
-"""Options that several commands take, each described once."""
+"""Options that several commands take, each described once, and how one with a unit is read."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, overload
 
 import typer
+
+if TYPE_CHECKING:
+    from harness.quantities import Dimension
 
 Station = Annotated[
     str, typer.Option("--station", help="A bench: a name under stations/, or a station file.", metavar="NAME")
@@ -72,3 +75,27 @@ ErrorWanted = Annotated[
 Json = Annotated[
     bool, typer.Option("--json", help="One JSON object on standard output; the rest on standard error.")
 ]
+
+
+@overload
+def quantity(option: str, text: str, kind: "Dimension") -> float: ...
+
+
+@overload
+def quantity(option: str, text: str | None, kind: "Dimension") -> float | None: ...
+
+
+def quantity(option: str, text: str | None, kind: "Dimension") -> float | None:
+    """The SI value of an option written with its unit; None where it was left out.
+
+    Raises:
+        WrongUse: naming the option, where the text is no such quantity.
+    """
+    from harness.errors import WrongUse
+
+    if text is None:
+        return None
+    try:
+        return kind.parse(text)
+    except ValueError as refused:
+        raise WrongUse(f"{option}: {refused}") from None

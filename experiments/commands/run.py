@@ -126,7 +126,8 @@ def run(
 
 def _target(budget: str | None, error: str | None, level: list[str] | None) -> Any:
     """What was asked of the estimate; None where nothing was."""
-    if budget is None and error is None:
+    given = error if budget is None else budget
+    if given is None:
         return None
     from experiments.contact_localization.front import Target
     from harness.quantities import LENGTH, TIME
@@ -135,11 +136,8 @@ def _target(budget: str | None, error: str | None, level: list[str] | None) -> A
         raise WrongUse("--budget and --error each choose the levels; give one of them")
     if level:
         raise WrongUse("--budget and --error choose the levels; leave --level out, or choose all with it")
-    option, given, kind = ("--budget", budget, TIME) if budget is not None else ("--error", error, LENGTH)
-    try:
-        value = kind.parse(given)
-    except ValueError as refused:
-        raise WrongUse(f"{option}: {refused}") from None
+    option, kind = ("--budget", TIME) if budget is not None else ("--error", LENGTH)
+    value = options.quantity(option, given, kind)
     if value <= 0.0:
         raise WrongUse(f"{option} {given}: it must be above zero")
     return Target(seconds=value) if budget is not None else Target(error=value)

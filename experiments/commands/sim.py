@@ -80,10 +80,10 @@ def modes(
         mesh,
         of,
         units,
-        wall=_quantity("--wall", wall, LENGTH, bare=False),
-        limit=_quantity("--up-to", up_to, FREQUENCY),
+        wall=options.quantity("--wall", wall, LENGTH),
+        limit=_in_si("--up-to", up_to, FREQUENCY),
         count=count,
-        edge=_quantity("--edge", edge, LENGTH, bare=False),
+        edge=options.quantity("--edge", edge, LENGTH),
         fixed=fixed or (),
     )
     if not json:
@@ -109,11 +109,11 @@ def _material(
     from harness.quantities import DECAY, DENSITY, PRESSURE, TIME
 
     given = {
-        "young": _quantity("--young", young, PRESSURE),
+        "young": _in_si("--young", young, PRESSURE),
         "poisson": poisson,
-        "density": _quantity("--density", density, DENSITY),
-        "alpha": _quantity("--alpha", alpha, DECAY),
-        "beta": _quantity("--beta", beta, TIME),
+        "density": _in_si("--density", density, DENSITY),
+        "alpha": _in_si("--alpha", alpha, DECAY),
+        "beta": _in_si("--beta", beta, TIME),
     }
     if name is not None:
         base = material(name)
@@ -133,18 +133,12 @@ def _material(
     return Material(name=label, **kept)
 
 
-def _quantity(option: str, text: str | None, kind: "Dimension", bare: bool = True) -> float | None:
-    """The SI value of an option; a bare number is one in SI units where ``bare`` says so."""
-    from harness.errors import WrongUse
-
-    if text is None:
-        return None
+def _in_si(option: str, text: str | None, kind: "Dimension") -> float | None:
+    """The SI value of an option; a bare number is one in SI units."""
     try:
-        return float(text) if bare else kind.parse(text)
-    except ValueError as refused:
-        if not bare:
-            raise WrongUse(f"{option}: {refused}") from None
-    return _quantity(option, text, kind, bare=False)
+        return None if text is None else float(text)
+    except ValueError:
+        return options.quantity(option, text, kind)
 
 
 def _listed(found: "FileModes", count: int | None) -> Any:
