@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.hypotheses import Contact, Noise
+from experiments.contact_localization.likelihood import GeometryNoise
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.nearest import nearest_point
 from experiments.contact_localization.posterior import best_point
@@ -17,6 +18,11 @@ from experiments.contact_localization.search import Search
 from experiments.contact_localization.surface import random_points
 from harness.arrays import FloatArray
 from harness.mesh import Mesh
+
+_BY_PLACES = Noise(unread=GeometryNoise(gap=1.2e-3))
+"""Of baselines: with no sound to choose among more attitudes, a strict one serves them better than an
+estimate's own noise of places unread (179 runs: 14.5 against 15.7 mm in the mean with close steps; 180: 2.8
+against 3.5 mm with spread ones)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +65,7 @@ def geometry_only(
         spacing: metres between surface samples.
         noise: of places.
     """
-    return _without_images(base_from_gels, model, prior, spacing, noise or Noise(), use_axis=False)
+    return _without_images(base_from_gels, model, prior, spacing, noise or _BY_PLACES, use_axis=False)
 
 
 def geometry_and_axis(
@@ -70,7 +76,7 @@ def geometry_and_axis(
     noise: Noise | None = None,
 ) -> BaselineAnswer:
     """As ``geometry_only``, and the tool stood near the surface's normal at every contact."""
-    return _without_images(base_from_gels, model, prior, spacing, noise or Noise(), use_axis=True)
+    return _without_images(base_from_gels, model, prior, spacing, noise or _BY_PLACES, use_axis=True)
 
 
 def _without_images(

@@ -1,6 +1,7 @@
 """The live readings beside what the model of the object says they should have been."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def compare(found: Answer, run: RunFiles, accuracy: Accuracy) -> Comparison:
     live_height = invert(live, run.calibration).height
     object_from_gel = _gels(found, live_height)
     plan = scene_plan(run.scene, run.station.gel.sensor, accuracy)
-    sources = {
+    sources: dict[str, Any] = {
         "object.mesh": run.mesh,
         "object.wall": run.scene.object.wall,
         "object.material": MATERIALS[run.scene.object.material],
@@ -55,6 +56,8 @@ def compare(found: Answer, run: RunFiles, accuracy: Accuracy) -> Comparison:
         "sensor.calibration": run.calibration,
         "seed": run.recording.header.seed,
     }
+    if "object.file" in plan.sources:
+        sources["object.file"] = run.objectfile
     evaluation = evaluate(plan, sources, Store(default_folder()))
     return Comparison(
         read_only(live),

@@ -6,7 +6,7 @@ from experiments.contact_localization.levels import Levels, Senses
 from harness.accuracy import Accuracy, Knob, Level
 from harness.effects import knobs_of
 from harness.sim.catalogue import EFFECTS
-from harness.sim.sound_effects import EDGE, MODES
+from harness.sim.sound_effects import EDGE, MODES, SHAPES
 
 METHOD = Knob(
     "localization.method", ("particle", "grid"), "", "method", "grid", "the paper's filter, or ours"
@@ -31,7 +31,7 @@ BLOCK = Knob("localization.block", (16, 8), "pixels", "number", 8, "tactile pixe
 
 KNOBS = (SENSES, METHOD, SPACING, ROUNDS, SAMPLES, PARTICLES, BLOCK, *knobs_of(EFFECTS))
 
-SIMULATED = (MODES, EDGE)
+SIMULATED = (MODES, EDGE, SHAPES)
 """Dials of the simulation that an estimate depends on: the modes that its sounds are compared with.
 Its other terms are its own, and only the comparison of a report draws simulated readings."""
 
@@ -90,12 +90,13 @@ def levels_of(accuracy: Accuracy) -> Levels:
     )
 
 
-def settings(thorough: bool = False, sound: bool = True) -> list[dict[str, Level]]:
+def settings(thorough: bool = False, sound: bool = True, objectfile: bool = False) -> list[dict[str, Level]]:
     """Choices of levels to measure, each once: by every sense, from the cheapest to the finest.
 
     Args:
         thorough: also every single dial turned from the default, by each sense.
         sound: whether the runs were heard; touch alone where not.
+        objectfile: whether every scene names one, from which modes can come too.
     """
     found = [
         *(_grid("touch", *dials) for dials in _GRIDS),
@@ -105,6 +106,7 @@ def settings(thorough: bool = False, sound: bool = True) -> list[dict[str, Level
         found += [_grid("both", *dials) for dials in _GRIDS]
         found += [_by_sound(float(spacing)) for spacing in SPACING.levels]
         found += _other_modes()
+        found += _other_shapes() if objectfile else []
     for turned in _turned(sound) if thorough else ():
         if turned not in found:
             found.append(turned)
@@ -127,11 +129,20 @@ def _other_modes() -> list[dict[str, Level]]:
     return [*({**full, **level} for level in few), {**quick, **few[0]}, {**_by_sound(2e-3), **few[1]}]
 
 
+def _other_shapes() -> list[dict[str, Level]]:
+    """Modes of the ObjectFile in place of those that finite elements give."""
+    others: list[dict[str, Level]] = [
+        {SHAPES.name: level} for level in SHAPES.levels if level != SHAPES.default
+    ]
+    quick = (_grid("both", 4e-3, 0, 600, 16), _grid("both", 2e-3, 3, 600, 8), _by_sound(2e-3))
+    return [{**setting, **shapes} for shapes in others for setting in quick]
+
+
 def _turned(sound: bool) -> Iterator[dict[str, Level]]:
     """Every dial of the grid turned from its default, one at a time."""
     for senses in ("touch", "both") if sound else ("touch",):
         default = _grid(senses, 2e-3, 3, 600, 8)
-        for knob in (SPACING, ROUNDS, SAMPLES, BLOCK, *(SIMULATED if senses == "both" else ())):
+        for knob in (SPACING, ROUNDS, SAMPLES, BLOCK, *((MODES, EDGE) if senses == "both" else ())):
             for level in knob.levels:
                 if level == knob.default:
                     continue
@@ -157,3 +168,8 @@ def needs_images(setting: Mapping[str, Level]) -> bool:
 def needs_sound(setting: Mapping[str, Level]) -> bool:
     """Whether a setting was measured on runs that were heard; one that names no sense was not."""
     return setting.get(SENSES.name, "touch") != "touch"
+
+
+def needs_objectfile(setting: Mapping[str, Level]) -> bool:
+    """Whether a setting takes the modes from an ObjectFile."""
+    return setting.get(SHAPES.name, SHAPES.default) != SHAPES.default

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from experiments.contact_localization.dials import needs_sound
+from experiments.contact_localization.dials import needs_objectfile, needs_sound
 from experiments.contact_localization.solving import ESTIMATOR, PROGRAM
 from harness.accuracy import Level
 from harness.cost import Curve, Point
@@ -79,6 +79,20 @@ class Front:
             )
         return replace(self, points=points)
 
+    def solved(self) -> "Front":
+        """Those settings whose modes, if any, do not come from an ObjectFile.
+
+        Raises:
+            WrongUse: there are none.
+        """
+        points = tuple(point for point in self.points if not needs_objectfile(point.levels))
+        if not points:
+            raise WrongUse(
+                "what accuracy costs was measured with modes out of ObjectFiles alone, and this scene names "
+                "none; name one, or measure without with `touchstone cost contact-localization`"
+            )
+        return replace(self, points=points)
+
 
 def front_for(scene: SceneFile, contacts: int) -> Front:
     """The curve of this machine, or the one that came with the program, for runs like this one.
@@ -101,7 +115,8 @@ def front_for(scene: SceneFile, contacts: int) -> Front:
     else:
         shipped = shipped_curve()
         found = front_of(shipped, wanted, stale(shipped, here, now), shipped=True)
-    return found if scene.sensors.sound else found.unheard()
+    found = found if scene.sensors.sound else found.unheard()
+    return found if scene.object.objectfile is not None else found.solved()
 
 
 def shipped_curve() -> Curve:

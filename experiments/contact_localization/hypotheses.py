@@ -81,13 +81,13 @@ class Noise:
     Attributes:
         geometry: of places and tool axes.
         unread: the same where no image is read: how far the gel was pressed in, and past which edge, is not
-            known there.
+            known there, so that the surface met may face elsewhere than the one that was aimed at.
         touch: of the images.
         temperature: factor on the images' share: their errors are shared between contacts.
     """
 
     geometry: GeometryNoise = field(default_factory=GeometryNoise)
-    unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3))
+    unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3, angle=np.radians(4.0)))
     touch: TouchNoise = field(default_factory=TouchNoise)
     temperature: float = 0.3
 

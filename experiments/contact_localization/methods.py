@@ -104,7 +104,7 @@ def _by_grid(
 def _by_sound(search: Search, count: int, heard: Heard, seconds: dict[str, float]) -> Solution:
     start = time.perf_counter()
     everyone = np.arange(count, dtype=np.int64)
-    found = by_sound(search, heard.term, heard.struck, everyone, anchor=0)
+    found = by_sound(search, heard.term, heard.struck, everyone)
     lap(seconds, "grid", start)
     return Solution(found, np.empty(0, dtype=np.int64), np.empty(0), pictured=False)
 

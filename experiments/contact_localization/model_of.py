@@ -1,5 +1,7 @@
 """The model of a scene's object: with its modes where the scene is to be heard."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from experiments.contact_localization.model import Model
@@ -8,15 +10,20 @@ from harness.effects import Facts
 from harness.evaluate import evaluate
 from harness.materials import MATERIALS
 from harness.mesh import Mesh
+from harness.objectfile.file import ObjectFile
 from harness.plan import default_accuracy, plan
 from harness.run_folder import RunFiles
 from harness.scene import SceneFile
 from harness.sim.catalogue import EFFECTS
 from harness.sim.modal import from_arrays
 from harness.sim.modes import Modes
+from harness.sim.scene_object import known_file
 from harness.sim.tactile_calibration import TactileCalibration
 from harness.station_file import Station
 from harness.store import Store, default_folder
+
+ReadFile = Callable[[], ObjectFile | None]
+"""Reads the object's ObjectFile, asked only where the modes come from it."""
 
 
 def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
@@ -26,7 +33,8 @@ def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
         run: the folder.
         accuracy: levels of the modes' dials; None for the default ones.
     """
-    return model_of_scene(run.scene, run.station, run.mesh, run.calibration, accuracy)
+    carried = partial(_carried, run)
+    return model_of_scene(run.scene, run.station, run.mesh, run.calibration, accuracy, carried)
 
 
 def model_of_scene(
@@ -35,6 +43,7 @@ def model_of_scene(
     mesh: Mesh,
     calibration: TactileCalibration,
     accuracy: Accuracy | None = None,
+    objectfile: ReadFile | None = None,
 ) -> Model:
     """The object and the sensor of a scene; modes only where it calls for sound.
 
@@ -44,24 +53,37 @@ def model_of_scene(
         mesh: of the object, in metres.
         calibration: of the gel, as the estimator is to know it.
         accuracy: levels of the modes' dials; None for the default ones.
+        objectfile: reads the object's; None for the one that the scene names.
 
     Raises:
         MeshRefused: the scene calls for sound, and the object's surface cannot be filled.
+        WrongUse: modes are to come from an ObjectFile, and there is none or another object's.
     """
     if not scene.sensors.sound:
         return Model(mesh, station.gel.sensor, calibration)
-    modes = object_modes(scene, station, mesh, accuracy)
+    modes = object_modes(scene, station, mesh, accuracy, objectfile)
     return Model(mesh, station.gel.sensor, calibration, modes, MATERIALS[scene.object.material])
 
 
-def object_modes(scene: SceneFile, station: Station, mesh: Mesh, accuracy: Accuracy | None = None) -> Modes:
-    """The object's modes, from the store where they were found before.
+def _carried(run: RunFiles) -> ObjectFile:
+    return run.objectfile
+
+
+def object_modes(
+    scene: SceneFile,
+    station: Station,
+    mesh: Mesh,
+    accuracy: Accuracy | None = None,
+    objectfile: ReadFile | None = None,
+) -> Modes:
+    """The object's modes: from the store where they were found before, or from its ObjectFile.
 
     Args:
         scene: says the material and the wall.
         station: gives the sensor.
         mesh: of the object, in metres.
         accuracy: levels of the modes' dials; None for the default ones.
+        objectfile: reads the object's; None for the one that the scene names.
     """
     chosen = plan(
         EFFECTS, Facts(scene, station.gel.sensor), ("object.modes",), accuracy or default_accuracy(EFFECTS)
@@ -71,4 +93,6 @@ def object_modes(scene: SceneFile, station: Station, mesh: Mesh, accuracy: Accur
         "object.wall": scene.object.wall,
         "object.material": MATERIALS[scene.object.material],
     }
+    if "object.file" in chosen.sources:
+        sources["object.file"] = (objectfile or partial(known_file, scene, mesh))()
     return from_arrays(evaluate(chosen, sources, Store(default_folder()))["object.modes"])

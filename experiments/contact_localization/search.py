@@ -25,7 +25,9 @@ _PICTURES = round(360.0 / _YAW_STEP)
 _SHARED_COARSELY = 3
 _MANY_PICTURES = 45
 _PRUNE = 30.0
-_MOST_HYPOTHESES = 20_000
+
+MOST_HYPOTHESES = 20_000
+"""That a grid keeps; of more, an even choice."""
 
 SAME_PLACE = 1.5e-3
 """Metres between two presses that count as one place."""
@@ -77,14 +79,21 @@ class Search:
             anchor: the one of them that a hypothesis puts on a sample.
             use_axis: whether the tool's attitude counts, or only places.
         """
+        gels, yaws, log_weights = self.places(members, anchor, use_axis)
+        return Hypotheses(gels, yaws, log_weights - log_weights.max())
+
+    def places(
+        self, members: IntArray, anchor: int, use_axis: bool = True, most: int = MOST_HYPOTHESES
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """As ``grid``, at most so many: gels, yaws and nats, which are of one scale whatever the anchor."""
         samples, yaws, log_weights = self._geometry(members, anchor, use_axis)
-        kept = best_of(log_weights, _PRUNE, _MOST_HYPOTHESES)
+        kept = best_of(log_weights, _PRUNE, most)
         samples, yaws = samples[kept], yaws[kept]
         rotations = self.prior.object_from_base(self.yaws)
         inward = (rotations @ self.axes[anchor])[yaws]
         gels_at_anchor = self.surface.points[samples] + self.contacts[anchor].indentation * inward
         gels = gels_at_anchor - (rotations @ self.positions[anchor])[yaws]
-        return Hypotheses(gels, self.yaws[yaws], log_weights[kept] - log_weights[kept].max())
+        return gels, self.yaws[yaws], log_weights[kept]
 
     def look(
         self, start: Hypotheses, members: IntArray, within: float, told: FloatArray | None = None

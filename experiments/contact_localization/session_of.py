@@ -3,6 +3,7 @@
 import datetime as dt
 import json
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ from experiments.contact_localization.dials import levels_of
 from experiments.contact_localization.estimate import Estimate
 from experiments.contact_localization.experiment import ContactLocalization
 from experiments.contact_localization.levels import Levels
+from experiments.contact_localization.model_of import model_of_run
 from experiments.contact_localization.planning import RunPlan, plan_run, twin_of, way_between
 from experiments.contact_localization.report_of import report_of
 from experiments.contact_localization.result import Scored, result_of
@@ -81,14 +83,21 @@ def start(
 
 
 def perform_on_bench(
-    recording: Recording, progress: Progress, ask: Ask | None = None
+    recording: Recording, progress: Progress, ask: Ask | None = None, accuracy: Accuracy | None = None
 ) -> tuple[bool, dict[str, Health]]:
     """Open the run's bench and perform what is left; False where Ctrl-C ended it early.
+
+    What the readings will be compared with is made while the bench opens, and before anything moves: an
+    object whose modes cannot be found is refused while the arm still stands.
 
     Args:
         recording: of the run.
         progress: is told of each step.
         ask: shows a person what to do, where the station has one strike; None where nobody is there.
+        accuracy: of the modes that a sound will be compared with; None for the default levels.
+
+    Raises:
+        MeshRefused: the scene calls for sound, and the object's surface cannot be filled.
     """
     run = RunFiles(recording)
     mock = recording.header.mock
@@ -100,7 +109,11 @@ def perform_on_bench(
     )
     if by_hand(run.scene, run.station):
         somebody(ask)
+    ahead = ThreadPoolExecutor(1, "model")
+    modelled = ahead.submit(model_of_run, run, accuracy)
+    ahead.shutdown(wait=False)  # a bench that does not open says so at once
     with open_station(run.station, run.scene, context) as bench:
+        modelled.result()
         return perform_on(bench, recording, progress, ask)
 
 

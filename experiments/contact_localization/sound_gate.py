@@ -11,7 +11,7 @@ from experiments.contact_localization.likelihood import arrange, geometry_scores
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.search import SAME_AXIS, SAME_PLACE, Search
 from experiments.contact_localization.sound_analysis import analyse
-from experiments.contact_localization.sound_places import strike_places
+from experiments.contact_localization.sound_places import anchors, strike_places
 from harness.acquisition import Strike
 from harness.arrays import FloatArray
 from harness.errors import FitRefused
@@ -80,7 +80,7 @@ def fit_by_sound(search: Search, hypotheses: Hypotheses, heard: Heard, count: in
 
     Args:
         search: the run.
-        hypotheses: of ``by_sound`` with the first contact as the anchor.
+        hypotheses: of ``by_sound``.
         heard: the run's strikes.
         count: contacts that count.
     """
@@ -191,21 +191,25 @@ def _same(one: FloatArray, other: FloatArray) -> bool:
 
 
 def _places(search: Search, best: Hypotheses, count: int) -> FloatArray:
-    """``(contacts,)`` nats of every contact's place and axis at one hypothesis."""
-    noise = search.geometry
+    """``(contacts,)`` nats of every contact's place and axis at one hypothesis, hung where it fits best."""
+    every = [_places_by(search, best, count, int(anchor)) for anchor in anchors(np.arange(count))]
+    return max(every, key=lambda places: float(places.sum()))
+
+
+def _places_by(search: Search, best: Hypotheses, count: int, anchor: int) -> FloatArray:
     rotations = search.prior.object_from_base(best.yaws)
     indentations = np.array([contact.indentation for contact in search.contacts[:count]])
     points = search.positions[:count] - indentations[:, None] * search.axes[:count]
-    anchor = np.asarray(search.surface.tree.query(search.contact_places(0, best))[1], dtype=np.int64)
+    sample = np.asarray(search.surface.tree.query(search.contact_places(anchor, best))[1], dtype=np.int64)
     zero = np.zeros(1, dtype=np.int64)
 
     def score(members: list[int]) -> float:
         arrangement = arrange(rotations, points[members], search.axes[members], 0)
         return float(
             geometry_scores(
-                search.surface, arrangement, anchor, zero, np.zeros(1), noise, use_axis=True, within=np.inf
+                search.surface, arrangement, sample, zero, np.zeros(1), search.geometry, True, np.inf
             )[0]
         )
 
-    first = score([0])
-    return np.array([first, *(score([0, k]) - first for k in range(1, count))])
+    first = score([anchor])
+    return np.array([first if k == anchor else score([anchor, k]) - first for k in range(count)])

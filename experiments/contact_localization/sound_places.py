@@ -3,7 +3,7 @@
 import numpy as np
 
 from experiments.contact_localization.hypotheses import Hypotheses
-from experiments.contact_localization.search import Search
+from experiments.contact_localization.search import MOST_HYPOTHESES, Search
 from experiments.contact_localization.sound_likelihood import SoundTerm
 from harness.arrays import FloatArray, IntArray
 
@@ -54,24 +54,34 @@ def sound_nats(
     return term.log_likelihood(*strike_places(search, struck, gels, yaws), between)
 
 
+ANCHORS = 2
+"""Contacts that the others hang on in turn: one of them may have slid off an edge."""
+
+
+def anchors(members: IntArray) -> IntArray:
+    """Those of ``(m,)`` contacts, evenly among them, that hypotheses are hung on."""
+    spread = np.linspace(0, len(members) - 1, min(ANCHORS, len(members)))
+    return members[np.unique(spread.astype(np.int64))]
+
+
 def by_sound(
-    search: Search,
-    term: SoundTerm,
-    struck: IntArray,
-    members: IntArray,
-    anchor: int,
-    use_axis: bool = True,
+    search: Search, term: SoundTerm, struck: IntArray, members: IntArray, use_axis: bool = True
 ) -> Hypotheses:
     """The posterior over surface samples and yaws by places, tool axes and sound, without any image.
+
+    A hypothesis hangs on its anchor, which must lie on the surface: where that contact slipped off an
+    edge, no hypothesis of it is right. The posterior is the mean of those by each anchor.
 
     Args:
         search: the run.
         term: of its strikes, in the order of ``struck``.
         struck: ``(K,)`` indices of the contacts that were struck.
         members: ``(m,)`` indices of the contacts whose place counts.
-        anchor: the one of them that a hypothesis puts on a sample.
         use_axis: whether the tool's attitude counts, or only places.
     """
-    start = search.grid(members, anchor, use_axis)
-    total = start.log_weights + sound_nats(search, term, struck, start.gels, start.yaws)
-    return Hypotheses(start.gels, start.yaws, total - total.max())
+    carriers = anchors(members)
+    most = MOST_HYPOTHESES // len(carriers)
+    parts = [search.places(members, int(anchor), use_axis, most) for anchor in carriers]
+    gels, yaws, places = (np.concatenate(column) for column in zip(*parts, strict=True))
+    total = places + sound_nats(search, term, struck, gels, yaws)
+    return Hypotheses(gels, yaws, total - total.max())

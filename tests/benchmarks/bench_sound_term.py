@@ -175,7 +175,7 @@ def score_of(thing: Thing, run: Run, settings: Analysis, noise: SoundNoise, seed
     analysed = time.thread_time()
     answers = {}
     for use_axis in (False, True):
-        found = by_sound(search, term, everyone, everyone, last, use_axis)
+        found = by_sound(search, term, everyone, everyone, use_axis)
         answers[use_axis] = off(best_point(search.contact_places(last, found), found.weights))
     places = search.grid(everyone, last)
     before = time.thread_time()

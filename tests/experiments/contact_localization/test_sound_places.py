@@ -8,12 +8,12 @@ from scipy.signal import find_peaks
 from experiments.contact_localization.hypotheses import Contact, Noise
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior import best_point
-from experiments.contact_localization.search import Search
+from experiments.contact_localization.search import MOST_HYPOTHESES, Search
 from experiments.contact_localization.sound_analysis import SoundEvidence, analyse
 from experiments.contact_localization.sound_gains import gain_table
 from experiments.contact_localization.sound_likelihood import SoundTerm
 from experiments.contact_localization.sound_pictures import sound_pair, spectrogram
-from experiments.contact_localization.sound_places import by_sound, sound_nats, strike_places
+from experiments.contact_localization.sound_places import anchors, by_sound, sound_nats, strike_places
 from harness.arrays import FloatArray
 from harness.geometry import frame_facing, rotation_about, transform
 from harness.materials import Material
@@ -82,7 +82,7 @@ def test_sound_alone_finds_the_place_on_a_flat_plate() -> None:
         points = plate.places(K, rng)
         search = _search(points, Prior(np.eye(3)))
         term = SoundTerm(analyse(plate.strikes(MODES, points, rng)), TABLE, MODES, DAMPED)
-        found = by_sound(search, term, np.arange(K), np.arange(K), K - 1)
+        found = by_sound(search, term, np.arange(K), np.arange(K))
         answer = best_point(search.contact_places(K - 1, found), found.weights)
         errors.append(np.linalg.norm(answer - points[-1]))
     assert np.median(errors) < 4e-3
@@ -93,10 +93,33 @@ def test_sounds_that_say_nothing_leave_the_posterior_of_the_places() -> None:
     search = _search(points, Prior(np.eye(3)))
     nothing = SoundEvidence(np.ones(K, dtype=np.bool_), ("",) * K, (), (), (0.0, 0.0))
     term = SoundTerm(nothing, TABLE, MODES, DAMPED)
-    grid = search.grid(np.arange(K), K - 1)
-    assert np.all(sound_nats(search, term, np.arange(K), grid.gels, grid.yaws) == 0.0)
-    found = by_sound(search, term, np.arange(K), np.arange(K), K - 1)
-    assert found.log_weights == pytest.approx(grid.log_weights)
+    half = MOST_HYPOTHESES // 2
+    parts = [search.places(np.arange(K), int(anchor), most=half) for anchor in anchors(np.arange(K))]
+    assert len(parts) == 2
+    nats = np.concatenate([weights for _, _, weights in parts])
+    gels, yaws = np.concatenate([g for g, _, _ in parts]), np.concatenate([y for _, y, _ in parts])
+    assert np.all(sound_nats(search, term, np.arange(K), gels, yaws) == 0.0)
+    found = by_sound(search, term, np.arange(K), np.arange(K))
+    assert found.log_weights == pytest.approx(nats - nats.max())
+
+
+@pytest.mark.parametrize("slid", [0, K - 1])
+def test_a_contact_that_slid_off_the_object_does_not_carry_the_others_with_it(slid: int) -> None:
+    """It was met 15 mm behind the surface; where it would be put on the surface, all others were off it."""
+    rng = np.random.default_rng(7)
+    points = plate.places(K, rng)
+    met = points.copy()
+    met[slid, 2] -= 0.015
+    search, told = _search(met, Prior(np.eye(3))), np.delete(np.arange(K), slid)
+    term = SoundTerm(analyse(plate.strikes(MODES, points[told], rng)), TABLE, MODES, DAMPED)
+    found = by_sound(search, term, told, np.arange(K))
+    answer = best_point(search.contact_places(2, found), found.weights)
+    assert np.linalg.norm(answer - points[2]) < 8e-3
+
+
+def test_contacts_that_others_hang_on_are_the_first_and_the_last() -> None:
+    assert anchors(np.array([1, 3, 4, 7])).tolist() == [1, 7]
+    assert anchors(np.array([5])).tolist() == [5]
 
 
 def test_a_spectrogram_shows_a_tone_where_it_is() -> None:
