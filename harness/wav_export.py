@@ -7,7 +7,6 @@ bit for bit. A WAV's rate is a whole number; the measured one and the time of th
 """
 
 import json
-import wave
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from harness.arrays import AnyArray
 from harness.errors import DataRefused
 from harness.reading import Reading
 from harness.recording import Recording, write_text_whole
+from harness.wav import write_pcm
 
 SCHEMA = 1
 INDEX = "wav.json"
@@ -88,10 +88,6 @@ def _write(folder: Path, step: int, reading: Reading, needed: int) -> WavFile:
     spans = np.diff(reading.times)
     rate = float(block / np.median(spans)) if len(spans) else float(reading.channel.nominal_rate or 0.0)
     name = f"{step:03d}-{reading.channel.name}.wav"
-    samples = np.left_shift(reading.values.ravel().astype(np.int64), shift).astype("<i4")
-    with wave.open(str(folder / name), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(bits // 8)
-        file.setframerate(round(reading.channel.nominal_rate or rate))
-        file.writeframes(samples.view(np.uint8).reshape(-1, 4)[:, : bits // 8].tobytes())
+    counts = np.left_shift(reading.values.ravel().astype(np.int64), shift)
+    write_pcm(str(folder / name), counts, round(reading.channel.nominal_rate or rate), bits)
     return WavFile(name, step, reading.channel.name, rate, float(reading.times[0]), bits, shift)

@@ -2,13 +2,13 @@
 
 import io
 import math
-import wave
 from pathlib import Path
 
 import numpy as np
 
 from harness.arrays import FloatArray
 from harness.errors import WrongUse
+from harness.wav import write_pcm
 
 BITS = 24
 """Of a sample: its rounding lies 140 dB below full scale, under what a sum of modes is in error."""
@@ -45,13 +45,9 @@ def write_wav(path: Path, sound: FloatArray, rate: float, full_scale: float | No
             f"a full scale of {scale:g} cannot hold a sound whose loudest sample is {loudest:g}; say "
             f"at least {1.001 * loudest:.4g}"
         )
-    counts = np.rint(sound * ((most + 1) / scale)).astype("<i4")
+    counts = np.rint(sound * ((most + 1) / scale)).astype(np.int64)
     stream = io.BytesIO()
-    with wave.open(stream, "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(BITS // 8)
-        file.setframerate(whole)
-        file.writeframes(counts.view(np.uint8).reshape(-1, 4)[:, : BITS // 8].tobytes())
+    write_pcm(stream, counts, whole, BITS)
     path.write_bytes(stream.getvalue())
     return scale
 
