@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.accuracy import Level
 from harness.clock import now
 from harness.effects import Effect
 from harness.errors import WrongUse
@@ -120,7 +121,7 @@ class _Run:
         step = self._planned[effect.provides]
         if effect.provides not in self._keys:
             needs = [self._input_key(need) for need in effect.needs]
-            about = (effect.provides, effect.version, tuple(needs), tuple(sorted(step.levels.items())))
+            about = (effect.provides, effect.version, tuple(needs), tuple(sorted(_named(step).items())))
             self._keys[effect.provides] = digest(about)
         return self._keys[effect.provides]
 
@@ -131,6 +132,18 @@ class _Run:
         if name not in self._keys:
             self._keys[name] = digest(self.sources[name])
         return self._keys[name]
+
+
+def _named(step: PlannedEffect) -> dict[str, Level]:
+    """The levels that tell a result from others.
+
+    An effect's own way, the one that others are held against, goes without a name, so that a new way
+    beside it drops nothing that was stored.
+    """
+    choice, levels = step.effect.choice, dict(step.levels)
+    if choice is not None and levels[choice.name] not in step.effect.ways:
+        del levels[choice.name]
+    return levels
 
 
 def frozen(value: Any) -> Any:

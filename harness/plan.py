@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from harness.accuracy import Accuracy, Level
+from harness.accuracy import Accuracy, Knob, Level
 from harness.effects import Effect, Facts, by_name, knobs_of
 from harness.errors import WrongUse
 from harness.toml_file import nearest
@@ -15,9 +15,9 @@ class PlannedEffect:
     """An effect that will run.
 
     Attributes:
-        effect: itself.
-        reason: who needs it, and what in the scene calls for it.
-        levels: of its knobs.
+        effect: itself, as its levels have it computed.
+        reason: who needs it, what in the scene calls for it, and in which of several ways it runs.
+        levels: of its knobs, the first that of its choice where it has one.
     """
 
     effect: Effect
@@ -62,6 +62,7 @@ class _Search:
 
     effects: Mapping[str, Effect]
     facts: Facts
+    accuracy: Accuracy
     order: list[str] = field(default_factory=list)
     asked_by: dict[str, list[str]] = field(default_factory=dict)
     aliases: dict[str, str] = field(default_factory=dict)
@@ -82,6 +83,7 @@ class _Search:
             return
         path = (*path, quantity)
         if _called_for(effect, self.facts):
+            _require_way(effect, self.facts, self.accuracy)
             for need in effect.needs:
                 self.visit(need, quantity, path)
             self.order.append(quantity)
@@ -100,17 +102,18 @@ def plan(effects: Sequence[Effect], facts: Facts, wanted: Iterable[str], accurac
         accuracy: a level for every knob of the catalogue.
 
     Raises:
-        WrongUse: a wanted quantity that no effect provides, or that the scene rules out.
+        WrongUse: a wanted quantity that no effect provides, or that the scene rules out; a level that
+            the scene does not have what it takes for.
         ValueError: a catalogue that is not one: circular, or two effects for one quantity.
     """
-    known = by_name(effects)
-    search = _Search(known, facts)
+    known = {name: effect.at(accuracy) for name, effect in by_name(effects).items()}
+    search = _Search(known, facts, accuracy)
     wanted = tuple(wanted)
     for quantity in wanted:
         if quantity not in known:
             raise WrongUse(f"nothing computes {quantity!r}; {nearest(quantity, known)}")
         search.visit(quantity, "", ())
-    ran = tuple(_planned(known[name], search.asked_by[name], accuracy) for name in search.order)
+    ran = tuple(_planned(known[name], search) for name in search.order)
     skipped = tuple(
         SkippedEffect(effect, _why_not(effect, search))
         for effect in effects
@@ -136,13 +139,37 @@ def _bypass(effect: Effect, asked_by: str) -> str:
     raise WrongUse(f"{who}, but {effect.when.otherwise}; change the scene, or do not ask for it")
 
 
-def _planned(effect: Effect, asked_by: Sequence[str], accuracy: Accuracy) -> PlannedEffect:
+def _require_way(effect: Effect, facts: Facts, accuracy: Accuracy) -> None:
+    way = effect.way(accuracy)
+    if way is None or way.when is None or way.when.holds(facts):
+        return
+    assert effect.choice is not None
+    name, level = effect.choice.name, accuracy[effect.choice.name]
+    raise WrongUse(
+        f"{name} = {level}: {way.when.otherwise}; change the scene, or take {name} = {effect.choice.default}"
+    )
+
+
+def _planned(effect: Effect, search: _Search) -> PlannedEffect:
+    asked_by, accuracy = search.asked_by[effect.provides], search.accuracy
     who = [f"{name} needs it" for name in asked_by if name]
     reasons = (["it is asked for"] if "" in asked_by else []) + who
     if effect.when is not None:
         reasons.append(effect.when.because)
-    levels = MappingProxyType({knob.name: accuracy[knob.name] for knob in effect.knobs})
+    knobs = effect.knobs
+    if effect.choice is not None:
+        knobs = (effect.choice, *knobs)
+        reasons.append(_why_this_way(effect, effect.choice, accuracy))
+    levels = MappingProxyType({knob.name: accuracy[knob.name] for knob in knobs})
     return PlannedEffect(effect, "; ".join(reasons), levels)
+
+
+def _why_this_way(effect: Effect, choice: Knob, accuracy: Accuracy) -> str:
+    way, level = effect.way(accuracy), accuracy[choice.name]
+    said = f"{choice.name} is {level}"
+    if way is not None and way.when is not None:
+        return f"{said}, and {way.when.because}"
+    return f"{said}, its default" if level == choice.default else said
 
 
 def _why_not(effect: Effect, search: _Search) -> str:

@@ -16,8 +16,11 @@ from harness.acquisition import AcquisitionCalibration
 from harness.clock import ClockOffset
 from harness.errors import RecordingDamaged, WrongUse
 from harness.mesh import Mesh
+from harness.objectfile.entries import DESCRIPTION
+from harness.objectfile.file import ObjectFile, copied
 from harness.recording import Recording, RunHeader, require_unused
 from harness.scene import SceneFile, scene_from_json
+from harness.sim.scene_object import known_file
 from harness.sim.tactile_calibration import (
     TactileCalibration,
     load_calibration,
@@ -27,6 +30,10 @@ from harness.sim.tactile_calibration import (
 from harness.station_file import Station, station_from_json
 
 OBJECT, CALIBRATION, ACQUISITION = "object.npz", "calibration.npz", "acquisition.json"
+OBJECTFILE = "objectfile"
+"""The folder of the object's ObjectFile within that of a run."""
+
+_DESCRIBED = f"{OBJECTFILE}/{DESCRIPTION}"
 
 _NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-python-headless", "mujoco", "touchstone-lab")
 
@@ -79,7 +86,12 @@ def create_run(
         seed: of everything random.
         mock: how the mocked bench is started; None at a real one.
         acquisition: of the hammer's box; None for a run without sound.
+
+    Raises:
+        WrongUse: the folder holds a run; or the scene is heard and names an ObjectFile of another object.
+        DataRefused: that ObjectFile is damaged.
     """
+    of = known_file(scene, mesh) if scene.sensors.sound else None
     require_unused(folder)
     folder.mkdir(parents=True, exist_ok=True)
     np.savez(folder / OBJECT, vertices=mesh.vertices, faces=mesh.faces)
@@ -88,6 +100,9 @@ def create_run(
     if acquisition is not None:
         acquisition.save(folder / ACQUISITION)
         carried.append(ACQUISITION)
+    if of is not None:
+        copied(of, folder / OBJECTFILE, of.description.sound_files)
+        carried.append(_DESCRIBED)
     header = RunHeader(
         experiment=experiment,
         scene=scene.model_dump(mode="json", by_alias=True),
@@ -136,6 +151,21 @@ class RunFiles:
         if ACQUISITION not in self.recording.header.files:
             return None
         return AcquisitionCalibration.load(self._checked(ACQUISITION))
+
+    @cached_property
+    def objectfile(self) -> ObjectFile:
+        """What the scene's ObjectFile said of the object's sound when the run was made.
+
+        Raises:
+            WrongUse: the scene named none, or was not to be heard.
+            DataRefused: it is damaged.
+        """
+        if _DESCRIBED not in self.recording.header.files:
+            raise WrongUse(
+                f"{self.recording.folder} carries no ObjectFile, as its scene named none or was not to be "
+                "heard; take sound.shapes = elements"
+            )
+        return ObjectFile.open(self._checked(_DESCRIBED).parent)
 
     def _checked(self, name: str) -> Path:
         path = self.recording.folder / name

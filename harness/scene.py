@@ -12,6 +12,7 @@ from harness.errors import WrongUse
 from harness.geometry import rotation_about, transform, translation
 from harness.materials import MATERIALS
 from harness.mesh import Mesh
+from harness.objectfile.entries import DESCRIPTION
 from harness.quantities import (
     Angle,
     Length,
@@ -64,6 +65,7 @@ class SceneObject(StrictModel):
         material: a key of ``harness.materials.MATERIALS``; a built-in object has one of its own.
         scale: applied to the mesh after its units.
         wall: m, of an object whose mesh is only its outside; None for what the mesh says.
+        objectfile: folder of its ObjectFile, found as ``mesh`` is; None where it has none.
         pose: nominal.
     """
 
@@ -72,6 +74,7 @@ class SceneObject(StrictModel):
     material: str
     scale: float = Field(default=1.0, gt=0.0, allow_inf_nan=False)
     wall: Annotated[Length, Positive] | None = None
+    objectfile: str | None = Field(default=None, min_length=1)
     pose: Pose = Pose()
 
     @property
@@ -234,16 +237,20 @@ class SceneFile(StrictModel):
 
 
 def load_scene(path: Path) -> SceneFile:
-    """A scene file, its mesh path made absolute.
+    """A scene file, its mesh's and its ObjectFile's paths made absolute.
 
     Raises:
-        WrongUse: naming each mistake; or the mesh file does not exist.
+        WrongUse: naming each mistake; or the mesh file or the ObjectFile does not exist.
     """
-    return _with_mesh_found(load_toml(path, SceneFile), path.parent, str(path))
+    return _with_files_found(load_toml(path, SceneFile), path.parent, str(path))
 
 
 def scene_from_options(
-    mesh: str, material: str | None = None, units: str | None = None, wall: str | None = None
+    mesh: str,
+    material: str | None = None,
+    units: str | None = None,
+    wall: str | None = None,
+    objectfile: str | None = None,
 ) -> SceneFile:
     """The scene that ``run --object FILE --material M --units mm --wall 2mm`` means.
 
@@ -252,18 +259,19 @@ def scene_from_options(
         material: None only for a built-in object.
         units: of the file's numbers.
         wall: a length with its unit.
+        objectfile: folder, relative to the working directory.
 
     Raises:
         WrongUse: an option that cannot be, or no such file.
     """
-    given = {"mesh": mesh, "material": material, "units": units, "wall": wall}
+    given = {"mesh": mesh, "material": material, "units": units, "wall": wall, "objectfile": objectfile}
     if material is None and not mesh.startswith(BUILTIN):
         raise WrongUse(
             f"--object {mesh} needs --material: it is one of {', '.join(MATERIALS)} (sound and mass "
             "depend on it, touch does not)"
         )
     tree = {"schema": 1, "object": {key: value for key, value in given.items() if value is not None}}
-    return _with_mesh_found(validate(tree, SceneFile, "the options"), Path.cwd(), "the options")
+    return _with_files_found(validate(tree, SceneFile, "the options"), Path.cwd(), "the options")
 
 
 def scene_from_json(tree: Any, where: str) -> SceneFile:
@@ -271,11 +279,19 @@ def scene_from_json(tree: Any, where: str) -> SceneFile:
     return validate(tree, SceneFile, where)
 
 
-def _with_mesh_found(scene: SceneFile, folder: Path, where: str) -> SceneFile:
-    if scene.object.builtin is not None:
-        return scene
-    path = (folder / scene.object.mesh).resolve()
-    if not path.is_file():
-        own = f'; our own objects are written "{BUILTIN}mug" and so on'
-        raise WrongUse(f"{where}: 'object.mesh': there is no file {path}{own}")
-    return scene.model_copy(update={"object": scene.object.model_copy(update={"mesh": str(path)})})
+def _with_files_found(scene: SceneFile, folder: Path, where: str) -> SceneFile:
+    named, found = scene.object, {}
+    if named.builtin is None:
+        path = (folder / named.mesh).resolve()
+        if not path.is_file():
+            own = f'our own objects are written "{BUILTIN}mug" and so on'
+            raise WrongUse(f"{where}: 'object.mesh': there is no file {path}; {own}")
+        found["mesh"] = str(path)
+    if named.objectfile is not None:
+        path = (folder / named.objectfile).resolve()
+        if not (path / DESCRIPTION).is_file():
+            make = "make one with `touchstone object build`, or leave the key out"
+            kind = f"ObjectFile {path}, a folder with {DESCRIPTION} in it"
+            raise WrongUse(f"{where}: 'object.objectfile': there is no {kind}; {make}")
+        found["objectfile"] = str(path)
+    return scene.model_copy(update={"object": named.model_copy(update=found)}) if found else scene

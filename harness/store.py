@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 from zipfile import BadZipFile
 
 import numpy as np
@@ -23,6 +23,16 @@ _SINGLE = "value"
 _CHECK = "sha256"
 
 Storable = AnyArray | Mapping[str, AnyArray]
+
+
+@runtime_checkable
+class OnDisk(Protocol):
+    """What lies on the disk and knows, without reading it all, what it holds."""
+
+    @property
+    def content_key(self) -> str:
+        """Another one for other content, wherever it lies."""
+        ...
 
 
 def default_folder() -> Path:
@@ -135,6 +145,8 @@ def _pieces(value: Any) -> "list[bytes]":
     if isinstance(value, Mapping):
         items = sorted((str(key), item) for key, item in value.items())
         return [f"mapping {len(items)}".encode(), *(p for pair in items for p in _pieces(pair))]
+    if isinstance(value, OnDisk):
+        return [f"on disk {value.content_key}".encode()]
     if is_dataclass(value) and not isinstance(value, type):
         parts = [(item.name, vars(value)[item.name]) for item in fields(value)]
         named = f"{type(value).__module__}.{type(value).__qualname__}"

@@ -3,10 +3,14 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from harness.materials import MATERIALS
 from harness.mesh import Mesh
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.same_object import require_same
 from harness.objects.household import build
 from harness.scene import SceneFile
 from harness.sim.intake import IntakeReport, take_in
+from harness.sim.walls import walled
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +29,24 @@ class KnownObject:
     def warnings(self) -> tuple[str, ...]:
         """What the operator should look at."""
         return self.report.warnings if self.report is not None else ()
+
+
+def known_file(scene: SceneFile, mesh: Mesh) -> ObjectFile | None:
+    """The scene's ObjectFile, seen to be of the scene's object; None where it names none.
+
+    Args:
+        scene: may name one.
+        mesh: of the scene's object, as ``known_object`` gives it.
+
+    Raises:
+        WrongUse: it is of another object or material; what differs is said.
+        DataRefused: it is missing or damaged.
+    """
+    if scene.object.objectfile is None:
+        return None
+    of = ObjectFile.open(Path(scene.object.objectfile))
+    require_same(of, walled(mesh, scene.object.wall), MATERIALS[scene.object.material])
+    return of
 
 
 def known_object(scene: SceneFile) -> KnownObject:

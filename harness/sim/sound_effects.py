@@ -1,16 +1,16 @@
 """The effects of sound, from the object's shape to the microphone's reading.
 
 Sources, beside those of the touch: ``object.wall`` (m, or None for a mesh of the material
-itself), ``strike`` (``Strikes``), ``room`` (``RoomField``), ``microphone``
-(``MicrophoneResponse``).
+itself), ``object.file`` (the object's ``ObjectFile``; asked for only where modes come from it),
+``strike`` (``Strikes``), ``room`` (``RoomField``), ``microphone`` (``MicrophoneResponse``).
 """
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from harness.accuracy import Knob, Level
 from harness.arrays import AnyArray, FloatArray
-from harness.effects import Condition, Effect
+from harness.effects import Compute, Condition, Effect, Way
 from harness.sim.microphone_response import as_heard
 from harness.sim.modal import ELEMENT_SHARE, HEARING, VERSION, default_edge, from_arrays, modes_of, to_arrays
 from harness.sim.modal_radiation import RadiationLevel, radiation
@@ -18,6 +18,9 @@ from harness.sim.modal_sound import ring
 from harness.sim.modes import dampings
 from harness.sim.room import reverberated
 from harness.sim.walls import walled
+
+if TYPE_CHECKING:
+    from harness.objectfile.audio import AudioLevel
 
 Given = Mapping[str, Any]
 Levels = Mapping[str, Level]
@@ -31,11 +34,24 @@ EDGE = Knob(
     "an element in shortest waves",
 )
 MODES = Knob("sound.modes", (16, 32, 64, 128, 256), "modes", "number", 128, "the lowest ones that are kept")
+SHAPES = Knob(
+    "sound.shapes",
+    ("network", "table", "elements"),
+    "",
+    "method",
+    "elements",
+    "the ObjectFile's network, its table, or finite elements",
+)
 RADIATION = Knob(
     "sound.radiation", ("bound", "monopoles"), "", "method", "monopoles", "how the surface moves the air"
 )
 
 SOUND = Condition(lambda f: f.scene.sensors.sound, "sensors.sound is true", "sensors.sound is false")
+NAMED = Condition(
+    lambda f: f.scene.object.objectfile is not None,
+    "the scene names an ObjectFile",
+    "the scene names no ObjectFile (objectfile in [object])",
+)
 ROOM = Condition(lambda f: f.scene.room is not None, "the scene has a [room]", "the scene has no [room]")
 
 
@@ -44,6 +60,23 @@ def _modes(given: Given, levels: Levels) -> dict[str, AnyArray]:
     material, most = given["object.material"], int(levels[MODES.name])
     edge = default_edge(solid, material, HEARING, most, float(levels[EDGE.name]))
     return to_arrays(modes_of(solid, material, HEARING, edge, most))
+
+
+def _modes_of_file(level: "AudioLevel") -> Compute:
+    def compute(given: Given, levels: Levels) -> dict[str, AnyArray]:
+        # Loaded by those alone who take modes from an ObjectFile.
+        from harness.objectfile.sound_level import modes_from
+
+        solid = walled(given["object.mesh"], given["object.wall"])
+        material, most = given["object.material"], int(levels[MODES.name])
+        return to_arrays(modes_from(given["object.file"], level, solid, material, most, HEARING))
+
+    return compute
+
+
+def _from_file(level: "AudioLevel") -> Way:
+    needs = ("object.file", "object.mesh", "object.wall", "object.material")
+    return Way(needs, _modes_of_file(level), when=NAMED, knobs=(MODES,))
 
 
 def _sound(given: Given, levels: Levels) -> FloatArray:
@@ -72,6 +105,8 @@ SOUND_EFFECTS = (
         knobs=(EDGE, MODES),
         version=VERSION,
         stored=True,
+        choice=SHAPES,
+        ways={"network": _from_file("network"), "table": _from_file("table")},
     ),
     Effect(
         "object.sound",

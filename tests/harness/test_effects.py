@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.accuracy import Accuracy, Knob
-from harness.effects import Condition, Effect, Facts, knobs_of
+from harness.accuracy import Accuracy, Knob, Level
+from harness.effects import Condition, Effect, Facts, Way, by_name, knobs_of
 from harness.errors import WrongUse
 from harness.evaluate import Evaluation, evaluate
 from harness.plan import default_accuracy, plan
@@ -228,3 +228,67 @@ def test_a_knob_downstream_does_not_disturb_what_is_stored_upstream(tmp_path: Pa
         made = plan(effects, FACTS, ["c"], Accuracy(knobs_of(effects), {"b": level}))
         done = evaluate(made, {"x": x}, store)
         assert ("a" in done.calls) == (level == 1)
+
+
+HOW = Knob("how", ("guess", "table", "exact"), "", "method", "exact")
+
+
+def with_ways(guess: Condition | None = ALWAYS, version: int = 1) -> tuple[Effect, ...]:
+    """``a`` of ``x``; or guessed, of ``y``; or out of a table, of both; and ``b`` of ``a``."""
+    ways: dict[Level, Way] = {
+        "guess": Way(("y",), lambda g, _: -g["y"], when=guess),
+        "table": Way(("x", "y"), lambda g, levels: g["x"] * levels["b"], knobs=(FACTOR,), version=version),
+    }
+    return (
+        Effect("a", ("x",), lambda g, _: g["x"], choice=HOW, ways=ways),
+        Effect("b", ("a",), lambda g, _: 2.0 * g["a"], stored=True),
+    )
+
+
+def through(effects: tuple[Effect, ...], how: str, store: Store | None = None, b: int = 2) -> Evaluation:
+    made = plan(effects, FACTS, ["b"], Accuracy((HOW, FACTOR), {"how": how, "b": b}))
+    return evaluate(made, {"x": np.ones(2), "y": np.full(2, 5.0)}, store)
+
+
+def test_a_level_is_a_way_with_needs_and_knobs_of_its_own() -> None:
+    effects = with_ways()
+    assert {how: through(effects, str(how))["b"][0] for how in HOW.levels} == {
+        "guess": -10.0,
+        "table": 4.0,
+        "exact": 2.0,
+    }
+    made = plan(effects, FACTS, ["b"], Accuracy(knobs_of(effects), {"how": "guess"}))
+    assert made.sources == ("y",)
+    assert made.ran[0].reason == "b needs it; how is guess, and it is so"
+    assert made.ran[0].levels == {"how": "guess"}
+    made = plan(effects, FACTS, ["b"], Accuracy(knobs_of(effects), {"how": "table"}))
+    assert (made.sources, dict(made.ran[0].levels)) == (("x", "y"), {"how": "table", "b": 2})
+    assert made.ran[0].reason == "b needs it; how is table"
+    made = plan(effects, FACTS, ["b"], default_accuracy(effects))
+    assert made.ran[0].reason == "b needs it; how is exact, its default"
+
+
+def test_a_way_whose_scene_has_not_what_it_takes_is_refused_only_where_it_would_run() -> None:
+    effects = with_ways(NEVER)
+    with pytest.raises(WrongUse, match="how = guess: it is not so; change the scene, or take how = exact"):
+        through(effects, "guess")
+    assert through(effects, "table")["b"][0] == 4.0
+    other = Effect("c", ("x",), lambda g, _: g["x"])
+    guessed = Accuracy(knobs_of(effects), {"how": "guess"})
+    assert plan((*effects, other), FACTS, ["c"], guessed).sources == ("x",)
+
+
+def test_ways_are_told_apart_in_the_store_and_a_new_one_drops_nothing(tmp_path: Path) -> None:
+    store, effects = Store(tmp_path), with_ways()
+    before = (replace(effects[0], choice=None, ways={}), effects[1])
+    assert through(before, "exact", store).calls["b"] == 1
+    assert "b" in through(effects, "exact", store).from_store
+    for how, b, version in (("guess", 2, 1), ("table", 2, 1), ("table", 3, 1), ("table", 3, 2)):
+        assert through(with_ways(version=version), how, store, b).calls["b"] == 1
+        assert "b" in through(with_ways(version=version), how, store, b).from_store
+
+
+def test_a_way_of_no_level_is_refused() -> None:
+    astray = replace(with_ways()[0], ways={"gues": Way((), lambda _g, _l: 0.0)})
+    with pytest.raises(ValueError, match="the ways of a are"):
+        by_name((astray,))

@@ -66,6 +66,19 @@ def test_a_mesh_path_is_relative_to_the_scene_and_absolute_once_read(tmp_path: P
     assert scene.object.name == "cup"
 
 
+def test_an_objectfile_is_found_beside_the_scene_and_must_be_one(tmp_path: Path) -> None:
+    named = scene_file(tmp_path, pose='objectfile = "own/mug"')
+    (tmp_path / "own" / "mug").mkdir(parents=True)
+    with pytest.raises(WrongUse, match=r"'object\.objectfile': there is no ObjectFile .*own/mug, a folder"):
+        load_scene(named)
+    (tmp_path / "own" / "mug" / "object.json").write_text("{}")
+    scene = load_scene(named)
+    assert scene.object.objectfile == str((tmp_path / "own" / "mug").resolve())
+    assert scene_from_json(json.loads(scene.model_dump_json()), "recording") == scene
+    with pytest.raises(WrongUse, match=r"unknown key 'object\.object_file'; .*did you mean 'objectfile'"):
+        load_scene(scene_file(tmp_path, pose='object_file = "own/mug"'))
+
+
 def test_options_carry_units(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("cup.stl").write_bytes(b"solid")

@@ -241,7 +241,8 @@ def test_without_touch_a_tactile_image_is_refused() -> None:
 
 def test_names_and_knobs_are_unique() -> None:
     assert len(by_name(EFFECTS)) == len(EFFECTS)
-    knobs = [knob for effect in EFFECTS for knob in effect.knobs]
+    chosen = [effect.choice for effect in EFFECTS if effect.choice is not None]
+    knobs = [*chosen, *(knob for effect in EFFECTS for knob in effect.knobs)]
     assert len({knob.name for knob in knobs}) == len(knobs) == len(knobs_of(EFFECTS))
 
 

@@ -1,0 +1,81 @@
+"""Whether an ObjectFile is of the object that stands in a scene."""
+
+from dataclasses import astuple
+
+import numpy as np
+
+from harness.arrays import FloatArray
+from harness.errors import WrongUse
+from harness.materials import Material
+from harness.mesh import Mesh
+from harness.objectfile.file import ObjectFile, file_entry
+from harness.objectfile.surface_file import ply_bytes
+from harness.objectfile.surface_search import SurfaceSearch
+from harness.objects.solid import signed_volume
+
+_SHAPE = 1e-3
+"""Of the diagonal, by which two surfaces of one object may differ, and of the volume: a frequency then
+differs by a thousandth or so, as the elements' own do."""
+
+_CONSTANT = 1e-9
+"""Relative, by which constants of one material may differ: more than JSON rounds them by."""
+
+_CONSTANTS = (("density", " kg/m^3"), ("young", " Pa"), ("poisson", ""), ("alpha", " 1/s"), ("beta", " s"))
+
+
+def require_same(of: ObjectFile, surface: Mesh, material: Material) -> None:
+    """Refuse an ObjectFile of something else.
+
+    Args:
+        of: an ObjectFile.
+        surface: of the material of the scene's object, in metres, in the object's frame.
+        material: of the scene's object.
+
+    Raises:
+        WrongUse: another size, place, shape, volume or material; each difference is said.
+        DataRefused: its mesh is damaged.
+    """
+    different = [*_materials(of.material, material), *_surfaces(of, surface)]
+    if different:
+        raise WrongUse(
+            f"{of.folder} is not of the scene's object: {'; '.join(different)}. Name its own ObjectFile, "
+            "build one with `touchstone object build`, or take sound.shapes = elements"
+        )
+
+
+def _materials(there: Material, here: Material) -> list[str]:
+    """Alpha and beta count: the decays of a scene's sounds are those of its material."""
+    said = []
+    pairs = zip(_CONSTANTS, astuple(there)[1:], astuple(here)[1:], strict=True)
+    for (name, unit), a, b in pairs:
+        if abs(a - b) > _CONSTANT * max(abs(a), abs(b)):
+            said.append(f"its {name} is {a:.6g}{unit} where the scene's {here.name} has {b:.6g}{unit}")
+    return said
+
+
+def _surfaces(of: ObjectFile, surface: Mesh) -> list[str]:
+    if file_entry(of.description.mesh.file, ply_bytes(surface)).sha256 == of.description.mesh.sha256:
+        return []
+    most = _SHAPE * surface.diagonal
+    low, high = np.array(of.description.mesh.low_m), np.array(of.description.mesh.high_m)
+    if (np.abs(np.stack([low, high]) - surface.bounds) > most).any():
+        return [f"it reaches {_box(np.stack([low, high]))}, the scene's object {_box(surface.bounds)}"]
+    gap = max(_farthest(surface, of.mesh), _farthest(of.mesh, surface))
+    if gap > most:
+        return [f"the surfaces are {gap * 1e3:.3g} mm apart, where {most * 1e3:.3g} mm are one object's"]
+    there, here = signed_volume(of.mesh), signed_volume(surface)
+    if abs(there - here) > _SHAPE * here:
+        return [f"it holds {there * 1e6:.5g} cm^3, the scene's object {here * 1e6:.5g}"]
+    return []
+
+
+def _farthest(points: Mesh, surface: Mesh) -> float:
+    """m, of a vertex of one mesh from the surface of another."""
+    used = points.vertices[np.unique(points.faces)]
+    places, _ = SurfaceSearch(surface).nearest(used, _SHAPE * surface.diagonal)
+    return float(np.linalg.norm(places - used, axis=1).max())
+
+
+def _box(bounds: FloatArray) -> str:
+    sides = zip("xyz", *(1e3 * bounds), strict=True)
+    return ", ".join(f"{axis} {low:.2f} to {high:.2f}" for axis, low, high in sides) + " mm"
