@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from calibration.taxim.pack import PressPack, read_pack
-from calibration.taxim.smooth_fit import SmoothFit, changes, fit_smooth, refined_centre, residual
-from calibration.taxim.table_fit import BINS, bin_of, fit_table
+from calibration.taxim.smooth_fit import changes, contact_pixels, fit_smooth, refined_centre, residual
+from calibration.taxim.table_fit import fit_table, table_shades
 from harness.arrays import FloatArray, IntArray
 from harness.errors import CalibrationRefused, WrongUse
 from harness.sim.tactile_calibration import (
     CalibrationHeader,
-    Float32Array,
     TactileCalibration,
     save_calibration,
 )
@@ -89,21 +88,10 @@ def held_out(pack: PressPack, ball: float) -> tuple[float, float]:
                 kept, change[k], kept.centres[k] + bias, fit.smooth, fit.edge, ball, steps=8
             )
             smooth_db.append(_decibels(residual(kept, change[k], centre, fit.smooth, fit.edge, ball)))
-            table_db.append(_decibels(_table_residual(change[k], centre, table, fit, ball)))
+            place = contact_pixels(kept.shape, centre, fit.edge, 1)
+            shown = table_shades(table, centre, place, ball)
+            table_db.append(_decibels(shown - change[k][place[:, 0], place[:, 1]]))
     return float(np.median(smooth_db)), float(np.median(table_db))
-
-
-def _table_residual(
-    change: FloatArray, centre: FloatArray, table: Float32Array, fit: SmoothFit, ball: float
-) -> FloatArray:
-    rows, columns = change.shape[:2]
-    away = np.hypot(np.arange(columns)[None, :] - centre[0], np.arange(rows)[:, None] - centre[1])
-    y, x = (axis.astype(np.float64) for axis in np.nonzero(away <= fit.edge))
-    magnitude = np.arcsin(np.hypot(x - centre[0], y - centre[1]) / ball)
-    at = bin_of(magnitude, np.arctan2(centre[1] - y, centre[0] - x), BINS)
-    terms = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=1)
-    left: FloatArray = np.einsum("nt,ntc->nc", terms, table[at].astype(np.float64)) - change[away <= fit.edge]
-    return left
 
 
 def _decibels(left: FloatArray) -> float:

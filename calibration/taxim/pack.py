@@ -33,6 +33,11 @@ class PressPack:
     number: IntArray
     sha256: str
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the pictures."""
+        return self.background.shape[0], self.background.shape[1]
+
     def of(self, chosen: IntArray) -> "PressPack":
         """Only the presses at these places of the pack."""
         return PressPack(

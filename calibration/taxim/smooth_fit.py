@@ -3,6 +3,10 @@
 The marks made by hand are a pixel or more off; the model is linear in its coefficients and a
 ball's normal is linear in its centre, so the two are found in turns. Speckles of dirt on the
 gel weigh less by Huber's rule.
+
+A contact also takes light from the gel, whatever the slope: at the apex of a ball, where the gel is as
+flat as untouched, real sensors are darker by a dozen grey levels. ``Manner.offset`` fits that too, as a
+polynomial of the position; without it the model is pulled aside, and the centres with it.
 """
 
 from dataclasses import dataclass
@@ -10,29 +14,51 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.taxim.pack import PressPack
-from harness.arrays import BoolArray, FloatArray, read_only
+from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused
 from harness.sim.shading import POSITION_TERMS, design, scaled_position, shades
-from harness.sim.tactile_calibration import POSITION_DEGREE
+from harness.sim.tactile_calibration import POSITION_DEGREE, smooth_terms
 
-_ROUNDS = 6
 _HUBER = 10.0
 """Grey levels beyond which a residual counts as an outlier: about twice the typical one."""
 
 _RIDGE = 1e-6
 """Of the normalised normal equations."""
 
-_PLACE_RIDGE = 1e-3
-"""Pulls the colours towards being the same everywhere, in units of the constant terms' own weight.
-
-Presses seldom cover the whole gel; where none was made, two halves of the published set differ
-by 16 grey levels without this and by 6 with it, for 0.1 dB on presses held out.
-"""
-
 _PLACE_DEGREES = np.array([c + d for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)])
 
 _FAR = 2.5
 """Ball radii from the centre beyond which the gel is taken to be untouched."""
+
+_ENOUGH = 20.0
+"""Pixels of contact radius that are enough; of larger contacts every second, third, ... row and column
+is looked at."""
+
+_LONGEST_STEP = 0.05
+"""Ball radii, or a pixel where that is more: how far a centre may move at once."""
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a set is fitted.
+
+    Attributes:
+        offset: whether a contact may change the colour whatever its slope.
+        rounds: of coefficients and centres in turns.
+        place_ridge: pulls the colours towards being the same everywhere, in units of the constant terms' own
+            weight. Presses seldom cover the whole gel; where none was made, two halves of the published set
+            differ by 16 grey levels without it and by 6 with 1e-3, for 0.1 dB on presses held out.
+        edge_again: whether the contact line is looked for again with refined centres, which show it sharper.
+    """
+
+    offset: bool = False
+    rounds: int = 6
+    place_ridge: float = 1e-3
+    edge_again: bool = False
+
+
+MARKED = Manner()
+"""From marks made by hand, as the shipped calibrations were."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,25 +66,36 @@ class SmoothFit:
     """A smooth model and the presses as it sees them.
 
     Attributes:
-        smooth: ``(120, 3)`` coefficients, see ``harness.sim.shading``.
+        colours: ``(120, 3)`` coefficients, see ``harness.sim.shading``; ``(126, 3)`` where the last six are
+            a contact's offset by the position.
         centres: ``(presses, 2)`` pixels (column, row), refined.
         edge: pixels, the radius out to which the gel follows the ball.
         condition: of the normalised least-squares problem.
         residual_rms: grey levels.
     """
 
-    smooth: FloatArray
+    colours: FloatArray
     centres: FloatArray
     edge: float
     condition: float
     residual_rms: float
+
+    @property
+    def smooth(self) -> FloatArray:
+        """``(120, 3)`` the coefficients of the slopes alone."""
+        return self.colours[: smooth_terms()]
+
+    @property
+    def offset(self) -> FloatArray:
+        """``(6, 3)`` what a contact adds by the position; ``(0, 3)`` where that was not fitted."""
+        return self.colours[smooth_terms() :]
 
 
 def changes(pack: PressPack) -> FloatArray:
     """``(presses, rows, columns, 3)`` grey levels against the untouched gel, drift of the light removed."""
     change = pack.images.astype(np.float64) - pack.background
     for k in range(len(change)):
-        far = _distance(pack, pack.centres[k]) > _FAR * pack.radii[k]
+        far = distance(pack.shape, pack.centres[k]) > _FAR * pack.radii[k]
         change[k] -= np.median(change[k][far], axis=0)
     return change
 
@@ -69,15 +106,7 @@ def ball_edge(pack: PressPack, change: FloatArray, centres: FloatArray, ball: fl
     Raises:
         CalibrationRefused: it is not inside the ball.
     """
-    reach = int(np.ceil(1.5 * ball))
-    profile = np.zeros((len(change), reach))
-    for k in range(len(change)):
-        away = _distance(pack, centres[k])
-        ring = away.astype(np.int64)
-        seen = ring < reach
-        strength = np.abs(change[k]).sum(axis=2)
-        total = np.bincount(ring[seen], strength[seen], minlength=reach)
-        profile[k] = total / np.maximum(np.bincount(ring[seen], minlength=reach), 1)
+    profile = [strength_by_radius(pack, change[k], centres[k], ball) for k in range(len(change))]
     edge = float(np.argmax(np.median(profile, axis=0))) + 0.5
     if not 3.0 <= edge < ball:
         raise CalibrationRefused(
@@ -87,104 +116,165 @@ def ball_edge(pack: PressPack, change: FloatArray, centres: FloatArray, ball: fl
     return edge
 
 
-def fit_smooth(pack: PressPack, ball: float) -> SmoothFit:
+def strength_by_radius(pack: PressPack, change: FloatArray, centre: FloatArray, ball: float) -> FloatArray:
+    """Mean change of colour of one press in rings of a pixel, out to one and a half balls."""
+    reach = int(np.ceil(1.5 * ball))
+    ring = distance(pack.shape, centre).astype(np.int64)
+    seen = ring < reach
+    strength = np.abs(change).sum(axis=2)
+    total = np.bincount(ring[seen], strength[seen], minlength=reach)
+    return np.asarray(total / np.maximum(np.bincount(ring[seen], minlength=reach), 1))
+
+
+def fit_smooth(
+    pack: PressPack, ball: float, manner: Manner = MARKED, change: FloatArray | None = None
+) -> SmoothFit:
     """Fit coefficients and centres.
 
     Args:
-        pack: the presses.
+        pack: the presses; centres and radii are where the search begins.
         ball: radius in pixels.
+        manner: how.
+        change: ``(presses, rows, columns, 3)`` grey levels against the untouched gel; ``changes(pack)``
+            where None.
 
     Raises:
         CalibrationRefused: the presses contradict the ball.
     """
-    change = changes(pack)
+    change = changes(pack) if change is None else change
     centres = pack.centres.copy()
     edge = ball_edge(pack, change, centres, ball)
-    for _ in range(_ROUNDS):
-        smooth, condition = _coefficients(pack, change, centres, edge, ball)
+    for turn in range(manner.rounds):
+        colours, _ = coefficients(pack, change, centres, edge, ball, manner)
         centres = np.stack(
-            [refined_centre(pack, change[k], centres[k], smooth, edge, ball) for k in range(len(centres))]
+            [refined_centre(pack, change[k], centres[k], colours, edge, ball) for k in range(len(centres))]
         )
-    smooth, condition = _coefficients(pack, change, centres, edge, ball)
-    left = [residual(pack, change[k], centres[k], smooth, edge, ball) for k in range(len(centres))]
+        if manner.edge_again and turn == manner.rounds // 2:
+            edge = ball_edge(pack, change, centres, ball)
+    return settled(pack, change, centres, edge, ball, manner)
+
+
+def settled(
+    pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float, manner: Manner
+) -> SmoothFit:
+    """The fit of presses whose centres and contact line are known."""
+    colours, condition = coefficients(pack, change, centres, edge, ball, manner)
+    left = [residual(pack, change[k], centres[k], colours, edge, ball) for k in range(len(centres))]
     rms = float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
-    return SmoothFit(read_only(smooth), read_only(centres), edge, condition, rms)
+    return SmoothFit(read_only(colours), read_only(centres), edge, condition, rms)
 
 
 def residual(
-    pack: PressPack, change: FloatArray, centre: FloatArray, smooth: FloatArray, edge: float, ball: float
+    pack: PressPack, change: FloatArray, centre: FloatArray, colours: FloatArray, edge: float, ball: float
 ) -> FloatArray:
     """``(pixels, 3)`` model less picture, grey levels, inside the contact of one press."""
-    inside = _distance(pack, centre) <= edge
-    return _shades(centre, inside, smooth, ball)[0] - change[inside]
+    place = contact_pixels(pack.shape, centre, edge, 1)
+    return _shades(pack, centre, place, colours, ball)[0] - change[place[:, 0], place[:, 1]]
 
 
 def refined_centre(
     pack: PressPack,
     change: FloatArray,
     centre: FloatArray,
-    smooth: FloatArray,
+    colours: FloatArray,
     edge: float,
     ball: float,
     steps: int = 2,
 ) -> FloatArray:
-    """The centre ``(2,)`` in pixels that explains one press best; Gauss-Newton steps of at most 1 px."""
-    inside = _distance(pack, centre) <= edge
+    """The centre ``(2,)`` in pixels that explains one press best; Gauss-Newton steps of limited length."""
+    place = contact_pixels(pack.shape, centre, edge, _stride(edge))
+    seen, longest = change[place[:, 0], place[:, 1]], max(1.0, _LONGEST_STEP * ball)
     for _ in range(steps):
-        shade, by_normal = _shades(centre, inside, smooth, ball)
-        left = shade - change[inside]
+        shade, by_normal = _shades(pack, centre, place, colours, ball)
+        left = shade - seen
         weight = _huber(left)
         jacobian = by_normal / -ball
         normal = np.einsum("p,pca,pcb->ab", weight, jacobian, jacobian)
         step = -np.linalg.solve(normal, np.einsum("p,pca,pc->a", weight, jacobian, left))
-        centre = centre + step * min(1.0, 1.0 / max(float(np.linalg.norm(step)), 1e-12))
+        centre = centre + step * min(1.0, longest / max(float(np.linalg.norm(step)), 1e-12))
     return centre
 
 
-def _shades(
-    centre: FloatArray, inside: BoolArray, smooth: FloatArray, ball: float
-) -> tuple[FloatArray, FloatArray]:
-    place = np.argwhere(inside)
-    normal = (place[:, ::-1] - centre) / ball
-    shade, by_normal = np.empty((len(place), 3)), np.empty((len(place), 3, 2))
-    shades(smooth, normal, place, inside.shape[0], inside.shape[1], shade, by_normal)
-    return shade, by_normal
+def contact_pixels(shape: tuple[int, int], centre: FloatArray, edge: float, stride: int) -> IntArray:
+    """``(n, 2)`` row and column of the pixels within ``edge`` of a centre, row by row."""
+    low = np.maximum(np.floor(centre - edge).astype(np.int64), 0)
+    low += -low % stride
+    high = np.floor(centre + edge).astype(np.int64) + 1
+    rows, columns = shape
+    x, y = np.arange(low[0], min(high[0], columns), stride), np.arange(low[1], min(high[1], rows), stride)
+    inside = np.argwhere(np.hypot(x[None, :] - centre[0], y[:, None] - centre[1]) <= edge)
+    return inside * stride + low[::-1]
 
 
-def _coefficients(
-    pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float
+def distance(shape: tuple[int, int], centre: FloatArray) -> FloatArray:
+    """``(rows, columns)`` pixels from a centre (column, row)."""
+    rows, columns = shape
+    away: FloatArray = np.hypot(np.arange(columns)[None, :] - centre[0], np.arange(rows)[:, None] - centre[1])
+    return away
+
+
+def coefficients(
+    pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float, manner: Manner
 ) -> tuple[FloatArray, float]:
-    masks = [_distance(pack, centre) <= edge for centre in centres]
-    terms = np.concatenate([_terms(c, m, ball) for c, m in zip(centres, masks, strict=True)])
-    wanted = np.concatenate([change[k][mask] for k, mask in enumerate(masks)])
+    """The colours ``(120 or 126, 3)`` that explain presses at known centres, and the problem's condition."""
+    places = [contact_pixels(pack.shape, centre, edge, _stride(edge)) for centre in centres]
+    terms = np.concatenate(
+        [colour_terms(pack, c, p, ball, manner.offset) for c, p in zip(centres, places, strict=True)]
+    )
+    wanted = np.concatenate([change[k][place[:, 0], place[:, 1]] for k, place in enumerate(places)])
     weight = np.ones(len(terms))
     for _ in range(2):
         weighted = terms * weight[:, None]
         gram, right = terms.T @ weighted, weighted.T @ wanted
-        normal = gram + np.diag(_ridge(np.diag(gram)))
-        smooth = np.linalg.solve(normal, right)
-        weight = _huber(terms @ smooth - wanted)
+        normal = gram + np.diag(_ridge(np.diag(gram), manner.place_ridge))
+        colours = np.linalg.solve(normal, right)
+        weight = _huber(terms @ colours - wanted)
     scale = np.sqrt(np.diag(normal))
-    return smooth, float(np.linalg.cond(normal / np.outer(scale, scale)))
+    return colours, float(np.linalg.cond(normal / np.outer(scale, scale)))
 
 
-def _ridge(diagonal: FloatArray) -> FloatArray:
+def colour_terms(
+    pack: PressPack, centre: FloatArray, place: IntArray, ball: float, offset: bool
+) -> FloatArray:
+    """``(n, 120 or 126)`` the terms of the colours at pixels of one press."""
+    rows, columns = pack.shape
+    y, x = (axis.astype(np.float64) for axis in place.T)
+    where = scaled_position(x, y, rows, columns)
+    terms = design(np.stack([x - centre[0], y - centre[1]], axis=1) / ball, where)
+    return np.hstack([terms, place_terms(where)]) if offset else terms
+
+
+def place_terms(where: FloatArray) -> FloatArray:
+    """``(n, 6)`` the powers of ``(n, 2)`` scaled positions, in the order of ``harness.sim.shading``."""
+    u, v = (np.vander(where[:, k], POSITION_DEGREE + 1, increasing=True) for k in range(2))
+    return np.stack(
+        [u[:, c] * v[:, d] for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)],
+        axis=1,
+    )
+
+
+def _shades(
+    pack: PressPack, centre: FloatArray, place: IntArray, colours: FloatArray, ball: float
+) -> tuple[FloatArray, FloatArray]:
+    rows, columns = pack.shape
+    normal = (place[:, ::-1] - centre) / ball
+    shade, by_normal = np.empty((len(place), 3)), np.empty((len(place), 3, 2))
+    shades(colours, normal, place, rows, columns, shade, by_normal)
+    offset = colours[smooth_terms() :]
+    if len(offset):
+        y, x = (axis.astype(np.float64) for axis in place.T)
+        shade += place_terms(scaled_position(x, y, rows, columns)) @ offset
+    return shade, by_normal
+
+
+def _ridge(diagonal: FloatArray, place_ridge: float) -> FloatArray:
     constants = diagonal.reshape(-1, POSITION_TERMS)[:, :1]
-    ridge: FloatArray = _RIDGE * diagonal + (_PLACE_RIDGE * constants * _PLACE_DEGREES**2).ravel()
+    ridge: FloatArray = _RIDGE * diagonal + (place_ridge * constants * _PLACE_DEGREES**2).ravel()
     return ridge
 
 
-def _terms(centre: FloatArray, inside: BoolArray, ball: float) -> FloatArray:
-    rows, columns = inside.shape
-    y, x = (axis.astype(np.float64) for axis in np.nonzero(inside))
-    normal = np.stack([x - centre[0], y - centre[1]], axis=1) / ball
-    return design(normal, scaled_position(x, y, rows, columns))
-
-
-def _distance(pack: PressPack, centre: FloatArray) -> FloatArray:
-    rows, columns = pack.background.shape[:2]
-    away: FloatArray = np.hypot(np.arange(columns)[None, :] - centre[0], np.arange(rows)[:, None] - centre[1])
-    return away
+def _stride(edge: float) -> int:
+    return max(1, int(np.ceil(edge / _ENOUGH)))
 
 
 def _huber(left: FloatArray) -> FloatArray:

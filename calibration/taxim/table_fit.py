@@ -2,13 +2,14 @@
 
 Few presses reach any one bin, so a bin starts from the smooth model, which has the table's own
 terms in the position, and is moved by the mean residual of the presses that did reach it,
-shrunk towards none. Rows beyond the steepest supported slope repeat the last supported one.
+shrunk towards none. Rows beyond the steepest supported slope repeat the last supported one. What a contact
+adds whatever its slope is let in over the first few degrees: flat gel keeps the background's colour.
 """
 
 import numpy as np
 
 from calibration.taxim.pack import PressPack
-from calibration.taxim.smooth_fit import SmoothFit, changes
+from calibration.taxim.smooth_fit import SmoothFit, changes, colour_terms, contact_pixels, place_terms
 from harness.arrays import BoolArray, FloatArray, IntArray
 from harness.sim.shading import design, scaled_position
 from harness.sim.tactile_calibration import Float32Array
@@ -19,6 +20,9 @@ BINS = 120
 _SHRINK = 4.0
 """Pixels' worth of belief in the smooth model, per bin."""
 
+_LET_IN = np.radians(4.0)
+"""Slope from which on the gel is taken to be in contact."""
+
 
 def bin_of(magnitude: FloatArray, direction: FloatArray, bins: int) -> tuple[IntArray, IntArray]:
     """Row and column of the table for slopes in rad; direction wraps at the seam."""
@@ -27,12 +31,23 @@ def bin_of(magnitude: FloatArray, direction: FloatArray, bins: int) -> tuple[Int
     return row, column % (bins - 1)
 
 
-def fit_table(pack: PressPack, fit: SmoothFit, ball: float) -> tuple[Float32Array, BoolArray]:
-    """The table ``(120, 120, 6, 3)`` in raw pixels and which bins presses reached ``(120, 120)``."""
-    rows, columns = pack.background.shape[:2]
-    table = _from_smooth(fit.smooth, fit.edge / ball, rows, columns)
-    total, count = _residuals(pack, fit, ball)
+def fit_table(
+    pack: PressPack, fit: SmoothFit, ball: float, change: FloatArray | None = None
+) -> tuple[Float32Array, BoolArray]:
+    """The table ``(120, 120, 6, 3)`` in raw pixels and which bins presses reached ``(120, 120)``.
+
+    Args:
+        pack: the presses.
+        fit: of the same presses.
+        ball: radius in pixels.
+        change: grey levels against the untouched gel; ``changes(pack)`` where None.
+    """
+    rows, columns = pack.shape
+    table = _from_smooth(fit, ball, rows, columns)
+    total, count = _residuals(pack, fit, ball, changes(pack) if change is None else change)
     table[..., 5, :] += total / (count + _SHRINK)[..., None]
+    if len(fit.offset):
+        table[0] = 0.0
     last = int(np.floor(np.arcsin(fit.edge / ball) / (0.5 * np.pi / (BINS - 1)))) - 1
     table[last + 1 :] = table[last]
     table[:, BINS - 1] = table[:, 0]
@@ -42,34 +57,49 @@ def fit_table(pack: PressPack, fit: SmoothFit, ball: float) -> tuple[Float32Arra
     return table.astype(np.float32), support
 
 
-def _from_smooth(smooth: FloatArray, limit: float, rows: int, columns: int) -> FloatArray:
+def table_shades(table: Float32Array, centre: FloatArray, place: IntArray, ball: float) -> FloatArray:
+    """``(n, 3)`` grey levels that a table gives pixels of a press at a centre (column, row)."""
+    y, x = (axis.astype(np.float64) for axis in place.T)
+    at = _bins_of_ball(x - centre[0], y - centre[1], ball)
+    terms = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=1)
+    shown: FloatArray = np.einsum("nt,ntc->nc", terms, table[at].astype(np.float64))
+    return shown
+
+
+def _bins_of_ball(right: FloatArray, down: FloatArray, ball: float) -> tuple[IntArray, IntArray]:
+    return bin_of(np.arcsin(np.hypot(right, down) / ball), np.arctan2(-down, -right), BINS)
+
+
+def _from_smooth(fit: SmoothFit, ball: float, rows: int, columns: int) -> FloatArray:
     step = 0.5 * np.pi / (BINS - 1)
     magnitude, direction = np.meshgrid(
         (np.arange(BINS) + 0.5) * step, -np.pi + (np.arange(BINS) + 0.5) * 4.0 * step, indexing="ij"
     )
-    sine = np.minimum(np.sin(magnitude), limit).ravel()
+    sine = np.minimum(np.sin(magnitude), fit.edge / ball).ravel()
     # A height's gradient (a down, b right) has the normal's image part pointing the other way.
     normal = -np.stack([sine * np.cos(direction.ravel()), sine * np.sin(direction.ravel())], axis=1)
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, columns - 1, 3), np.linspace(0, rows - 1, 3)))
     where = scaled_position(x, y, rows, columns)
     shades = np.stack(
-        [design(normal, np.broadcast_to(place, normal.shape)) @ smooth for place in where]
+        [design(normal, np.broadcast_to(place, normal.shape)) @ fit.smooth for place in where]
     )  # (9, bins^2, 3)
+    if len(fit.offset):
+        share = np.minimum(1.0, magnitude.ravel() / _LET_IN)
+        shades += share[None, :, None] * (place_terms(where) @ fit.offset)[:, None, :]
     raw = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=1)
     table: FloatArray = np.einsum("tp,pnc->ntc", np.linalg.pinv(raw), shades).reshape(BINS, BINS, 6, 3)
     return table
 
 
-def _residuals(pack: PressPack, fit: SmoothFit, ball: float) -> tuple[FloatArray, FloatArray]:
-    rows, columns = pack.background.shape[:2]
+def _residuals(
+    pack: PressPack, fit: SmoothFit, ball: float, change: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     total, count = np.zeros((BINS, BINS, 3)), np.zeros((BINS, BINS))
-    change = changes(pack)
-    for k, (cx, cy) in enumerate(fit.centres):
-        away = np.hypot(np.arange(columns)[None, :] - cx, np.arange(rows)[:, None] - cy)
-        y, x = (axis.astype(np.float64) for axis in np.nonzero(away <= fit.edge))
-        normal = np.stack([x - cx, y - cy], axis=1) / ball
-        left = change[k][away <= fit.edge] - design(normal, scaled_position(x, y, rows, columns)) @ fit.smooth
-        at = bin_of(np.arcsin(np.hypot(*normal.T)), np.arctan2(-normal[:, 1], -normal[:, 0]), BINS)
+    for k, centre in enumerate(fit.centres):
+        place = contact_pixels(pack.shape, centre, fit.edge, 1)
+        seen = change[k][place[:, 0], place[:, 1]]
+        left = seen - colour_terms(pack, centre, place, ball, len(fit.offset) > 0) @ fit.colours
+        at = _bins_of_ball(place[:, 1] - centre[0], place[:, 0] - centre[1], ball)
         np.add.at(total, at, left)
         np.add.at(count, at, 1.0)
     return total, count

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from harness.accuracy import Level
 from harness.cost import Curve, Point, front
 from harness.cost_bounds import MET, predicted_at_most, promises
 from harness.report.cost_chart import contacts_chart, cost_chart
 from harness.report.figures import Album, Picture
+from harness.report.template import rendered
 
 PAGE = "cost.html"
 """Name of the page in its folder."""
@@ -67,15 +67,8 @@ def write_cost_page(
     """
     folder.mkdir(parents=True, exist_ok=True)
     album = Album(folder)
-    environment = Environment(
-        loader=PackageLoader("harness.report", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    page = environment.get_template(PAGE).render(
-        style=environment.get_template("report.css").render(),
+    page = rendered(
+        PAGE,
         curve=curve,
         reasons=reasons,
         headings=HEADINGS,

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from harness.arrays import AnyArray, FloatArray
 from harness.report import wording
@@ -23,6 +22,7 @@ from harness.report.pictures import (
 )
 from harness.report.sound_data import PeakLine, Sound
 from harness.report.sound_figures import senses_figure, spectrogram_pair
+from harness.report.template import rendered
 from harness.report.tiles import DIFFERENCE_GAIN, difference, height_picture, png, root_mean_square
 from harness.report.values import Missing, Posterior
 
@@ -52,15 +52,7 @@ def write_report(data: ReportData, folder: Path) -> Path:
         Path of the page, which refers to nothing outside itself.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    environment = Environment(
-        loader=PackageLoader("harness.report", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    style = environment.get_template("report.css").render()
-    page = environment.get_template(PAGE).render(style=style, **_content(data, Album(folder)))
+    page = rendered(PAGE, **_content(data, Album(folder)))
     (folder / PAGE).write_text(page, encoding="utf-8")
     return folder / PAGE
 

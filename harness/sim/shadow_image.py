@@ -21,6 +21,7 @@ def darkening(
     sensor: TactileSensor,
     calibration: TactileCalibration,
     table: ShadowTable,
+    rest: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """How much darker shadows make each picture.
 
@@ -33,6 +34,8 @@ def darkening(
         sensor: of the pictures.
         calibration: gives the background, the core of a contact and the pitch.
         table: of the sensor; a rim deeper or shallower than it takes its nearest row.
+        rest: ``(rows, columns)`` metres, the untouched gel's surface towards the camera, where the sensor's
+            own flat or spherical one does not say it.
 
     Returns:
         ``(n, rows, columns, 3)`` grey levels, 0 or more, and ``(n,)`` the share of each contact's rim
@@ -40,7 +43,8 @@ def darkening(
     """
     held, _ = over_range(penetration, sensor)
     core = (held > calibration.header.skirt.core * held.max(axis=(1, 2), keepdims=True)) & (held > 0.0)
-    surface = (indentation - rest_surface(sensor)) / calibration.header.pitch
+    untouched = -rest_surface(sensor) if rest is None else rest
+    surface = (indentation + untouched) / calibration.header.pitch
     change = pictures.astype(np.float64) - calibration.background
     shaded, outside = cast_shadows(change, indentation, surface, core, table)
     sigma = SOFTNESS / calibration.header.pitch

@@ -39,6 +39,10 @@ Wall = Annotated[
     str | None,
     typer.Option("--wall", help="Wall of a hollow thing scanned as a solid, as 2mm.", metavar="LENGTH"),
 ]
+ObjectFileOption = Annotated[
+    str | None,
+    typer.Option("--objectfile", help="Folder of the object's ObjectFile (with --object).", metavar="FOLDER"),
+]
 Seed = Annotated[
     int | None,
     typer.Option("--seed", help="Of everything random; the scene's own where none is given.", min=0),

@@ -1,0 +1,1 @@
+"""What ``touchstone calibrate`` offers, one command a module."""

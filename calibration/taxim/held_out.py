@@ -1,0 +1,151 @@
+"""How well presses are predicted that a calibration has never seen: eight folds, press by press."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.taxim.contact_circle import ContactCircle, contact_circle
+from calibration.taxim.pack import PressPack
+from calibration.taxim.rest import rest_change
+from calibration.taxim.smooth_fit import (
+    Manner,
+    SmoothFit,
+    contact_pixels,
+    fit_smooth,
+    refined_centre,
+    residual,
+    settled,
+)
+from calibration.taxim.table_fit import fit_table, table_shades
+from harness.arrays import BoolArray, FloatArray, IntArray
+from harness.sim.tactile_calibration import Float32Array
+
+FOLDS = 8
+WITHIN = 0.95
+"""Of the median contact radius: the pixels that are scored."""
+
+PLAIN = Manner(rounds=5, place_ridge=1e-4, edge_again=True)
+OFFSET = Manner(offset=True, rounds=3, place_ridge=1e-4)
+
+_SETTLE = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What is taught by a set of presses.
+
+    Attributes:
+        plain: slopes alone make the colour, as the smooth model of a calibration has it.
+        fit: a contact's offset besides. With it a shift of all centres together is hardly seen in the
+            colours, so the centres are those of the contact line.
+        circle: the contact line.
+        table: of ``fit``.
+        support: of the table.
+        rest: ``(rows, columns, 3)`` grey levels, of the untouched gel against the background.
+        bias: ``(2,)`` pixels from where the detector finds a centre to where the fit does.
+    """
+
+    plain: SmoothFit
+    fit: SmoothFit
+    circle: ContactCircle
+    table: Float32Array
+    support: BoolArray
+    rest: FloatArray
+    bias: FloatArray
+
+
+@dataclass(frozen=True)
+class Score:
+    """One press predicted by presses it was not among; PSNR in dB over the scored pixels.
+
+    Attributes:
+        table: of the table, only the centre refitted.
+        smooth: of the smooth model, only the centre refitted.
+        unrefitted: of the table, with the centre where the detector found it.
+        nothing: of no prediction at all, the untouched gel.
+    """
+
+    table: float
+    smooth: float
+    unrefitted: float
+    nothing: float
+
+
+def teach(pack: PressPack, change: FloatArray, ball: float) -> Model:
+    """Fit everything a calibration holds to presses.
+
+    Args:
+        pack: the presses; centres and radii as found.
+        change: ``(presses, rows, columns, 3)`` grey levels against the background, drift removed.
+        ball: radius in pixels.
+
+    Raises:
+        CalibrationRefused: the presses contradict the ball.
+    """
+    rest = rest_change(pack, change)
+    clean = change - rest
+    plain = fit_smooth(pack, ball, PLAIN, clean)
+    loose = fit_smooth(replace(pack, centres=plain.centres), ball, OFFSET, clean)
+    circle = contact_circle(clean, loose.centres, ball)
+    fit = settled(pack, clean, loose.centres + circle.shift, circle.radius, ball, OFFSET)
+    plain = settled(pack, clean, plain.centres, circle.radius, ball, PLAIN)
+    table, support = fit_table(pack, fit, ball, clean)
+    bias = np.median(fit.centres - pack.centres, axis=0)
+    return Model(plain, fit, circle, table, support, rest, np.asarray(bias))
+
+
+def held_out(
+    pack: PressPack, change: FloatArray, ball: float, radius: float
+) -> tuple[list[Score], FloatArray, FloatArray]:
+    """Score every press by a model of the other folds' presses.
+
+    Args:
+        pack: the presses; press ``k`` belongs to fold ``k % 8``.
+        change: as for ``teach``.
+        ball: radius in pixels.
+        radius: pixels about a press's centre that are scored.
+
+    Returns:
+        The scores; what was left over, summed over the presses, ``(rows, columns)`` grey levels rms
+        squared; and how many presses each pixel was scored in, ``(rows, columns)``.
+    """
+    shape = change.shape[1:3]
+    scores: dict[int, Score] = {}
+    left, count = np.zeros(shape), np.zeros(shape)
+    for fold in range(FOLDS):
+        out = np.arange(len(change)) % FOLDS == fold
+        taught: IntArray = np.nonzero(~out)[0]
+        model = teach(pack.of(taught), change[taught], ball)
+        for k in np.nonzero(out)[0]:
+            scores[int(k)], place, apart = score(pack, change[k], pack.centres[k], model, ball, radius)
+            left[place[:, 0], place[:, 1]] += np.mean(apart**2, axis=1)
+            count[place[:, 0], place[:, 1]] += 1.0
+    return [scores[k] for k in range(len(change))], left, count
+
+
+def score(
+    pack: PressPack, change: FloatArray, found: FloatArray, model: Model, ball: float, radius: float
+) -> tuple[Score, IntArray, FloatArray]:
+    """Score one press; also the pixels of it ``(n, 2)`` and what the table leaves over ``(n, 3)``."""
+    clean, edge = change - model.rest, model.fit.edge
+    start = found + model.bias
+    centre = refined_centre(pack, clean, start, model.fit.colours, edge, ball, _SETTLE)
+    smooth_centre = refined_centre(pack, clean, start, model.plain.colours, edge, ball, _SETTLE)
+    place, apart = _table_residual(pack, clean, centre, model.table, ball, radius)
+    _, guessed = _table_residual(pack, clean, start, model.table, ball, radius)
+    smooth = residual(pack, clean, smooth_centre, model.plain.colours, radius, ball)
+    nothing = clean[place[:, 0], place[:, 1]]
+    answer = Score(decibels(apart), decibels(smooth), decibels(guessed), decibels(nothing))
+    return answer, place, apart
+
+
+def decibels(left: FloatArray) -> float:
+    """PSNR of what a prediction leaves over, in grey levels of 255."""
+    return float(10.0 * np.log10(255.0**2 / max(float(np.mean(left**2)), 1e-12)))
+
+
+def _table_residual(
+    pack: PressPack, change: FloatArray, centre: FloatArray, table: Float32Array, ball: float, radius: float
+) -> tuple[IntArray, FloatArray]:
+    place = contact_pixels(pack.shape, centre, radius, 1)
+    return place, table_shades(table, centre, place, ball) - change[place[:, 0], place[:, 1]]

@@ -1,0 +1,260 @@
+"""Calibrate a tactile camera from pictures of ball presses alone: nobody marks anything.
+
+Presses are found (``detect``), damaged ones refused with their reason (``gates``), colours and centres
+fitted in turns (``smooth_fit``), and the result scored on presses left out (``held_out``). A ball's known
+radius turns a place within a contact into a slope; the radius of the contact line is its depth.
+"""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from calibration.taxim.explained import contact_radius, too_large, unexplained
+from calibration.taxim.gates import CONTACT, LEAST_PRESSES, check_set, reached, refusals, sightings
+from calibration.taxim.held_out import WITHIN, Model, Score, held_out, teach
+from calibration.taxim.likeness import check_order
+from calibration.taxim.pack import PressPack
+from calibration.taxim.pictures import Pictures, Refused, digest
+from calibration.taxim.smooth_fit import changes
+from harness.arrays import FloatArray, IntArray, read_only
+from harness.errors import CalibrationRefused
+from harness.sim.tactile_calibration import CalibrationHeader, TactileCalibration
+
+LEAST_GAIN = 12.0
+"""dB over predicting nothing that presses left out must gain in the median; published sets gain 19."""
+
+_SMALLEST_BALL = 5.0
+"""Pixels of radius."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What the presses cannot say of themselves.
+
+    Attributes:
+        sensor: make.
+        serial: of the sensor.
+        licence: of the pictures.
+        date: ISO 8601.
+        pitch: metres a pixel.
+        ball_radius: metres.
+    """
+
+    sensor: str
+    serial: str
+    licence: str
+    date: str
+    pitch: float
+    ball_radius: float
+
+    @property
+    def ball(self) -> float:
+        """Radius of the ball in pixels."""
+        return self.ball_radius / self.pitch
+
+
+@dataclass(frozen=True)
+class UsedPress:
+    """A press of the calibration.
+
+    Attributes:
+        name: of its picture.
+        centre: pixels (column, row).
+        radius: pixels, of its contact line.
+        depth: metres, of the ball in the gel, by its contact line.
+        score: by the presses of the other folds.
+    """
+
+    name: str
+    centre: tuple[float, float]
+    radius: float
+    depth: float
+    score: Score
+
+
+@dataclass(frozen=True, eq=False)
+class MarkFree:
+    """A calibration, and what it was made of.
+
+    Attributes:
+        calibration: the artefact.
+        used: the presses it stands on, in the order of the set.
+        refused: the others.
+        contact_radius: pixels, of the contact line of all presses laid over one another.
+        roundness: pixels that this line strays from a circle.
+        lean: rad by which the smooth model's slopes lean against the contact line: without a contact's own
+            dimming it explains it by a shift of the centres.
+        left: ``(rows, columns)`` grey levels rms left over on held-out presses, NaN where none was scored.
+        coverage: ``(rows, columns)`` how many contacts reached a pixel.
+        background_from: in words.
+        seconds: from pictures in memory to the artefact.
+    """
+
+    calibration: TactileCalibration
+    used: tuple[UsedPress, ...]
+    refused: tuple[Refused, ...]
+    contact_radius: float
+    roundness: float
+    lean: float
+    left: FloatArray
+    coverage: IntArray
+    background_from: str
+    seconds: float
+
+    def median(self, which: str) -> float:
+        """dB, median over the presses of one of the scores: table, smooth, unrefitted or nothing."""
+        return float(np.median([vars(press.score)[which] for press in self.used]))
+
+
+def calibrate(
+    pictures: Pictures,
+    identity: Identity,
+    use_marks: bool = False,
+    like: TactileCalibration | None = None,
+) -> MarkFree:
+    """Fit a calibration to presses.
+
+    Args:
+        pictures: the presses.
+        identity: pitch, ball and names.
+        use_marks: start from the circles that came with a data pack instead of finding the presses.
+        like: of the same make, mounted alike; where given, the order of the colours is held to it.
+
+    Raises:
+        CalibrationRefused: a set too damaged, or a fit too poor.
+    """
+    began = perf_counter()
+    ball = identity.ball
+    _check_ball(identity, pictures)
+    ordered = _in_order_of_content(pictures)
+    pack, kept, refused = _usable(ordered, ball, use_marks)
+    change = changes(pack)
+    model = teach(pack, change, ball)
+    if like is not None:
+        check_order(model.plain.colours, like)
+    worse = unexplained(pack, change, model, ball, [ordered.names[k] for k in kept])
+    if worse:
+        fine = np.array([k not in worse for k in range(len(kept))])
+        refused = [*refused, *worse.values()]
+        pack, change, kept = pack.of(np.nonzero(fine)[0]), change[fine], kept[fine]
+        _still_enough(pack, refused)
+        model = teach(pack, change, ball)
+    scores, left, count = held_out(pack, change, ball, WITHIN * model.fit.edge)
+    names = [ordered.names[k] for k in kept]
+    used = [
+        _used(names[k], pack, change[k] - model.rest, model.fit.centres[k], identity, scores[k])
+        for k in range(len(names))
+    ]
+    _check_gain(scores)
+    made = MarkFree(
+        _artefact(pictures, pack, model, identity, scores),
+        tuple(sorted(used, key=lambda press: pictures.names.index(press.name))),
+        tuple(sorted([*refused, *pictures.refused], key=lambda one: one.name)),
+        model.fit.edge,
+        model.circle.scatter,
+        _lean(model, ball),
+        read_only(np.sqrt(left / np.where(count > 0.0, count, np.nan))),
+        reached(model.fit.centres, model.fit.edge, *pictures.background.shape[:2]).sum(axis=0),
+        pictures.background_from,
+        0.0,
+    )
+    return replace(made, seconds=perf_counter() - began)
+
+
+def _lean(model: Model, ball: float) -> float:
+    apart = np.median(model.plain.centres - model.fit.centres, axis=0)
+    return float(np.arcsin(min(1.0, float(np.hypot(*apart)) / ball)))
+
+
+def _check_ball(identity: Identity, pictures: Pictures) -> None:
+    smallest = min(pictures.background.shape[:2])
+    if not _SMALLEST_BALL <= identity.ball <= 0.5 * smallest:
+        raise CalibrationRefused(
+            f"a ball of {1e3 * identity.ball_radius:g} mm at {1e3 * identity.pitch:g} mm a pixel has a "
+            f"radius of {identity.ball:.1f} px; between {_SMALLEST_BALL:g} px and half the picture "
+            f"({smallest / 2:g} px) is wanted: check radius (not diameter) and pitch"
+        )
+
+
+def _in_order_of_content(pictures: Pictures) -> Pictures:
+    order = sorted(range(len(pictures.images)), key=lambda k: digest(pictures.images[k]))
+    return replace(
+        pictures,
+        images=pictures.images[order],
+        names=tuple(pictures.names[k] for k in order),
+        marks=None if pictures.marks is None else pictures.marks[order],
+    )
+
+
+def _usable(pictures: Pictures, ball: float, use_marks: bool) -> tuple[PressPack, IntArray, list[Refused]]:
+    """The presses that can be used, with their circles; their places in the set; and the others."""
+    seen = sightings(pictures, ball)
+    verdicts = refusals(pictures, seen, ball)
+    circles = np.array([[*one.found.centre, CONTACT * ball] for one in seen])
+    if use_marks:
+        if pictures.marks is None:
+            raise CalibrationRefused("these pictures came without marks; leave --marks out")
+        circles = pictures.marks
+        verdicts = [
+            first if first is not None else too_large(name, radius, ball, "its marked circle")
+            for first, name, radius in zip(verdicts, pictures.names, circles[:, 2], strict=True)
+        ]
+    check_set(pictures, verdicts, seen, ball)
+    kept = np.array([k for k, verdict in enumerate(verdicts) if verdict is None])
+    pack = PressPack(
+        pictures.background,
+        pictures.images[kept],
+        read_only(circles[kept, :2]),
+        read_only(circles[kept, 2]),
+        read_only(kept),
+        pictures.sha256,
+    )
+    return pack, kept, [verdict for verdict in verdicts if verdict is not None]
+
+
+def _still_enough(pack: PressPack, refused: list[Refused]) -> None:
+    if len(pack.images) < max(LEAST_PRESSES, len(refused)):
+        raise CalibrationRefused(
+            f"{len(refused)} presses are refused and {len(pack.images)} left; at least {LEAST_PRESSES}, and "
+            f"half of the set, are wanted; {refused[-1].name}: {refused[-1].reason}"
+        )
+
+
+def _used(
+    name: str, pack: PressPack, clean: FloatArray, centre: FloatArray, identity: Identity, score: Score
+) -> UsedPress:
+    ball = identity.ball
+    radius = min(contact_radius(pack, clean, centre, ball), ball)
+    depth = identity.pitch * (ball - np.sqrt(ball**2 - radius**2))
+    return UsedPress(name, (float(centre[0]), float(centre[1])), radius, float(depth), score)
+
+
+def _check_gain(scores: list[Score]) -> None:
+    gain = float(np.median([one.table - one.nothing for one in scores]))
+    if gain < LEAST_GAIN:
+        raise CalibrationRefused(
+            f"presses left out are predicted {gain:.1f} dB better than nothing in the median (at least "
+            f"{LEAST_GAIN:g}); clean the gel, check ball and pitch, and take the presses again"
+        )
+
+
+def _artefact(
+    pictures: Pictures, pack: PressPack, model: Model, identity: Identity, scores: list[Score]
+) -> TactileCalibration:
+    header = CalibrationHeader(
+        sensor=identity.sensor,
+        serial=identity.serial,
+        date=identity.date,
+        made_from=f"sha256 {pictures.sha256}, {len(pack.images)} presses without marks",
+        licence=identity.licence,
+        pitch=identity.pitch,
+        ball_radius=identity.ball_radius,
+        slope_limit=model.plain.edge / identity.ball,
+        held_out_db=float(np.median([one.smooth for one in scores])),
+        held_out_table_db=float(np.median([one.table for one in scores])),
+        residual_rms=model.plain.residual_rms,
+        condition=model.plain.condition,
+    )
+    background = np.clip(np.round(pictures.background + model.rest), 0.0, 255.0).astype(np.uint8)
+    return TactileCalibration(header, background, model.table, model.support, model.plain.colours)

@@ -1,0 +1,178 @@
+"""Pictures of ball presses as an operator has them: a folder, or somebody's data pack; no marks needed."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from calibration.taxim.pack import read_pack
+from harness.arrays import ByteArray, FloatArray, read_only
+from harness.errors import CalibrationRefused
+from harness.image_file import read_image
+
+Channels = Literal["rgb", "bgr"]
+
+PACK = "dataPack.npz"
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+REST_NAMES = ("background", "bg", "f0", "ref", "reference", "rest", "untouched", "no_contact")
+"""Names of a file, without its ending, that say it shows the untouched gel."""
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A press that is not used.
+
+    Attributes:
+        name: of its picture.
+        kind: of the damage, one word for programs.
+        reason: for people: what was found, the limit, what to do.
+    """
+
+    name: str
+    kind: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """One ball pressed into one gel at many places.
+
+    Attributes:
+        background: ``(rows, columns, 3)`` RGB of the untouched gel.
+        background_from: where that comes from, in words.
+        images: ``(presses, rows, columns, 3)`` RGB.
+        names: of the presses.
+        marks: ``(presses, 3)`` centre (column, row) and radius in pixels that came with a data pack.
+        source: of the pixels, in words.
+        sha256: of background and images, whatever the order of the presses.
+        refused: files that are no press of this set.
+    """
+
+    background: ByteArray
+    background_from: str
+    images: ByteArray
+    names: tuple[str, ...]
+    marks: FloatArray | None
+    source: str
+    sha256: str
+    refused: tuple[Refused, ...] = ()
+
+
+def read_pictures(path: Path, background: Path | None = None, channels: Channels | None = None) -> Pictures:
+    """Read presses from a folder of pictures, a folder with ``dataPack.npz``, or such a file.
+
+    Args:
+        path: the folder or file.
+        background: picture of the untouched gel; found by its name among the others where None, and
+            made of the presses' median where there is none.
+        channels: order in which the files hold the colours. Where None it is what the formats say: RGB for
+            pictures, blue first for data packs.
+
+    Raises:
+        CalibrationRefused: no pictures, or none that belong together.
+        DataRefused: a file that is no picture.
+    """
+    packed = path if path.suffix == ".npz" else path / PACK
+    if packed.is_file():
+        return _from_pack(packed, background, channels or "bgr")
+    if not path.is_dir():
+        raise CalibrationRefused(f"{path} is no folder and no {PACK}; name the folder of the press pictures")
+    files = [file for file in sorted(path.iterdir()) if file.suffix.lower() in SUFFIXES]
+    rest = background or next((file for file in files if file.stem.lower() in REST_NAMES), None)
+    presses = [file for file in files if rest is None or not _same(file, rest)]
+    if not presses:
+        raise CalibrationRefused(
+            f"{path} holds no pictures ({', '.join(SUFFIXES)}) and no {PACK}; put one picture a press into it"
+        )
+    read = [_ordered(read_image(file), channels or "rgb") for file in presses]
+    seen = None if rest is None else _ordered(read_image(rest), channels or "rgb")
+    return _together(
+        read,
+        [file.name for file in presses],
+        seen,
+        f"picture {rest.name}" if rest is not None else "",
+        str(path),
+    )
+
+
+def _from_pack(path: Path, background: Path | None, channels: Channels) -> Pictures:
+    pack = read_pack(path)
+    flip = slice(None) if channels == "bgr" else slice(None, None, -1)
+    rest = pack.background if background is None else read_image(background)
+    whence = f"f0 of {path.name}" if background is None else f"picture {background.name}"
+    found = _together(
+        [np.ascontiguousarray(image[..., flip]) for image in pack.images],
+        [f"press {number}" for number in pack.number],
+        np.ascontiguousarray(rest[..., flip]) if background is None else rest,
+        whence,
+        str(path),
+    )
+    if found.refused:
+        raise CalibrationRefused(f"{path}: {found.refused[0].reason}")
+    return Pictures(**{**vars(found), "marks": read_only(np.column_stack([pack.centres, pack.radii]))})
+
+
+def _together(
+    read: Sequence[ByteArray], names: Sequence[str], rest: ByteArray | None, whence: str, source: str
+) -> Pictures:
+    """The presses that share one shape, the background's where there is one."""
+    shape = rest.shape if rest is not None else Counter(image.shape for image in read).most_common(1)[0][0]
+    fits = [image.shape == shape for image in read]
+    refused = tuple(
+        Refused(
+            name,
+            "size",
+            f"{image.shape[1]} x {image.shape[0]} pixels where the set has {shape[1]} x {shape[0]}: "
+            "of another camera or resolution; take it out",
+        )
+        for name, image, fit in zip(names, read, fits, strict=True)
+        if not fit
+    )
+    kept = [image for image, fit in zip(read, fits, strict=True) if fit]
+    if not kept:
+        raise CalibrationRefused(
+            f"{source}: the background is {shape[1]} x {shape[0]} pixels and no press is; give the one "
+            "that was taken with them"
+        )
+    images = np.stack(kept)
+    if rest is None:
+        rest, whence = (
+            _median(images),
+            "the presses' own median, for no picture of the untouched gel was given",
+        )
+    return Pictures(
+        read_only(np.ascontiguousarray(rest)),
+        whence,
+        read_only(images),
+        tuple(name for name, fit in zip(names, fits, strict=True) if fit),
+        None,
+        source,
+        _hash(rest, images),
+        refused,
+    )
+
+
+def _median(images: ByteArray) -> ByteArray:
+    return np.asarray(np.round(np.median(images, axis=0)), dtype=np.uint8)
+
+
+def _ordered(image: ByteArray, channels: Channels) -> ByteArray:
+    return image if channels == "rgb" else np.ascontiguousarray(image[..., ::-1])
+
+
+def _same(one: Path, other: Path) -> bool:
+    return other.exists() and one.samefile(other)
+
+
+def digest(image: ByteArray) -> str:
+    """Hash of one picture's pixels; presses are ordered by it, so that a folder's order changes nothing."""
+    return hashlib.sha256(np.ascontiguousarray(image).tobytes()).hexdigest()
+
+
+def _hash(rest: ByteArray, images: ByteArray) -> str:
+    every = "".join([digest(rest), *sorted(digest(image) for image in images)])
+    return hashlib.sha256(every.encode()).hexdigest()

@@ -1,0 +1,22 @@
+"""Taxim's own file of a colour table, written; ``harness.sim.published_pack`` reads it."""
+
+from pathlib import Path
+
+import numpy as np
+
+from harness.sim.tactile_calibration import TactileCalibration
+
+
+def write_polycalib(calibration: TactileCalibration, path: Path) -> None:
+    """Write ``polycalib.npz``: the number of bins and one table a channel.
+
+    The layout names its channels r, g, b and holds what OpenCV reads, blue first: ``grad_r`` is blue.
+    Taxim's program takes it so, and so does ours.
+
+    Args:
+        calibration: whose table is written; pitch, background and quality have no place in the file.
+        path: of the file.
+    """
+    red, green, blue = (calibration.table[..., c].astype(np.float64) for c in range(3))
+    with path.open("wb") as file:
+        np.savez(file, bins=np.int64(calibration.bins), grad_r=blue, grad_g=green, grad_b=red)

@@ -1,0 +1,108 @@
+"""A calibration's report: figures, presses, and live pictures beside what is drawn of them."""
+
+import numpy as np
+
+from calibration.taxim.mark_free import MarkFree, UsedPress
+from calibration.taxim.pictures import Pictures
+from calibration.taxim.rest import AWAY, SIGHTINGS
+from calibration.taxim.smooth_fit import contact_pixels, distance
+from calibration.taxim.table_fit import table_shades
+from harness.arrays import ByteArray, FloatArray
+from harness.report.calibration_page import CalibrationReport, Example, PressLine
+from harness.sim.tactile_calibration import TactileCalibration
+
+_SHARES = (0.0, 0.5, 1.0)
+"""Of the presses sorted by their score: which are shown."""
+
+_MARGIN = 2.0
+"""Contact radii shown about a press."""
+
+
+def report_of(made: MarkFree, pictures: Pictures, title: str) -> CalibrationReport:
+    """What the page of a calibration shows.
+
+    Args:
+        made: the calibration.
+        pictures: that it was made of.
+        title: of the page.
+    """
+    header = made.calibration.header
+    return CalibrationReport(
+        title,
+        _cards(made),
+        [(name, str(value)) for name, value in vars(header).items()]
+        + [("sha256", made.calibration.sha256), ("background", made.background_from)],
+        _notes(made),
+        [
+            PressLine(press.name, press.centre, press.radius, press.depth, **vars(press.score))
+            for press in made.used
+        ],
+        [(one.name, one.kind, one.reason) for one in made.refused],
+        made.calibration.background,
+        made.coverage,
+        made.left,
+        _examples(made, pictures),
+    )
+
+
+def _cards(made: MarkFree) -> list[tuple[str, str, str]]:
+    covered = float((made.coverage > 0).mean())
+    return [
+        ("held out, table", f"{made.median('table'):.1f} dB", "median PSNR within the contact"),
+        ("held out, smooth model", f"{made.median('smooth'):.1f} dB", "the level without bins"),
+        ("untouched gel", f"{made.median('nothing'):.1f} dB", "what predicting nothing scores"),
+        (
+            "presses",
+            f"{len(made.used)}",
+            f"{len(made.refused)} refused; {covered:.0%} of the picture reached",
+        ),
+    ]
+
+
+def _notes(made: MarkFree) -> list[str]:
+    header = made.calibration.header
+    steepest = np.degrees(np.arcsin(header.slope_limit))
+    return [
+        f"Background: {made.background_from}, corrected where at least {SIGHTINGS} presses show the gel "
+        f"untouched. Slopes to {steepest:.0f} degrees are supported; "
+        f"{made.calibration.support.mean():.0%} of the table's bins were reached. Took {made.seconds:.1f} s.",
+        f"Pitch ({1e3 * header.pitch:g} mm a pixel) and ball ({1e3 * header.ball_radius:g} mm) were given, "
+        "not measured: balls of one size cannot tell a wrong pitch, because it only relabels the slopes.",
+        f"The contact line of all presses is a circle of {made.contact_radius:.1f} px to within "
+        f"{made.roundness:.2f} px. Slopes of the smooth model, which knows no dimming by a contact, lean by "
+        f"{np.degrees(made.lean):.1f} degrees against it; those of the table do not.",
+    ]
+
+
+def _examples(made: MarkFree, pictures: Pictures) -> list[Example]:
+    order = sorted(made.used, key=lambda press: press.score.table)
+    chosen = [order[round(share * (len(order) - 1))] for share in _SHARES]
+    return [
+        _example(word, press, made, pictures)
+        for word, press in zip(("worst", "median", "best"), chosen, strict=True)
+    ]
+
+
+def _example(word: str, press: UsedPress, made: MarkFree, pictures: Pictures) -> Example:
+    live = pictures.images[pictures.names.index(press.name)]
+    centre = np.array(press.centre)
+    change = live.astype(np.float64) - pictures.background
+    far = distance((live.shape[0], live.shape[1]), centre) > AWAY * made.contact_radius
+    drift = np.median(change[far], axis=0)
+    drawn = draw_press(made.calibration, centre, made.contact_radius)
+    reach = _MARGIN * made.contact_radius
+    rows, columns = live.shape[:2]
+    x0, y0 = np.maximum(np.floor(centre - reach).astype(int), 0)
+    x1, y1 = np.minimum(np.ceil(centre + reach).astype(int), (columns, rows))
+    shifted = np.clip(np.round(live - drift), 0.0, 255.0).astype(np.uint8)
+    title = f"{word}: {press.name}, held out {press.score.table:.1f} dB"
+    return Example(title, shifted[y0:y1, x0:x1], drawn[y0:y1, x0:x1])
+
+
+def draw_press(calibration: TactileCalibration, centre: FloatArray, radius: float) -> ByteArray:
+    """``(rows, columns, 3)`` RGB of a ball pressed at a centre (column, row), without the gel's skirt."""
+    ball = calibration.header.ball_radius / calibration.header.pitch
+    place = contact_pixels((calibration.rows, calibration.columns), centre, radius, 1)
+    shown = calibration.background.astype(np.float64)
+    shown[place[:, 0], place[:, 1]] += table_shades(calibration.table, centre, place, ball)
+    return np.clip(np.round(shown), 0.0, 255.0).astype(np.uint8)

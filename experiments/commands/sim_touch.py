@@ -1,0 +1,195 @@
+"""``touchstone sim touch``: what a gel shows of a height map, or of a mesh that it is pressed onto."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.commands import sim_touch_sources as sources
+from experiments.commands.sim_touch_answer import Touched, as_json, draw, print_answer
+from experiments.commands.sim_touch_sources import Three, refuse
+from harness import options
+from harness.output import emit, warn
+
+
+def touch(
+    mesh: Annotated[
+        str | None, typer.Argument(help="A mesh file, or builtin:mug; or say --height.", metavar="MESH")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="The picture, 8 bits RGB.", metavar="FILE.png")] = None,
+    height: Annotated[
+        Path | None,
+        typer.Option(
+            help="A height map in place of a mesh: (rows, columns) float metres of indentation, positive "
+            "into the gel, 0 where it is not reached, in gel coordinates (x along columns, y along rows).",
+            metavar="FILE.npy",
+        ),
+    ] = None,
+    heights_of: Annotated[
+        str,
+        typer.Option(
+            help="What --height is of: object, how deep the object reaches, and the gel's skirt is drawn; "
+            "gel, the surface of the gel itself.",
+            metavar="WHAT",
+        ),
+    ] = "object",
+    reached: Annotated[
+        Path | None,
+        typer.Option(
+            help="Beside the surface of a gel: how deep the object itself reaches, which shadows start from.",
+            metavar="FILE.npy",
+        ),
+    ] = None,
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            help="A make: gelsight-r1.5 (if nothing else is said) or taxim-gelsight.", metavar="NAME"
+        ),
+    ] = None,
+    calibration: Annotated[
+        str | None,
+        typer.Option(
+            help="A calibration file, a shipped one's name, or a folder of Taxim's or ObjectFolder's; the "
+            "sensor's own if left out.",
+            metavar="FILE",
+        ),
+    ] = None,
+    pitch: Annotated[
+        str | None, typer.Option(help="Of a pixel, where a published calibration is read.", metavar="LENGTH")
+    ] = None,
+    thickness: Annotated[
+        str | None, typer.Option(help="Of the gel, in place of the make's.", metavar="LENGTH")
+    ] = None,
+    background: Annotated[
+        Path | None,
+        typer.Option(help="Picture of the untouched gel, in place of the calibration's.", metavar="IMAGE"),
+    ] = None,
+    shadow: Annotated[
+        bool | None,
+        typer.Option(
+            help="Draw shadows, or not. Left out: if a table of them came with the calibration, and it is "
+            "known where the object touches."
+        ),
+    ] = None,
+    contact: Annotated[
+        Three | None,
+        typer.Option(help="Of a mesh: where, metres in the mesh file's frame.", metavar="X Y Z"),
+    ] = None,
+    depth: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a mesh: how deep the gel's centre is pressed on, 1mm if left out.", metavar="L"
+        ),
+    ] = None,
+    tilt: Annotated[
+        str | None,
+        typer.Option(help="Of a mesh: between the gel's axis and the normal, 0deg if left out.", metavar="A"),
+    ] = None,
+    azimuth: Annotated[
+        str | None,
+        typer.Option(help="Of a mesh: which way it is tilted, from the gel's x at no yaw.", metavar="A"),
+    ] = None,
+    yaw: Annotated[
+        str | None, typer.Option(help="Of a mesh: the sensor turned about its own axis.", metavar="A")
+    ] = None,
+    units: Annotated[
+        str | None, typer.Option(help="Of the mesh file's numbers: m, cm, mm or in.", metavar="U")
+    ] = None,
+    level: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Turn one dial, as touch.optics=exact; may be given again. touch.supersampling, touch.gel, "
+            "touch.optics, touch.marker_motion.",
+            metavar="D=L",
+        ),
+    ] = None,
+    noise: Annotated[float, typer.Option(help="Sigma of the camera's noise in grey levels.", min=0.0)] = 0.0,
+    seed: Annotated[int, typer.Option(help="Of the noise.", min=0)] = 0,
+    live: Annotated[
+        Path | None, typer.Option(help="What a camera saw, to be compared with.", metavar="IMAGE")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Heights, colours and differences side by side.", metavar="FILE.png")
+    ] = None,
+    height_out: Annotated[
+        Path | None,
+        typer.Option(help="The height map that was drawn, as --height takes it.", metavar="FILE.npy"),
+    ] = None,
+    json: options.Json = False,
+) -> int:
+    """What the camera behind a gel sees of a press.
+
+    Only what the sensor calls for is computed. Without a contact the picture is that of the untouched gel
+    to the bit, and it is said.
+
+    Try: touchstone sim touch builtin:mug --contact -0.04 0 0.05 --depth 1mm --tilt 5deg --out touch.png
+    """
+    out = _checked_files(out, picture, height_out)
+    begun = time.perf_counter()
+    if shadow is None and heights_of == "gel" and reached is None:
+        shadow = False
+    gel = sources.gel(sensor, calibration, pitch, thickness, background, shadow, noise, seed)
+    loaded = time.perf_counter() - begun
+    if (mesh is None) == (height is None):
+        refuse("say what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")
+    if height is not None:
+        if any(given is not None for given in (contact, depth, tilt, azimuth, yaw, units)):
+            refuse(
+                "--contact, --depth, --tilt, --azimuth, --yaw and --units are of a mesh; --height is a map"
+            )
+        touched = sources.of_heights(height, heights_of, reached, gel, level or [])
+    else:
+        if contact is None or heights_of != "object" or reached is not None:
+            refuse("a mesh needs --contact X Y Z, and --heights-of and --reached are of --height")
+        assert mesh is not None
+        touched = sources.of_mesh(mesh, units, contact, (depth, tilt, azimuth, yaw), gel, level or [])
+    return _finish(touched, {"calibration": loaded}, out, live, picture, height_out, json)
+
+
+def _finish(
+    touched: Touched,
+    before: dict[str, float],
+    out: Path,
+    live: Path | None,
+    picture: Path | None,
+    height_out: Path | None,
+    json: bool,
+) -> int:
+    from harness.image_file import read_image, write_png
+
+    seen = None if live is None else read_image(live)
+    whole = touched.compared(seen, before)
+    write_png(out, whole.press.image)
+    if height_out is not None:
+        _write_heights(height_out, whole)
+    if picture is not None:
+        draw(whole, picture)
+    for sentence in whole.notes:
+        warn(sentence)
+    if json:
+        emit(as_json(whole, out, picture, height_out))
+    else:
+        print_answer(whole, out, picture)
+    return 0
+
+
+def _checked_files(out: Path | None, picture: Path | None, height_out: Path | None) -> Path:
+    if out is None:
+        refuse("say where the picture goes: --out FILE.png")
+    for option, path, suffix in (
+        ("--out", out, ".png"),
+        ("--picture", picture, ".png"),
+        ("--height-out", height_out, ".npy"),
+    ):
+        if path is not None and path.suffix != suffix:
+            refuse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
+    if out == picture:
+        refuse(f"--out and --picture are both {out}; give them two names")
+    return out
+
+
+def _write_heights(path: Path, touched: Touched) -> None:
+    import numpy as np
+
+    np.save(path, touched.press.heights)

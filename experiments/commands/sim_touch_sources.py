@@ -1,0 +1,131 @@
+"""What ``sim touch`` is given: a gel, and a height map or a mesh to press onto it."""
+
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from experiments.commands.sim_touch_answer import Touched
+from harness import options
+
+if TYPE_CHECKING:
+    from harness.scene import SceneFile
+    from harness.sim.given_heights import Heights
+    from harness.sim.touch_press import Gel
+
+Three = tuple[float, float, float]
+
+
+def refuse(sentence: str) -> NoReturn:
+    """Raise ``WrongUse``."""
+    from harness.errors import WrongUse
+
+    raise WrongUse(sentence)
+
+
+def gel(
+    sensor: str | None,
+    calibration: str | None,
+    pitch: str | None,
+    thickness: str | None,
+    background: Path | None,
+    shadow: bool | None,
+    noise: float,
+    seed: int,
+) -> "Gel":
+    """The gel that the options describe; ``WrongUse`` and ``CalibrationRefused`` as ``known_gel``."""
+    from dataclasses import replace
+
+    from harness.image_file import read_image
+    from harness.quantities import LENGTH
+    from harness.sim.known_gel import known_gel
+
+    gel = known_gel(
+        sensor,
+        calibration,
+        pitch=_positive("--pitch", options.quantity("--pitch", pitch, LENGTH)),
+        thickness=_positive("--thickness", options.quantity("--thickness", thickness, LENGTH)),
+        background=None if background is None else read_image(background),
+        shadow=shadow,
+    )
+    if not math.isfinite(noise):
+        refuse(f"--noise of {noise} grey levels cannot be drawn; give a finite number")
+    return replace(gel, noise=noise, seed=seed)
+
+
+def _positive(option: str, value: float | None) -> float | None:
+    if value is not None and value <= 0.0:
+        refuse(f"{option} of {value:g} m cannot be; say a length above zero")
+    return value
+
+
+def of_heights(path: Path, of: str, under: Path | None, gel: "Gel", levels: list[str]) -> Touched:
+    """The press of a height map; ``under`` is how deep the object reaches below a gel's surface."""
+    from harness.sim.given_heights import read_heights
+    from harness.sim.touch_press import press_heights
+
+    kind = _heights_of(of)
+    begun = time.perf_counter()
+    heights = read_heights(path, gel.sensor, kind)
+    if under is not None and kind == "object":
+        refuse("--reached stands beside the surface of a gel; an object's --height says it already")
+    reached = None if under is None else read_heights(under, gel.sensor)
+    read = time.perf_counter() - begun
+    press = press_heights(heights, kind, gel, _scene(str(path), None, gel), levels, reached)
+    return Touched(press, str(path), seconds={"read": read})
+
+
+def _heights_of(text: str) -> "Heights":
+    from harness.errors import WrongUse
+
+    if text == "object":
+        return "object"
+    if text == "gel":
+        return "gel"
+    raise WrongUse(f"--heights-of {text} is no kind of height map; there are object and gel")
+
+
+def of_mesh(
+    mesh: str,
+    units: str | None,
+    contact: Three,
+    pose: tuple[str | None, str | None, str | None, str | None],
+    gel: "Gel",
+    levels: list[str],
+) -> Touched:
+    """The press of a mesh; ``pose`` is depth, tilt, azimuth and yaw with their units, None where left out."""
+    import numpy as np
+
+    from harness.quantities import ANGLE, LENGTH
+    from harness.sim.press_pose import contact_place, gel_from_object
+    from harness.sim.scene_object import known_object
+    from harness.sim.touch_press import press_mesh
+
+    depth = options.quantity("--depth", pose[0] or "1mm", LENGTH)
+    tilt, azimuth, yaw = (
+        options.quantity(option, text or "0deg", ANGLE)
+        for option, text in zip(("--tilt", "--azimuth", "--yaw"), pose[1:], strict=True)
+    )
+    begun = time.perf_counter()
+    scene = _scene(mesh, units, gel)
+    known = known_object(scene)
+    place = contact_place(known.mesh, np.array(contact))
+    at = gel_from_object(place, depth, tilt, azimuth, yaw)
+    read = time.perf_counter() - begun
+    sources = {"object.mesh": known.mesh, "contact.gel_from_object": at[None]}
+    press = press_mesh(sources, gel, scene, levels)
+    asked = {"depth_m": depth, "tilt_rad": tilt, "azimuth_rad": azimuth, "yaw_rad": yaw}
+    return Touched(press, mesh, place, at, asked, known.warnings, seconds={"mesh": read})
+
+
+def _scene(what: str, units: str | None, gel: "Gel") -> "SceneFile":
+    """A table with nothing on it but what is touched; touch does not depend on its material."""
+    from harness.scene import BUILTIN, SceneFile, scene_from_options
+    from harness.toml_file import validate
+
+    if what.endswith(".npy"):
+        tree = {"schema": 1, "object": {"mesh": what, "material": "steel"}}
+        scene = validate(tree, SceneFile, "the options")
+    else:
+        scene = scene_from_options(what, None if what.startswith(BUILTIN) else "steel", units)
+    return scene.model_copy(update={"sensors": scene.sensors.model_copy(update={"noise": gel.noise > 0.0})})

@@ -1,0 +1,237 @@
+"""One press of a gel: from a height map, a gel or a mesh and a pose to the picture and what limits it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from harness.accuracy import Accuracy
+from harness.arrays import BoolArray, ByteArray, FloatArray
+from harness.effects import Effect, Facts, knobs_of
+from harness.errors import DataRefused, OutOfDomain, WrongUse
+from harness.evaluate import Evaluation, evaluate
+from harness.plan import Plan, default_accuracy, plan
+from harness.scene import SceneFile
+from harness.sensor import TactileSensor
+from harness.sim.given_heights import MOST_BEYOND, Heights
+from harness.sim.shadow import ShadowTable
+from harness.sim.tactile_calibration import TactileCalibration
+from harness.sim.touch_effects import REST, contact_of, press_effects
+
+
+@dataclass(frozen=True, eq=False)
+class Gel:
+    """A sensor and all that is known of its gel.
+
+    Attributes:
+        sensor: its geometry; whether it casts shadows is said by ``shadow``.
+        calibration: of its colours.
+        rest: ``(rows, columns)`` metres, the untouched surface towards the camera; None for the sensor's.
+        shadow: of its light; None for one that casts none.
+        noise: grey levels, sigma of the camera's; 0 for none.
+        seed: of the noise.
+    """
+
+    sensor: TactileSensor
+    calibration: TactileCalibration
+    rest: FloatArray | None = None
+    shadow: ShadowTable | None = None
+    noise: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        seen = (self.calibration.rows, self.calibration.columns)
+        if seen != (self.sensor.rows, self.sensor.columns):
+            raise DataRefused(
+                f"the calibration is of {seen[0]} x {seen[1]} pixels and {self.sensor.name} has "
+                f"{self.sensor.rows} x {self.sensor.columns}; give the sensor's own calibration"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Press:
+    """A press, drawn.
+
+    Attributes:
+        gel: that was pressed.
+        plan: what ran, what did not, and why.
+        evaluation: every quantity on the way.
+        contact: ``(rows, columns)`` where the object touches.
+        of: whether the heights are of the object or of the gel.
+    """
+
+    gel: Gel
+    plan: Plan
+    evaluation: Evaluation
+    contact: BoolArray
+    of: Heights
+
+    @property
+    def image(self) -> ByteArray:
+        """``(rows, columns, 3)`` RGB."""
+        image: ByteArray = self.evaluation["touch.image"][0]
+        return image
+
+    @property
+    def heights(self) -> FloatArray:
+        """``(rows, columns)`` metres: how deep the object reaches, or the gel that was given."""
+        return self.surface if self.of == "gel" else self._value("touch.height_map")
+
+    @property
+    def surface(self) -> FloatArray:
+        """``(rows, columns)`` metres of indentation of the gel, as the camera sees it."""
+        return self._value("touch.gel")
+
+    @property
+    def deepest(self) -> float:
+        """Metres that the object reaches into the undeformed gel; 0 without contact."""
+        return max(0.0, float(self.heights.max()))
+
+    @property
+    def over_range(self) -> float:
+        """Metres by which the press is deeper than the gel is thick; it was held there."""
+        return max(0.0, self.deepest - self.gel.sensor.gel_thickness)
+
+    @property
+    def touches_border(self) -> bool:
+        """Whether the contact reaches the edge of what the camera sees."""
+        edge = np.ones_like(self.contact)
+        edge[1:-1, 1:-1] = False
+        return bool((self.contact & edge).any())
+
+    @property
+    def saturated(self) -> int:
+        """Values of the picture clipped to black or white by the optics."""
+        return int(self.evaluation["touch.saturated"][0])
+
+    @property
+    def out_of_domain(self) -> float | None:
+        """Share of pixels steeper than any press of the calibration; None where it does not say how steep."""
+        if self.gel.calibration.header.slope_limit >= 1.0:
+            return None
+        return int(self.evaluation["touch.extrapolated"][0]) / self.contact.size
+
+    @property
+    def shadow_out_of_table(self) -> float | None:
+        """Share of the contact's rim whose depth the shadow table does not hold; None without shadows."""
+        if "touch.shadow_out_of_table" not in self.evaluation.values:
+            return None
+        return float(self.evaluation["touch.shadow_out_of_table"][0])
+
+    @property
+    def levels(self) -> dict[str, Any]:
+        """Of every knob of an effect that ran."""
+        return {name: level for step in self.plan.ran for name, level in step.levels.items()}
+
+    def _value(self, quantity: str) -> FloatArray:
+        value: FloatArray = self.evaluation[quantity][0]
+        return value
+
+
+def press_heights(
+    heights: FloatArray,
+    of: Heights,
+    gel: Gel,
+    scene: SceneFile,
+    levels: Sequence[str] = (),
+    reached: FloatArray | None = None,
+) -> Press:
+    """Draw the press of a height map.
+
+    Args:
+        heights: ``(rows, columns)`` metres, checked by ``given_heights``.
+        of: the object, around which the gel's skirt is then hung, or the gel itself.
+        gel: that is pressed.
+        scene: says which senses and noises there are.
+        levels: as an operator writes them, ``"touch.optics=exact"``.
+        reached: beside a gel, ``(rows, columns)`` metres, how deep the object reaches: shadows and printed
+            dots go by it. Without it the contact is taken as what the object surely shapes.
+
+    Raises:
+        WrongUse: an unknown knob or level; shadows or dots of a gel of which nobody says what pressed it.
+        CalibrationRefused: a level that the calibration does not have.
+    """
+    if of == "object":
+        return _pressed({"touch.height_map": np.maximum(heights, 0.0)[None]}, of, gel, scene, levels)
+    if reached is None and (gel.sensor.casts_shadow or gel.sensor.markers is not None):
+        raise WrongUse(
+            "the surface of a gel does not say where the object touches, and shadows and dots go by that; "
+            "give it with --reached FILE.npy, or leave them out (--no-shadow)"
+        )
+    touched = heights if reached is None else reached
+    sources = {"touch.height_map": np.maximum(touched, 0.0)[None], "touch.gel": heights[None]}
+    press = _pressed(sources, of, gel, scene, levels)
+    return (
+        press if reached is None else replace(press, contact=contact_of(reached, gel.calibration, "object"))
+    )
+
+
+def press_mesh(sources: Mapping[str, Any], gel: Gel, scene: SceneFile, levels: Sequence[str] = ()) -> Press:
+    """Draw the press of a mesh.
+
+    Args:
+        sources: ``object.mesh`` and ``contact.gel_from_object``, ``(1, 4, 4)``.
+        gel: that is pressed.
+        scene: says which senses and noises there are.
+        levels: as an operator writes them, ``"touch.optics=exact"``.
+
+    Raises:
+        WrongUse: an unknown knob or level.
+        CalibrationRefused: a level that the calibration does not have.
+        OutOfDomain: a part of the object is where the sensor would be.
+    """
+    press = _pressed(sources, "object", gel, scene, levels)
+    most = MOST_BEYOND * gel.sensor.gel_thickness
+    if press.deepest > most:
+        raise OutOfDomain(
+            f"the object reaches {press.deepest * 1e3:.3g} mm past the gel's face; the limit is "
+            f"{most * 1e3:g} mm. Another part of it is in the sensor's way, or the press is too deep: turn, "
+            "tilt or move the contact, or press less"
+        )
+    return press
+
+
+def press_knobs() -> Accuracy:
+    """The knobs of a press, where nobody chooses."""
+    return Accuracy.default(knobs_of(_touching(press_effects(frozenset(), own_rest=False))))
+
+
+def _pressed(
+    given: Mapping[str, Any], of: Heights, gel: Gel, scene: SceneFile, levels: Sequence[str]
+) -> Press:
+    effects = press_effects(frozenset(given), gel.rest is not None)
+    chosen = press_knobs().with_texts(levels)
+    known = default_accuracy(effects)
+    accuracy = known.with_({name: level for name, level in chosen.items() if name in known.levels})
+    wanted = ["touch.image", "touch.saturated", "touch.extrapolated"]
+    wanted += ["touch.shadow_out_of_table"] if gel.sensor.casts_shadow else []
+    made = plan(effects, Facts(scene, gel.sensor), wanted, accuracy)
+    _refuse_idle(levels, made)
+    sources = {
+        "sensor": gel.sensor,
+        "sensor.calibration": gel.calibration,
+        REST: gel.rest,
+        "sensor.shadow_table": gel.shadow,
+        "sensor.noise": gel.noise,
+        "seed": gel.seed,
+    }
+    done = evaluate(made, {**sources, **given})
+    values = Evaluation({**given, **done.values}, done.seconds, done.calls, done.from_store)
+    heights = values["touch.gel" if of == "gel" else "touch.height_map"][0]
+    return Press(gel, made, values, contact_of(heights, gel.calibration, of), of)
+
+
+def _touching(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    return tuple(effect for effect in effects if effect.provides.startswith("touch."))
+
+
+def _refuse_idle(levels: Sequence[str], made: Plan) -> None:
+    dialled = {name for step in made.ran for name in step.levels}
+    for text in levels:
+        name = text.partition("=")[0].strip()
+        if name not in dialled:
+            raise WrongUse(
+                f"{text}: nothing that runs here goes by {name}; leave it out (there are "
+                f"{', '.join(sorted(dialled))})"
+            )

@@ -1,0 +1,121 @@
+"""Height maps out of files: what could not be one of this sensor is refused, and the unit is named."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.arrays import FloatArray
+from harness.errors import DataRefused, OutOfDomain
+from harness.sensor import GELSIGHT_R15, TactileSensor
+from harness.sim.given_heights import check_heights, read_heights
+
+SENSOR = GELSIGHT_R15
+TAXIM = TactileSensor("taxim", 480, 640, 0.0295e-3, 5e-3)
+
+
+def bump(deepest: float) -> FloatArray:
+    y, x = np.mgrid[:120, :160] - np.array([60.0, 80.0])[:, None, None]
+    return np.asarray(deepest * np.maximum(0.0, 1.0 - (x * x + y * y) / 900.0))
+
+
+def written(folder: Path, array: Any) -> Path:
+    np.save(folder / "h.npy", array)
+    return folder / "h.npy"
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_metres_are_handed_on(tmp_path: Path, kind: Any) -> None:
+    heights = read_heights(written(tmp_path, bump(1e-3).astype(kind)), SENSOR)
+    assert heights.dtype == np.float64
+    assert heights == pytest.approx(bump(1e-3), rel=1e-6)
+
+
+def test_nothing_below_an_object_is_asked_about_but_a_gel_may_only_bulge_a_little(tmp_path: Path) -> None:
+    far = written(tmp_path, bump(1e-3) - 0.3)  # an object a foot away has no contact
+    assert read_heights(far, SENSOR).max() < 0.0
+    with pytest.raises(OutOfDomain, match="thick"):
+        read_heights(far, SENSOR, "gel")
+    assert read_heights(written(tmp_path, bump(1e-3) - 0.1e-3), SENSOR, "gel").min() < 0.0
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    deepest=st.floats(0.05e-3, 2.5e-3), unit=st.sampled_from([("millimetres", 1e-3), ("micrometres", 1e-6)])
+)
+def test_another_unit_is_named(deepest: float, unit: tuple[str, float]) -> None:
+    name, scale = unit
+    assert_refused_for_unit(bump(deepest) / scale, SENSOR, name)
+
+
+@settings(max_examples=40, deadline=None)
+@given(deepest=st.floats(0.15e-3, 2.5e-3))
+def test_pixels_are_named(deepest: float) -> None:
+    assert_refused_for_unit(bump(deepest) / SENSOR.pitch, SENSOR, "pixels of 0.1245 mm")
+
+
+def assert_refused_for_unit(heights: FloatArray, sensor: TactileSensor, unit: str) -> None:
+    for of in ("object", "gel"):
+        with pytest.raises(OutOfDomain, match="write metres") as refused:
+            check_heights(heights, sensor, "gel" if of == "gel" else "object", "h.npy")
+        assert unit in str(refused.value)
+
+
+def test_taxims_published_surface_is_told_for_pixels() -> None:
+    y, x = np.mgrid[:480, :640] - np.array([240.0, 320.0])[:, None, None]
+    surface = 212.0 + 30.0 * (x * x + y * y < 100.0**2)
+    assert_refused_for_unit(surface, TAXIM, "pixels of 0.0295 mm")
+
+
+def test_beyond_the_gel_is_for_the_caller_to_hold_but_not_far_beyond() -> None:
+    check_heights(bump(4e-3), SENSOR, "object", "h.npy")
+    with pytest.raises(OutOfDomain, match=r"reach 0\.004 m and the gel is 2\.5 mm thick"):
+        check_heights(bump(4e-3), SENSOR, "gel", "h.npy")
+    with pytest.raises(OutOfDomain, match="reach"):
+        check_heights(bump(11e-3), SENSOR, "object", "h.npy")
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_is_counted_and_placed(bad: float) -> None:
+    heights = bump(1e-3)
+    heights[7, 40:44] = bad
+    with pytest.raises(OutOfDomain, match=r"4 of 19200 heights are not finite.*row 7, column 40"):
+        check_heights(heights, SENSOR, "object", "h.npy")
+
+
+@pytest.mark.parametrize(
+    ("shape", "hint"),
+    [
+        ((160, 120), "transpose it"),
+        ((1, 120, 160), "one contact"),
+        ((480, 640), r"\(120, 160\)"),
+        ((5,), "h.npy"),
+    ],
+)
+def test_another_shape_is_refused(shape: tuple[int, ...], hint: str) -> None:
+    with pytest.raises(OutOfDomain, match=hint):
+        check_heights(np.zeros(shape), SENSOR, "object", "h.npy")
+
+
+def test_a_gel_that_only_bulges_has_its_sign_the_wrong_way() -> None:
+    with pytest.raises(OutOfDomain, match="turn the sign"):
+        check_heights(-bump(1e-3), SENSOR, "gel", "h.npy")
+    check_heights(np.zeros((120, 160)), SENSOR, "gel", "h.npy")
+
+
+def test_what_is_no_array_of_heights_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataRefused, match="does not read"):
+        read_heights(tmp_path / "absent.npy", SENSOR)
+    with pytest.raises(DataRefused, match=r"\.npy"):
+        read_heights(tmp_path / "h.png", SENSOR)
+    (tmp_path / "h.npy").write_bytes(b"")
+    with pytest.raises(DataRefused, match="does not read"):
+        read_heights(tmp_path / "h.npy", SENSOR)
+    for array in (np.zeros((120, 160), np.uint8), np.zeros((120, 160), np.complex128)):
+        with pytest.raises(DataRefused, match="floating-point"):
+            read_heights(written(tmp_path, array), SENSOR)
+    with pytest.raises(DataRefused, match="does not read"):
+        read_heights(written(tmp_path, np.array([{"a": 1}], dtype=object)), SENSOR)
