@@ -1,12 +1,13 @@
 """``touchstone object``: what an ObjectFile holds, and whether it is what it says."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.commands import options
-from experiments.commands.output import ANSWERS, emit
+from harness import options
+from harness.output import ANSWERS, emit
 
 if TYPE_CHECKING:
     from harness.objectfile.description import Description
@@ -72,10 +73,29 @@ def _lines(description: "Description") -> list[str]:
         f"  licence   {description.provenance.licence}",
     ]
     lines += _audio_lines(description)
-    for modality in ("touch", "vision"):
-        network = description.networks.get(modality)
-        said = "none yet" if network is None else f"{network.file}, {_megabytes(network.bytes)}"
-        lines.append(f"  {modality:<8}  {said}")
+    lines += _touch_lines(description)
+    vision = description.vision
+    said = "none yet" if vision is None else f"{vision.file}, {_megabytes(vision.bytes)}"
+    return [*lines, f"  vision    {said}"]
+
+
+def _touch_lines(description: "Description") -> list[str]:
+    touch = description.touch
+    if touch is None:
+        return ["  touch     none yet"]
+    gel, (low, high) = touch.gel, touch.depth_m
+    lines = [
+        f"  touch     {gel.name}, {gel.rows} x {gel.columns}; {low * 1e3:g} to {high * 1e3:g} mm deep, "
+        f"tilts to {math.degrees(touch.most_tilt_rad):g} deg"
+    ]
+    if touch.codes is not None:
+        size = _megabytes(touch.codes.network.bytes + touch.codes.nodes.bytes)
+        lines.append(
+            f"    codes   {touch.codes.network.file}, {size}{_measured(touch.codes.network.measured)}"
+        )
+    if touch.perceptron is not None:
+        size = _megabytes(touch.perceptron.bytes)
+        lines.append(f"    perceptron {touch.perceptron.file}, {size}{_measured(touch.perceptron.measured)}")
     return lines
 
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.commands import options
 from experiments.commands.object_render_answer import Rendered, as_json, draw, print_answer
-from experiments.commands.output import emit
+from harness import options
+from harness.output import emit
 
 if TYPE_CHECKING:
     from harness.objectfile.audio import AudioLevel, ObjectAudio

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.commands.output import ANSWERS, warn
+from harness.output import ANSWERS, warn
 
 if TYPE_CHECKING:
     from harness.objectfile.audio import ObjectAudio

@@ -1,7 +1,7 @@
 """From modes to the network of an object's sound, and what it is worth on nodes it never saw."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from harness.authoring.audio_metrics import (
 )
 from harness.authoring.audio_profiles import PerceptronSpec, Profile
 from harness.authoring.audio_waves import fit_waves
+from harness.authoring.training import Report, median_seconds, train
 from harness.objectfile.audio_graph import audio_graph
 from harness.objectfile.audio_part import NETWORK, network_tensors
 from harness.objectfile.audio_table import scaled
@@ -30,9 +31,6 @@ from harness.objectfile.runtime import Network
 from harness.sim.modal_sound import audible
 from harness.sim.modes import Modes
 from harness.sim.synthesis import synthesize
-
-Report = Callable[[str, float], None]
-"""Told what is being done and the share of it that is done."""
 
 CHECKPOINT = ".audio_training.npz"
 """Beside ``object.json`` until the training is over."""
@@ -129,14 +127,8 @@ def _perceptrons(
     from harness.authoring.audio_mlp import Training
 
     torch.set_num_threads(threads)
-    checkpoint = folder / CHECKPOINT
     training = Training(spec, modes, split.trained, seed)
-    if checkpoint.exists():
-        training.load(checkpoint)
-    while not training.done:
-        report(f"training, epoch {training.epoch + 1} of {spec.epochs}", training.epoch / spec.epochs)
-        training.step_epoch()
-        training.save(checkpoint)
+    train(training, spec.epochs, folder / CHECKPOINT, report)
     trained = training.finish()
     graph = audio_graph(trained.branches, trained.normaliser, trained.scales, trained.encoding)
     settings: dict[str, str | float | int | bool | None] = {"network": "perceptrons", **vars(spec)}
@@ -168,7 +160,8 @@ def measure_audio(
             f"gain_error_{key}": value for key, value in quantiles(relative_errors(shapes, truth)).items()
         }
         errors[name] = gains | _sound_errors(modes, dampings, split, shapes, chosen)
-    errors["network"]["seconds_per_vertex"] = _seconds(network, modes.points[split.held_out[:1]])
+    vertex = {"points": modes.points[split.held_out[:1]]}
+    errors["network"]["seconds_per_vertex"] = median_seconds(lambda: network(vertex), _TIMED)
     errors["network"]["bytes"] = float(len(graph.SerializeToString()))
     errors["table_float16"]["bytes"] = float(2 * modes.shapes.size)
     return errors
@@ -208,12 +201,3 @@ def _sound_errors(
         "stft_distance_worst": float(np.max([each.stft for each in distances])),
         "envelope_distance_worst": float(np.max([each.envelope for each in distances])),
     }
-
-
-def _seconds(network: Network, point: FloatArray) -> float:
-    took = []
-    for _ in range(_TIMED):
-        begun = time.perf_counter()
-        network({"points": point})
-        took.append(time.perf_counter() - begun)
-    return float(np.median(took))

@@ -1,20 +1,20 @@
 """The perceptrons of sound: the paper's three and one for all, trained by Adam, resumed exactly."""
 
-import os
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from harness.arrays import AnyArray, FloatArray, IntArray
+from harness.authoring.adam_state import Progress, load_training, save_training
 from harness.authoring.audio_data import between_nodes
 from harness.authoring.audio_profiles import PerceptronSpec
 from harness.authoring.audio_readout import error_shares, solve_readout
-from harness.errors import DataRefused, WrongUse
+from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_rate
+from harness.errors import WrongUse
 from harness.objectfile.audio_graph import OutputScales
 from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
 from harness.sim.modes import Modes
@@ -42,10 +42,13 @@ class Perceptrons(nn.Module):
     def __init__(self, spec: PerceptronSpec, modes: int, seed: int) -> None:
         super().__init__()
         self._skip = spec.skip
-        self._encoded = Encoding.octaves(spec.octaves).width(3)
+        encoded = Encoding.octaves(spec.octaves).width(3)
         random = np.random.default_rng([seed, 4])
         outputs = 3 * modes // spec.branches
-        self.branches = nn.ModuleList(self._branch(spec, outputs, random) for _ in range(spec.branches))
+        self.branches = nn.ModuleList(
+            dense_layers(encoded, outputs, spec.depth, spec.width, spec.skip, random)
+            for _ in range(spec.branches)
+        )
 
     def forward(self, encoded: Tensor) -> Tensor:
         """Outputs of all modes and directions."""
@@ -68,20 +71,6 @@ class Perceptrons(nn.Module):
         for branch in self.branches:
             assert isinstance(branch, nn.ModuleList)
             yield [layer for layer in branch if isinstance(layer, nn.Linear)]
-
-    def _branch(self, spec: PerceptronSpec, outputs: int, random: np.random.Generator) -> nn.ModuleList:
-        layers = nn.ModuleList()
-        width = self._encoded
-        for index in range(spec.depth + 1):
-            taken = width + (self._encoded if index and index == spec.skip else 0)
-            width = spec.width if index < spec.depth else outputs
-            layer = nn.Linear(taken, width)
-            with torch.no_grad():
-                weight = random.standard_normal((width, taken)) * np.sqrt(2.0 / taken)
-                layer.weight.copy_(torch.from_numpy(np.float32(weight)))
-                layer.bias.zero_()
-            layers.append(layer)
-        return layers
 
 
 class Training:
@@ -126,7 +115,8 @@ class Training:
         batches = np.array_split(order, max(1, len(order) // self._spec.batch))
         total = 0.0
         for number, batch in enumerate(batches):
-            self._set_rate((self.epoch + number / len(batches)) / self._spec.epochs)
+            over = (self.epoch + number / len(batches)) / self._spec.epochs
+            set_rate(self._adam, self._spec.rate, over)
             wanted = torch.from_numpy(np.float32(shapes[batch] * shares[batch, None, None]))
             weights = scales * torch.from_numpy(np.float32(shares[batch]))[:, None, None]
             self._adam.zero_grad()
@@ -153,7 +143,7 @@ class Training:
                 return self._features(at, layers)
 
             readout = solve_readout(features, points, targets, np.arange(len(points)), shares)
-            inner = [_arrays(layer) for layer in layers[:-1]]
+            inner = [arrays_of(layer) for layer in layers[:-1]]
             last = readout.weights[:-1], readout.weights[-1]
             branches.append(MlpWeights((*inner, last), (spec.skip,) if spec.skip else ()))
         scales = OutputScales(np.ones((modes, 3)), np.zeros((modes, 3)))
@@ -170,52 +160,18 @@ class Training:
         return np.stack(found, axis=2)
 
     def save(self, path: Path) -> None:
-        """Write a checkpoint: weights, both moments of Adam, its steps, the epoch and the losses."""
-        arrays: dict[str, AnyArray] = {
-            "identity": np.array(self._identity),
-            "epoch": np.array(self.epoch),
-            "losses": np.array(self.losses),
-        }
-        for number, parameter in enumerate(self._network.parameters()):
-            arrays[f"weight.{number}"] = parameter.detach().numpy()
-            for name, value in self._adam.state[parameter].items():
-                arrays[f"{name}.{number}"] = value.numpy()
-        part = path.with_name(f".{path.name}.part")
-        with part.open("wb") as stream:
-            np.savez(stream, allow_pickle=False, **arrays)
-            stream.flush()
-            os.fsync(stream.fileno())
-        part.replace(path)
+        """Write a checkpoint (``adam_state.save_training``)."""
+        progress = Progress(self.epoch, self.losses)
+        save_training(path, self._identity, progress, self._network, self._adam)
 
     def load(self, path: Path) -> None:
         """Go on from a checkpoint.
 
         Raises:
-            DataRefused: it cannot be read, or is of another network, object, split or seed.
+            DataRefused: it cannot be read, or is of another network, object, data or seed.
         """
-        try:
-            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-                arrays = {name: archive[name] for name in archive.files}
-        except (OSError, ValueError, BadZipFile, EOFError, KeyError) as error:
-            raise DataRefused(
-                f"checkpoint {path} cannot be read ({error}); delete it to begin anew"
-            ) from error
-        if str(arrays.get("identity")) != self._identity:
-            raise DataRefused(
-                f"checkpoint {path} is of another network, object, split or seed; "
-                "delete it to begin anew, or build into another folder"
-            )
-        state = self._adam.state_dict()
-        moments = {}
-        for number, parameter in enumerate(self._network.parameters()):
-            with torch.no_grad():
-                parameter.copy_(torch.from_numpy(arrays[f"weight.{number}"]))
-            names = [name for name in ("step", "exp_avg", "exp_avg_sq") if f"{name}.{number}" in arrays]
-            moments[number] = {name: torch.from_numpy(arrays[f"{name}.{number}"]) for name in names}
-        state["state"] = {number: values for number, values in moments.items() if values}
-        self._adam.load_state_dict(state)
-        self.epoch = int(arrays["epoch"])
-        self.losses = arrays["losses"].tolist()
+        progress = load_training(path, self._identity, self._network, self._adam)
+        self.epoch, self.losses = progress.epoch, progress.losses
 
     def predict(self, points: FloatArray) -> FloatArray:
         """``(k, m, 3)`` 1/sqrt(kg), of the network as it is trained so far."""
@@ -224,15 +180,8 @@ class Training:
         shapes: FloatArray = found * self._scales
         return shapes
 
-    def _set_rate(self, share: float) -> None:
-        for group in self._adam.param_groups:
-            group["lr"] = 0.5 * self._spec.rate * (1.0 + np.cos(np.pi * share))
-
     def _encoded(self, points: FloatArray) -> Tensor:
-        place = np.float32((points - self._normaliser.shift) * self._normaliser.factor)
-        angles = [np.float32(frequency) * place for frequency in self._encoding.frequencies]
-        parts = [place, *(wave for angle in angles for wave in (np.sin(angle), np.cos(angle)))]
-        return torch.from_numpy(np.concatenate(parts, axis=1))
+        return encode(points, self._normaliser, self._encoding)
 
     def _features(self, points: FloatArray, layers: list[nn.Linear]) -> AnyArray:
         found = []
@@ -243,10 +192,6 @@ class Training:
                 )
         hidden = np.concatenate(found)
         return np.concatenate([hidden, np.ones((len(hidden), 1), np.float32)], axis=1)
-
-
-def _arrays(layer: nn.Linear) -> tuple[AnyArray, AnyArray]:
-    return layer.weight.detach().numpy().T.copy(), layer.bias.detach().numpy().copy()
 
 
 def _check(spec: PerceptronSpec) -> None:

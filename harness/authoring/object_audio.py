@@ -1,6 +1,5 @@
 """From a file to an ObjectFile with a sound: intake, modes, network, measurement, writing."""
 
-import hashlib
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,28 +7,23 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.authoring.audio import CHECKPOINT, AuthoredAudio, Report, author_audio
+from harness.authoring.audio import CHECKPOINT, AuthoredAudio, author_audio
 from harness.authoring.audio_data import canonical
 from harness.authoring.audio_profiles import profile
+from harness.authoring.object_source import created_object, source_of, surface_of
+from harness.authoring.training import Report
 from harness.code_version import content_hash
-from harness.errors import MeshRefused, WrongUse
+from harness.errors import MeshRefused
 from harness.materials import Material
 from harness.mesh import Mesh
 from harness.objectfile.audio_part import AudioPart, with_audio
-from harness.objectfile.entries import DESCRIPTION, Provenance, Source
-from harness.objectfile.file import MESH, ObjectFile, create_object, file_entry
-from harness.objectfile.surface_file import ply_bytes
-from harness.objects.household import build
-from harness.sim.intake import take_in
+from harness.objectfile.entries import Provenance, Source
+from harness.objectfile.file import ObjectFile
 from harness.sim.modal import HEARING, default_edge, modes_of
 from harness.sim.modal_file import modes_of_file
 from harness.sim.modes import Modes, dampings
 from harness.sim.volume_mesh import read_volume
-from harness.sim.walls import walled
 from harness.store import Store
-
-BUILTIN = "builtin:"
-"""In front of a built-in object's name, in place of a file."""
 
 MODES = 128
 """At most, where nobody asks for another number."""
@@ -110,7 +104,7 @@ def build_audio(
     modes = _lowest(canonical(found), wanted.most)
     rates = dampings(modes.frequencies, wanted.material)
     solved = time.perf_counter() - begun
-    created = _created(wanted, mesh, out, source)
+    created = created_object(wanted.mesh, wanted.licence, wanted.material, mesh, out, source)
     audio = author_audio(modes, rates, chosen, wanted.seed, out, report, threads)
     begun = time.perf_counter()
     report("writing", 0.0)
@@ -136,24 +130,15 @@ def build_audio(
 
 
 def _modes(wanted: ObjectRequest, store: Store | None) -> tuple[Mesh, Modes, Source, tuple[str, ...]]:
-    if wanted.mesh.startswith(BUILTIN):
-        mesh = build(wanted.mesh.removeprefix(BUILTIN))
-        source = Source(what="mesh", origin=wanted.mesh, licence=wanted.licence)
-        return mesh, _solved(wanted, mesh, store), source, ()
-    path = Path(wanted.mesh)
-    if not path.is_file():
-        raise MeshRefused(f"there is no file {path}; say a mesh file, or {BUILTIN} and a name")
-    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
-    source = Source(what="mesh", origin=path.name, licence=wanted.licence, sha256=sha256)
-    if read_volume(path, wanted.units) is not None:
+    source = source_of(wanted.mesh, wanted.licence)
+    if source.sha256 is not None and read_volume(Path(wanted.mesh), wanted.units) is not None:
+        path = Path(wanted.mesh)
         solved = modes_of_file(
             path, wanted.material, wanted.units, wanted.wall, wanted.limit, edge=wanted.edge
         )
         modes = solved.solution.modes
         return Mesh(modes.points, modes.faces), modes, source, solved.said
-    intake = take_in(path, wanted.units, wall=wanted.wall)
-    mesh = walled(intake.mesh, wanted.wall)
-    said = (*intake.report.repairs, *intake.report.warnings)
+    mesh, said = surface_of(wanted.mesh, wanted.units, wanted.wall)
     return mesh, _solved(wanted, mesh, store), source, said
 
 
@@ -179,20 +164,3 @@ def _lowest(modes: Modes, most: int) -> Modes:
         shapes=np.ascontiguousarray(modes.shapes[:, :most]),
         limit=float(kept[-1]),
     )
-
-
-def _created(wanted: ObjectRequest, mesh: Mesh, out: Path, source: Source) -> ObjectFile:
-    """The folder's object, made where there is none."""
-    if not (out / DESCRIPTION).exists():
-        name = Path(wanted.mesh.removeprefix(BUILTIN)).stem
-        provenance = Provenance(sources=(source,), licence=wanted.licence)
-        return create_object(out, name, mesh, wanted.material, provenance)
-    there = ObjectFile.open(out)
-    same_mesh = there.description.mesh.sha256 == file_entry(MESH, ply_bytes(mesh)).sha256
-    if not same_mesh or there.material != wanted.material:
-        other = "material" if same_mesh else "mesh"
-        raise WrongUse(
-            f"{out} holds {there.description.name}, of another {other}; "
-            "name another folder, or delete that one"
-        )
-    return there

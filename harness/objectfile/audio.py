@@ -7,7 +7,7 @@ measured, not decided here.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -17,10 +17,12 @@ from harness.mesh import Mesh
 from harness.objectfile.audio_table import HalfArray, interpolated, table_from
 from harness.objectfile.entries import AudioEntry, TableEntry
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.runtime import Network, open_network
 from harness.objectfile.surface_file import mesh_from_ply
 from harness.objectfile.surface_search import SurfaceSearch, checked_points
 from harness.sim.modes import Modes
+
+if TYPE_CHECKING:
+    from harness.objectfile.runtime import Network
 
 AudioLevel = Literal["network", "table"]
 
@@ -37,7 +39,7 @@ _UNIT_ERROR = 1e-6
 class NetworkShapes:
     """Shapes from ``audio.onnx``."""
 
-    network: Network
+    network: "Network"
 
     def __call__(self, points: FloatArray) -> AnyArray:
         """``(n, m, 3)`` at ``(n, 3)`` points."""
@@ -184,6 +186,9 @@ def open_audio(of: ObjectFile, level: AudioLevel = "network", threads: int = 1) 
     shapes: NetworkShapes | TableShapes
     match level:
         case "network" if entry.network is not None:
+            # What runs graphs is heavy, and a table needs none of it.
+            from harness.objectfile.runtime import open_network
+
             shapes = NetworkShapes(open_network(of.read(entry.network), entry.network, threads))
         case "table" if entry.table is not None:
             shapes = _table(of, entry.table, entry.near_surface_m)

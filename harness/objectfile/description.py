@@ -17,6 +17,7 @@ from harness.objectfile.entries import (
     NetworkEntry,
     Provenance,
 )
+from harness.objectfile.touch_entries import TouchEntry
 from harness.toml_file import validate
 
 SCHEMA = 1
@@ -36,7 +37,7 @@ class Description(Entry):
     mesh: MeshEntry
     provenance: Provenance
     audio: AudioEntry | None = None
-    touch: NetworkEntry | None = None
+    touch: TouchEntry | None = None
     vision: NetworkEntry | None = None
 
     @property
@@ -46,14 +47,22 @@ class Description(Entry):
         table = None if audio is None else audio.table
         network = None if audio is None else audio.network
         surface = None if table is None else table.surface
-        listed = (self.mesh, network, table, surface, self.touch, self.vision)
+        touch = () if self.touch is None else self.touch.files
+        listed = (self.mesh, network, table, surface, *touch, self.vision)
         return tuple(entry for entry in listed if entry is not None)
+
+    @property
+    def sound_files(self) -> tuple[FileEntry, ...]:
+        """Those that the sound is made of, and the mesh."""
+        other = (*(() if self.touch is None else self.touch.files), self.vision)
+        return tuple(entry for entry in self.files if entry not in other)
 
     @property
     def networks(self) -> Mapping[str, NetworkEntry]:
         """By modality, those that there are."""
         audio = None if self.audio is None else self.audio.network
-        every = {"audio": audio, "touch": self.touch, "vision": self.vision}
+        touch = {} if self.touch is None else self.touch.networks
+        every = {"audio": audio, **touch, "vision": self.vision}
         return {name: entry for name, entry in every.items() if entry is not None}
 
     @model_validator(mode="after")

@@ -5,7 +5,7 @@ Files are read on first use, each against its hash. Reading runs nothing of what
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -31,6 +31,7 @@ from harness.objectfile.entries import (
     Provenance,
 )
 from harness.objectfile.surface_file import mesh_from_ply, ply_bytes
+from harness.objectfile.touch_entries import TouchEntry
 
 MESH = "mesh.ply"
 
@@ -57,6 +58,14 @@ class ObjectFile:
             DataRefused: it is missing or damaged; what is wrong is named.
         """
         return cls(folder, read_description(folder / DESCRIPTION))
+
+    @cached_property
+    def content_key(self) -> str:
+        """A hash of all that the folder holds.
+
+        ``object.json`` names the hash of every file, and ``read`` refuses a file of another.
+        """
+        return hashlib.sha256(description_text(self.description).encode()).hexdigest()
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -147,8 +156,27 @@ def create_object(
     return ObjectFile(folder, description)
 
 
+def copied(of: ObjectFile, folder: Path, files: Iterable[FileEntry]) -> ObjectFile:
+    """A copy that says the same and holds some of the files: what needs no other can use it.
+
+    Args:
+        of: copied.
+        folder: made; what is there of the same names is replaced.
+        files: that are copied beside ``object.json``.
+
+    Raises:
+        DataRefused: one of them is missing or damaged.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    _write(folder, of.description, {entry.file: of.read(entry) for entry in files})
+    return ObjectFile(folder, of.description)
+
+
 def with_part(
-    of: ObjectFile, modality: Modality, entry: AudioEntry | NetworkEntry, contents: Mapping[str, bytes]
+    of: ObjectFile,
+    modality: Modality,
+    entry: AudioEntry | TouchEntry | NetworkEntry,
+    contents: Mapping[str, bytes],
 ) -> ObjectFile:
     """The ObjectFile with a modality written, in place of what there was of it.
 

@@ -12,6 +12,7 @@ from harness.objectfile.entries import DESCRIPTION, FileEntry
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.verify_network import look_at_domain, look_at_graph, look_at_self_test, opened_once
+from harness.objectfile.verify_touch import look_at_codes
 
 _SAMPLES = 256
 """Places of the surface where network and table are compared."""
@@ -56,6 +57,9 @@ def _looks(of: ObjectFile) -> Iterator[tuple[str, Callable[[], str]]]:
         yield "audio: table", partial(_table, of)
         if audio.network is not None:
             yield "audio: network and table", partial(_agreement, of)
+    touch = of.description.touch
+    if touch is not None and touch.codes is not None:
+        yield "touch: codes and mesh", partial(look_at_codes, of, touch.codes)
 
 
 def _tried(name: str, look: Callable[[], str]) -> Check:

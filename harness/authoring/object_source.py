@@ -1,0 +1,82 @@
+"""What an ObjectFile is built from: a mesh's origin, its surface, and the folder's object."""
+
+import hashlib
+from pathlib import Path
+
+from harness.errors import MeshRefused, WrongUse
+from harness.materials import Material
+from harness.mesh import Mesh
+from harness.objectfile.entries import DESCRIPTION, Provenance, Source
+from harness.objectfile.file import MESH, ObjectFile, create_object, file_entry
+from harness.objectfile.surface_file import ply_bytes
+from harness.objects.household import build
+from harness.scene import BUILTIN
+from harness.sim.intake import take_in
+from harness.sim.walls import walled
+
+
+def source_of(mesh: str, licence: str) -> Source:
+    """Where a mesh comes from; with a hash where it is a file.
+
+    Args:
+        mesh: a file, or ``builtin:`` and a name.
+        licence: of the mesh.
+
+    Raises:
+        MeshRefused: there is no such file.
+    """
+    if mesh.startswith(BUILTIN):
+        return Source(what="mesh", origin=mesh, licence=licence)
+    path = Path(mesh)
+    if not path.is_file():
+        raise MeshRefused(f"there is no file {path}; say a mesh file, or {BUILTIN} and a name")
+    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    return Source(what="mesh", origin=path.name, licence=licence, sha256=sha256)
+
+
+def surface_of(mesh: str, units: str | None, wall: float | None) -> tuple[Mesh, tuple[str, ...]]:
+    """The surface of an object's material, and what was done to the mesh and what to look at.
+
+    Args:
+        mesh: a file of a surface, or ``builtin:`` and a name.
+        units: of the file's numbers; None to take the only ones that make sense.
+        wall: m, of a hollow thing of which the file has the outside.
+
+    Raises:
+        MeshRefused: a mesh that cannot stand for an object.
+        WrongUse: units or a wall that cannot be.
+    """
+    if mesh.startswith(BUILTIN):
+        return build(mesh.removeprefix(BUILTIN)), ()
+    intake = take_in(Path(mesh), units, wall=wall)
+    return walled(intake.mesh, wall), (*intake.report.repairs, *intake.report.warnings)
+
+
+def created_object(
+    origin: str, licence: str, material: Material, mesh: Mesh, out: Path, source: Source
+) -> ObjectFile:
+    """The folder's object, made where there is none.
+
+    Args:
+        origin: a file, or ``builtin:`` and a name.
+        licence: of the mesh.
+        material: it is of.
+        mesh: its surface.
+        out: the folder.
+        source: of the mesh.
+
+    Raises:
+        WrongUse: the folder holds an object of another mesh or material.
+    """
+    if not (out / DESCRIPTION).exists():
+        name = Path(origin.removeprefix(BUILTIN)).stem
+        return create_object(out, name, mesh, material, Provenance(sources=(source,), licence=licence))
+    there = ObjectFile.open(out)
+    same_mesh = there.description.mesh.sha256 == file_entry(MESH, ply_bytes(mesh)).sha256
+    if not same_mesh or there.material != material:
+        other = "material" if same_mesh else "mesh"
+        raise WrongUse(
+            f"{out} holds {there.description.name}, of another {other}; "
+            "name another folder, or delete that one"
+        )
+    return there

@@ -1,0 +1,109 @@
+"""From a file to an ObjectFile with a touch: intake, codes, perceptron, measurement, writing."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from harness.authoring.object_source import created_object, source_of, surface_of
+from harness.authoring.touch import CHECKPOINT, AuthoredTouch, author_touch
+from harness.authoring.touch_data import DEPTHS, MOST_TILT
+from harness.authoring.touch_profiles import touch_profile
+from harness.authoring.training import Report
+from harness.code_version import content_hash
+from harness.materials import Material
+from harness.objectfile.entries import Provenance
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.touch_part import TouchPart, with_touch
+from harness.sensor import GELSIGHT_R15, TactileSensor
+from harness.sim.gel import skirt_for
+from harness.sim.press_pose import MOST_MOVED
+
+
+@dataclass(frozen=True, eq=False)
+class TouchRequest:
+    """What is to be built.
+
+    Attributes:
+        mesh: a file of a surface, or ``builtin:`` and a name.
+        material: it is of; touch does not ask, an ObjectFile says.
+        profile: of ``touch_profiles.TOUCH_PROFILES``.
+        units: of the file's numbers; None to take the only ones that make sense.
+        wall: m, of a hollow thing of which the file has the outside.
+        licence: of the mesh, and so of the ObjectFile.
+        seed: of everything random.
+        sensor: a flat gel.
+    """
+
+    mesh: str
+    material: Material
+    profile: str = "standard"
+    units: str | None = None
+    wall: float | None = None
+    licence: str = "unknown"
+    seed: int = 0
+    sensor: TactileSensor = GELSIGHT_R15
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltTouch:
+    """An ObjectFile and how it came about.
+
+    Attributes:
+        object: on disk.
+        touch: its networks and errors.
+        said: what was done to the mesh and what to look at.
+        seconds: s on the clock of each stage.
+    """
+
+    object: ObjectFile
+    touch: AuthoredTouch
+    said: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+
+def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 1) -> BuiltTouch:
+    """Build an object's touch, or go on with a training that was stopped.
+
+    Args:
+        wanted: what.
+        out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
+        report: told of progress.
+        threads: of a training.
+
+    Raises:
+        WrongUse: options that cannot be.
+        MeshRefused: a mesh that cannot stand for an object.
+        DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
+    """
+    chosen = touch_profile(wanted.profile)
+    begun = time.perf_counter()
+    report("reading the mesh", 0.0)
+    source = source_of(wanted.mesh, wanted.licence)
+    mesh, said = surface_of(wanted.mesh, wanted.units, wanted.wall)
+    taken = time.perf_counter() - begun
+    created = created_object(wanted.mesh, wanted.licence, wanted.material, mesh, out, source)
+    skirt = skirt_for(wanted.sensor)
+    touch = author_touch(mesh, wanted.sensor, skirt, chosen, wanted.seed, out, report, threads)
+    begun = time.perf_counter()
+    report("writing", 0.0)
+    part = TouchPart(
+        sensor=wanted.sensor,
+        skirt=skirt,
+        depths=DEPTHS,
+        most_tilt=MOST_TILT,
+        near_surface=MOST_MOVED,
+        provenance=Provenance(
+            code={"harness.authoring.object_touch": content_hash("harness.authoring.object_touch")},
+            seeds={"touch": wanted.seed},
+            settings={"profile": wanted.profile, **touch.settings},
+            sources=(source,),
+            licence=wanted.licence,
+        ),
+        codes=touch.codes,
+        perceptron=touch.perceptron,
+    )
+    made = with_touch(created, part)
+    (out / CHECKPOINT).unlink(missing_ok=True)
+    seconds = {"mesh": taken, **touch.seconds, "write": time.perf_counter() - begun}
+    return BuiltTouch(made, touch, said, seconds)

@@ -1,0 +1,115 @@
+"""The tables of ``object.json`` that say what an object's touch is."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from harness.objectfile.entries import Entry, FileEntry, NetworkEntry, Provenance
+from harness.sensor import TactileSensor
+from harness.sim.tactile_calibration import GelSkirt
+
+Positive = Annotated[float, Field(gt=0.0)]
+Size = Annotated[int, Field(ge=1)]
+
+
+class GelEntry(Entry):
+    """The flat gel that the maps are of, and its skirt in its own pixels."""
+
+    name: str
+    rows: Size
+    columns: Size
+    pitch_m: Positive
+    thickness_m: Positive
+    skirt_kernels: tuple[Size, ...]
+    skirt_final: Size
+    skirt_core: Annotated[float, Field(ge=0.0, le=1.0)]
+
+    @classmethod
+    def of(cls, sensor: TactileSensor, skirt: GelSkirt) -> Self:
+        """The entry of a sensor."""
+        return cls(
+            name=sensor.name,
+            rows=sensor.rows,
+            columns=sensor.columns,
+            pitch_m=sensor.pitch,
+            thickness_m=sensor.gel_thickness,
+            skirt_kernels=skirt.kernels,
+            skirt_final=skirt.final,
+            skirt_core=skirt.core,
+        )
+
+    @property
+    def sensor(self) -> TactileSensor:
+        """Its geometry again."""
+        return TactileSensor(self.name, self.rows, self.columns, self.pitch_m, self.thickness_m)
+
+    @property
+    def skirt(self) -> GelSkirt:
+        """Its skirt again."""
+        return GelSkirt(self.skirt_kernels, self.skirt_final, self.skirt_core)
+
+
+class CodesEntry(Entry):
+    """Codes of the surface: their graph, the places they belong to, how far a press may be from one."""
+
+    network: NetworkEntry
+    nodes: FileEntry
+    most_off_m: Positive
+
+
+class TouchEntry(Entry):
+    """The object's touch: what may be asked, and one or two ways to the answer."""
+
+    gel: GelEntry
+    depth_m: tuple[Positive, Positive]
+    most_tilt_rad: Annotated[float, Field(gt=0.0, lt=1.5)]
+    near_surface_m: Positive
+    codes: CodesEntry | None = None
+    perceptron: NetworkEntry | None = None
+    provenance: Provenance
+
+    @property
+    def files(self) -> tuple[FileEntry, ...]:
+        """All that the folder must hold for it."""
+        codes = () if self.codes is None else (self.codes.network, self.codes.nodes)
+        return codes if self.perceptron is None else (*codes, self.perceptron)
+
+    @property
+    def networks(self) -> dict[str, NetworkEntry]:
+        """Its graphs, by the name of the level."""
+        codes = None if self.codes is None else self.codes.network
+        every = {"touch": codes, "touch perceptron": self.perceptron}
+        return {name: entry for name, entry in every.items() if entry is not None}
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if self.codes is None and self.perceptron is None:
+            raise ValueError("there are neither codes nor a perceptron")
+        if self.depth_m[0] > self.depth_m[1]:
+            raise ValueError(
+                f"depth_m runs from {self.depth_m[0]} to {self.depth_m[1]}; the lesser comes first"
+            )
+        image = ("n", self.gel.rows, self.gel.columns)
+        if self.codes is not None:
+            taken = [("node", "int64", ("n", 1)), ("node_from_gel", "float64", ("n", 3, 4))]
+            _check(self.codes.network, taken, [("maps", "float32", image)], "codes")
+        if self.perceptron is not None:
+            _check(
+                self.perceptron,
+                [("pixel", "float64", ("n", 9))],
+                [("depth", "float32", ("n", 1))],
+                "perceptron",
+            )
+        return self
+
+
+def _check(
+    network: NetworkEntry,
+    inputs: list[tuple[str, str, tuple[int | str, ...]]],
+    outputs: list[tuple[str, str, tuple[int | str, ...]]],
+    what: str,
+) -> None:
+    taken = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.inputs]
+    given = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.outputs]
+    if taken != inputs or given != outputs:
+        raise ValueError(f"its {what} take {taken} and give {given}, where touch has {inputs} and {outputs}")
