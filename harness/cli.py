@@ -78,9 +78,17 @@ COMMANDS = {
     "object verify": Command(
         "experiments.commands.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
     ),
+    "calibrate taxim": Command(
+        "calibration.commands.taxim:taxim",
+        "Calibrate a tactile camera from pictures of ball presses, without marks.",
+    ),
     "sim modes": Command(
         "experiments.commands.sim:modes",
         "Frequencies and dampings of a mesh, counted so that none is missing.",
+    ),
+    "sim touch": Command(
+        "experiments.commands.sim_touch:touch",
+        "What a gel's camera sees of a height map, or of a mesh it is pressed onto.",
     ),
 }
 
@@ -88,6 +96,7 @@ GROUPS = {
     "tables": "The tables a paper would print, measured on the mocked bench.",
     "cost": "What accuracy costs in seconds, measured on this machine.",
     "object": "ObjectFiles: what is known of one object, in a folder of open files.",
+    "calibrate": "Instruments' own calibrations, each an artefact with its residual and its reasons.",
     "sim": "What the simulators compute, one at a time.",
 }
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from experiments.commands import options
-from experiments.commands.output import ANSWERS, CONSOLE, emit
+from harness import options
 from harness.device import Health
 from harness.errors import BenchFault
+from harness.output import ANSWERS, CONSOLE, emit
 
 if TYPE_CHECKING:
     from harness.station import Bench

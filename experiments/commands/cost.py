@@ -7,8 +7,8 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from experiments.commands import options
-from experiments.commands.output import ANSWERS, CONSOLE, emit, warn
+from harness import options
+from harness.output import ANSWERS, CONSOLE, emit, warn
 
 
 def contact_localization(
@@ -69,7 +69,7 @@ def contact_localization(
     )
     work = Work(
         tuple(wanted),
-        tuple(settings(thorough, sound)),
+        tuple(settings(thorough, sound, all(each.object.objectfile is not None for each in scenes.values()))),
         tuple(sorted(set(contacts or (2, 4, 6)))),
         tuple(settings_by_count(sound)),
     )

@@ -5,24 +5,27 @@ from typing import Annotated
 
 import typer
 
-from experiments.commands import options
-from experiments.commands.output import CONSOLE
 from experiments.commands.run import Experiment, Sense, Spacing, run
+from harness import options
+from harness.output import CONSOLE
 
 
 def demo(
     object_: Annotated[
         str, typer.Option("--object", help="A built-in object: mug, bowl, plate, pitcher, tray, wrench.")
     ] = "mug",
+    objectfile: options.ObjectFileOption = None,
+    level: options.LevelOption = None,
     seed: options.Seed = 1,
     out: Annotated[Path | None, typer.Option(help="The run's folder.")] = None,
     json: options.Json = False,
 ) -> int:
     """Localize a contact on the mocked bench from end to end, by touch, by sound and by both.
 
-    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object five times and strikes each
+    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object four times and strikes each
     place with a mocked hammer (over a serial line); the drivers are those of a real bench. The estimates are
-    made from the recording alone. The object's modes are computed the first time and kept.
+    made from the recording alone. The object's modes are computed the first time and kept;
+    with --objectfile and --level sound.shapes=network they come from its ObjectFile, and nothing is solved.
     """
     CONSOLE.print(
         "mock bench: a UR5e's controller and a GelSight's stream on loopback, a hammer and a microphone on a "
@@ -31,7 +34,9 @@ def demo(
     return run(
         Experiment.CONTACT_LOCALIZATION,
         object_=f"builtin:{object_}",
-        contacts=5,
+        objectfile=objectfile,
+        level=level,
+        contacts=4,
         spacing=Spacing.SPREAD,
         sense=Sense.BOTH,
         seed=seed,

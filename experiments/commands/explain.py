@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from experiments.commands import options
-from experiments.commands.output import ANSWERS, emit
+from harness import options
+from harness.output import ANSWERS, emit
 
 
 def explain(

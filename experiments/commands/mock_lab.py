@@ -4,8 +4,8 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from experiments.commands import options
-from experiments.commands.output import ANSWERS, CONSOLE, emit
+from harness import options
+from harness.output import ANSWERS, CONSOLE, emit
 
 
 def mock_lab(

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from experiments.commands import options
-from experiments.commands.output import CONSOLE, warn
 from experiments.commands.run import show
+from harness import options
+from harness.output import CONSOLE, warn
 
 
 def replay(

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from experiments.commands import options
-from experiments.commands.output import ANSWERS, CONSOLE, emit, millimetres, step_progress, warn
+from harness import options
 from harness.errors import WrongUse
+from harness.output import ANSWERS, CONSOLE, emit, millimetres, step_progress, warn
 
 
 class Experiment(StrEnum):
@@ -46,6 +46,7 @@ def run(
     material: options.Material = None,
     units: options.Units = None,
     wall: options.Wall = None,
+    objectfile: options.ObjectFileOption = None,
     seed: options.Seed = None,
     gap: options.GapOption = None,
     contacts: Annotated[int | None, typer.Option(help="How many contacts.", min=1, max=100)] = None,
@@ -91,6 +92,7 @@ def run(
             material=material,
             units=units,
             wall=wall,
+            objectfile=objectfile,
             seed=seed,
             gap=gap,
             out=out,
@@ -101,14 +103,14 @@ def run(
         )
         recording = Recording(resume)
     else:
-        wanted = resolve(scene, object_, material, units, wall, contacts, spacing, yaw, sense)
+        wanted = resolve(scene, object_, material, units, wall, contacts, spacing, yaw, sense, objectfile)
         bench = load_station(station_path(station or "mock"))
         if target is not None:
             _foresee(target, wanted)
         begun = session_of.start(wanted, bench, wanted.localization.seed if seed is None else seed, gap, out)
         recording = begun.recording
         _describe(begun)
-    complete, health = _perform(recording, json)
+    complete, health = _perform(recording, accuracy, json)
     if not complete:
         return _stopped(recording, json)
     cost = None
@@ -238,7 +240,7 @@ def _stopped(recording: Any, as_json: bool) -> int:
     return 130
 
 
-def _perform(recording: Any, as_json: bool) -> tuple[bool, Any]:
+def _perform(recording: Any, accuracy: Any, as_json: bool) -> tuple[bool, Any]:
     from experiments.contact_localization import session_of
 
     total = len(recording.header.plan["contacts"])
@@ -246,7 +248,7 @@ def _perform(recording: Any, as_json: bool) -> tuple[bool, Any]:
         return True, None  # nothing is left to touch: no bench is opened
     CONSOLE.print(f"recording to {recording.folder}", markup=False)
     with step_progress(recording.committed, total) as progress:
-        return session_of.perform_on_bench(recording, progress, None if as_json else _ask)
+        return session_of.perform_on_bench(recording, progress, None if as_json else _ask, accuracy)
 
 
 def _ask(what: str) -> None:

@@ -17,6 +17,7 @@ def resolve(
     spacing: str | None = None,
     yaw: str | None = None,
     sense: str | None = None,
+    objectfile: str | None = None,
 ) -> SceneFile:
     """The scene of a file or of ``--object``, with what the command line changes of it.
 
@@ -26,12 +27,14 @@ def resolve(
     if (scene is None) == (object_ is None):
         raise WrongUse("say what is on the table: either --scene FILE or --object FILE --material M")
     if scene is not None:
-        if material is not None or units is not None or wall is not None:
-            raise WrongUse("--material, --units and --wall belong to --object; a scene file says its own")
+        if any(option is not None for option in (material, units, wall, objectfile)):
+            raise WrongUse(
+                "--material, --units, --wall and --objectfile belong to --object; a scene file says its own"
+            )
         found = load_scene(scene)
     else:
         assert object_ is not None
-        found = scene_from_options(object_, material, units, wall)
+        found = scene_from_options(object_, material, units, wall, objectfile)
     changes = {"contacts": contacts, "spacing": spacing, "yaw": yaw}
     asked = {key: str_or_int(value) for key, value in changes.items() if value is not None}
     return _changed(found, asked, None if sense is None else {"touch": True, "sound": sense == "both"})

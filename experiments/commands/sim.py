@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from experiments.commands import options
-from experiments.commands.output import ANSWERS, emit, warn
+from harness import options
+from harness.output import ANSWERS, emit, warn
 
 if TYPE_CHECKING:
     from harness.materials import Material

@@ -9,8 +9,8 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from experiments.commands import options
-from experiments.commands.output import ANSWERS, CONSOLE, emit, warn
+from harness import options
+from harness.output import ANSWERS, CONSOLE, emit, warn
 
 
 def localization(

@@ -273,9 +273,7 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
 def test_the_command_measures_keeps_and_draws(
     cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "experiments.contact_localization.dials.settings", lambda _thorough, _sound: [COARSE, DEFAULT]
-    )
+    monkeypatch.setattr("experiments.contact_localization.dials.settings", lambda *_asked: [COARSE, DEFAULT])
     arguments = ["cost", "contact-localization", "--only", "wrench", "--seeds", "1", "--spacing", "spread"]
     arguments += ["--sense", "touch"]
     arguments += ["--contacts", "2", "--out", str(tmp_path / "out"), "--json"]

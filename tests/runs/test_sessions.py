@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from whole_run import Quiet, copied, edited, in_process_run, touch_scene
 
-from experiments.commands.output import warn
 from experiments.contact_localization import session_of
 from harness.cli import invoke
 from harness.errors import BenchFault, NotTouched, WrongUse
+from harness.output import warn
 from harness.reading import Reading
 from harness.recording import Recording
 from harness.run_folder import RunFiles
