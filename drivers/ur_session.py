@@ -89,8 +89,11 @@ class UrSession:
         self.require_unlatched()
         try:
             return self.process.request(message, seconds, beat=beat)
-        except (DeadlineMissed, ChildLost) as error:
+        except DeadlineMissed as error:
             self._fault(str(error))
+        except ChildLost as error:
+            self.process.kill()  # so that its last words are read to their end
+            self._fault(self.process.lost or str(error))
         except ProtectiveStop as error:
             self.latched = error
             raise

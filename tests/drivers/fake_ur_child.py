@@ -44,7 +44,10 @@ def main() -> None:
             requests.put(pipe.unpack_message(payload))
         os._exit(0)
 
-    if mode != "deaf":
+    if mode == "shut":
+        os.write(sys.stderr.fileno(), b"free(): invalid pointer\n")
+        os.close(sys.stdin.fileno())
+    elif mode != "deaf":
         threading.Thread(target=read, daemon=True).start()
     os.write(out, pipe.message_frame({"id": 0, "ok": True, "value": ["UR5", "1234", "5.12.0"]}))
     joints, moving, moving_id, end, start = READY.copy(), False, 0, 0.0, time.monotonic()

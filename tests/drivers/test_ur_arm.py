@@ -173,6 +173,17 @@ def test_a_child_killed_during_a_motion_stops_the_arm(make_arm: MakeArm, far_end
     assert far_end.heard == ["stop"]
 
 
+def test_last_words_are_told_of_a_child_found_dead_by_writing_to_it(
+    make_arm: MakeArm, far_end: FarEnd
+) -> None:
+    # Whichever is noticed first, the end of what it says or the pipe that nobody reads.
+    arm = make_arm("shut")
+    arm.open()
+    with pytest.raises(BenchFault, match="invalid pointer"):
+        move(arm)
+    assert far_end.heard == ["stop"]
+
+
 def test_reopening_after_a_fault_gives_a_working_arm(make_arm: MakeArm) -> None:
     arm = make_arm("good")
     arm.open()
