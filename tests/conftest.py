@@ -1,6 +1,9 @@
-"""Fixtures that every test may ask for."""
+"""Fixtures that every test may ask for, and which tests may run side by side."""
 
+import functools
+import os
 from pathlib import Path
+from typing import Final
 
 import pytest
 from hypothesis import settings
@@ -9,7 +12,21 @@ from real_data import WHY_NOT, find_shared_data
 from harness.scene import SceneFile, load_scene
 from harness.station_file import Station, load_station
 
-ROOT = Path(__file__).parents[1]
+TESTS: Final = Path(__file__).parent
+ROOT: Final = TESTS.parent
+WIRES: Final = (
+    "wire",
+    "drivers",
+    "runs",
+    "mocks/daq",
+    "mocks/ur",
+    "mocks/test_gelsight_stream.py",
+    "mocks/test_lab_processes.py",
+    "mocks/test_sound_card_player.py",
+    "mocks/test_strike_on_card.py",
+    "harness/test_mock_lab.py",
+)
+"""Where processes keep each other's deadlines: one at a time, and before all that only computes."""
 
 # One commit gets one verdict; `make hunt` draws other cases every time.
 settings.register_profile("verdict", derandomize=True)
@@ -36,3 +53,26 @@ def scene() -> SceneFile:
 def station() -> Station:
     """The mocked bench, as the example says."""
     return load_station(ROOT / "stations" / "mock.toml")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What shares a file shares a worker, and so its fixtures; all that speaks over wires shares one."""
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group(_group(item.path)))
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """A worker that has come to computing gives way to the one with deadlines."""
+    if "PYTEST_XDIST_WORKER" in os.environ and _group(item.path) != "wires":
+        _give_way()
+
+
+@functools.cache
+def _give_way() -> None:
+    os.nice(10)
+
+
+def _group(path: Path) -> str:
+    inside = path.relative_to(TESTS)
+    wired = any(inside.is_relative_to(place) for place in WIRES)
+    return "wires" if wired else inside.as_posix()
