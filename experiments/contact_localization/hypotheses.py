@@ -92,6 +92,15 @@ class Noise:
     temperature: float = 0.3
 
 
+def anchors(members: IntArray, most: int) -> IntArray:
+    """At most ``most`` of ``(m,)`` contacts, evenly among them, that hypotheses are hung on in turn.
+
+    A hypothesis hangs on its anchor: where that contact slid off an edge, another must carry the others.
+    """
+    spread = np.linspace(0, len(members) - 1, min(most, len(members)))
+    return members[np.unique(spread.astype(np.int64))]
+
+
 def normalised(log_weights: FloatArray) -> FloatArray:
     """``(n,)`` weights summing to 1, of ``(n,)`` nats the greatest of which is 0."""
     weights = np.exp(log_weights)

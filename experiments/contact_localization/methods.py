@@ -8,7 +8,7 @@ import numpy as np
 from experiments.contact_localization.gate import refuse_bad_fit
 from experiments.contact_localization.grid import on_samples, refine
 from experiments.contact_localization.heard import Heard
-from experiments.contact_localization.hypotheses import Hypotheses
+from experiments.contact_localization.hypotheses import Hypotheses, anchors
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.particle import particle_filter
 from experiments.contact_localization.search import Search
@@ -63,8 +63,7 @@ def solve_run(
     if levels.method == "particle":
         return _by_particles(search, count, members, levels, seed, seconds)
     best: Solution | None = None
-    # A hypothesis hangs on its anchor: where that contact slipped, another must carry the others.
-    for anchor in _anchors(members):
+    for anchor in anchors(members, _ANCHORS):
         found = _by_grid(search, members, int(anchor), levels, seed, seconds, heard)
         if best is None or np.median(found.fits) > np.median(best.fits):
             best = found
@@ -73,11 +72,6 @@ def solve_run(
             break
     assert best is not None
     return best
-
-
-def _anchors(members: IntArray) -> IntArray:
-    spread = np.linspace(0, len(members) - 1, min(_ANCHORS, len(members)))
-    return members[np.unique(spread.astype(np.int64))]
 
 
 def _by_grid(

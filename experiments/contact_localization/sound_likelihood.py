@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from experiments.contact_localization.sound_analysis import Peak, SoundEvidence
+from experiments.contact_localization.sound_density import MOST_RANK, sound_scores
 from experiments.contact_localization.sound_gains import GainTable
-from experiments.contact_localization.sound_kernels import MOST_RANK, sound_scores
 from experiments.contact_localization.sound_matching import (
     Scales,
     SoundNoise,
@@ -207,7 +207,7 @@ class SoundTerm:
             self._starts,
             pairs.shares,
             pairs.clutter,
-            np.full(len(heard.counts), weight),
+            weight,
             self.scales.log_shares,
         )
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.contact_localization.hypotheses import Hypotheses
+from experiments.contact_localization.hypotheses import Hypotheses, anchors
 from experiments.contact_localization.search import MOST_HYPOTHESES, Search
 from experiments.contact_localization.sound_likelihood import SoundTerm
 from harness.arrays import FloatArray, IntArray
@@ -55,13 +55,7 @@ def sound_nats(
 
 
 ANCHORS = 2
-"""Contacts that the others hang on in turn: one of them may have slid off an edge."""
-
-
-def anchors(members: IntArray) -> IntArray:
-    """Those of ``(m,)`` contacts, evenly among them, that hypotheses are hung on."""
-    spread = np.linspace(0, len(members) - 1, min(ANCHORS, len(members)))
-    return members[np.unique(spread.astype(np.int64))]
+"""Contacts that the others hang on in turn."""
 
 
 def by_sound(
@@ -79,7 +73,7 @@ def by_sound(
         members: ``(m,)`` indices of the contacts whose place counts.
         use_axis: whether the tool's attitude counts, or only places.
     """
-    carriers = anchors(members)
+    carriers = anchors(members, ANCHORS)
     most = MOST_HYPOTHESES // len(carriers)
     parts = [search.places(members, int(anchor), use_axis, most) for anchor in carriers]
     gels, yaws, places = (np.concatenate(column) for column in zip(*parts, strict=True))

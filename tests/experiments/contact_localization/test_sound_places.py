@@ -5,7 +5,7 @@ import pytest
 import sounding_plate as plate
 from scipy.signal import find_peaks
 
-from experiments.contact_localization.hypotheses import Contact, Noise
+from experiments.contact_localization.hypotheses import Contact, Noise, anchors
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior import best_point
 from experiments.contact_localization.search import MOST_HYPOTHESES, Search
@@ -13,7 +13,7 @@ from experiments.contact_localization.sound_analysis import SoundEvidence, analy
 from experiments.contact_localization.sound_gains import gain_table
 from experiments.contact_localization.sound_likelihood import SoundTerm
 from experiments.contact_localization.sound_pictures import sound_pair, spectrogram
-from experiments.contact_localization.sound_places import anchors, by_sound, sound_nats, strike_places
+from experiments.contact_localization.sound_places import ANCHORS, by_sound, sound_nats, strike_places
 from harness.arrays import FloatArray
 from harness.geometry import frame_facing, rotation_about, transform
 from harness.materials import Material
@@ -94,7 +94,7 @@ def test_sounds_that_say_nothing_leave_the_posterior_of_the_places() -> None:
     nothing = SoundEvidence(np.ones(K, dtype=np.bool_), ("",) * K, (), (), (0.0, 0.0))
     term = SoundTerm(nothing, TABLE, MODES, DAMPED)
     half = MOST_HYPOTHESES // 2
-    parts = [search.places(np.arange(K), int(anchor), most=half) for anchor in anchors(np.arange(K))]
+    parts = [search.places(np.arange(K), int(anchor), most=half) for anchor in anchors(np.arange(K), ANCHORS)]
     assert len(parts) == 2
     nats = np.concatenate([weights for _, _, weights in parts])
     gels, yaws = np.concatenate([g for g, _, _ in parts]), np.concatenate([y for _, y, _ in parts])
@@ -118,8 +118,8 @@ def test_a_contact_that_slid_off_the_object_does_not_carry_the_others_with_it(sl
 
 
 def test_contacts_that_others_hang_on_are_the_first_and_the_last() -> None:
-    assert anchors(np.array([1, 3, 4, 7])).tolist() == [1, 7]
-    assert anchors(np.array([5])).tolist() == [5]
+    assert anchors(np.array([1, 3, 4, 7]), 2).tolist() == [1, 7]
+    assert anchors(np.array([5]), 2).tolist() == [5]
 
 
 def test_a_spectrogram_shows_a_tone_where_it_is() -> None:

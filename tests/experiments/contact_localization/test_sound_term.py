@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.contact_localization.sound_analysis import Peak, SoundEvidence, analyse
+from experiments.contact_localization.sound_density import MOST_RANK, add_densities, sound_scores
 from experiments.contact_localization.sound_gains import gain_table
-from experiments.contact_localization.sound_kernels import angular_gaussian
 from experiments.contact_localization.sound_likelihood import SoundTerm
 from experiments.contact_localization.sound_matching import SoundNoise, group_starts, likely_scales
 from harness.arrays import AnyArray, FloatArray
@@ -135,31 +135,94 @@ def test_a_strike_across_all_modes_says_nothing_of_itself() -> None:
     assert np.ptp(found) == pytest.approx(0.0, abs=1e-12)
 
 
+def _densities(gains: FloatArray, rows: FloatArray, y: AnyArray, count: int) -> FloatArray:
+    """``(B,)`` of ``(B, K, r)`` gains and one direction."""
+    side_by_side = np.ascontiguousarray(np.moveaxis(gains, 0, 2).swapaxes(0, 1))
+    found, work = np.zeros(len(gains)), np.full((MOST_RANK + 2, MOST_RANK, len(gains)), np.nan)
+    add_densities(side_by_side, rows, y.real.copy(), y.imag.copy(), count, 1e-12, 1.0, work, found)
+    return found
+
+
 @pytest.mark.parametrize("rank", [1, 2, 3, 4])
 def test_the_kernel_is_the_density_it_says(rank: int) -> None:
     rng = np.random.default_rng(rank)
-    gains, y = rng.normal(size=(K, rank)), _complex(rng, (K,))
-    y /= np.linalg.norm(y)
+    gains, y = rng.normal(size=(7, K, rank)), _complex(rng, (K,))
     rows = np.array([1.0, 0.5, 0.0, 2.0, 1.0])
-    weighted = rows * y
+    unit = rows * y / np.linalg.norm(rows * y)
     scaled = gains * rows[:, None]
-    matrix = np.eye(K) + scaled @ scaled.T
-    norm = float(np.sum(np.abs(weighted) ** 2))
-    quadratic = float((weighted.conj() @ np.linalg.solve(matrix, weighted)).real) / norm
-    expected = -np.linalg.slogdet(matrix)[1] - 4 * np.log(quadratic)
-    unit = weighted / np.sqrt(norm)
-    found = angular_gaussian(gains, rows, unit.real.copy(), unit.imag.copy(), 4)
-    assert found == pytest.approx(expected, rel=1e-10)
+    matrices = np.eye(K) + scaled @ scaled.swapaxes(1, 2)
+    solved = np.linalg.solve(matrices, np.tile(unit[:, None], (7, 1, 1)))[..., 0]
+    quadratic = (solved @ unit.conj()).real
+    expected = 1.0 / np.linalg.det(matrices) / quadratic**4
+    assert _densities(gains, rows, unit, 4) == pytest.approx(expected, rel=1e-10)
 
 
 def test_the_density_integrates_to_one() -> None:
     """Over all directions, drawn evenly: the mean of the density against the even one is 1."""
     rng = np.random.default_rng(0)
-    gains = rng.normal(size=(3, 1))
+    gains = rng.normal(size=(1, 3, 1))
     ys = _complex(rng, (40_000, 3))
     ys /= np.linalg.norm(ys, axis=1)[:, None]
-    densities = [np.exp(angular_gaussian(gains, np.ones(3), y.real.copy(), y.imag.copy(), 3)) for y in ys]
+    densities = [_densities(gains, np.ones(3), y, 3)[0] for y in ys]
     assert np.mean(densities) == pytest.approx(1.0, abs=0.05)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10_000), peaks=st.integers(1, 40), strikes=st.integers(2, 30))
+def test_scores_are_the_sums_that_they_say(seed: int, peaks: int, strikes: int) -> None:
+    """Against the definition in logarithms, however many peaks and strikes multiply."""
+    rng = np.random.default_rng(seed)
+    hypotheses, scales = 35, 3
+    shapes = rng.normal(size=(50, 7, 3)).astype(np.float32)
+    starts = np.array([0, 1, 3, 6, 7])
+    samples = rng.integers(0, 50, (hypotheses, strikes, 1))
+    down = np.tile([0.0, 0.0, -1.0], (1, strikes, 1))
+    groups = rng.integers(0, 4, (peaks, 2))
+    spreads = np.array([10.0, 2.5])
+    rows = rng.uniform(0.1, 1.0, (2, peaks, strikes))
+    ys = _complex(rng, (2, peaks, strikes))
+    ys /= np.linalg.norm(ys, axis=2)[..., None]
+    offsets = rng.normal(scale=3.0, size=(2, peaks))
+    shares, clutter = rng.uniform(0.0, 0.4, (scales, 2 * peaks)), rng.uniform(0.1, 0.3, (scales, peaks))
+    log_shares = np.log(rng.dirichlet(np.ones(scales)))
+    found = sound_scores(
+        shapes,
+        samples,
+        np.ones(samples.shape),
+        down,
+        np.repeat(spreads[:, None], 7, axis=1),
+        rows,
+        ys.real.copy(),
+        ys.imag.copy(),
+        np.full(peaks, strikes),
+        offsets,
+        np.arange(0, 2 * peaks + 1, 2),
+        groups.ravel(),
+        starts,
+        shares,
+        clutter,
+        0.2,
+        log_shares,
+    )
+    totals = np.tile(log_shares, (hypotheses, 1))
+    struck = -shapes[samples[..., 0], :, 2].astype(np.float64)
+    for p in range(peaks):
+        terms = np.log(np.tile(clutter[:, p], (hypotheses, 1)))
+        for q in range(2):
+            block = struck[:, :, starts[groups[p, q]] : starts[groups[p, q] + 1]]
+            nats = [offsets[c, p] + _log_density(spreads[c] * block, rows[c, p], ys[c, p]) for c in range(2)]
+            both = np.logaddexp(*nats)[:, None] + np.log(shares[:, 2 * p + q])
+            terms = np.logaddexp(terms, both)
+        totals += 0.2 * terms
+    assert found == pytest.approx(np.logaddexp.reduce(totals, axis=1), abs=1e-9)
+
+
+def _log_density(gains: FloatArray, rows: FloatArray, y: AnyArray) -> FloatArray:
+    scaled = gains * rows[:, None]
+    matrices = np.eye(len(y)) + scaled @ scaled.swapaxes(1, 2)
+    solved = np.linalg.solve(matrices, np.tile(y[:, None], (len(gains), 1, 1)))[..., 0]
+    quadratic = (solved @ y.conj()).real
+    return np.asarray(-np.linalg.slogdet(matrices)[1] - len(y) * np.log(quadratic))
 
 
 def test_silence_and_noise_leave_every_place_alike() -> None:
