@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
 from onnx import ModelProto
 
 from harness.arrays import FloatArray
@@ -16,14 +15,11 @@ from harness.objectfile.entries import (
     Input,
     NetworkEntry,
     Provenance,
-    Sampled,
-    SelfTest,
     TableEntry,
     Tensor,
-    Whole,
 )
 from harness.objectfile.file import ObjectFile, file_entry, with_part
-from harness.objectfile.runtime import Network
+from harness.objectfile.network_part import NetworkPart, network_entry
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.sim.modes import Modes
@@ -34,7 +30,6 @@ TABLE = "audio_table.npy"
 TABLE_SURFACE = "audio_surface.ply"
 
 _SELF_TEST_POINTS = 4
-_SELF_TEST_VALUES = 512
 _TOLERANCE = 1e-4
 """Of the self-test, of the greatest gain: thirty times what float32 loses in these networks
 (3e-6 against float64), and a hundredth of what a network may be wrong by."""
@@ -127,28 +122,10 @@ def network_tensors(modes: int, near_surface: float) -> tuple[Input, Tensor]:
 
 
 def _network(mesh: Mesh, part: AudioPart, graph: ModelProto, contents: dict[str, bytes]) -> NetworkEntry:
-    data = graph.SerializeToString(deterministic=True)
-    contents[NETWORK] = data
     points, gains = network_tensors(len(part.modes.frequencies), part.near_surface)
-    return NetworkEntry(
-        **file_entry(NETWORK, data).model_dump(),
-        inputs=(points,),
-        outputs=(gains,),
-        self_test=_self_test(Network(data, NETWORK, [points], [gains]), mesh),
-        measured=dict(part.measured.get("network", {})),
-    )
-
-
-def _self_test(network: Network, mesh: Mesh) -> SelfTest:
-    points = SurfaceSearch(mesh).spread(_SELF_TEST_POINTS)[0]
-    gains = network({"points": points})["gains"].ravel()
-    at = np.unique(np.linspace(0, gains.size - 1, min(_SELF_TEST_VALUES, gains.size)).astype(np.int64))
-    return SelfTest(
-        rows=len(points),
-        inputs=(Whole(name="points", values=tuple(points.ravel().tolist())),),
-        outputs=(Sampled(name="gains", at=tuple(at.tolist()), values=tuple(gains[at].tolist())),),
-        tolerance=_TOLERANCE,
-    )
+    asked = {"points": SurfaceSearch(mesh).spread(_SELF_TEST_POINTS)[0]}
+    measured = part.measured.get("network", {})
+    return network_entry(NetworkPart(NETWORK, graph, (points,), gains, asked, _TOLERANCE, measured), contents)
 
 
 def _table(part: AudioPart, contents: dict[str, bytes]) -> TableEntry:

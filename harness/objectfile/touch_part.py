@@ -6,21 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from onnx import ModelProto
 
-from harness.arrays import AnyArray, FloatArray
+from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.errors import WrongUse
-from harness.objectfile.entries import (
-    Domain,
-    FileEntry,
-    Input,
-    NetworkEntry,
-    Provenance,
-    Sampled,
-    SelfTest,
-    Tensor,
-    Whole,
-)
+from harness.objectfile.entries import Domain, Input, NetworkEntry, Provenance, Tensor
 from harness.objectfile.file import ObjectFile, file_entry, with_part
-from harness.objectfile.runtime import Network
+from harness.objectfile.network_part import SELF_TEST_VALUES, NetworkPart, network_entry, spread
 from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
 from harness.objectfile.touch_nodes import SurfaceNodes, nodes_bytes
 from harness.sensor import TactileSensor
@@ -32,7 +22,6 @@ NODES = "touch_nodes.npy"
 PERCEPTRON = "touch_perceptron.onnx"
 
 _SELF_TEST_ROWS = 4
-_SELF_TEST_VALUES = 512
 _SELF_TEST_DEPTH = 1e-3
 _TOLERANCE = 1e-4
 """Of the self-test, of the greatest depth: a hundred times what float32 loses, a tenth of a micrometre."""
@@ -194,48 +183,22 @@ def _codes(part: TouchPart, codes: CodesPart, contents: dict[str, bytes]) -> Cod
     poses[:, 2, 3] = _SELF_TEST_DEPTH
     asked = {"node": chosen, "node_from_gel": poses}
     contents[NODES] = nodes_bytes(codes.nodes)
-    network = _network(CODES, codes.graph, inputs, outputs, asked, codes.measured, contents)
+    written = NetworkPart(CODES, codes.graph, inputs, outputs[0], asked, _TOLERANCE, codes.measured, _seen)
+    network = network_entry(written, contents)
     return CodesEntry(network=network, nodes=file_entry(NODES, contents[NODES]), most_off_m=codes.most_off)
 
 
 def _perceptron(part: PerceptronPart, contents: dict[str, bytes]) -> NetworkEntry:
     inputs, outputs = perceptron_tensors(part.least, part.most)
-    shares = np.random.default_rng(0).random((_SELF_TEST_VALUES, len(part.least)))
+    shares = np.random.default_rng(0).random((SELF_TEST_VALUES, len(part.least)))
     asked = {"pixel": part.least + shares * (part.most - part.least)}
-    return _network(PERCEPTRON, part.graph, inputs, outputs, asked, part.measured, contents)
-
-
-def _network(
-    name: str,
-    graph: ModelProto,
-    inputs: tuple[Input, ...],
-    outputs: tuple[Tensor],
-    asked: Mapping[str, AnyArray],
-    measured: Mapping[str, float],
-    contents: dict[str, bytes],
-) -> NetworkEntry:
-    data = graph.SerializeToString(deterministic=True)
-    contents[name] = data
-    entry: FileEntry = file_entry(name, data)
-    return NetworkEntry(
-        **entry.model_dump(),
-        inputs=inputs,
-        outputs=outputs,
-        self_test=_self_test(Network(data, name, inputs, outputs), asked),
-        measured=dict(measured),
+    return network_entry(
+        NetworkPart(PERCEPTRON, part.graph, inputs, outputs[0], asked, _TOLERANCE, part.measured, _seen),
+        contents,
     )
 
 
-def _self_test(network: Network, asked: Mapping[str, AnyArray]) -> SelfTest:
-    name = network.outputs[0].name
-    found = network(asked)[name].ravel()
-    # Half of the places where most is to be seen: most of a map is zero.
-    spread = np.linspace(0, found.size - 1, min(_SELF_TEST_VALUES, found.size)).astype(np.int64)
-    deepest = np.argsort(found, kind="stable")[-_SELF_TEST_VALUES // 2 :: 4]
-    at = np.unique(np.concatenate([spread, deepest]))
-    return SelfTest(
-        rows=len(next(iter(asked.values()))),
-        inputs=tuple(Whole(name=key, values=tuple(values.ravel().tolist())) for key, values in asked.items()),
-        outputs=(Sampled(name=name, at=tuple(at.tolist()), values=tuple(found[at].tolist())),),
-        tolerance=_TOLERANCE,
-    )
+def _seen(found: AnyArray) -> IntArray:
+    """Half of the places where most is to be seen: most of a map is zero."""
+    deepest = np.argsort(found, kind="stable")[-SELF_TEST_VALUES // 2 :: 4]
+    return np.unique(np.concatenate([spread(found), deepest]))

@@ -1,0 +1,78 @@
+"""Writing a network of an ObjectFile: its graph as a file, what is said of it, its self-test."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from onnx import ModelProto
+
+from harness.arrays import AnyArray, IntArray
+from harness.objectfile.entries import Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
+from harness.objectfile.file import file_entry
+from harness.objectfile.runtime import Network
+
+SELF_TEST_VALUES = 512
+"""Of an output that are kept, at most, but for what a part keeps beside."""
+
+
+def spread(found: AnyArray) -> IntArray:
+    """Places of a flat output, from its first number to its last, evenly."""
+    count = min(SELF_TEST_VALUES, found.size)
+    return np.unique(np.linspace(0, found.size - 1, count).astype(np.int64))
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkPart:
+    """A network to be written.
+
+    Attributes:
+        file: its name in the folder.
+        graph: of the network.
+        inputs: it takes.
+        output: it gives.
+        asked: the inputs of its self-test, by name.
+        tolerance: of the self-test, of the greatest output.
+        measured: its errors, by a name with its unit.
+        kept: the places of the flat output that the self-test keeps.
+    """
+
+    file: str
+    graph: ModelProto
+    inputs: tuple[Input, ...]
+    output: Tensor
+    asked: Mapping[str, AnyArray]
+    tolerance: float
+    measured: Mapping[str, float] = field(default_factory=dict)
+    kept: Callable[[AnyArray], IntArray] = spread
+
+
+def network_entry(part: NetworkPart, contents: dict[str, bytes]) -> NetworkEntry:
+    """The entry of a network, whose bytes are put among the contents of its folder.
+
+    Raises:
+        DataRefused: a graph that must not be run, or that takes or gives something else.
+    """
+    data = part.graph.SerializeToString(deterministic=True)
+    network = Network(data, part.file, part.inputs, [part.output])
+    contents[part.file] = data
+    return NetworkEntry(
+        **file_entry(part.file, data).model_dump(),
+        inputs=part.inputs,
+        outputs=(part.output,),
+        self_test=_self_test(network, part),
+        measured=dict(part.measured),
+    )
+
+
+def _self_test(network: Network, part: NetworkPart) -> SelfTest:
+    name = part.output.name
+    found = network(part.asked)[name].ravel()
+    at = part.kept(found)
+    return SelfTest(
+        rows=len(next(iter(part.asked.values()))),
+        inputs=tuple(
+            Whole(name=key, values=tuple(values.ravel().tolist())) for key, values in part.asked.items()
+        ),
+        outputs=(Sampled(name=name, at=tuple(at.tolist()), values=tuple(found[at].tolist())),),
+        tolerance=part.tolerance,
+    )
