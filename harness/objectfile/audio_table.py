@@ -5,17 +5,14 @@ its greatest number, so that neither a grain nor an anvil leaves the range of fl
 node: 2^-11 of the number, or 3e-8 of the mode's greatest.
 """
 
-import io
-
 import numpy as np
 import numpy.typing as npt
 
 from harness.arrays import AnyArray, FloatArray, IntArray, read_only
 from harness.errors import DataRefused
+from harness.objectfile.npy_file import npy_array, npy_bytes
 
 HalfArray = npt.NDArray[np.float16]
-
-_LONGEST_HEADER = 512
 
 
 def scaled(shapes: FloatArray) -> tuple[HalfArray, FloatArray]:
@@ -27,9 +24,7 @@ def scaled(shapes: FloatArray) -> tuple[HalfArray, FloatArray]:
 
 def table_bytes(table: HalfArray) -> bytes:
     """The table as a file."""
-    stream = io.BytesIO()
-    np.lib.format.write_array(stream, np.ascontiguousarray(table, "<f2"), (1, 0), allow_pickle=False)
-    return stream.getvalue()
+    return npy_bytes(table, "<f2")
 
 
 def table_from(data: bytes, name: str, shape: tuple[int, int, int]) -> HalfArray:
@@ -38,20 +33,7 @@ def table_from(data: bytes, name: str, shape: tuple[int, int, int]) -> HalfArray
     Raises:
         DataRefused: it is no such file, has another type or shape, or numbers that are not finite.
     """
-    stream = io.BytesIO(data)
-    try:
-        np.lib.format.read_magic(stream)
-        found, fortran, dtype = np.lib.format.read_array_header_1_0(stream, max_header_size=_LONGEST_HEADER)
-    except ValueError as error:
-        raise DataRefused(f"{name} is not a file of numpy ({error}); build the object again") from error
-    if found != shape or fortran or dtype != np.dtype("<f2"):
-        raise DataRefused(
-            f"{name} holds {dtype} {found} where a table of float16 {shape} belongs; build the object again"
-        )
-    start, count = stream.tell(), int(np.prod(shape))
-    if len(data) != start + 2 * count:
-        raise DataRefused(f"{name} has {len(data)} bytes, not {start + 2 * count}; copy it again")
-    table = np.frombuffer(data, "<f2", count, start).reshape(shape)
+    table: HalfArray = npy_array(data, name, "<f2", shape, f"a table of float16 {shape}")
     if not np.isfinite(table).all():
         bad = int(np.count_nonzero(~np.isfinite(table)))
         raise DataRefused(f"{name} has {bad} numbers that are not finite; build the object again")

@@ -1,6 +1,5 @@
 """The places of a surface that codes belong to, and which of them a press is nearest to."""
 
-import io
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,12 +8,11 @@ from scipy.spatial import cKDTree
 from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.errors import DataRefused, OutOfDomain
 from harness.geometry import inverse
+from harness.objectfile.npy_file import npy_array, npy_bytes
 from harness.objectfile.presses import Presses, frames_facing
 
 BEND = 20e-3
 """m: the distance that counts as much as a turn of the normal by one radian."""
-
-_LONGEST_HEADER = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +86,7 @@ class NodeSearch:
 
 def nodes_bytes(nodes: SurfaceNodes) -> bytes:
     """``.npy``: float64 ``(n, 6)``, points in metres and normals."""
-    stream = io.BytesIO()
-    rows = np.ascontiguousarray(np.hstack([nodes.points, nodes.normals]), "<f8")
-    np.lib.format.write_array(stream, rows, (1, 0), allow_pickle=False)
-    return stream.getvalue()
+    return npy_bytes(np.hstack([nodes.points, nodes.normals]), "<f8")
 
 
 def nodes_from(data: bytes, name: str) -> SurfaceNodes:
@@ -100,19 +95,7 @@ def nodes_from(data: bytes, name: str) -> SurfaceNodes:
     Raises:
         DataRefused: it holds something else.
     """
-    stream = io.BytesIO(data)
-    try:
-        np.lib.format.read_magic(stream)
-        shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream, max_header_size=_LONGEST_HEADER)
-    except ValueError as error:
-        raise DataRefused(f"{name} is not a file of numpy ({error}); build the object again") from error
-    if fortran or dtype != np.dtype("<f8") or len(shape) != 2 or shape[1] != 6 or shape[0] < 1:
-        raise DataRefused(
-            f"{name} holds {dtype} {shape} where nodes are float64 (n, 6); build the object again"
-        )
-    if len(data) != stream.tell() + 48 * shape[0]:
-        raise DataRefused(f"{name} has {len(data)} bytes, not those of {shape[0]} nodes; copy it again")
-    rows = np.frombuffer(data, "<f8", 6 * shape[0], stream.tell()).reshape(shape)
+    rows = npy_array(data, name, "<f8", (None, 6), "nodes of float64 (n, 6)")
     lengths = np.linalg.norm(rows[:, 3:], axis=1)
     if not np.isfinite(rows).all() or (np.abs(lengths - 1.0) > 1e-9).any():
         raise DataRefused(

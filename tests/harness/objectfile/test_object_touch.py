@@ -141,7 +141,7 @@ def test_a_description_that_contradicts_itself_is_refused(spoiled_peg: Path) -> 
     ("data", "said"),
     [
         (b"no array", "not a file of numpy"),
-        (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.eye(3)[:2]))[:-8], "not those of 2 nodes"),
+        (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.eye(3)[:2]))[:-8], "bytes, not the"),
         (nodes_bytes(SurfaceNodes(np.full((2, 3), np.nan), np.eye(3)[:2])), "not finite"),
         (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.ones((2, 3)))), "length 1"),
         (nodes_bytes(SurfaceNodes(np.zeros((0, 3)), np.zeros((0, 3)))), r"float64 \(n, 6\)"),
