@@ -1,4 +1,4 @@
-"""Arrays in files of numpy (``.npy``, version 1.0): no Python objects are written, and none run by reading."""
+"""Arrays in files of numpy (``.npy``, version 1.0): no Python objects are written, none run by reading."""
 
 import io
 import math
