@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from harness import options
-from harness.output import ANSWERS, CONSOLE, emit, warn
+from harness.output import ANSWERS, emit, share_progress, warn
 
 if TYPE_CHECKING:
     from harness.authoring.object_audio import BuiltAudio
@@ -87,13 +86,7 @@ def build(
         licence=licence,
         seed=seed,
     )
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=CONSOLE, transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def report(doing: str, share: float) -> None:
-            bar.update(task, description=doing, completed=share)
-
+    with share_progress() as report:
         built = build_audio(wanted, out, Store(default_folder()), report, threads)
     for sentence in built.said:
         warn(sentence)

@@ -3,10 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from harness.output import ANSWERS, CONSOLE, emit, warn
+from harness.output import ANSWERS, emit, share_progress, warn
 
 if TYPE_CHECKING:
     from harness.authoring.object_touch import BuiltTouch
@@ -32,13 +31,7 @@ def build_touch_part(
     from harness.materials import material as named
 
     wanted = TouchRequest(mesh, named(material), profile, units, wall, licence, seed)
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=CONSOLE, transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def report(doing: str, share: float) -> None:
-            bar.update(task, description=doing, completed=share)
-
+    with share_progress() as report:
         built = build_touch(wanted, out, report, threads)
     for sentence in built.said:
         warn(sentence)
