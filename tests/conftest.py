@@ -55,6 +55,7 @@ def station() -> Station:
     return load_station(ROOT / "stations" / "mock.toml")
 
 
+@pytest.hookimpl(tryfirst=True)  # before the scheduler names the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What shares a file shares a worker, and so its fixtures; all that speaks over wires shares one."""
     for item in items:
