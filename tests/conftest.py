@@ -55,11 +55,9 @@ def station() -> Station:
     return load_station(ROOT / "stations" / "mock.toml")
 
 
-@pytest.hookimpl(tryfirst=True)  # before the scheduler names the groups
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_itemcollected(item: pytest.Item) -> None:
     """What shares a file shares a worker, and so its fixtures; all that speaks over wires shares one."""
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group(_group(item.path)))
+    item.add_marker(pytest.mark.xdist_group(_group(item.path)))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
