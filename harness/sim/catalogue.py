@@ -8,8 +8,6 @@ which the caller gives: ``object.mesh`` (``Mesh``), ``object.material`` (``Mater
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,15 +15,13 @@ import numpy as np
 from harness.accuracy import Knob, Level
 from harness.arrays import ByteArray, FloatArray
 from harness.effects import Condition, Effect
-from harness.sensor import TactileSensor
 from harness.sim.gel import deform, over_range
-from harness.sim.height_map import RasterMesh, height_maps, penetration, rest_surface
+from harness.sim.height_map import RasterMesh
 from harness.sim.markers import draw_markers, marker_displacements
 from harness.sim.noise import with_camera_noise
-from harness.sim.optics import Optics
 from harness.sim.shadow_image import darkened, darkening
 from harness.sim.sound_effects import SOUND_EFFECTS
-from harness.sim.tactile_calibration import TactileCalibration
+from harness.sim.touch_drawing import optics, reached
 
 Given = Mapping[str, Any]
 Levels = Mapping[str, Level]
@@ -41,13 +37,8 @@ def _prepare(given: Given, _levels: Levels) -> RasterMesh:
 
 
 def _height_map(given: Given, levels: Levels) -> FloatArray:
-    sensor, rays = given["sensor"], int(levels[SUPERSAMPLING.name])
-    fine = replace(sensor, rows=sensor.rows * rays, columns=sensor.columns * rays, pitch=sensor.pitch / rays)
-    gap = height_maps(given["object.raster"], given["contact.gel_from_object"], fine)
-    deep = penetration(gap, fine)
-    blocks = deep.reshape(len(deep), sensor.rows, rays, sensor.columns, rays)
-    mean: FloatArray = deep if rays == 1 else blocks.mean(axis=(2, 4))
-    return mean
+    poses, rays = given["contact.gel_from_object"], int(levels[SUPERSAMPLING.name])
+    return reached(given["object.raster"], poses, given["sensor"], rays)
 
 
 def _over_range(given: Given, _levels: Levels) -> FloatArray:
@@ -61,17 +52,8 @@ def _gel(given: Given, levels: Levels) -> FloatArray:
 
 
 def _colour(given: Given, levels: Levels) -> ByteArray:
-    optics = _optics(given["sensor.calibration"], str(levels[OPTICS.name]), given["sensor"])
-    return optics.render(given["touch.gel"]).images
-
-
-@lru_cache(maxsize=4)
-def _optics(calibration: TactileCalibration, level: str, sensor: TactileSensor) -> Optics:
-    rest = None if sensor.gel_radius is None else -rest_surface(sensor)
-    match level:
-        case "exact" | "fast" | "smooth":
-            return Optics(calibration, level, rest)
-    raise ValueError(f"no optics level {level!r}")
+    drawn = optics(given["sensor.calibration"], str(levels[OPTICS.name]), given["sensor"])
+    return drawn.render(given["touch.gel"]).images
 
 
 def _darkening(given: Given, _levels: Levels) -> tuple[FloatArray, FloatArray]:

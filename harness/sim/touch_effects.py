@@ -7,29 +7,22 @@ is steeper than any press of the calibration.
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any, Literal
 
-import numpy as np
-
 from harness.accuracy import Level
-from harness.arrays import BoolArray, ByteArray, FloatArray, IntArray, read_only
+from harness.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from harness.effects import Effect
-from harness.sensor import TactileSensor
-from harness.sim.catalogue import EFFECTS, OPTICS
-from harness.sim.height_map import height_maps, rest_surface
-from harness.sim.optics import Optics, OpticsLevel, TactileImages
+from harness.sim.catalogue import EFFECTS, OPTICS, SUPERSAMPLING
+from harness.sim.optics import TactileImages
 from harness.sim.shadow_image import darkening
-from harness.sim.snapped_optics import SnappedOptics
 from harness.sim.tactile_calibration import TactileCalibration
+from harness.sim.touch_drawing import optics, reached
 
 Given = Mapping[str, Any]
 Levels = Mapping[str, Level]
 
 REST = "sensor.rest"
 """Source: ``(rows, columns)`` metres, the untouched gel's surface towards the camera."""
-
-_LEVELS: dict[str, OpticsLevel] = {"exact": "exact", "fast": "fast", "smooth": "smooth"}
 
 
 def press_effects(given: frozenset[str], own_rest: bool) -> tuple[Effect, ...]:
@@ -70,30 +63,8 @@ def contact_of(
 
 
 def _drawn(given: Given, levels: Levels) -> TactileImages:
-    calibration, level = given["sensor.calibration"], _LEVELS[str(levels[OPTICS.name])]
-    return _optics(calibration, level, given["sensor"], _Rest(given.get(REST))).render(given["touch.gel"])
-
-
-class _Rest:
-    """An array that a cache can tell from another: by being the same one."""
-
-    def __init__(self, surface: FloatArray | None) -> None:
-        self.surface = surface
-
-    def __hash__(self) -> int:
-        return id(self.surface)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Rest) and other.surface is self.surface
-
-
-@lru_cache(maxsize=4)
-def _optics(
-    calibration: TactileCalibration, level: OpticsLevel, sensor: TactileSensor, rest: _Rest
-) -> Optics:
-    if rest.surface is not None:
-        return SnappedOptics(calibration, level, rest.surface)
-    return Optics(calibration, level, None if sensor.gel_radius is None else -rest_surface(sensor))
+    level, rest = str(levels[OPTICS.name]), given.get(REST)
+    return optics(given["sensor.calibration"], level, given["sensor"], rest).render(given["touch.gel"])
 
 
 def _colour(given: Given, _levels: Levels) -> ByteArray:
@@ -124,13 +95,6 @@ def _darkening(given: Given, _levels: Levels) -> tuple[FloatArray, FloatArray]:
 
 
 def _height_map(given: Given, levels: Levels) -> FloatArray:
-    """As the catalogue's, over a surface of the gel's own; its z is 0 at the window's centre."""
-    sensor, rays = given["sensor"], int(levels["touch.supersampling"])
-    fine = replace(sensor, rows=sensor.rows * rays, columns=sensor.columns * rays, pitch=sensor.pitch / rays)
-    gap = height_maps(given["object.raster"], given["contact.gel_from_object"], fine)
-    towards = given[REST]
-    rows, columns = (np.array([(size - 1) // 2, size // 2]) for size in towards.shape)
-    surface = towards[np.ix_(rows, columns)].mean() - towards
-    deep = np.maximum(0.0, surface.repeat(rays, axis=0).repeat(rays, axis=1) - gap)
-    blocks = deep.reshape(len(deep), sensor.rows, rays, sensor.columns, rays)
-    return read_only(blocks.mean(axis=(2, 4)))
+    """As the catalogue's, over a surface of the gel's own."""
+    poses, rays = given["contact.gel_from_object"], int(levels[SUPERSAMPLING.name])
+    return reached(given["object.raster"], poses, given["sensor"], rays, given[REST])
