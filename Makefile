@@ -41,7 +41,7 @@ demo: $(RUN) ## localize a contact on the mocked bench, and write the report
 	@$(BIN)/touchstone demo
 
 test: $(DEV) sound lint types contracts ## everything CI checks
-	@$(BIN)/python -m pytest -m "not benchmark" -n auto --dist loadgroup
+	@$(BIN)/python -m pytest -m "not benchmark" -n auto --dist loadscope
 
 hunt: $(DEV) ## the property tests on cases drawn anew
 	@$(BIN)/python -m pytest -m "not benchmark" --hypothesis-profile=hunt -k "$(or $(K),test)"

@@ -8,6 +8,7 @@ from typing import Final
 import pytest
 from hypothesis import settings
 from real_data import WHY_NOT, find_shared_data
+from xdist.scheduler import LoadScopeScheduling
 
 from harness.scene import SceneFile, load_scene
 from harness.station_file import Station, load_station
@@ -55,9 +56,16 @@ def station() -> Station:
     return load_station(ROOT / "stations" / "mock.toml")
 
 
-def pytest_itemcollected(item: pytest.Item) -> None:
+class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # the library is not typed
     """What shares a file shares a worker, and so its fixtures; all that speaks over wires shares one."""
-    item.add_marker(pytest.mark.xdist_group(_group(item.path)))
+
+    def _split_scope(self, nodeid: str) -> str:
+        return _group(ROOT / nodeid.split("::")[0])
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> _ByFile:
+    """How tests are shared out."""
+    return _ByFile(config, log)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
