@@ -4,7 +4,8 @@
 with a polynomial for the arctangent (a pixel differs where its slope lies on the edge of a bin,
 and then by the table's own step); ``smooth`` the polynomial of ``harness.sim.shading``, without bins.
 All of them add to the background the change against the untouched gel, so that no contact
-gives the background bit for bit.
+gives the background bit for bit. All see the same surface, held to a grid far below any sensor's noise
+(``harness.sim.optics_kernels.GRID``), so that rounding chooses no colour.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,13 @@ import numpy as np
 from harness.arrays import ByteArray, FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused, OutOfDomain
 from harness.sim.optics_fast import PADDED, change_fast, draw_fast, padded
-from harness.sim.optics_kernels import change_exactly, change_smoothly, draw_exactly, draw_smoothly
+from harness.sim.optics_kernels import (
+    change_exactly,
+    change_smoothly,
+    draw_exactly,
+    draw_smoothly,
+    to_pixels,
+)
 from harness.sim.tactile_calibration import Float32Array, TactileCalibration
 
 OpticsLevel = Literal["exact", "fast", "smooth"]
@@ -84,22 +91,22 @@ class Optics:
         images = np.empty((*indentation.shape, 3), np.uint8)
         counts = np.empty((len(indentation), 2), np.int64)
         for n, pressed in enumerate(indentation):
-            counts[n] = self._draw((self._rest + pressed) * self._per_pitch, images[n])
+            counts[n] = self._draw(self._surface(pressed), images[n])
         return TactileImages(read_only(images), read_only(counts[:, 0]), read_only(counts[:, 1]))
+
+    def _surface(self, pressed: FloatArray) -> FloatArray:
+        """``(rows, columns)`` the gel's height in pixels, on the grid."""
+        surface = np.empty(self._rest.shape)
+        to_pixels(self._rest, pressed, 1.0 / self.calibration.header.pitch, surface)
+        return surface
 
     def _draw(self, z: FloatArray, image: ByteArray) -> tuple[int, int]:
         known = self.calibration
         if self.level == "exact":
             return draw_exactly(z, self._table, self._base, self._steepest, image)
         if self.level == "fast":
-            return draw_fast(
-                z.astype(np.float32), known.bins, self._padded, self._base_fast, self._steepest, image
-            )
+            return draw_fast(z, known.bins, self._padded, self._base_fast, self._steepest, image)
         return draw_smoothly(z, known.smooth, self._base, known.header.slope_limit, image)
-
-    @property
-    def _per_pitch(self) -> float:
-        return 1.0 / self.calibration.header.pitch
 
     @property
     def _steepest(self) -> float:
@@ -118,7 +125,7 @@ class Optics:
     def _base(self) -> FloatArray:
         # Background less what the untouched gel's own slope would add: no contact adds it back.
         change = np.empty(self.calibration.background.shape)
-        z = self._rest * self._per_pitch
+        z = self._surface(np.zeros_like(self._rest))
         if self.level == "exact":
             change_exactly(z, self._table, change)
         else:
@@ -130,8 +137,7 @@ class Optics:
     def _base_fast(self) -> Float32Array:
         rows, columns = self._rest.shape
         change = np.empty((rows, columns, PADDED), np.float32)
-        z = (self._rest * self._per_pitch).astype(np.float32)
-        change_fast(z, self.calibration.bins, self._padded, change)
+        change_fast(self._surface(np.zeros_like(self._rest)), self.calibration.bins, self._padded, change)
         base = np.zeros_like(change)
         base[..., :3] = self.calibration.background - change[..., :3]
         return base

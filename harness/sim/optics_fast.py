@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from harness.arrays import ByteArray
+from harness.arrays import ByteArray, FloatArray
 from harness.sim.compiled import compiled_fast
 from harness.sim.tactile_calibration import Float32Array
 
@@ -11,6 +11,11 @@ Int32Array = npt.NDArray[np.int32]
 
 PADDED = 4
 """Channels to a row of the padded table: three and one unused, a whole vector register."""
+
+_MARGIN = np.float32(2.0**-15)
+"""Bins by which a slope may fall short of a bin's border and count as on it: more than single precision
+loses of an angle. Directions along the axes and slopes of 45 degrees lie on borders of a table of 125 bins;
+double precision finds them there, and whole faces would change their colour with the level."""
 
 _HALF_PI = np.float32(0.5 * np.pi)
 _PI = np.float32(np.pi)
@@ -46,7 +51,7 @@ def arctangent(t: np.float32) -> np.float32:
 
 
 @compiled_fast
-def _bins_of_row(z: Float32Array, i: int, bins: int, steepest2: np.float32, at: Int32Array) -> int:
+def _bins_of_row(z: FloatArray, i: int, bins: int, steepest2: np.float32, at: Int32Array) -> int:
     columns = z.shape[1]
     per_row = np.float32((bins - 1) / (0.5 * np.pi))
     per_column = np.float32((bins - 1) / (2.0 * np.pi))
@@ -54,8 +59,9 @@ def _bins_of_row(z: Float32Array, i: int, bins: int, steepest2: np.float32, at: 
     above, here, below = z[i - 1], z[i], z[i + 1]
     beyond = 0
     for j in range(1, columns - 1):
-        a = (below[j] - above[j]) * _HALF
-        b = (here[j + 1] - here[j - 1]) * _HALF
+        # Differences on the surface's grid are exact in double precision, and then in single.
+        a = np.float32(below[j] - above[j]) * _HALF
+        b = np.float32(here[j + 1] - here[j - 1]) * _HALF
         sizes_a, sizes_b = abs(a), abs(b)
         most, least = max(sizes_a, sizes_b), min(sizes_a, sizes_b)
         angle = arctangent(least / most if most > 0 else least)
@@ -66,8 +72,8 @@ def _bins_of_row(z: Float32Array, i: int, bins: int, steepest2: np.float32, at: 
         steep = np.sqrt(steep2)
         tilt = arctangent(steep if steep < _ONE else _ONE / steep)
         tilt = tilt if steep < _ONE else _HALF_PI - tilt
-        row = min(np.int32(tilt * per_row), last)
-        column = min(np.int32((angle + _PI) * per_column), last)
+        row = min(np.int32(tilt * per_row + _MARGIN), last)
+        column = min(np.int32((angle + _PI) * per_column + _MARGIN), last)
         at[j] = row * wide + column
         beyond += steep2 > steepest2
     at[0], at[columns - 1] = at[1], at[columns - 2]
@@ -75,7 +81,7 @@ def _bins_of_row(z: Float32Array, i: int, bins: int, steepest2: np.float32, at: 
 
 
 @compiled_fast
-def change_fast(z: Float32Array, bins: int, table: Float32Array, change: Float32Array) -> None:
+def change_fast(z: FloatArray, bins: int, table: Float32Array, change: Float32Array) -> None:
     """Write the table's grey levels ``(rows, columns, 4)`` for a surface ``z`` in pixels."""
     rows, columns = z.shape
     at = np.empty(columns, np.int32)
@@ -93,7 +99,7 @@ def change_fast(z: Float32Array, bins: int, table: Float32Array, change: Float32
 
 @compiled_fast
 def draw_fast(
-    z: Float32Array, bins: int, table: Float32Array, base: Float32Array, steepest: float, image: ByteArray
+    z: FloatArray, bins: int, table: Float32Array, base: Float32Array, steepest: float, image: ByteArray
 ) -> tuple[int, int]:
     """Add the table's grey levels to ``base``, round and clip to ``image``; count clipped and too steep.
 

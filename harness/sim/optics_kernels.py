@@ -6,6 +6,21 @@ from harness.arrays import ByteArray, FloatArray
 from harness.sim.compiled import compiled
 from harness.sim.shading import at_pixel, at_row, colour, softly_limited
 
+GRID = 2.0**20
+"""Steps to a pixel of height. Far below any sensor's noise, and far above rounding: a table goes by the
+direction of a slope however small, so rounding alone would choose the colour of a flat face, or the side of
+a bin's border that a face along an axis is drawn on. Sums and differences on the grid are exact; published
+maps, in single precision, lie on it and are drawn as they were."""
+
+
+@compiled
+def to_pixels(rest: FloatArray, pressed: FloatArray, per_pitch: float, out: FloatArray) -> None:
+    """Write the surface of the pressed gel in pixels, held to the grid."""
+    for i in range(rest.shape[0]):
+        for j in range(rest.shape[1]):
+            # Held once, as a whole: of two parts each would bring rounding of its own.
+            out[i, j] = np.rint((rest[i, j] + pressed[i, j]) * per_pitch * GRID) / GRID
+
 
 @compiled
 def _slopes(z: FloatArray, i: int, j: int) -> tuple[float, float]:

@@ -9,7 +9,6 @@ from harness.arrays import FloatArray, read_only
 from harness.sensor import TactileSensor
 from harness.sim.height_map import RasterMesh, height_maps, penetration, rest_surface
 from harness.sim.optics import Optics, OpticsLevel
-from harness.sim.snapped_optics import SnappedOptics
 from harness.sim.tactile_calibration import TactileCalibration
 
 _OPTICS: dict[str, OpticsLevel] = {"exact": "exact", "fast": "fast", "smooth": "smooth"}
@@ -81,9 +80,9 @@ class _Rest:
 def _optics(
     calibration: TactileCalibration, level: OpticsLevel, sensor: TactileSensor, rest: _Rest
 ) -> Optics:
-    if rest.surface is not None:
-        return SnappedOptics(calibration, level, rest.surface)
-    return Optics(calibration, level, None if sensor.gel_radius is None else -rest_surface(sensor))
+    if rest.surface is not None or sensor.gel_radius is None:
+        return Optics(calibration, level, rest.surface)
+    return Optics(calibration, level, -rest_surface(sensor))
 
 
 def _surface(towards: FloatArray, rays: int) -> FloatArray:
