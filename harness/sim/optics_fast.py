@@ -75,7 +75,7 @@ def _bins_of_row(z: FloatArray, i: int, bins: int, steepest2: np.float32, at: In
         row = min(np.int32(tilt * per_row + _MARGIN), last)
         column = min(np.int32((angle + _PI) * per_column + _MARGIN), last)
         at[j] = row * wide + column
-        beyond += steep2 > steepest2
+        beyond += int(steep2 > steepest2)
     at[0], at[columns - 1] = at[1], at[columns - 2]
     return beyond
 
