@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from harness.authoring.touch import OFF, opened_codes
+from harness.authoring.touch import OFF, opened_codes, spaced_codes
 from harness.authoring.touch_codes import CodedSurface, PatchSpec, code_surface
 from harness.authoring.touch_data import DEPTHS, MOST_TILT, choose_nodes
 from harness.authoring.touch_metrics import Bench
+from harness.authoring.touch_profiles import touch_profile
 from harness.materials import MATERIALS
 from harness.mesh import Mesh
 from harness.objectfile.entries import Provenance
@@ -17,7 +18,7 @@ from harness.objectfile.file import ObjectFile, create_object
 from harness.objectfile.touch import CodeMaps
 from harness.objectfile.touch_graph import codes_graph
 from harness.objectfile.touch_part import CodesPart, TouchPart, with_touch
-from harness.sensor import TactileSensor
+from harness.sensor import GELSIGHT_R15, TactileSensor
 from harness.sim.gel import skirt_for
 from harness.sim.height_map import RasterMesh
 
@@ -67,3 +68,21 @@ def peg_part() -> TouchPart:
 def peg_file(folder: Path) -> ObjectFile:
     """The peg with its touch, written."""
     return with_touch(create_object(folder, "peg", peg(), MATERIALS["steel"], PROVENANCE), peg_part())
+
+
+@cache
+def ball() -> Mesh:
+    """A ball, 40 mm across, off the origin."""
+    solid = trimesh.creation.icosphere(subdivisions=4, radius=20e-3)
+    return Mesh(np.asarray(solid.vertices) + np.array([0.01, 0.02, 0.03]), np.asarray(solid.faces))
+
+
+def ball_file(folder: Path) -> ObjectFile:
+    """The ball with its touch, by codes for the bench's own gel."""
+    raster, skirt = RasterMesh(ball()), skirt_for(GELSIGHT_R15)
+    found, spacing = spaced_codes(raster, GELSIGHT_R15, touch_profile("smoke").codes, 0)
+    codes = CodesPart(
+        codes_graph(found.patches, GELSIGHT_R15, skirt), found.nodes, OFF * spacing, {"psnr_db": 50.0}
+    )
+    part = TouchPart(GELSIGHT_R15, skirt, DEPTHS, MOST_TILT, 2e-3, PROVENANCE, codes)
+    return with_touch(create_object(folder, "ball", ball(), MATERIALS["wood"], PROVENANCE), part)

@@ -96,11 +96,18 @@ def touch(
     units: Annotated[
         str | None, typer.Option(help="Of the mesh file's numbers: m, cm, mm or in.", metavar="U")
     ] = None,
+    objectfile: Annotated[
+        Path | None,
+        typer.Option(
+            help="Of a mesh: the object's ObjectFile, for --level touch.shapes=codes or =perceptron.",
+            metavar="FOLDER",
+        ),
+    ] = None,
     level: Annotated[
         list[str] | None,
         typer.Option(
-            help="Turn one dial, as touch.optics=exact; may be given again. touch.supersampling, touch.gel, "
-            "touch.optics, touch.marker_motion.",
+            help="Turn one dial, as touch.optics=exact; may be given again. touch.shapes, touch.gel, "
+            "touch.supersampling, touch.optics, touch.marker_motion.",
             metavar="D=L",
         ),
     ] = None,
@@ -134,16 +141,18 @@ def touch(
     if (mesh is None) == (height is None):
         refuse("say what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")
     if height is not None:
-        if any(given is not None for given in (contact, depth, tilt, azimuth, yaw, units)):
+        if any(given is not None for given in (contact, depth, tilt, azimuth, yaw, units, objectfile)):
             refuse(
-                "--contact, --depth, --tilt, --azimuth, --yaw and --units are of a mesh; --height is a map"
+                "--contact, --depth, --tilt, --azimuth, --yaw, --units and --objectfile are of a mesh; "
+                "--height is a map"
             )
         touched = sources.of_heights(height, heights_of, reached, gel, level or [])
     else:
         if contact is None or heights_of != "object" or reached is not None:
             refuse("a mesh needs --contact X Y Z, and --heights-of and --reached are of --height")
         assert mesh is not None
-        touched = sources.of_mesh(mesh, units, contact, (depth, tilt, azimuth, yaw), gel, level or [])
+        pose = (depth, tilt, azimuth, yaw)
+        touched = sources.of_mesh(mesh, units, contact, pose, gel, level or [], objectfile)
     return _finish(touched, {"calibration": loaded}, out, live, picture, height_out, json)
 
 

@@ -60,9 +60,10 @@ class Touched:
         press, said = self.press, list(self.said)
         if not press.contact.any():
             said.append("no contact: the picture is the untouched gel's")
-        if press.over_range > 0.0:
+        over_range = press.over_range or 0.0
+        if over_range > 0.0:
             said.append(
-                f"the press is {press.over_range * 1e3:.3g} mm deeper than the gel is thick "
+                f"the press is {over_range * 1e3:.3g} mm deeper than the gel is thick "
                 f"({press.gel.sensor.gel_thickness * 1e3:g} mm) and was held there"
             )
         if press.touches_border:
@@ -116,6 +117,7 @@ def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path 
             "held_out_db": _claimed(calibration.header.held_out_db),
             "held_out_table_db": _claimed(calibration.header.held_out_table_db),
             "residual_rms_grey": _finite(calibration.header.residual_rms),
+            "maps_measured": press.maps_measured,
         },
         "live": None if touched.live is None else _compared(touched),
         "levels": press.levels,

@@ -92,10 +92,12 @@ def of_mesh(
     pose: tuple[str | None, str | None, str | None, str | None],
     gel: "Gel",
     levels: list[str],
+    objectfile: Path | None = None,
 ) -> Touched:
     """The press of a mesh; ``pose`` is depth, tilt, azimuth and yaw with their units, None where left out."""
     import numpy as np
 
+    from harness.objectfile.presses import Presses
     from harness.quantities import ANGLE, LENGTH
     from harness.sim.press_pose import contact_place, gel_from_object
     from harness.sim.scene_object import known_object
@@ -107,18 +109,22 @@ def of_mesh(
         for option, text in zip(("--tilt", "--azimuth", "--yaw"), pose[1:], strict=True)
     )
     begun = time.perf_counter()
-    scene = _scene(mesh, units, gel)
+    scene = _scene(mesh, units, gel, objectfile)
     known = known_object(scene)
     place = contact_place(known.mesh, np.array(contact))
     at = gel_from_object(place, depth, tilt, azimuth, yaw)
     read = time.perf_counter() - begun
-    sources = {"object.mesh": known.mesh, "contact.gel_from_object": at[None]}
+    sources = {
+        "object.mesh": known.mesh,
+        "contact.gel_from_object": at[None],
+        "contact.presses": Presses.one(place.point, place.normal, depth, tilt, azimuth, yaw),
+    }
     press = press_mesh(sources, gel, scene, levels)
     asked = {"depth_m": depth, "tilt_rad": tilt, "azimuth_rad": azimuth, "yaw_rad": yaw}
     return Touched(press, mesh, place, at, asked, known.warnings, seconds={"mesh": read})
 
 
-def _scene(what: str, units: str | None, gel: "Gel") -> "SceneFile":
+def _scene(what: str, units: str | None, gel: "Gel", objectfile: Path | None = None) -> "SceneFile":
     """A table with nothing on it but what is touched; touch does not depend on its material."""
     from harness.scene import BUILTIN, SceneFile, scene_from_options
     from harness.toml_file import validate
@@ -127,5 +133,7 @@ def _scene(what: str, units: str | None, gel: "Gel") -> "SceneFile":
         tree = {"schema": 1, "object": {"mesh": what, "material": "steel"}}
         scene = validate(tree, SceneFile, "the options")
     else:
-        scene = scene_from_options(what, None if what.startswith(BUILTIN) else "steel", units)
+        material = None if what.startswith(BUILTIN) else "steel"
+        named = None if objectfile is None else str(objectfile)
+        scene = scene_from_options(what, material, units, objectfile=named)
     return scene.model_copy(update={"sensors": scene.sensors.model_copy(update={"noise": gel.noise > 0.0})})

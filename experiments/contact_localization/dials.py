@@ -5,8 +5,10 @@ from collections.abc import Iterator, Mapping
 from experiments.contact_localization.levels import Levels, Senses
 from harness.accuracy import Accuracy, Knob, Level
 from harness.effects import knobs_of
+from harness.errors import WrongUse
 from harness.sim.catalogue import EFFECTS
 from harness.sim.sound_effects import EDGE, MODES, SHAPES
+from harness.sim.touch_file_effects import SHAPES as DRAWN
 
 METHOD = Knob(
     "localization.method", ("particle", "grid"), "", "method", "grid", "the paper's filter, or ours"
@@ -71,9 +73,16 @@ def chosen(texts: list[str]) -> Accuracy:
     """The default accuracy but for what an operator wrote, for example ``["localization.rounds=1"]``.
 
     Raises:
-        WrongUse: an unknown dial or level; the nearest is named.
+        WrongUse: an unknown dial or level, and the nearest is named; a touch that no run carries.
     """
-    return Accuracy.default(KNOBS).with_texts(texts)
+    accuracy = Accuracy.default(KNOBS).with_texts(texts)
+    if accuracy[DRAWN.name] != DRAWN.default:
+        raise WrongUse(
+            f"{DRAWN.name} = {accuracy[DRAWN.name]}: a run is compared with the mesh that it carries, and it "
+            f"carries no ObjectFile's touch; take {DRAWN.name} = {DRAWN.default}, or draw a press with "
+            "`touchstone object render touch`"
+        )
+    return accuracy
 
 
 def levels_of(accuracy: Accuracy) -> Levels:

@@ -50,6 +50,14 @@ class Presses:
                 f"normals of lengths {lengths.min():.6g} to {lengths.max():.6g}; divide each by its length"
             )
 
+    @classmethod
+    def one(
+        cls, point: FloatArray, normal: FloatArray, depth: float, tilt: float, azimuth: float, yaw: float
+    ) -> "Presses":
+        """One press, as ``press_pose.gel_from_object`` takes it."""
+        angles = [np.array([number]) for number in (depth, tilt, azimuth, yaw)]
+        return cls(point[None], normal[None], *angles)
+
     def __len__(self) -> int:
         return len(self.points)
 

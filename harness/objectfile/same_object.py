@@ -36,10 +36,25 @@ def require_same(of: ObjectFile, surface: Mesh, material: Material) -> None:
         DataRefused: its mesh is damaged.
     """
     different = [*_materials(of.material, material), *_surfaces(of, surface)]
+    _refuse(of, different, "sound.shapes = elements")
+
+
+def require_same_shape(of: ObjectFile, surface: Mesh, instead: str) -> None:
+    """As ``require_same``, of whatever material.
+
+    Args:
+        of: an ObjectFile.
+        surface: of the scene's object.
+        instead: the level that needs no ObjectFile, for a refusal.
+    """
+    _refuse(of, _surfaces(of, surface), instead)
+
+
+def _refuse(of: ObjectFile, different: list[str], instead: str) -> None:
     if different:
         raise WrongUse(
             f"{of.folder} is not of the scene's object: {'; '.join(different)}. Name its own ObjectFile, "
-            "build one with `touchstone object build`, or take sound.shapes = elements"
+            f"build one with `touchstone object build`, or take {instead}"
         )
 
 

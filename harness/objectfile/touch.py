@@ -5,6 +5,7 @@ Three levels of one quantity: ``codes`` (``touch.onnx``), ``perceptron`` (the ne
 measured against. All refuse what they were not made for.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -99,6 +100,16 @@ class ObjectTouch:
     surface: SurfaceSearch
     maps: Maps
 
+    @property
+    def measured(self) -> Mapping[str, float]:
+        """Errors of the level, by names with units; none of the reference."""
+        match self.level:
+            case "codes" if self.entry.codes is not None:
+                return self.entry.codes.network.measured
+            case "perceptron" if self.entry.perceptron is not None:
+                return self.entry.perceptron.measured
+        return {}
+
     def at(self, presses: Presses) -> FloatArray:
         """``(n, rows, columns)`` m of indentation of the gel, positive into it.
 
@@ -124,17 +135,22 @@ class ObjectTouch:
         depths, tilts, most = presses.depths, presses.tilts, self.entry.most_tilt_rad
         if ((depths < low * (1.0 - _EDGE)) | (depths > high * (1.0 + _EDGE))).any():
             raise OutOfDomain(
-                f"a press {depths.min() * 1e3:.4g} to {depths.max() * 1e3:.4g} mm deep was asked of the "
+                f"a press {_span(depths * 1e3)} mm deep was asked of the "
                 f"touch's {self.level}, which knows {low * 1e3:g} to {high * 1e3:g} mm; press within that, "
                 "or simulate it with `touchstone sim touch`"
             )
         if ((tilts < 0.0) | (tilts > most * (1.0 + _EDGE))).any():
             raise OutOfDomain(
-                f"a tilt of {np.degrees(tilts.min()):.4g} to {np.degrees(tilts.max()):.4g} deg was asked of "
+                f"a tilt of {_span(np.degrees(tilts))} deg was asked of "
                 f"the touch's {self.level}, which knows 0 to {np.degrees(most):g} deg; lean less, or "
                 "simulate it with `touchstone sim touch`"
             )
         self.surface.require_within(presses.points, self.entry.near_surface_m, f"the touch's {self.level}")
+
+
+def _span(values: FloatArray) -> str:
+    low, high = f"{values.min():.4g}", f"{values.max():.4g}"
+    return low if low == high else f"{low} to {high}"
 
 
 def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) -> ObjectTouch:

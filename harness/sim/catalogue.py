@@ -4,7 +4,8 @@ The functions here only take apart what the kernels take; the mathematics is the
 which the caller gives: ``object.mesh`` (``Mesh``), ``object.material`` (``Material``),
 ``contact.gel_from_object`` (``(n, 4, 4)``), ``sensor`` (``TactileSensor``),
 ``sensor.calibration`` (``TactileCalibration``), ``sensor.shadow_table`` (``ShadowTable``),
-``sensor.noise`` (grey levels), ``seed``; for sound those of ``harness.sim.sound_effects``.
+``sensor.noise`` (grey levels), ``seed``; for sound those of ``harness.sim.sound_effects``; for touch from
+an ObjectFile those of ``harness.sim.touch_file_effects``.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,6 +23,7 @@ from harness.sim.noise import with_camera_noise
 from harness.sim.shadow_image import darkened, darkening
 from harness.sim.sound_effects import SOUND_EFFECTS
 from harness.sim.touch_drawing import optics, reached
+from harness.sim.touch_file_effects import FILE_EFFECTS, SHAPES, gel_from
 
 Given = Mapping[str, Any]
 Levels = Mapping[str, Level]
@@ -123,7 +125,15 @@ EFFECTS = (
         knobs=(SUPERSAMPLING,),
     ),
     Effect("touch.over_range", ("touch.height_map", "sensor"), _over_range),
-    Effect("touch.gel", ("touch.height_map", "sensor", "sensor.calibration"), _gel, knobs=(GEL,)),
+    *FILE_EFFECTS,
+    Effect(
+        "touch.gel",
+        ("touch.height_map", "sensor", "sensor.calibration"),
+        _gel,
+        knobs=(GEL,),
+        choice=SHAPES,
+        ways={"codes": gel_from("codes"), "perceptron": gel_from("perceptron")},
+    ),
     Effect("touch.colour", ("touch.gel", "sensor", "sensor.calibration"), _colour, knobs=(OPTICS,)),
     Effect(
         "touch.darkening",

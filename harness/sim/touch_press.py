@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,7 +59,7 @@ class Press:
         plan: what ran, what did not, and why.
         evaluation: every quantity on the way.
         contact: ``(rows, columns)`` where the object touches.
-        of: whether the heights are of the object or of the gel.
+        of: whether the heights are of the object or, given or of an ObjectFile's network, of the gel.
     """
 
     gel: Gel
@@ -89,8 +90,13 @@ class Press:
         return max(0.0, float(self.heights.max()))
 
     @property
-    def over_range(self) -> float:
-        """Metres by which the press is deeper than the gel is thick; it was held there."""
+    def over_range(self) -> float | None:
+        """Metres by which the press is deeper than the gel is thick; it was held there.
+
+        None where an ObjectFile's network gave the gel's surface: it holds it, and does not say by how much.
+        """
+        if "touch.height_map" not in self.evaluation.values:
+            return None
         return max(0.0, self.deepest - self.gel.sensor.gel_thickness)
 
     @property
@@ -118,6 +124,15 @@ class Press:
         if "touch.shadow_out_of_table" not in self.evaluation.values:
             return None
         return float(self.evaluation["touch.shadow_out_of_table"][0])
+
+    @property
+    def maps_measured(self) -> dict[str, float] | None:
+        """Errors that an ObjectFile claims for the network that gave the gel's surface; None without one."""
+        for level in ("codes", "perceptron"):
+            opened = self.evaluation.values.get(f"object.touch_{level}")
+            if opened is not None:
+                return dict(opened.measured)
+        return None
 
     @property
     def levels(self) -> dict[str, Any]:
@@ -171,13 +186,15 @@ def press_mesh(sources: Mapping[str, Any], gel: Gel, scene: SceneFile, levels: S
     """Draw the press of a mesh.
 
     Args:
-        sources: ``object.mesh`` and ``contact.gel_from_object``, ``(1, 4, 4)``.
+        sources: ``object.mesh`` and ``contact.gel_from_object``, ``(1, 4, 4)``; ``contact.presses`` too where
+            the place is known.
         gel: that is pressed.
-        scene: says which senses and noises there are.
+        scene: says which senses and noises there are, and names an ObjectFile where touch comes from one.
         levels: as an operator writes them, ``"touch.optics=exact"``.
 
     Raises:
-        WrongUse: an unknown knob or level.
+        WrongUse: an unknown knob or level; no ObjectFile where one is asked, or one of another object or gel.
+        DataRefused: an ObjectFile without the touch that is asked for, or a damaged one.
         CalibrationRefused: a level that the calibration does not have.
         OutOfDomain: a part of the object is where the sensor would be.
     """
@@ -208,7 +225,7 @@ def _pressed(
     wanted += ["touch.shadow_out_of_table"] if gel.sensor.casts_shadow else []
     made = plan(effects, Facts(scene, gel.sensor), wanted, accuracy)
     _refuse_idle(levels, made)
-    sources = {
+    sources: dict[str, Any] = {
         "sensor": gel.sensor,
         "sensor.calibration": gel.calibration,
         REST: gel.rest,
@@ -216,10 +233,21 @@ def _pressed(
         "sensor.noise": gel.noise,
         "seed": gel.seed,
     }
+    sources |= {"object.wall": scene.object.wall, **_file(made, scene)}
     done = evaluate(made, {**sources, **given})
     values = Evaluation({**given, **done.values}, done.seconds, done.calls, done.from_store)
-    heights = values["touch.gel" if of == "gel" else "touch.height_map"][0]
-    return Press(gel, made, values, contact_of(heights, gel.calibration, of), of)
+    seen: Heights = of if "touch.height_map" in values.values else "gel"
+    heights = values["touch.gel" if seen == "gel" else "touch.height_map"][0]
+    return Press(gel, made, values, contact_of(heights, gel.calibration, seen), seen)
+
+
+def _file(made: Plan, scene: SceneFile) -> dict[str, Any]:
+    """The scene's ObjectFile, where something that runs is computed from it."""
+    if "object.file" not in made.sources or scene.object.objectfile is None:
+        return {}
+    from harness.objectfile.file import ObjectFile
+
+    return {"object.file": ObjectFile.open(Path(scene.object.objectfile))}
 
 
 def _touching(effects: Sequence[Effect]) -> tuple[Effect, ...]:

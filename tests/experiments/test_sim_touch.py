@@ -71,7 +71,10 @@ def test_a_mesh_is_drawn_as_the_catalogue_draws_it(
     ran = {step["effect"] for step in answer["effects"]["ran"]}
     assert ran <= set(answer["seconds"])
     assert not {name for name in ran if name.startswith(("object.modes", "room", "touch.shadow", "arm"))}
-    assert answer["levels"] == {"touch.supersampling": 1, "touch.gel": "exact", "touch.optics": "fast"}
+    shapes = {"touch.shapes": "reference"}
+    assert answer["levels"] == {
+        "touch.supersampling": 1, **shapes, "touch.gel": "exact", "touch.optics": "fast"
+    }  # fmt: skip
     assert answer["error_estimate"]["held_out_db"] == pytest.approx(BENCH.header.held_out_db)
     again = answered(capsys, tmp_path, "--height", tmp_path / "h.npy", "--out", tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

@@ -87,3 +87,10 @@ def test_about_thirty_settings_are_measured_over_senses_modes_and_elements() -> 
     assert 25 <= len(found) <= 35
     assert {setting.get("sound.modes") for setting in found} >= {None, 16, 32}
     assert {setting.get("sound.edge") for setting in found} >= {None, 0.7}
+
+
+@pytest.mark.parametrize("level", ["codes", "perceptron"])
+def test_a_run_takes_no_touch_that_it_does_not_carry(level: str) -> None:
+    with pytest.raises(WrongUse, match=rf"touch\.shapes = {level}: .*take touch\.shapes = reference"):
+        chosen([f"touch.shapes={level}"])
+    assert chosen(["touch.shapes=reference"]) == chosen([])

@@ -188,7 +188,7 @@ def test_noise_runs_only_where_it_is_asked_for_and_is_the_seeds() -> None:
 
 def test_levels_are_turned_or_refused() -> None:
     press = press_heights(bump(1e-3), "object", BENCH, SCENE, ["touch.optics=smooth", "touch.gel=fast"])
-    assert press.levels == {"touch.optics": "smooth", "touch.gel": "fast"}
+    assert press.levels == {"touch.shapes": "reference", "touch.optics": "smooth", "touch.gel": "fast"}
     for level, words in (
         ("touch.optics=exat", "did you mean 'exact'"),
         ("touch.lens=1", "no knob"),
