@@ -71,9 +71,13 @@ COMMANDS = {
     "object info": Command(
         "experiments.commands.object:info", "Say what an ObjectFile holds: modes, networks, sources, licence."
     ),
-    "object render": Command(
+    "object render audio": Command(
         "experiments.commands.object_render:render",
         "Render the sound of a strike at a place: a WAV, and a picture of it and of the modes.",
+    ),
+    "object render touch": Command(
+        "experiments.commands.object_render_touch:render",
+        "Render a press at a place: what a gel's camera sees, and how far that is from the mesh's.",
     ),
     "object verify": Command(
         "experiments.commands.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
@@ -96,9 +100,12 @@ GROUPS = {
     "tables": "The tables a paper would print, measured on the mocked bench.",
     "cost": "What accuracy costs in seconds, measured on this machine.",
     "object": "ObjectFiles: what is known of one object, in a folder of open files.",
+    "object render": "What an ObjectFile's networks say, for ears and eyes: audio, touch.",
     "calibrate": "Instruments' own calibrations, each an artefact with its residual and its reasons.",
     "sim": "What the simulators compute, one at a time.",
 }
+
+_MOST_WORDS = max(len(name.split()) for name in COMMANDS)
 
 EPILOG = (
     "Start with `touchstone demo`. Exit codes: 0 answered; 1 a named failure of the bench or the data; "
@@ -127,8 +134,8 @@ def invoke(arguments: list[str]) -> int:
 
 
 def _chosen(arguments: Sequence[str]) -> str | None:
-    words = [word for word in arguments if not word.startswith("-")][:2]
-    candidates = (" ".join(words), words[0] if words else "")
+    words = [word for word in arguments if not word.startswith("-")]
+    candidates = (" ".join(words[:count]) for count in range(_MOST_WORDS, 0, -1))
     return next((name for name in candidates if name in COMMANDS), None)
 
 
@@ -144,14 +151,15 @@ def _app(chosen: str | None) -> typer.Typer:
     )
     groups = {name: typer.Typer(help=text, no_args_is_help=True) for name, text in GROUPS.items()}
     for name, command in COMMANDS.items():
-        *group, last = name.split()
-        parent = groups[group[0]] if group else app
+        group, _, last = name.rpartition(" ")
+        parent = groups[group] if group else app
         body = _interruptible(load(command.target)) if name == chosen else _stub
         parent.command(last, help=None if name == chosen else command.summary, short_help=command.summary)(
             body
         )
     for name, group_app in groups.items():
-        app.add_typer(group_app, name=name)
+        group, _, last = name.rpartition(" ")
+        (groups[group] if group else app).add_typer(group_app, name=last)
     return app
 
 

@@ -1,4 +1,4 @@
-"""``touchstone object render``: what an ObjectFile's networks say, for ears and eyes."""
+"""``touchstone object render audio``: what a strike at a place of an object sounds like."""
 
 import time
 from dataclasses import dataclass
@@ -35,7 +35,6 @@ class _Pulse:
 
 
 def render(
-    modality: Annotated[str, typer.Argument(help="What to render: audio.", metavar="MODALITY")],
     folder: Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")],
     out: Annotated[Path, typer.Option(help="The sound, 24 bits.", metavar="FILE.wav")],
     at: Annotated[
@@ -104,7 +103,7 @@ def render(
     from harness.objectfile.sound_wav import wav_rate, write_wav
     from harness.quantities import LENGTH, MASS, SPEED, TIME
 
-    _check(modality, out, picture, impulse, hammer, contact_time)
+    _check(out, picture, impulse, hammer, contact_time)
     wav_rate(rate)
     given = _Pulse(
         hammer,
@@ -126,7 +125,6 @@ def render(
 
 
 def _check(
-    modality: str,
     out: Path,
     picture: Path | None,
     impulse: bool,
@@ -135,8 +133,6 @@ def _check(
 ) -> None:
     from harness.errors import WrongUse
 
-    if modality != "audio":
-        raise WrongUse(f"{modality} cannot be rendered; there is audio")
     for option, path, suffix in (("--out", out, ".wav"), ("--picture", picture, ".png")):
         if path is not None and path.suffix != suffix:
             raise WrongUse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")

@@ -58,24 +58,90 @@ def touch_figure(shown: TouchPictures) -> Figure:
     return figure
 
 
-def _heights(figure: Figure, axes: Axes, shown: TouchPictures) -> None:
+@dataclass(frozen=True, eq=False)
+class LevelPictures:
+    """A press by one level of an object's touch, beside the rasteriser's.
+
+    Attributes:
+        level: its name.
+        heights: ``(rows, columns)`` metres of indentation of the gel.
+        image: ``(rows, columns, 3)`` RGB.
+        background: the same of the untouched gel.
+        reference: heights and picture by the rasteriser; None where that is the level.
+        pitch: metres a pixel.
+        words: under the height map, and under the differences.
+    """
+
+    level: str
+    heights: FloatArray
+    image: ByteArray
+    background: ByteArray
+    reference: tuple[FloatArray, ByteArray] | None
+    pitch: float
+    words: tuple[str, str]
+
+
+def levels_figure(shown: LevelPictures) -> Figure:
+    """A row of the level's press, and under it how far it is from the rasteriser's.
+
+    Raises:
+        ValueError: pictures of other shapes, or heights that are not finite.
+    """
+    _check(TouchPictures(shown.heights, shown.image, shown.background, None, shown.pitch, ("", "", "")))
     rows, columns = shown.heights.shape
-    half = 0.5e3 * shown.pitch * np.array([columns, rows])
+    down = 1 if shown.reference is None else 2
+    with styled():
+        figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES))
+        figure.set_layout_engine("constrained")
+        grid = np.asarray(figure.subplots(down, 3, squeeze=False))
+        low, high = min(0.0, float(shown.heights.min())), max(1e-6, float(shown.heights.max()))
+        _map(figure, grid[0, 0], 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")
+        grid[0, 0].set_title(f"indentation, {shown.level}", fontsize=10)
+        _picture(grid[0, 1], shown.image, shown.level, "")
+        _difference(grid[0, 2], shown.image, shown.background, f"{shown.level} - background", "")
+        if shown.reference is not None:
+            heights, image = shown.reference
+            apart = 1e6 * (shown.heights - heights)
+            most = max(1e-3, float(np.abs(apart).max()))
+            _map(figure, grid[1, 0], apart, shown.pitch, (-most, most), "um", "RdBu_r")
+            grid[1, 0].set_title(f"indentation, {shown.level} - rasteriser", fontsize=10)
+            _picture(grid[1, 1], image, "rasteriser", "")
+            _difference(grid[1, 2], shown.image, image, f"{shown.level} - rasteriser", "")
+        figure.supxlabel("\n".join(shown.words[:down]), fontsize=8)
+    return figure
+
+
+def _heights(figure: Figure, axes: Axes, shown: TouchPictures) -> None:
     low, high = min(0.0, float(shown.heights.min())), max(1e-6, float(shown.heights.max()))
+    _map(figure, axes, 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")
+    axes.set_title("indentation", fontsize=10)
+    axes.set_xlabel(f"gel x in mm\n{shown.words[0]}", fontsize=8)
+
+
+def _map(
+    figure: Figure,
+    axes: Axes,
+    values: FloatArray,
+    pitch: float,
+    limits: tuple[float, float],
+    unit: str,
+    colours: str = "viridis",
+) -> None:
+    rows, columns = values.shape
+    half = 0.5e3 * pitch * np.array([columns, rows])
     drawn = axes.imshow(
-        1e3 * shown.heights,
-        cmap="viridis",
-        vmin=1e3 * low,
-        vmax=1e3 * high,
+        values,
+        cmap=colours,
+        vmin=limits[0],
+        vmax=limits[1],
         extent=(-half[0], half[0], half[1], -half[1]),
         interpolation="nearest",
     )
-    axes.set_title("indentation", fontsize=10)
-    axes.set_xlabel(f"gel x in mm\n{shown.words[0]}", fontsize=8)
+    axes.set_xlabel("gel x in mm", fontsize=8)
     axes.set_ylabel("gel y in mm", fontsize=8)
     axes.tick_params(labelsize=7)
     bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=24)
-    bar.set_label("mm", fontsize=8)
+    bar.set_label(unit, fontsize=8)
     bar.ax.tick_params(labelsize=7)
 
 

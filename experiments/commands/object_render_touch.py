@@ -1,0 +1,175 @@
+"""``touchstone object render touch``: what a gel's camera sees of a press onto an object."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from experiments.commands.object_render_touch_answer import RenderedPress, as_json, draw, notes, print_answer
+from harness import options
+from harness.output import emit, warn
+
+if TYPE_CHECKING:
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.touch import ObjectTouch, TouchLevel
+    from harness.sim.press_pose import ContactPlace
+    from harness.sim.touch_press import Gel, Press
+
+Three = tuple[float, float, float]
+
+
+def render(
+    folder: Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")],
+    contact: Annotated[
+        Three, typer.Option(help="Where it is pressed, metres in the object's frame.", metavar="X Y Z")
+    ],
+    out: Annotated[Path, typer.Option(help="The picture, 8 bits RGB.", metavar="FILE.png")],
+    depth: Annotated[str, typer.Option(help="How deep the gel's centre is pressed on.", metavar="L")] = "1mm",
+    tilt: Annotated[str, typer.Option(help="Between the gel's axis and the normal.", metavar="A")] = "0deg",
+    azimuth: Annotated[
+        str, typer.Option(help="Which way it is tilted, from the gel's x at no yaw.", metavar="A")
+    ] = "0deg",
+    yaw: Annotated[str, typer.Option(help="The sensor turned about its own axis.", metavar="A")] = "0deg",
+    level: Annotated[
+        str,
+        typer.Option(
+            help="Where the map comes from: codes, perceptron, or reference (the mesh's rasteriser)."
+        ),
+    ] = "codes",
+    calibration: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the colours: a file, a shipped one's name, or a published folder; the sensor's own if "
+            "left out.",
+            metavar="FILE",
+        ),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            help="Map and picture, beside the rasteriser's, and the differences.", metavar="FILE.png"
+        ),
+    ] = None,
+    height_out: Annotated[
+        Path | None,
+        typer.Option(
+            help="The gel's surface, metres, as `sim touch --heights-of gel` takes it.", metavar="FILE.npy"
+        ),
+    ] = None,
+    json: options.Json = False,
+) -> int:
+    """What the camera behind a gel sees of a press onto an object, by its ObjectFile.
+
+    The surface of the gel comes from the object's codes or its perceptron; beside it stands what the
+    rasteriser makes of its mesh, and how far the one is from the other. A depth, tilt or place that the
+    networks were not made for is refused.
+
+    Try: touchstone object render touch objects/mug --contact -0.04 0 0.05 --tilt 5deg --out touch.png
+    """
+    from harness.image_file import write_png
+    from harness.quantities import ANGLE, LENGTH
+
+    _check_files(out, picture, height_out)
+    deep = options.quantity("--depth", depth, LENGTH)
+    tilted, towards, turned = (
+        options.quantity(option, text, ANGLE)
+        for option, text in (("--tilt", tilt), ("--azimuth", azimuth), ("--yaw", yaw))
+    )
+    rendered = _rendered(folder, _level(level), contact, (deep, tilted, towards, turned), calibration)
+    write_png(out, rendered.press.image)
+    if height_out is not None:
+        _write_heights(height_out, rendered)
+    if picture is not None:
+        draw(rendered, picture)
+    for sentence in notes(rendered):
+        warn(sentence)
+    if json:
+        emit(as_json(rendered, out, picture, height_out))
+    else:
+        print_answer(rendered, out, picture)
+    return 0
+
+
+def _rendered(
+    folder: Path,
+    level: "TouchLevel",
+    contact: Three,
+    pose: tuple[float, float, float, float],
+    calibration: str | None,
+) -> RenderedPress:
+    import numpy as np
+
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.touch import open_touch
+    from harness.objectfile.touch_level import require_gel
+    from harness.sim.known_gel import known_gel
+    from harness.sim.press_pose import contact_place
+
+    begun = time.perf_counter()
+    of = ObjectFile.open(folder)
+    touch = open_touch(of, level)
+    gel = known_gel(None, calibration, shadow=False)
+    require_gel(of, touch.entry.gel, gel.sensor, gel.calibration.header.skirt)
+    place = contact_place(of.mesh, np.array(contact))
+    # The first press loads the compiled loops for all that follow.
+    _pressed(of, touch, gel, place, pose)
+    loaded, begun = time.perf_counter() - begun, time.perf_counter()
+    press = _pressed(of, touch, gel, place, pose)
+    seconds = {"load": loaded, "render": time.perf_counter() - begun}
+    if level == "reference":
+        return RenderedPress(of, touch, place, pose, press, None, seconds)
+    begun = time.perf_counter()
+    beside = open_touch(of, "reference")
+    reference = _pressed(of, beside, gel, place, pose)
+    seconds["reference"] = time.perf_counter() - begun
+    return RenderedPress(of, touch, place, pose, press, reference, seconds)
+
+
+def _pressed(
+    of: "ObjectFile",
+    touch: "ObjectTouch",
+    gel: "Gel",
+    place: "ContactPlace",
+    pose: tuple[float, float, float, float],
+) -> "Press":
+    from harness.objectfile.presses import Presses
+    from harness.scene import SceneFile
+    from harness.sim.touch_press import press_heights
+    from harness.toml_file import validate
+
+    surface = touch.at(Presses.one(place.point, place.normal, *pose))[0]
+    what = {"mesh": str(of.folder / of.description.mesh.file), "material": "steel"}
+    scene = validate({"schema": 1, "object": what}, SceneFile, "the options")
+    return press_heights(surface, "gel", gel, scene)
+
+
+def _level(text: str) -> "TouchLevel":
+    from harness.errors import WrongUse
+
+    match text:
+        case "codes" | "perceptron" | "reference":
+            return text
+    raise WrongUse(
+        f"no level {text!r} of a touch; --level takes codes, perceptron, or reference for the mesh's"
+    )
+
+
+def _check_files(out: Path, picture: Path | None, height_out: Path | None) -> None:
+    from harness.errors import WrongUse
+
+    for option, path, suffix in (
+        ("--out", out, ".png"),
+        ("--picture", picture, ".png"),
+        ("--height-out", height_out, ".npy"),
+    ):
+        if path is not None and path.suffix != suffix:
+            raise WrongUse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
+    if out == picture:
+        raise WrongUse(f"--out and --picture are both {out}; give them two names")
+
+
+def _write_heights(path: Path, rendered: RenderedPress) -> None:
+    import numpy as np
+
+    np.save(path, rendered.press.surface)
