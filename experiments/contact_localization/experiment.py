@@ -10,12 +10,12 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from experiments.contact_localization.first_touch import first_touch
-from experiments.contact_localization.pace import joint_speed
 from experiments.contact_localization.strike import Ask, StrikeMotion, strike, strike_by_hand
 from harness.arrays import FloatArray
 from harness.device import Arm
 from harness.errors import BenchFault, NotTouched
 from harness.geometry import transform
+from harness.pace import joint_speed
 from harness.reading import Reading
 from harness.recording import Recording
 from harness.station import PRESS, Bench

@@ -13,6 +13,9 @@ from experiments.contact_localization.surface import Surface
 from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.sim.compiled import compiled
 
+_GOOD = -0.5
+"""Nats at which the nearest sample explains a place well enough not to look at its neighbours."""
+
 
 @dataclass(frozen=True)
 class GeometryNoise:
@@ -135,11 +138,11 @@ def geometry_scores(
 
 
 @compiled
-def _fit(
+def _best_fit(
     points: FloatArray,
     normals: FloatArray,
     spacing: float,
-    sample: int,
+    samples: AnyArray,
     x: float,
     y: float,
     z: float,
@@ -148,18 +151,31 @@ def _fit(
     free_angle: float,
     angle: float,
     use_axis: bool,
+    best: float,
 ) -> float:
-    dx, dy, dz = x - points[sample, 0], y - points[sample, 1], z - points[sample, 2]
-    nx, ny, nz = normals[sample, 0], normals[sample, 1], normals[sample, 2]
-    out = dx * nx + dy * ny + dz * nz
-    # Between samples the surface goes on: only what exceeds their spacing is off the surface.
-    along = max(0.0, np.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - out * out)) - spacing)
-    cost = (out * out + along * along) / (sigma * sigma)
-    if use_axis:
-        facing = -(nx * axis[0] + ny * axis[1] + nz * axis[2])
-        if facing < np.cos(free_angle):
-            cost += ((np.arccos(max(-1.0, facing)) - free_angle) / angle) ** 2
-    return float(-0.5 * cost)
+    """Nats of a place at the sample that explains it best, or ``best`` where none does better."""
+    least_facing, square = np.cos(free_angle), sigma * sigma
+    ax, ay, az = axis[0], axis[1], axis[2]
+    most = -2.0 * best
+    for sample in samples:
+        dx, dy, dz = x - points[sample, 0], y - points[sample, 1], z - points[sample, 2]
+        nx, ny, nz = normals[sample, 0], normals[sample, 1], normals[sample, 2]
+        out = dx * nx + dy * ny + dz * nz
+        cost = out * out / square
+        # Most samples are given up here: roots and angles are for the few that are near.
+        if cost >= most:
+            continue
+        # Between samples the surface goes on: only what exceeds their spacing is off the surface.
+        aside = dx * dx + dy * dy + dz * dz - out * out
+        if aside > spacing * spacing:
+            along = np.sqrt(aside) - spacing
+            cost += along * along / square
+        if use_axis:
+            facing = -(nx * ax + ny * ay + nz * az)
+            if facing < least_facing and cost < most:
+                cost += ((np.arccos(max(-1.0, facing)) - free_angle) / angle) ** 2
+        most = min(most, cost)
+    return float(-0.5 * most)
 
 
 @compiled
@@ -184,7 +200,7 @@ def _geometry_scores(
     use_axis: bool,
     within: float,
 ) -> FloatArray:
-    contacts = offsets.shape[1]
+    contacts, one = offsets.shape[1], np.empty(1, np.int64)
     scores = np.empty(len(samples))
     leader = -np.inf
     for n in range(len(samples)):
@@ -209,19 +225,18 @@ def _geometry_scores(
             if sample < 0:
                 total -= cap
                 continue
+            one[0] = sample
             axis = axes[j, k]
-            best = _fit(
-                points, normals, spacing, sample, x, y, z, axis, sigmas[k], free_angle, angle, use_axis
+            best = _best_fit(
+                points, normals, spacing, one, x, y, z, axis, sigmas[k], free_angle, angle, use_axis, -cap
             )
             # Near an edge the nearest sample may lie on the other face.
-            if use_axis and k != anchor and best < -0.5:
-                for m in range(neighbours.shape[1]):
-                    other = neighbours[sample, m]
-                    fit = _fit(
-                        points, normals, spacing, other, x, y, z, axis, sigmas[k], free_angle, angle, use_axis
-                    )
-                    best = max(best, fit)
-            total += max(best, -cap)
+            if use_axis and k != anchor and best < _GOOD:
+                about = neighbours[sample]
+                best = _best_fit(
+                    points, normals, spacing, about, x, y, z, axis, sigmas[k], free_angle, angle, True, best
+                )
+            total += best
         scores[n] = total
         leader = max(leader, total)
     return scores

@@ -10,16 +10,15 @@ from experiments.contact_localization.experiment import ContactMotion
 from experiments.contact_localization.sites import Presses, Site, plan_sites
 from experiments.contact_localization.strike import StrikeMotion, planner
 from harness.arrays import FloatArray
-from harness.errors import WrongUse
 from harness.mesh import Mesh
 from harness.scene import SceneFile
 from harness.sim.height_map import RasterMesh
 from harness.station_file import Station
 from harness.twin.bench import TwinBench
+from harness.twin.bench_of import twin_of
 from harness.twin.motion import PlannedContact, plan_contact, reachable
 from harness.twin.rehearsal import RehearsalReport, Segment, rehearse
 from harness.twin.strike_motion import PlannedStrike, StrikePlanner
-from harness.twin.ways import connect
 
 HOME = np.radians([0.0, -90.0, 60.0, -60.0, -90.0, 0.0])
 """rad: the gel above and behind the object, pointing down; where the first travel starts."""
@@ -65,24 +64,6 @@ class RunPlan:
             motions += contact.segments(k)
             motions += self.strikes[k].segments(k) if self.strikes else ()
         return motions
-
-
-def twin_of(scene: SceneFile, station: Station, mesh: Mesh) -> TwinBench:
-    """The bench as the scene and the station state it."""
-    safety = station.arm.safety
-    return TwinBench(
-        station.arm.model,
-        station.flange_from_gel,
-        station.gel.sensor,
-        mesh,
-        scene.base_from_object(mesh),
-        table_height=scene.table.height,
-        pedestal_radius=0.5 * scene.support.width,
-        joint_range=np.array([safety.joint_low, safety.joint_high]),
-        flange_from_hammer=station.flange_from_hammer,
-        workspace=np.array([safety.workspace_low, safety.workspace_high]),
-        tool_points=station.tool_points,
-    )
 
 
 def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> RunPlan:
@@ -161,33 +142,3 @@ class Itinerary:
         if not self.contacts:
             return HOME
         return self.strikes[-1].ready_joints if self.strikes else self.contacts[-1].stand_off_joints
-
-
-def way_between(bench: TwinBench, here: FloatArray, planned: FloatArray) -> FloatArray:
-    """From where the arm is to the end of a planned travel, hitting nothing.
-
-    Straight to its end where there is a natural way; else onto the travel, as late as can be, and
-    along it; else by a search.
-
-    Args:
-        bench: the twin.
-        here: ``(6,)`` rad.
-        planned: ``(n, 6)`` rad: the travel, the posture that it starts at first.
-
-    Returns:
-        ``(m, 6)`` rad, the last of them the travel's end.
-
-    Raises:
-        WrongUse: there is no such way.
-    """
-    for thorough in (False, True):
-        for k in reversed(range(len(planned))):
-            way = connect(bench, here, planned[k], thorough=thorough)
-            if way is not None:
-                return np.concatenate([way, planned[k + 1 :]])
-    meeting = " and ".join(f"the {hit.first} is in the {hit.second}" for hit in bench.hits(here))
-    raise WrongUse(
-        "no way was found from where the arm is to the first contact"
-        + (f" (by the twin {meeting} there)" if meeting else "")
-        + "; move it by hand to a place above the object, clear of the table, and start again"
-    )

@@ -19,7 +19,7 @@ from experiments.contact_localization.estimate import Estimate
 from experiments.contact_localization.experiment import ContactLocalization
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model_of import model_of_run
-from experiments.contact_localization.planning import RunPlan, plan_run, twin_of, way_between
+from experiments.contact_localization.planning import RunPlan, plan_run
 from experiments.contact_localization.report_of import report_of
 from experiments.contact_localization.result import Scored, result_of
 from experiments.contact_localization.sound_gate import doubts_of_sound
@@ -40,6 +40,7 @@ from harness.sim.scene_object import KnownObject, known_object
 from harness.station import Bench, RunContext, open_station
 from harness.station_file import Station
 from harness.symmetry import find_symmetries
+from harness.twin.bench_of import twin_of, way_between
 
 NAME = "contact-localization"
 

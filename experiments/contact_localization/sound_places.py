@@ -54,6 +54,9 @@ def sound_nats(
     return term.log_likelihood(*strike_places(search, struck, gels, yaws), between)
 
 
+_WORTH_KEEPING = 18.0
+"""Nats behind the best: all hypotheses beyond together weigh less than a thousandth of it."""
+
 ANCHORS = 2
 """Contacts that the others hang on in turn."""
 
@@ -78,4 +81,4 @@ def by_sound(
     parts = [search.places(members, int(anchor), use_axis, most) for anchor in carriers]
     gels, yaws, places = (np.concatenate(column) for column in zip(*parts, strict=True))
     total = places + sound_nats(search, term, struck, gels, yaws)
-    return Hypotheses(gels, yaws, total - total.max())
+    return Hypotheses(gels, yaws, total - total.max()).best(_WORTH_KEEPING, len(total))

@@ -22,7 +22,7 @@ from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.model_of import model_of_scene
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.planning import plan_run, way_between
+from experiments.contact_localization.planning import plan_run
 from experiments.contact_localization.result import fit_of
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.sound_mfcc import MfccTable, mfcc_filter
@@ -38,6 +38,7 @@ from harness.station import RunContext
 from harness.station_file import Station
 from harness.step_file import Step, StepRecord
 from harness.symmetry import SymmetryGroup, find_symmetries
+from harness.twin.bench_of import way_between
 from mocks.in_process import in_process_bench
 
 METHODS = ("random", "geometry", "geometry + axis", "paper's touch filter", "touch")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.arrays import FloatArray
+from harness.arrays import FloatArray, IntArray
 from harness.mesh import Mesh
 from harness.symmetry import find_symmetries
 
@@ -44,6 +44,24 @@ class Turning:
         if self.fold == 0:
             return np.asarray(2.0 * np.pi * parts)
         return np.asarray(np.floor(self.fold * parts) * self.period)
+
+    def copies(self, weights: FloatArray, most: int) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Hypotheses repeated under turns of the group, the heavier the more often.
+
+        The few hypotheses that sound leaves would otherwise stand for as few turns.
+
+        Args:
+            weights: ``(n,)``, summing to 1.
+            most: no copy weighs more than one part in so many.
+
+        Returns:
+            ``(c,)`` whose copy each is, rising; ``(c,)`` rad of its turn; ``(c,)`` weights, summing to 1.
+        """
+        if self.fold == 1:
+            return np.arange(len(weights)), np.zeros(len(weights)), weights
+        each = np.ceil(weights * most).clip(min=1.0).astype(np.int64)
+        owners = np.repeat(np.arange(len(each)), each)
+        return owners, self.spread(len(owners)), (weights / each)[owners]
 
     def turned(self, points: FloatArray, angles: FloatArray) -> FloatArray:
         """``(n, 3)`` points in the object's frame, each turned by its own of ``(n,)`` rad."""

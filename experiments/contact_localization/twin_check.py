@@ -3,10 +3,10 @@
 import numpy as np
 
 from experiments.contact_localization.answer import Answer
-from experiments.contact_localization.planning import twin_of
 from harness.geometry import rotation_from_quaternion, transform
 from harness.report.data import TwinDeviation
 from harness.run_folder import RunFiles
+from harness.twin.bench_of import twin_of
 from harness.twin.compare import compare_arm, compare_contact
 from harness.twin.rehearsal import predict_contact
 

@@ -57,6 +57,23 @@ def test_turns_belong_to_the_group_and_are_used_evenly(fold: int) -> None:
     assert len(used) == (12 if fold == 0 else fold)
 
 
+@pytest.mark.parametrize("fold", [0, 1, 2, 4])
+@pytest.mark.parametrize("count", [1, 3, 500])
+def test_copies_weigh_what_they_are_copies_of_and_fill_every_turn(fold: int, count: int) -> None:
+    weights = np.random.default_rng(count).dirichlet(np.ones(count))
+    turning = Turning(np.zeros(3), UP, fold)
+    owners, turns, shares = turning.copies(weights, 4000)
+    assert np.bincount(owners, shares) == pytest.approx(weights)
+    assert np.all(np.diff(owners) >= 0)
+    if fold == 1:
+        assert np.all(turns == 0.0)
+        return
+    assert shares.max() <= 1.0 / 4000
+    parts = fold or 40
+    filled = np.bincount(np.floor(turns / (2.0 * np.pi) * parts + 1e-9).astype(int), shares)
+    assert filled == pytest.approx(np.full(parts, 1.0 / parts), rel=0.1)
+
+
 def test_a_turned_point_keeps_its_height_and_its_distance_from_the_line() -> None:
     rng = np.random.default_rng(0)
     points, turning = rng.normal(size=(50, 3)), Turning(rng.normal(size=3), UP, 0)
