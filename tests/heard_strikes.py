@@ -5,13 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from experiments.contact_localization.experiment import ContactLocalization
-from experiments.contact_localization.planning import RunPlan, way_between
+from experiments.contact_localization.planning import RunPlan
 from harness.acquisition import Strike, strike_from_readings
 from harness.arrays import AnyArray
 from harness.reading import Reading
 from harness.station import Bench
 from harness.station_file import Station
 from harness.step_file import Step
+from harness.twin.bench_of import way_between
 
 Readings = dict[str, Reading]
 

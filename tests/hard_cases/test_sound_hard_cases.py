@@ -15,7 +15,7 @@ from experiments.contact_localization.levels import Levels, Senses
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.model_of import model_of_scene
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.planning import RunPlan, plan_run, way_between
+from experiments.contact_localization.planning import RunPlan, plan_run
 from experiments.contact_localization.sound_gate import doubts_of_sound
 from harness.acquisition import Strike
 from harness.arrays import FloatArray
@@ -27,6 +27,7 @@ from harness.sim.scene_object import known_object
 from harness.station import RunContext
 from harness.station_file import Station, load_station, station_path
 from harness.step_file import Step, StepRecord
+from harness.twin.bench_of import way_between
 from mocks.in_process import in_process_bench
 
 pytestmark = pytest.mark.timeout(300, func_only=True)  # on a cold machine the modes are computed first

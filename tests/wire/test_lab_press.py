@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.experiment import ContactLocalization, Speeds
-from experiments.contact_localization.planning import RunPlan, plan_run, way_between
+from experiments.contact_localization.planning import RunPlan, plan_run
 from harness.arrays import FloatArray
 from harness.gap import load_gap
 from harness.geometry import rotation_from_quaternion, transform
@@ -26,6 +26,7 @@ from harness.sim.scene_object import known_object
 from harness.station import Bench, RunContext, open_station
 from harness.station_file import Station
 from harness.step_file import Step
+from harness.twin.bench_of import way_between
 from mocks.gelsight_stream import encode
 from mocks.in_process import in_process_bench
 from mocks.lab_scene import nominal_bench

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.experiment import ContactLocalization, Speeds
-from experiments.contact_localization.planning import RunPlan, plan_run, way_between
+from experiments.contact_localization.planning import RunPlan, plan_run
 from experiments.contact_localization.strike import AFTER, BEFORE, POSE
 from harness.acquisition import strike_from_readings
 from harness.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
@@ -23,6 +23,7 @@ from harness.sim.scene_object import known_object
 from harness.station import STRIKE, Bench, RunContext, open_station
 from harness.station_file import Station, load_station
 from harness.step_file import Step
+from harness.twin.bench_of import way_between
 from mocks.in_process import in_process_bench
 
 ROOT = Path(__file__).parents[2]
