@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from harness.arrays import FloatArray, IntArray
@@ -12,11 +13,14 @@ from harness.materials import Material
 from harness.mesh import Mesh
 from harness.sim.modal_solve import Elasticity
 from harness.sim.surface_measure import wall_thickness
-from harness.sim.tetrahedra import Tetrahedra, tetrahedra
+from harness.sim.tetrahedra import Tetrahedra, signed_volumes, tetrahedra
 
 _WAVES = 128
 _THICKEST = 1.5
 """Of the median wall: behind a rim, straight inwards is along the wall and not across it."""
+
+_EASINGS = 20
+"""Rounds of carrying a cell whole; each takes in those that the last one turned."""
 
 _ROUNDS = 4
 """Of averaging a node's wall with its neighbours', so that the surface stays smooth."""
@@ -43,8 +47,8 @@ def perturbed(nominal: Tetrahedra, wall_change: float) -> Tetrahedra:
     outer = np.unique(surface.faces)
     normals = surface.vertex_normals[outer]
     wall = _smoothed(surface, outer, wall_thickness(surface, surface.vertices[outer], normals))
-    moved = nominal.nodes + _extended(nominal, outer, 0.5 * wall_change * wall[:, None] * normals)
-    made = tetrahedra(moved, nominal.cells)
+    way = _extended(nominal, outer, 0.5 * wall_change * wall[:, None] * normals)
+    made = tetrahedra(nominal.nodes + _eased(nominal, way), nominal.cells)
     if not np.array_equal(made.cells, nominal.cells):
         raise MeshRefused(
             f"a wall changed by {wall_change:.1%} turns a cell inside out; change it less, or mesh the "
@@ -111,6 +115,26 @@ def _extended(nominal: Tetrahedra, outer: IntArray, way: FloatArray) -> FloatArr
     within = sp.csc_array(balance[inner][:, inner])
     whole[inner] = splu(within).solve(-np.asarray(balance[inner][:, outer] @ way))
     return whole
+
+
+def _eased(nominal: Tetrahedra, way: FloatArray) -> FloatArray:
+    """``(n, 3)`` m: the same ways, but for cells that they would turn inside out: those are carried whole.
+
+    A sliver turns inside out for a hundredth of a millimetre. Its nodes all go their mean way, so that it
+    keeps its shape; where that flattens a cell beside it, the two are carried together.
+    """
+    eased, carried = way, np.zeros(len(nominal.cells), dtype=np.bool_)
+    for _ in range(_EASINGS):
+        turned = signed_volumes(nominal.nodes + eased, nominal.cells) <= 0.0
+        if not turned.any():
+            break
+        carried |= turned
+        rigid = nominal.cells[carried]
+        group = connected_components(_graph(rigid, len(nominal.nodes)))[1]
+        count = np.bincount(group)
+        mean = np.column_stack([np.bincount(group, column) / count for column in way.T])
+        eased = mean[group]
+    return eased
 
 
 def _graph(cells: IntArray, count: int) -> Any:

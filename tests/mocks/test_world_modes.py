@@ -7,7 +7,7 @@ from volume_meshes import box
 from harness.errors import MeshRefused
 from harness.materials import MATERIALS
 from harness.sim.modal import solve_modes
-from harness.sim.tetrahedra import Tetrahedra
+from harness.sim.tetrahedra import Tetrahedra, tetrahedra
 from mocks.world_modes import perturbed, smooth_field, uneven
 
 CERAMIC = MATERIALS["ceramic"]
@@ -42,6 +42,24 @@ def test_no_change_is_none(plate: Tetrahedra) -> None:
     assert perturbed(plate, 0.0).nodes == pytest.approx(plate.nodes, abs=1e-15)
     with pytest.raises(MeshRefused, match="less than half"):
         perturbed(plate, -0.6)
+
+
+@pytest.mark.parametrize("cell", [0, 5, 600])
+@pytest.mark.parametrize("change", [-0.08, 0.08])
+def test_a_sliver_is_carried_along_and_not_turned_inside_out(
+    plate: Tetrahedra, cell: int, change: float
+) -> None:
+    nodes, corners = plate.nodes.copy(), plate.cells[cell]
+    a, b, c, top = nodes[corners]
+    out = np.cross(b - a, c - a)
+    out /= np.linalg.norm(out)
+    nodes[corners[3]] -= (1.0 - 1e-4) * ((top - a) @ out) * out
+    sliver = tetrahedra(nodes, plate.cells)
+    made = perturbed(sliver, change)
+    assert (made.cells == sliver.cells).all()
+    assert (made.volumes > 0.0).all()
+    ways, elsewhere = made.nodes - sliver.nodes, perturbed(plate, change).nodes - plate.nodes
+    assert np.count_nonzero(np.abs(ways - elsewhere).max(axis=1) > 0.02e-3) <= 8
 
 
 def test_nodes_of_the_middles_follow_the_deformation(plate: Tetrahedra) -> None:
