@@ -50,12 +50,16 @@ class SensorGap(StrictModel):
         tilt_per_contact: rad, about gel x and y each, per contact.
         image_yaw: rad, of the image about the gel's z, per run.
         gel_centre: m, per axis of the gel's frame, per run.
+        pitch: relative, of the length of gel that a pixel shows, per run.
+        aspect: relative, of a pixel's height against its width, per run.
     """
 
     tilt: Annotated[Angle, Nonnegative]
     tilt_per_contact: Annotated[Angle, Nonnegative]
     image_yaw: Annotated[Angle, Nonnegative]
     gel_centre: Annotated[Length, Nonnegative]
+    pitch: Annotated[Ratio, Nonnegative] = 0.0
+    aspect: Annotated[Ratio, Nonnegative] = 0.0
 
 
 class GelGap(StrictModel):

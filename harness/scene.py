@@ -93,7 +93,7 @@ class SceneObject(StrictModel):
         mesh = data.get("mesh") if isinstance(data, dict) else None
         if not (isinstance(mesh, str) and mesh.startswith(BUILTIN)):
             return data
-        from harness.objects.household import MATERIALS as OWN
+        from harness.objects.builtin import MATERIALS as OWN
 
         name = mesh.removeprefix(BUILTIN)
         if name not in OWN:

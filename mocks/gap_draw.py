@@ -19,7 +19,7 @@ from harness.geometry import rotation_about, rotation_from_vector, transform
 from mocks.world_mesh import ShapeDeviation
 
 # What a stream of numbers is for; each stays what it is when another is added.
-_OBJECT, _SENSOR, _GEL, _SHAPE, _SHADING, _ARM, _TILT, _OFFSET, _PIXELS = range(9)
+_OBJECT, _SENSOR, _GEL, _SHAPE, _SHADING, _ARM, _TILT, _OFFSET, _PIXELS, _CAMERA = range(10)
 
 _VERTICAL = np.array([0.0, 0.0, 1.0])
 _SHADING_SHARE = 0.15
@@ -37,6 +37,8 @@ class RunDraw:
         sensor_tilt: ``(2,)`` rad, of the gel about its x and y.
         image_yaw: rad, of the gel about its z.
         gel_centre: ``(3,)`` metres, of the gel in its nominal frame.
+        pitch: length of gel that a pixel shows from column to column, over its nominal length.
+        aspect: a pixel's height over its width.
         height_gain: true indentation over what the calibration's gel would show.
         scale: true size of the object over its nominal size.
     """
@@ -47,6 +49,8 @@ class RunDraw:
     sensor_tilt: FloatArray
     image_yaw: float
     gel_centre: FloatArray
+    pitch: float
+    aspect: float
     height_gain: float
     scale: float
 
@@ -98,6 +102,7 @@ class GapDraw:
         """The draws that hold for the whole run."""
         thing, sensor = self.gap.object, self.gap.sensor
         of_object, of_sensor, of_gel = self.random(_OBJECT), self.random(_SENSOR), self.random(_GEL)
+        of_camera = self.random(_CAMERA)
         return RunDraw(
             position=read_only(thing.position * of_object.standard_normal(3)),
             yaw=thing.yaw * of_object.standard_normal(),
@@ -105,6 +110,8 @@ class GapDraw:
             sensor_tilt=read_only(sensor.tilt * of_sensor.standard_normal(2)),
             image_yaw=sensor.image_yaw * of_sensor.standard_normal(),
             gel_centre=read_only(sensor.gel_centre * of_sensor.standard_normal(3)),
+            pitch=1.0 + sensor.pitch * of_camera.standard_normal(),
+            aspect=1.0 + sensor.aspect * of_camera.standard_normal(),
             height_gain=1.0 + self.gap.gel.height_gain * of_gel.standard_normal(),
             scale=1.0 + self.gap.shape.scale * self.random(_SHAPE, 0).standard_normal(),
         )
@@ -151,6 +158,8 @@ class GapDraw:
             "sensor_tilt_rad": run.sensor_tilt.tolist(),
             "image_yaw_rad": run.image_yaw,
             "gel_centre_m": run.gel_centre.tolist(),
+            "pitch_over_nominal": run.pitch,
+            "aspect": run.aspect,
             "height_gain": run.height_gain,
             "gel_skirt_m": self.gap.gel.skirt,
             "calibration": self.gap.gel.calibration,

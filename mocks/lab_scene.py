@@ -15,7 +15,7 @@ import numpy as np
 from harness.arrays import FloatArray
 from harness.errors import WrongUse
 from harness.mesh import Mesh
-from harness.objects.household import build
+from harness.objects.builtin import build
 from harness.scene import SceneFile, scene_from_json
 from harness.station_file import Station, station_from_json
 from mocks.world import Camera, Furniture, NominalBench

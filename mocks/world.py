@@ -16,9 +16,10 @@ from harness.gap import Gap
 from harness.geometry import apply, inverse, transform, translation
 from harness.mesh import Mesh
 from harness.sensor import TactileSensor
-from harness.sim.height_map import RasterMesh, depth_image, height_maps, penetration
+from harness.sim.height_map import RasterMesh, depth_image, penetration
 from mocks.gap_draw import GapDraw
 from mocks.gel_contact import GelContact
+from mocks.picture_grid import PictureGrid
 from mocks.scene_view import Body, SceneView, box
 from mocks.world_gel import WorldGel
 from mocks.world_mesh import nearest_face, shares_of_corners, split_long_edges
@@ -101,7 +102,7 @@ class World:
         seed: of the run.
 
     Attributes:
-        sensor: the make of the gel.
+        sensor: the gel as it was made: the make's, but for its pitch.
         nominal: the object's drawing, on the world's own tessellation.
         mesh: the true object, in its own frame; the same faces.
         scale: of the true object.
@@ -115,7 +116,8 @@ class World:
         self._bench = bench
         self._draw = GapDraw(gap, seed)
         self._flange_from_gel: dict[int, FloatArray] = {}
-        self.sensor = bench.sensor
+        self._grid = PictureGrid.drawn(bench.sensor, self._draw.run.pitch, self._draw.run.aspect)
+        self.sensor = self._grid.sensor
         edges = bench.mesh.corners - np.roll(bench.mesh.corners, 1, axis=1)
         longest = float(np.linalg.norm(edges, axis=-1).max())
         self.nominal = split_long_edges(bench.mesh, min(LONGEST_EDGE, CUT * longest))
@@ -128,7 +130,8 @@ class World:
         self._middle = apply(self.base_from_object, self.mesh.bounds.mean(axis=0)[None])[0]
         tool = float(np.linalg.norm(bench.flange_from_gel[:3, 3]))
         self._touching_distance = self.mesh.diagonal / 2 + tool + float(np.hypot(*self.sensor.window)) + REACH
-        self._gel = WorldGel(self.sensor, gap.gel, bench.calibration)
+        steeper = bench.sensor.pitch / self._grid.mean_pitch
+        self._gel = WorldGel(self.sensor, gap.gel, bench.calibration, steeper)
         self.background = self._gel.background
         self._shading = self._draw.shading(self.sensor.rows, self.sensor.columns)
         self._contact = GelContact(self.mesh, self.sensor.window, SPRING_SPACING, REACH)
@@ -281,7 +284,6 @@ class World:
 
     def _indentation(self, base_from_flange: FloatArray, step: int) -> FloatArray:
         gel_from_object = inverse(self._object_from_gel(base_from_flange, step))
-        indentation: FloatArray = penetration(
-            height_maps(self._raster, gel_from_object[None], self.sensor), self.sensor
-        )[0]
+        gaps = self._grid.gaps(self._raster, gel_from_object)
+        indentation: FloatArray = penetration(gaps[None], self.sensor)[0]
         return indentation

@@ -31,15 +31,17 @@ class WorldGel:
         sensor: make and geometry.
         gap: how this gel differs from its model.
         calibration: that estimators believe in, a shipped name or a path.
+        steeper: the pitch that colours are stated for over this gel's own: a slope in pixels.
 
     Attributes:
         background: ``(rows, columns, 3)``, the picture of the untouched gel.
         calibration: whose colours this gel has.
     """
 
-    def __init__(self, sensor: TactileSensor, gap: GelGap, calibration: str) -> None:
+    def __init__(self, sensor: TactileSensor, gap: GelGap, calibration: str, steeper: float = 1.0) -> None:
         self._sensor = sensor
         self.calibration = _calibration(gap, calibration)
+        self._steeper = steeper
         self._skirt = skirt_of(gap.skirt, sensor.pitch)
         self._optics = Optics(self.calibration, "exact", -rest_surface(sensor))
         self.background: ByteArray = self.calibration.background
@@ -55,7 +57,10 @@ class WorldGel:
         touched = penetration > 0.0
         shown = np.where(touched, np.maximum(gain * penetration + noise, 0.0), 0.0)
         held, _ = over_range(shown[None], self._sensor)
-        image: ByteArray = self._optics.render(deform(held, self._skirt)).images[0]
+        deformed = deform(held, self._skirt)
+        if self._steeper != 1.0:
+            deformed = self._steeper * deformed
+        image: ByteArray = self._optics.render(deformed).images[0]
         return image
 
 

@@ -7,7 +7,7 @@ from harness.materials import MATERIALS
 from harness.mesh import Mesh
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import require_same
-from harness.objects.household import build
+from harness.objects.builtin import build
 from harness.scene import SceneFile
 from harness.sim.intake import IntakeReport, take_in
 from harness.sim.walls import walled

@@ -9,7 +9,7 @@ import pytest
 from harness.errors import WrongUse
 from harness.geometry import apply, rotation_about
 from harness.mesh import Mesh
-from harness.objects.household import MATERIALS
+from harness.objects.builtin import MATERIALS
 from harness.scene import load_scene, scene_from_json, scene_from_options
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))

@@ -1,0 +1,68 @@
+"""Things that are pressed to calibrate a sensor: their size is known, and nobody asks what they are."""
+
+from collections.abc import Callable
+from types import MappingProxyType
+
+import numpy as np
+
+from harness.arrays import FloatArray
+from harness.errors import WrongUse
+from harness.mesh import Mesh
+from harness.objects.solid import lathe, outward
+
+BALL_RADIUS = 2e-3
+"""Metres, of ``"builtin:ball"`` at scale 1: ObjectFolder pressed one of 4 mm across."""
+
+_STEM = 0.65
+"""Of the ball's radius: the stem that it stands on, thin enough to stay behind the ball in the gel."""
+
+_HEIGHT = 10.0
+"""Ball radii from the foot to the top: the housing beside the gel stays clear of what holds the foot."""
+
+_FINER = 1.0 / 40.0
+"""Of the edge asked for: that of a household object would leave a ball a cube."""
+
+
+def ball(edge: float = 3e-3) -> Mesh:
+    """A ball of radius ``BALL_RADIUS`` on a stem, standing on z = 0 about the z axis, in metres.
+
+    The ball's top is ``_HEIGHT`` radii above the foot. At the usual edge the facets stay within a
+    micrometre of the sphere.
+
+    Args:
+        edge: metres, as ``harness.objects.household.build`` takes it; a fortieth of it is taken.
+
+    Returns:
+        A watertight mesh, outward.
+    """
+    fine = edge * _FINER
+    return outward(lathe(_profile(fine), fine, np.mod(7.318281828 * fine / BALL_RADIUS, 1.0)))
+
+
+def _profile(edge: float) -> FloatArray:
+    """``(n, 2)`` metres (distance from the axis, height): foot, stem, ball, top."""
+    centre = (_HEIGHT - 1.0) * BALL_RADIUS
+    from_below = np.arcsin(_STEM)
+    steps = int(np.ceil((np.pi - from_below) * BALL_RADIUS / edge))
+    turned = np.linspace(from_below, np.pi, steps + 1)
+    arc = np.column_stack([BALL_RADIUS * np.sin(turned), centre - BALL_RADIUS * np.cos(turned)])
+    arc[-1, 0] = 0.0
+    foot = np.array([[0.0, 0.0], [_STEM * BALL_RADIUS, 0.0]])
+    return np.vstack([foot, arc])
+
+
+_BUILDERS: MappingProxyType[str, Callable[[float], Mesh]] = MappingProxyType({"ball": ball})
+
+MATERIALS: MappingProxyType[str, str] = MappingProxyType({"ball": "steel"})
+"""What each target is made of."""
+
+
+def build_target(name: str, edge: float = 3e-3) -> Mesh:
+    """A target in metres.
+
+    Raises:
+        WrongUse: no such target.
+    """
+    if name not in _BUILDERS:
+        raise WrongUse(f"no built-in target {name!r}; there are {', '.join(_BUILDERS)}")
+    return _BUILDERS[name](edge)
