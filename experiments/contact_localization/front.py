@@ -1,6 +1,6 @@
 """The measured settings that a run goes by, and what is asked of its answer."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -71,13 +71,11 @@ class Front:
         Raises:
             WrongUse: there are none.
         """
-        points = tuple(point for point in self.points if not needs_sound(point.levels))
-        if not points:
-            raise WrongUse(
-                "what accuracy costs was measured by sound alone, and this run was not heard; measure "
-                "touch with `touchstone cost contact-localization --sense touch`"
-            )
-        return replace(self, points=points)
+        return self._without(
+            needs_sound,
+            "what accuracy costs was measured by sound alone, and this run was not heard; measure "
+            "touch with `touchstone cost contact-localization --sense touch`",
+        )
 
     def solved(self) -> "Front":
         """Those settings whose modes, if any, do not come from an ObjectFile.
@@ -85,12 +83,16 @@ class Front:
         Raises:
             WrongUse: there are none.
         """
-        points = tuple(point for point in self.points if not needs_objectfile(point.levels))
+        return self._without(
+            needs_objectfile,
+            "what accuracy costs was measured with modes out of ObjectFiles alone, and this scene names "
+            "none; name one, or measure without with `touchstone cost contact-localization`",
+        )
+
+    def _without(self, needs: Callable[[Mapping[str, Level]], bool], otherwise: str) -> "Front":
+        points = tuple(point for point in self.points if not needs(point.levels))
         if not points:
-            raise WrongUse(
-                "what accuracy costs was measured with modes out of ObjectFiles alone, and this scene names "
-                "none; name one, or measure without with `touchstone cost contact-localization`"
-            )
+            raise WrongUse(otherwise)
         return replace(self, points=points)
 
 
