@@ -4,7 +4,7 @@ What is refused: numbers kept in other files, operations beyond a list (so no lo
 others), weights that are not finite, results whose size cannot be known or is absurd.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import onnx
@@ -12,6 +12,7 @@ from google.protobuf.message import DecodeError
 from onnx import GraphProto, ModelProto, TensorProto, TypeProto, helper, numpy_helper
 
 from harness.errors import DataRefused
+from harness.objectfile.entries import Tensor
 
 MOST_NUMBERS = 2**24
 """In any one value that a graph computes for one query."""
@@ -156,6 +157,22 @@ def declared(model: ModelProto) -> dict[str, tuple[str, tuple[int | str, ...]]]:
         )
         found[value.name] = (str(np.dtype(helper.tensor_dtype_to_np_dtype(tensor.elem_type))), sizes)
     return found
+
+
+def require_declared(model: ModelProto, tensors: Sequence[Tensor], name: str) -> None:
+    """Refuse a graph that takes or gives something else than is described.
+
+    Raises:
+        DataRefused: naming the first value that differs.
+    """
+    found = declared(model)
+    described = {tensor.name: (tensor.dtype, tuple(tensor.shape)) for tensor in tensors}
+    for value in dict.fromkeys((*described, *found)):
+        if described.get(value) != found.get(value):
+            raise DataRefused(
+                f"{name}: {value!r} is {found.get(value, 'not')} in the graph and "
+                f"{described.get(value, 'not')} in object.json; they were not built together, build again"
+            )
 
 
 def _first_line(error: Exception) -> str:

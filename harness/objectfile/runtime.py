@@ -14,7 +14,7 @@ import onnxruntime
 from harness.arrays import AnyArray
 from harness.errors import DataRefused, WrongUse
 from harness.objectfile.entries import Input, NetworkEntry, Tensor
-from harness.objectfile.graph_check import checked_graph, declared
+from harness.objectfile.graph_check import checked_graph, require_declared
 
 _FATAL = 4
 """onnxruntime's severity; what goes wrong is raised, and said once."""
@@ -39,7 +39,7 @@ class Network:
     ) -> None:
         if threads < 1:
             raise WrongUse(f"{threads} threads compute nothing; say 1 or more")
-        _check_declared(declared(checked_graph(data, name)), (*inputs, *outputs), name)
+        require_declared(checked_graph(data, name), (*inputs, *outputs), name)
         self.name, self.inputs, self.outputs = name, tuple(inputs), tuple(outputs)
         self._session = _session(data, name, threads)
 
@@ -79,15 +79,3 @@ def _failed(name: str, error: Exception) -> DataRefused:
     """Its exceptions are classes of its own for each kind of failure, with no common base."""
     reason = " ".join(str(error).split())[:200]
     return DataRefused(f"{name} cannot be run by onnxruntime ({reason}); build the object again")
-
-
-def _check_declared(
-    found: Mapping[str, tuple[str, tuple[int | str, ...]]], tensors: Sequence[Tensor], name: str
-) -> None:
-    described = {tensor.name: (tensor.dtype, tuple(tensor.shape)) for tensor in tensors}
-    for value in dict.fromkeys((*described, *found)):
-        if described.get(value) != found.get(value):
-            raise DataRefused(
-                f"{name}: {value!r} is {found.get(value, 'not')} in the graph and "
-                f"{described.get(value, 'not')} in object.json; they were not built together, build again"
-            )

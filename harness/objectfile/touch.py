@@ -25,6 +25,7 @@ from harness.sim.height_map import RasterMesh, height_maps, penetration
 
 if TYPE_CHECKING:
     from harness.objectfile.runtime import Network
+    from harness.objectfile.touch_compiled import CompiledCodes
 
 TouchLevel = Literal["codes", "perceptron", "reference"]
 
@@ -44,9 +45,14 @@ class Maps(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class CodeMaps:
-    """Maps from codes of the surface."""
+    """Maps from codes of the surface.
 
-    network: "Network"
+    Attributes:
+        network: the graph of codes, run as it is or compiled.
+        nodes: where the codes belong.
+    """
+
+    network: "Network | CompiledCodes"
     nodes: NodeSearch
 
     def __call__(self, presses: Presses) -> AnyArray:
@@ -153,13 +159,17 @@ def _span(values: FloatArray) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) -> ObjectTouch:
+def open_touch(
+    of: ObjectFile, level: TouchLevel = "codes", threads: int = 1, compiled: bool = True
+) -> ObjectTouch:
     """The touch of an object at a level.
 
     Args:
         of: an object that has a touch.
         level: ``"codes"``, ``"perceptron"`` or ``"reference"``.
-        threads: that a network may use.
+        threads: that a network, or a batch of presses, may use.
+        compiled: codes in loops made for their graph, where it is one that ``touch_graph`` makes; False runs
+            the graph as it is, as other programs do.
 
     Raises:
         DataRefused: the object has no touch, or not at that level; or a file of it is damaged.
@@ -173,7 +183,7 @@ def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) ->
         case "reference":
             maps = ReferenceMaps(RasterMesh(of.mesh), entry.gel)
         case "codes" if entry.codes is not None:
-            maps = _codes(of, entry.codes, threads)
+            maps = _codes(of, entry, entry.codes, threads, compiled)
         case "perceptron" if entry.perceptron is not None:
             from harness.objectfile.runtime import open_network
 
@@ -186,16 +196,21 @@ def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) ->
     return ObjectTouch(level, entry, SurfaceSearch(of.mesh), maps)
 
 
-def _codes(of: ObjectFile, entry: CodesEntry, threads: int) -> CodeMaps:
-    # What runs graphs is heavy, and the reference needs none of it.
-    from harness.objectfile.runtime import open_network
-
+def _codes(of: ObjectFile, touch: TouchEntry, entry: CodesEntry, threads: int, compiled: bool) -> CodeMaps:
     nodes = nodes_from(of.read(entry.nodes), entry.nodes.file)
     asked = entry.network.inputs[0].domain
     if asked.high is None or asked.high[0] != len(nodes) - 1:
         raise DataRefused(
             f"{entry.nodes.file} has {len(nodes)} nodes, its graph another number; build it again"
         )
-    return CodeMaps(
-        open_network(of.read(entry.network), entry.network, threads), NodeSearch(nodes, entry.most_off_m)
-    )
+    data, search = of.read(entry.network), NodeSearch(nodes, entry.most_off_m)
+    if compiled:
+        # Graphs are heavy to read, and the reference needs none of it.
+        from harness.objectfile.touch_compiled import compiled_codes
+
+        found = compiled_codes(data, entry.network, touch.gel.sensor, touch.gel.skirt, threads)
+        if found is not None:
+            return CodeMaps(found, search)
+    from harness.objectfile.runtime import open_network
+
+    return CodeMaps(open_network(data, entry.network, threads), search)

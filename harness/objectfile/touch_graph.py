@@ -104,9 +104,7 @@ def codes_graph(
     moved = nodes.add("Transpose", nodes.add("Cast", "node_from_gel", to=TensorProto.FLOAT), perm=[0, 2, 1])
     scale = np.array([1.0 / half_width, 1.0 / half_width, 1.0], np.float32)
     motion = _Motion(nodes, nodes.add("Mul", moved, nodes.constant(scale)), sensor)
-    coarse = _COARSE if sensor.rows % _COARSE == 0 and sensor.columns % _COARSE == 0 else 1
-    # A cover is linear between a patch's pixels: half the rays see all of it where they are closer.
-    half = 2 if coarse > 1 and 2.0 * sensor.pitch <= patches.pitch else 1
+    coarse, half = coarseness(patches, sensor)
     along = None
     for _ in range(lookups - 1):
         along = motion.to_height(heights, along, coarse)
@@ -156,6 +154,21 @@ def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
     cover = nodes.add("Gather", nodes.constant(np.hstack([patches.cover, none])), asked, axis=0)
     spread = nodes.add("Cast", nodes.add("Gather", cover, index, axis=1), to=TensorProto.FLOAT)
     return heights, nodes.add("Reshape", spread, _shape(nodes, -1, 1, size, size))
+
+
+def coarseness(patches: PatchCodes, sensor: TactileSensor) -> tuple[int, int]:
+    """Pixels a side to one ray of the first look-ups, and of those of covers."""
+    coarse = _COARSE if sensor.rows % _COARSE == 0 and sensor.columns % _COARSE == 0 else 1
+    # A cover is linear between a patch's pixels: half the rays see all of it where they are closer.
+    return coarse, 2 if coarse > 1 and 2.0 * sensor.pitch <= patches.pitch else 1
+
+
+def ray_places(sensor: TactileSensor, coarse: int) -> tuple[AnyArray, AnyArray]:
+    """Float32 x and y, m, of rays that are ``coarse`` pixels apart."""
+    rows, columns, pitch = sensor.rows // coarse, sensor.columns // coarse, sensor.pitch * coarse
+    x = (np.arange(columns) + 0.5 - columns / 2) * pitch
+    y = (np.arange(rows) + 0.5 - rows / 2) * pitch
+    return x.astype(np.float32), y.astype(np.float32)
 
 
 class _Motion:
@@ -229,10 +242,8 @@ class _Motion:
 
 def _rays(sensor: TactileSensor, coarse: int) -> AnyArray:
     """``(rays, 4)`` float32: places of the gel's plane, homogeneous."""
-    rows, columns, pitch = sensor.rows // coarse, sensor.columns // coarse, sensor.pitch * coarse
-    x = (np.arange(columns) + 0.5 - columns / 2) * pitch
-    y = (np.arange(rows) + 0.5 - rows / 2) * pitch
-    places = np.zeros((rows, columns, 4), np.float32)
+    x, y = ray_places(sensor, coarse)
+    places = np.zeros((len(y), len(x), 4), np.float32)
     places[:, :, 0], places[:, :, 1], places[:, :, 3] = x, y[:, None], 1.0
     return places.reshape(-1, 4)
 
