@@ -1,12 +1,18 @@
 """How far one picture is from another."""
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
-from harness.arrays import AnyArray, BoolArray
+from harness.arrays import AnyArray, BoolArray, FloatArray
 from harness.errors import OutOfDomain
 
 PEAK = 255.0
 """Grey levels from black to white."""
+
+_WINDOW = 1.5
+"""Pixels, sigma of the window, cut off at five: 11 pixels wide."""
+
+_STABLE = ((0.01 * PEAK) ** 2, (0.03 * PEAK) ** 2)
 
 
 def psnr(a: AnyArray, b: AnyArray, where: BoolArray | None = None) -> float:
@@ -33,3 +39,30 @@ def mean_square(a: AnyArray, b: AnyArray, where: BoolArray | None = None) -> flo
     if counted.size == 0:
         raise OutOfDomain("no pixel was chosen to compare two pictures by; choose one or more")
     return float(counted.mean())
+
+
+def ssim(a: AnyArray, b: AnyArray) -> float:
+    """Structural similarity, mean over pixels and channels; 1 where the pictures are the same.
+
+    Wang, Bovik, Sheikh and Simoncelli (2004), equation 13, with their Gaussian window and constants.
+
+    Args:
+        a: ``(rows, columns, 3)`` grey levels of 0 to 255.
+        b: the same shape.
+
+    Raises:
+        OutOfDomain: shapes that disagree.
+    """
+    if a.shape != b.shape or a.ndim != 3:
+        raise OutOfDomain(f"pictures of {a.shape} and {b.shape} pixels cannot be compared")
+    x, y = a.astype(np.float64), b.astype(np.float64)
+    mean_x, mean_y = _blurred(x), _blurred(y)
+    var_x, var_y = _blurred(x * x) - mean_x**2, _blurred(y * y) - mean_y**2
+    both = _blurred(x * y) - mean_x * mean_y
+    alike = (2.0 * mean_x * mean_y + _STABLE[0]) * (2.0 * both + _STABLE[1])
+    of = (mean_x**2 + mean_y**2 + _STABLE[0]) * (var_x + var_y + _STABLE[1])
+    return float((alike / of).mean())
+
+
+def _blurred(picture: FloatArray) -> FloatArray:
+    return np.asarray(gaussian_filter(picture, (_WINDOW, _WINDOW, 0.0), truncate=5.0 / _WINDOW))

@@ -20,10 +20,10 @@ from harness.objectfile.entries import DESCRIPTION
 from harness.objectfile.file import ObjectFile, copied
 from harness.recording import Recording, RunHeader, require_unused
 from harness.scene import SceneFile, scene_from_json
+from harness.sim.lit_calibration import read_calibration
 from harness.sim.scene_object import known_file
 from harness.sim.tactile_calibration import (
     TactileCalibration,
-    load_calibration,
     save_calibration,
     shipped_calibration,
 )
@@ -41,7 +41,7 @@ _NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-python-headless", "mujo
 def station_calibration(station: Station) -> TactileCalibration:
     """The calibration of a station's gel: a file, or one that comes with the package."""
     named = station.gel.calibration
-    return load_calibration(Path(named)) if named.endswith(".npz") else shipped_calibration(named)
+    return read_calibration(Path(named)) if named.endswith(".npz") else shipped_calibration(named)
 
 
 def station_acquisition(scene: SceneFile, station: Station) -> AcquisitionCalibration | None:
@@ -143,7 +143,7 @@ class RunFiles:
     @cached_property
     def calibration(self) -> TactileCalibration:
         """The gel's colours as the estimator knows them."""
-        return load_calibration(self._checked(CALIBRATION))
+        return read_calibration(self._checked(CALIBRATION))
 
     @cached_property
     def acquisition(self) -> AcquisitionCalibration | None:

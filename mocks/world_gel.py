@@ -9,11 +9,11 @@ from harness.gap import GelGap
 from harness.sensor import TactileSensor
 from harness.sim.gel import R15_SKIRT, deform, half_kernel, over_range
 from harness.sim.height_map import rest_surface
+from harness.sim.lit_calibration import read_calibration
 from harness.sim.optics import Optics
 from harness.sim.tactile_calibration import (
     GelSkirt,
     TactileCalibration,
-    load_calibration,
     shipped_calibration,
 )
 
@@ -92,4 +92,4 @@ def _sigma(kernels: tuple[int, ...]) -> float:
 
 def _calibration(gap: GelGap, believed: str) -> TactileCalibration:
     name = WORLD_CALIBRATION if gap.calibration == "other presses" else believed
-    return load_calibration(Path(name)) if Path(name).is_file() else shipped_calibration(name)
+    return read_calibration(Path(name)) if Path(name).is_file() else shipped_calibration(name)

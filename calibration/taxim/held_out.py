@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.taxim.contact_circle import ContactCircle, contact_circle
+from calibration.taxim.light_fit import Light, fit_light, light_shades
 from calibration.taxim.pack import PressPack
 from calibration.taxim.rest import rest_change
 from calibration.taxim.smooth_fit import (
@@ -13,7 +14,6 @@ from calibration.taxim.smooth_fit import (
     contact_pixels,
     fit_smooth,
     refined_centre,
-    residual,
     settled,
 )
 from calibration.taxim.table_fit import fit_table, table_shades
@@ -39,6 +39,7 @@ class Model:
         fit: a contact's offset besides. With it a shift of all centres together is hardly seen in the
             colours, so the centres are those of the contact line.
         circle: the contact line.
+        light: skirt and colours of the smooth level, fitted to the skirt too.
         table: of ``fit``.
         support: of the table.
         rest: ``(rows, columns, 3)`` grey levels, of the untouched gel against the background.
@@ -48,6 +49,7 @@ class Model:
     plain: SmoothFit
     fit: SmoothFit
     circle: ContactCircle
+    light: Light
     table: Float32Array
     support: BoolArray
     rest: FloatArray
@@ -60,7 +62,7 @@ class Score:
 
     Attributes:
         table: of the table, only the centre refitted.
-        smooth: of the smooth model, only the centre refitted.
+        smooth: of the smooth level with the light of a press, at the same centre.
         unrefitted: of the table, with the centre where the detector found it.
         nothing: of no prediction at all, the untouched gel.
     """
@@ -91,7 +93,8 @@ def teach(pack: PressPack, change: FloatArray, ball: float) -> Model:
     plain = settled(pack, clean, plain.centres, circle.radius, ball, PLAIN)
     table, support = fit_table(pack, fit, ball, clean)
     bias = np.median(fit.centres - pack.centres, axis=0)
-    return Model(plain, fit, circle, table, support, rest, np.asarray(bias))
+    light = fit_light(pack, clean, fit.centres, circle.radius, ball)
+    return Model(plain, fit, circle, light, table, support, rest, np.asarray(bias))
 
 
 def held_out(
@@ -130,11 +133,10 @@ def score(
     clean, edge = change - model.rest, model.fit.edge
     start = found + model.bias
     centre = refined_centre(pack, clean, start, model.fit.colours, edge, ball, _SETTLE)
-    smooth_centre = refined_centre(pack, clean, start, model.plain.colours, edge, ball, _SETTLE)
     place, apart = _table_residual(pack, clean, centre, model.table, ball, radius)
     _, guessed = _table_residual(pack, clean, start, model.table, ball, radius)
-    smooth = residual(pack, clean, smooth_centre, model.plain.colours, radius, ball)
     nothing = clean[place[:, 0], place[:, 1]]
+    smooth = light_shades(pack, model.light, centre, place) - nothing
     answer = Score(decibels(apart), decibels(smooth), decibels(guessed), decibels(nothing))
     return answer, place, apart
 

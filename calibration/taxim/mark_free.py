@@ -13,12 +13,14 @@ import numpy as np
 from calibration.taxim.explained import contact_radius, too_large, unexplained
 from calibration.taxim.gates import CONTACT, LEAST_PRESSES, check_set, reached, refusals, sightings
 from calibration.taxim.held_out import WITHIN, Model, Score, held_out, teach
+from calibration.taxim.light_fit import per_metre
 from calibration.taxim.likeness import check_order
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures, Refused, digest
 from calibration.taxim.smooth_fit import changes
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused
+from harness.sim.lit_calibration import LitCalibration
 from harness.sim.tactile_calibration import CalibrationHeader, TactileCalibration
 
 LEAST_GAIN = 12.0
@@ -83,8 +85,9 @@ class MarkFree:
         refused: the others.
         contact_radius: pixels, of the contact line of all presses laid over one another.
         roundness: pixels that this line strays from a circle.
-        lean: rad by which the smooth model's slopes lean against the contact line: without a contact's own
-            dimming it explains it by a shift of the centres.
+        lean: rad by which slopes lean against the contact line where a contact's own dimming has no place
+            in the model, as in the array ``smooth`` that the inverse starts from.
+        depth: metres that the balls reach past the untouched gel, by the contact line and the skirt.
         left: ``(rows, columns)`` grey levels rms left over on held-out presses, NaN where none was scored.
         coverage: ``(rows, columns)`` how many contacts reached a pixel.
         background_from: in words.
@@ -97,6 +100,7 @@ class MarkFree:
     contact_radius: float
     roundness: float
     lean: float
+    depth: float
     left: FloatArray
     coverage: IntArray
     background_from: str
@@ -154,6 +158,7 @@ def calibrate(
         model.fit.edge,
         model.circle.scatter,
         _lean(model, ball),
+        model.light.depth * identity.pitch,
         read_only(np.sqrt(left / np.where(count > 0.0, count, np.nan))),
         reached(model.fit.centres, model.fit.edge, *pictures.background.shape[:2]).sum(axis=0),
         pictures.background_from,
@@ -241,7 +246,7 @@ def _check_gain(scores: list[Score]) -> None:
 
 def _artefact(
     pictures: Pictures, pack: PressPack, model: Model, identity: Identity, scores: list[Score]
-) -> TactileCalibration:
+) -> LitCalibration:
     header = CalibrationHeader(
         sensor=identity.sensor,
         serial=identity.serial,
@@ -255,6 +260,8 @@ def _artefact(
         held_out_table_db=float(np.median([one.table for one in scores])),
         residual_rms=model.plain.residual_rms,
         condition=model.plain.condition,
+        skirt=model.light.skirt,
     )
     background = np.clip(np.round(pictures.background + model.rest), 0.0, 255.0).astype(np.uint8)
-    return TactileCalibration(header, background, model.table, model.support, model.plain.colours)
+    lit = per_metre(model.light.lit, identity.pitch)
+    return LitCalibration(header, background, model.table, model.support, model.plain.colours, lit)

@@ -16,6 +16,7 @@ import numpy as np
 from calibration.taxim.pack import PressPack
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused
+from harness.sim.lit_calibration import place_terms
 from harness.sim.shading import POSITION_TERMS, design, scaled_position, shades
 from harness.sim.tactile_calibration import POSITION_DEGREE, smooth_terms
 
@@ -187,7 +188,7 @@ def refined_centre(
     for _ in range(steps):
         shade, by_normal = _shades(pack, centre, place, colours, ball)
         left = shade - seen
-        weight = _huber(left)
+        weight = huber(left)
         jacobian = by_normal / -ball
         normal = np.einsum("p,pca,pcb->ab", weight, jacobian, jacobian)
         step = -np.linalg.solve(normal, np.einsum("p,pca,pc->a", weight, jacobian, left))
@@ -228,7 +229,7 @@ def coefficients(
         gram, right = terms.T @ weighted, weighted.T @ wanted
         normal = gram + np.diag(_ridge(np.diag(gram), manner.place_ridge))
         colours = np.linalg.solve(normal, right)
-        weight = _huber(terms @ colours - wanted)
+        weight = huber(terms @ colours - wanted)
     scale = np.sqrt(np.diag(normal))
     return colours, float(np.linalg.cond(normal / np.outer(scale, scale)))
 
@@ -242,15 +243,6 @@ def colour_terms(
     where = scaled_position(x, y, rows, columns)
     terms = design(np.stack([x - centre[0], y - centre[1]], axis=1) / ball, where)
     return np.hstack([terms, place_terms(where)]) if offset else terms
-
-
-def place_terms(where: FloatArray) -> FloatArray:
-    """``(n, 6)`` the powers of ``(n, 2)`` scaled positions, in the order of ``harness.sim.shading``."""
-    u, v = (np.vander(where[:, k], POSITION_DEGREE + 1, increasing=True) for k in range(2))
-    return np.stack(
-        [u[:, c] * v[:, d] for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)],
-        axis=1,
-    )
 
 
 def _shades(
@@ -277,7 +269,8 @@ def _stride(edge: float) -> int:
     return max(1, int(np.ceil(edge / _ENOUGH)))
 
 
-def _huber(left: FloatArray) -> FloatArray:
+def huber(left: FloatArray) -> FloatArray:
+    """``(n,)`` weights of what is left over ``(n, 3)`` grey levels: Huber's, so that dirt weighs less."""
     size = np.sqrt(np.mean(left**2, axis=1))
     weight: FloatArray = np.minimum(1.0, _HUBER / np.maximum(size, 1e-9))
     return weight

@@ -9,8 +9,9 @@ adds whatever its slope is let in over the first few degrees: flat gel keeps the
 import numpy as np
 
 from calibration.taxim.pack import PressPack
-from calibration.taxim.smooth_fit import SmoothFit, changes, colour_terms, contact_pixels, place_terms
+from calibration.taxim.smooth_fit import SmoothFit, changes, colour_terms, contact_pixels
 from harness.arrays import BoolArray, FloatArray, IntArray
+from harness.sim.lit_calibration import place_terms
 from harness.sim.shading import design, scaled_position
 from harness.sim.tactile_calibration import Float32Array
 

@@ -16,8 +16,9 @@ import numpy as np
 
 from harness.arrays import FloatArray, read_only
 from harness.errors import CalibrationRefused
+from harness.sim.lit_calibration import place_terms
 from harness.sim.shading import POSITION_TERMS, design, scaled_position
-from harness.sim.tactile_calibration import POSITION_DEGREE, TABLE_TERMS, TactileCalibration
+from harness.sim.tactile_calibration import TABLE_TERMS, TactileCalibration
 
 FLATTEST = np.radians(5.0)
 """Slope from which on the table holds all of a contact's offset, which is let in over the first 4 degrees."""
@@ -57,7 +58,7 @@ def contact_colour(calibration: TactileCalibration) -> ContactColour:
     misfit = float(np.sqrt(np.mean((terms @ found - flat)[:, :3] ** 2)))
     found = found.reshape(-1, POSITION_TERMS, 3)
     y, x = (axis.ravel().astype(np.float64) for axis in np.mgrid[: calibration.rows, : calibration.columns])
-    offset = _place_terms(scaled_position(x, y, calibration.rows, calibration.columns)) @ found[-1]
+    offset = place_terms(scaled_position(x, y, calibration.rows, calibration.columns)) @ found[-1]
     return ContactColour(
         read_only(np.ascontiguousarray(found[:-1].reshape(-1, 3))),
         read_only(offset.reshape(calibration.rows, calibration.columns, 3)),
@@ -95,12 +96,5 @@ def _between(rows: int, columns: int) -> FloatArray:
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, columns - 1, 3), np.linspace(0, rows - 1, 3)))
     raw = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=1)
     assert raw.shape[1] == TABLE_TERMS
-    back = np.linalg.pinv(_place_terms(scaled_position(x, y, rows, columns)))
+    back = np.linalg.pinv(place_terms(scaled_position(x, y, rows, columns)))
     return np.asarray(back @ raw, dtype=np.float64)
-
-
-def _place_terms(where: FloatArray) -> FloatArray:
-    """``(n, 6)`` the powers of ``(n, 2)`` scaled positions, in the smooth model's order."""
-    u, v = (np.vander(where[:, k], POSITION_DEGREE + 1, increasing=True) for k in range(2))
-    places = [(c, d) for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)]
-    return np.stack([u[:, c] * v[:, d] for c, d in places], axis=1)

@@ -2,15 +2,14 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from zipfile import is_zipfile
 
 from harness.arrays import ByteArray
 from harness.errors import CalibrationRefused, WrongUse
 from harness.sensor import GELSIGHT_R15, TactileSensor
+from harness.sim.lit_calibration import read_calibration
 from harness.sim.published_pack import SHADOWS, TABLE, PublishedPack, is_published, read_published
 from harness.sim.tactile_calibration import (
     TactileCalibration,
-    load_calibration,
     shipped_calibration,
     with_background,
 )
@@ -120,9 +119,7 @@ def _own(make: Make | None, calibration: str | None) -> TactileCalibration:
         raise CalibrationRefused(f"{path} has no {TABLE}; a published calibration is a folder that has one")
     if not path.exists() and path.suffix == "":
         return shipped_calibration(calibration)
-    if path.exists() and not is_zipfile(path):
-        raise CalibrationRefused(f"{path} does not read as a calibration: it is no .npz archive")
-    return load_calibration(path)
+    return read_calibration(path)
 
 
 def _sensor(

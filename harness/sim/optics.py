@@ -2,7 +2,8 @@
 
 ``exact`` is Taxim's table in double precision; ``fast`` the same table in single precision
 with a polynomial for the arctangent (a pixel differs where its slope lies on the edge of a bin,
-and then by the table's own step); ``smooth`` the polynomial of ``harness.sim.shading``, without bins.
+and then by the table's own step); ``smooth`` the polynomial of ``harness.sim.shading``, without bins, and
+with the light of a press where the calibration has it (``harness.sim.lit_calibration``).
 All of them add to the background the change against the untouched gel, so that no contact
 gives the background bit for bit. All see the same surface, held to a grid far below any sensor's noise
 (``harness.sim.optics_kernels.GRID``), so that rounding chooses no colour.
@@ -16,11 +17,13 @@ import numpy as np
 
 from harness.arrays import ByteArray, FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused, OutOfDomain
+from harness.sim.lit_calibration import LitCalibration
 from harness.sim.optics_fast import PADDED, change_fast, draw_fast, padded
 from harness.sim.optics_kernels import (
     change_exactly,
     change_smoothly,
     draw_exactly,
+    draw_lit,
     draw_smoothly,
     to_pixels,
 )
@@ -106,6 +109,11 @@ class Optics:
             return draw_exactly(z, self._table, self._base, self._steepest, image)
         if self.level == "fast":
             return draw_fast(z, known.bins, self._padded, self._base_fast, self._steepest, image)
+        if isinstance(known, LitCalibration):
+            light = known.light * known.header.pitch
+            return draw_lit(
+                z, z - self._untouched, known.slopes, light, self._base, known.header.slope_limit, image
+            )
         return draw_smoothly(z, known.smooth, self._base, known.header.slope_limit, image)
 
     @property
@@ -121,15 +129,24 @@ class Optics:
     def _padded(self) -> Float32Array:
         return padded(self.calibration.table)
 
+    @property
+    def _slopes(self) -> FloatArray:
+        known = self.calibration
+        return known.slopes if isinstance(known, LitCalibration) else known.smooth
+
+    @cached_property
+    def _untouched(self) -> FloatArray:
+        return self._surface(np.zeros_like(self._rest))
+
     @cached_property
     def _base(self) -> FloatArray:
         # Background less what the untouched gel's own slope would add: no contact adds it back.
         change = np.empty(self.calibration.background.shape)
-        z = self._surface(np.zeros_like(self._rest))
+        z = self._untouched
         if self.level == "exact":
             change_exactly(z, self._table, change)
         else:
-            change_smoothly(z, self.calibration.smooth, self.calibration.header.slope_limit, change)
+            change_smoothly(z, self._slopes, self.calibration.header.slope_limit, change)
         base: FloatArray = self.calibration.background - change
         return base
 
@@ -137,7 +154,7 @@ class Optics:
     def _base_fast(self) -> Float32Array:
         rows, columns = self._rest.shape
         change = np.empty((rows, columns, PADDED), np.float32)
-        change_fast(self._surface(np.zeros_like(self._rest)), self.calibration.bins, self._padded, change)
+        change_fast(self._untouched, self.calibration.bins, self._padded, change)
         base = np.zeros_like(change)
         base[..., :3] = self.calibration.background - change[..., :3]
         return base

@@ -18,8 +18,9 @@ from calibration.taxim.smooth_fit import changes
 from harness import cli
 from harness.errors import CalibrationRefused, DataRefused
 from harness.image_file import write_png
+from harness.sim.lit_calibration import LitCalibration, read_calibration
 from harness.sim.published_pack import read_table
-from harness.sim.tactile_calibration import load_calibration, shipped_calibration
+from harness.sim.tactile_calibration import shipped_calibration
 
 
 def _folder(path: Path, pictures: Pictures, background: str | None = "background.png") -> Path:
@@ -171,7 +172,8 @@ def test_the_command_writes_artefact_table_and_page(
     options = ["--ball-radius", "1.2mm", "--pitch", "0.1mm", "--report", "page", "--polycalib", "poly.npz"]
     assert cli.invoke(["calibrate", "taxim", str(folder), *options, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
-    made = load_calibration(Path(answer["artefact"]))
+    made = read_calibration(Path(answer["artefact"]))
+    assert isinstance(made, LitCalibration)
     assert made.sha256 == answer["sha256"]
     assert made.header.held_out_table_db == answer["psnr_contact_db"] > 40.0
     assert answer["presses"] == len(answer["per_press"]) == 18

@@ -1,0 +1,232 @@
+"""The gel around a contact and the light on it, from the same ball presses.
+
+Around a ball the gel hangs in a skirt several contacts wide, and its colours are the ball's own at the same
+slopes. They are most of what a press changes in the picture. The skirt is Taxim's pyramid of blurs; how wide
+it is, and how much of the ball's depth the object shapes, are the two numbers that explain the colours best.
+With the surface known everywhere, the smooth model is fitted to contact and skirt at once, with the light
+of ``harness.sim.lit_calibration``, in proportion to how far the gel is pushed in. Without it a slope of the
+skirt would get the dimming of a contact, or a contact none.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.taxim.pack import PressPack
+from calibration.taxim.smooth_fit import distance, huber
+from harness.arrays import FloatArray, IntArray, read_only
+from harness.errors import CalibrationRefused
+from harness.sim.gel import GelLevel, deform
+from harness.sim.lit_calibration import light_design
+from harness.sim.shading import KNEE, POSITION_TERMS, design, scaled_position
+from harness.sim.tactile_calibration import GelSkirt, smooth_terms
+
+REACH = 4.0
+"""Contact radii from the centre that are looked at; in the published sets the skirt ends at 3.5."""
+
+WITHIN_WEIGHT = 3.0
+"""Of a pixel within the contact line against one of the skirt, of which there are ten times as many."""
+
+_WIDTHS = (0.25, 1.0, 2.0, 4.0, 6.0, 9.0, 13.0)
+"""Contact radii, of the widest blur."""
+
+_BESIDE = (0.7, 0.85, 1.0, 1.15, 1.3)
+_CORES = (0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7)
+_START = 0.5
+_NARROWEST = 5
+_FEW, _MANY = 250.0, 2000.0
+"""Pixels of a press: to choose the skirt by, and to fit the colours to."""
+
+_RIDGE, _PLACE_RIDGE = 1e-6, 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A ball in the gel, by the distance from its axis; 0, 1, 2, ... pixels.
+
+    Attributes:
+        sine: of the surface's slope as the camera's pixels have it.
+        height: pixels, of indentation.
+    """
+
+    sine: FloatArray
+    height: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """The skirt and the colours of contact and skirt.
+
+    Attributes:
+        skirt: of the gel.
+        lit: ``(156, 3)`` as ``harness.sim.lit_calibration`` keeps it, but per pixel of indentation.
+        depth: pixels that the ball reaches past the untouched gel.
+        profile: of the ball in it.
+        edge: pixels, the contact line.
+        limit: sine of the steepest slope.
+        residual_rms: grey levels, over contact and skirt.
+    """
+
+    skirt: GelSkirt
+    lit: FloatArray
+    depth: float
+    profile: Profile
+    edge: float
+    limit: float
+    residual_rms: float
+
+
+def fit_light(pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float) -> Light:
+    """Fit skirt and colours.
+
+    Args:
+        pack: the presses.
+        change: ``(presses, rows, columns, 3)`` grey levels against the untouched gel.
+        centres: ``(presses, 2)`` pixels (column, row), of the balls' axes.
+        edge: pixels, the contact line's radius.
+        ball: radius in pixels.
+
+    Raises:
+        CalibrationRefused: the contact line is no smaller than the ball.
+    """
+    if not 0.0 < edge < ball:
+        raise CalibrationRefused(
+            f"the contact line has a radius of {edge:.1f} px and the ball one of {ball:.1f} px: no contact "
+            "is larger than the ball; check the ball's radius (not its diameter) and the pitch"
+        )
+    few = _samples(pack, change, centres, edge, _FEW)
+
+    def misfit(skirt: GelSkirt) -> float:
+        return _solved(few, ball_profile(skirt, edge, ball, "fast"), edge, ball)[1]
+
+    best = min((skirt_of(width * edge, _START) for width in _WIDTHS), key=misfit)
+    best = min((GelSkirt(best.kernels, best.final, core) for core in _CORES), key=misfit)
+    best = min((skirt_of(wider * best.kernels[0], best.core) for wider in _BESIDE), key=misfit)
+    profile = ball_profile(best, edge, ball, "exact")
+    lit, rms = _solved(_samples(pack, change, centres, edge, _MANY), profile, edge, ball)
+    return Light(best, read_only(lit), depth_of(best, edge, ball), profile, edge, edge / ball, rms)
+
+
+def skirt_of(widest: float, core: float) -> GelSkirt:
+    """A pyramid of blurs, each half as wide as the one before it; ``widest`` in pixels."""
+    kernels = [max(_NARROWEST, int(widest) | 1)]
+    while kernels[-1] // 2 | 1 >= _NARROWEST and kernels[-1] > _NARROWEST:
+        kernels.append(kernels[-1] // 2 | 1)
+    return GelSkirt(tuple(kernels), core=core)
+
+
+def depth_of(skirt: GelSkirt, edge: float, ball: float) -> float:
+    """Pixels that a ball reaches in if it shapes the gel just out to its contact line."""
+    return _cap(np.array(edge), ball).item() / (1.0 - skirt.core)
+
+
+def ball_profile(skirt: GelSkirt, edge: float, ball: float, level: GelLevel) -> Profile:
+    """The surface around a ball that touches out to ``edge``; pixels."""
+    reach = int(np.ceil(REACH * edge)) + 2
+    size = reach + skirt.kernels[0] // 2
+    away = distance((2 * size + 1, 2 * size + 1), np.array([size, size], dtype=np.float64))
+    surface = deform(pressed_ball(away, depth_of(skirt, edge, ball), ball)[None], skirt, level)[0]
+    height = surface[size, size : size + reach]
+    slope = np.zeros(reach)
+    slope[1:-1] = (height[:-2] - height[2:]) / 2.0
+    return Profile(read_only((slope / np.hypot(1.0, slope))[:-1]), read_only(height[:-1].copy()))
+
+
+def pressed_ball(away: FloatArray, depth: float, ball: float) -> FloatArray:
+    """How deep a ball reaches at distances from its axis; pixels, 0 where it does not."""
+    inside = away < ball
+    reached: FloatArray = np.where(
+        inside, np.maximum(0.0, depth - _cap(np.where(inside, away, 0.0), ball)), 0.0
+    )
+    return reached
+
+
+def per_metre(lit: FloatArray, pitch: float) -> FloatArray:
+    """The coefficients with the light in grey levels a metre instead of a pixel of ``pitch`` metres."""
+    scaled = lit.copy()
+    scaled[smooth_terms() :] /= pitch
+    return scaled
+
+
+def light_shades(pack: PressPack, light: Light, centre: FloatArray, place: IntArray) -> FloatArray:
+    """``(n, 3)`` grey levels that contact and skirt of a press give pixels ``(n, 2)``, row and column."""
+    terms = _terms(light.profile, place[:, ::-1] - centre, _where(pack, place), light.limit)
+    return np.asarray(terms @ light.lit)
+
+
+def _cap(away: FloatArray, ball: float) -> FloatArray:
+    cap: FloatArray = ball - np.sqrt(ball**2 - away**2)
+    return cap
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Pixels of all presses: from the press's centre (right, down), scaled place, and the change there."""
+
+    offset: FloatArray
+    where: FloatArray
+    seen: FloatArray
+
+
+def _samples(
+    pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, pixels: float
+) -> _Samples:
+    stride = max(1, round(float(np.sqrt(np.pi * (REACH * edge) ** 2 / pixels))))
+    offset, where, seen = [], [], []
+    for k, centre in enumerate(centres):
+        # Another part of the raster in every press, so that no pixel of the sensor is always left out.
+        first = np.array(divmod(k, stride)) % stride
+        near = distance(pack.shape, centre)[first[0] :: stride, first[1] :: stride] < REACH * edge
+        place = np.argwhere(near) * stride + first
+        offset.append(place[:, ::-1] - centre)
+        where.append(_where(pack, place))
+        seen.append(change[k][place[:, 0], place[:, 1]])
+    return _Samples(np.concatenate(offset), np.concatenate(where), np.concatenate(seen))
+
+
+def _where(pack: PressPack, place: IntArray) -> FloatArray:
+    y, x = (axis.astype(np.float64) for axis in place.T)
+    return scaled_position(x, y, *pack.shape)
+
+
+def _solved(samples: _Samples, profile: Profile, edge: float, ball: float) -> tuple[FloatArray, float]:
+    """The coefficients ``(156, 3)`` and the weighted rms of what they leave over, grey levels."""
+    terms = _terms(profile, samples.offset, samples.where, edge / ball)
+    inside = np.hypot(samples.offset[:, 0], samples.offset[:, 1]) <= edge
+    fixed = np.where(inside, WITHIN_WEIGHT, 1.0)
+    weight = fixed
+    for _ in range(2):
+        weighted = terms * weight[:, None]
+        gram = terms.T @ weighted
+        solved = np.linalg.solve(gram + np.diag(_ridge(np.diag(gram))), weighted.T @ samples.seen)
+        lit = np.asarray(solved, dtype=np.float64)
+        left = terms @ lit - samples.seen
+        weight = fixed * huber(left)
+    rms = float(np.sqrt((fixed * np.mean(left**2, axis=1)).sum() / fixed.sum()))
+    return lit, rms
+
+
+def _terms(profile: Profile, offset: FloatArray, where: FloatArray, limit: float) -> FloatArray:
+    away: FloatArray = np.hypot(offset[:, 0], offset[:, 1])
+    radii = np.arange(len(profile.sine), dtype=np.float64)
+    slope: FloatArray = np.interp(away, radii, profile.sine, right=0.0)
+    sine = _softly_limited(slope, limit)
+    height: FloatArray = np.interp(away, radii, profile.height, right=0.0)
+    normal = offset * (sine / np.maximum(away, 1e-9))[:, None]
+    return np.hstack([design(normal, where), light_design(normal, where) * height[:, None]])
+
+
+def _softly_limited(sine: FloatArray, limit: float) -> FloatArray:
+    """As ``harness.sim.shading.softly_limited``, of many."""
+    knee, room = KNEE * limit, (1.0 - KNEE) * limit
+    bent: FloatArray = np.where(
+        sine <= knee, sine, knee + room * (1.0 - np.exp(-np.maximum(sine - knee, 0.0) / room))
+    )
+    return bent
+
+
+def _ridge(diagonal: FloatArray) -> FloatArray:
+    degrees = np.array([c + d for c in range(3) for d in range(3 - c)], dtype=np.float64)
+    constants = diagonal.reshape(-1, POSITION_TERMS)[:, :1]
+    ridge: FloatArray = _RIDGE * diagonal + (_PLACE_RIDGE * constants * degrees**2).ravel()
+    return ridge

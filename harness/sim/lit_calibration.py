@@ -1,0 +1,142 @@
+"""A calibration that also knows what a press does to the light, whatever the slope.
+
+Beside what every calibration holds it has a second smooth model, of the surface's normal *and* of how far
+the gel was pushed in:
+
+    dI = slopes(normal, position) + height * light(normal, position)
+
+with the terms of ``harness.sim.shading`` for the slopes, and for the light a constant and the normal's terms
+to degree 2, by the same terms of the position. It is zero where the gel is untouched, and fitted to the
+skirt of the presses too (``calibration.taxim.light_fit``): pushed in, the gel is nearer to the lights' plane,
+and darker even where it is flat; they graze it, and one side of a bump is in the other's way.
+Without it the file is one of ``harness.sim.tactile_calibration``.
+"""
+
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+from zipfile import BadZipFile, is_zipfile
+
+import numpy as np
+
+from harness.arrays import AnyArray, FloatArray
+from harness.errors import CalibrationRefused
+from harness.sim.shading import POSITION_TERMS
+from harness.sim.tactile_calibration import (
+    POSITION_DEGREE,
+    SCHEMA,
+    CalibrationHeader,
+    GelSkirt,
+    TactileCalibration,
+    load_calibration,
+    smooth_terms,
+)
+
+LIT = "lit"
+"""Of the array in the file."""
+
+LIGHT_DEGREE = 2
+LIGHT_POWERS = tuple((a, b) for a in range(LIGHT_DEGREE + 1) for b in range(LIGHT_DEGREE + 1 - a))
+"""Of the normal's x and y, in the light's terms; the first is the constant one."""
+
+
+@dataclass(frozen=True, eq=False)
+class LitCalibration(TactileCalibration):
+    """A calibration with the light of a press.
+
+    Attributes:
+        lit: ``(156, 3)``: 120 coefficients of slopes as in ``smooth``, then six of the position for each of
+            ``LIGHT_POWERS``, in grey levels a metre of indentation.
+    """
+
+    lit: FloatArray
+
+    def __post_init__(self) -> None:
+        wanted = (smooth_terms() + len(LIGHT_POWERS) * POSITION_TERMS, 3)
+        found = self.lit
+        if found.shape != wanted or found.dtype != np.float64 or not np.isfinite(found).all():
+            raise CalibrationRefused(
+                f"lit is {found.dtype} {found.shape}, or not finite; finite float64 {wanted} is wanted: "
+                "fit the calibration again"
+            )
+        super().__post_init__()
+
+    @property
+    def arrays(self) -> dict[str, AnyArray]:
+        """Every array by its name in the file."""
+        return {**super().arrays, LIT: self.lit}
+
+    @property
+    def slopes(self) -> FloatArray:
+        """``(120, 3)`` the coefficients of the slopes."""
+        return self.lit[: smooth_terms()]
+
+    @property
+    def light(self) -> FloatArray:
+        """``(36, 3)`` the coefficients of the light, grey levels a metre of indentation."""
+        return self.lit[smooth_terms() :]
+
+
+def light_design(normal: FloatArray, position: FloatArray) -> FloatArray:
+    """``(n, 36)`` the light's terms at ``(n, 2)`` normals and scaled positions, for unit indentation."""
+    powers = np.stack([normal[:, 0] ** a * normal[:, 1] ** b for a, b in LIGHT_POWERS], axis=1)
+    terms: FloatArray = (powers[:, :, None] * place_terms(position)[:, None, :]).reshape(len(normal), -1)
+    return terms
+
+
+def place_terms(where: FloatArray) -> FloatArray:
+    """``(n, 6)`` the powers of ``(n, 2)`` scaled positions, in the order of ``harness.sim.shading``."""
+    u, v = (np.vander(where[:, k], POSITION_DEGREE + 1, increasing=True) for k in range(2))
+    places = [(c, d) for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)]
+    return np.stack([u[:, c] * v[:, d] for c, d in places], axis=1)
+
+
+def read_calibration(path: Path) -> TactileCalibration:
+    """Read a calibration, with its light where it has one; strictly.
+
+    Raises:
+        CalibrationRefused: missing, of another schema, incomplete, or not what was written.
+    """
+    if not path.is_file():
+        return load_calibration(path)
+    if not is_zipfile(path):
+        raise CalibrationRefused(
+            f"{path} does not read as a calibration: it is no .npz archive; give what touchstone calibrate "
+            "taxim wrote"
+        )
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            found = {name: archive[name] for name in archive.files} if LIT in archive.files else {}
+    except (OSError, EOFError, ValueError, BadZipFile) as error:
+        raise CalibrationRefused(f"{path} does not read as a calibration: {error}") from error
+    return _lit(found, path) if found else load_calibration(path)
+
+
+def _lit(found: dict[str, AnyArray], path: Path) -> LitCalibration:
+    wanted = {"header", "background", "table", "support", "smooth", LIT}
+    if set(found) != wanted:
+        raise CalibrationRefused(f"{path} holds {sorted(found)} where a calibration holds {sorted(wanted)}")
+    header, sha256 = _header(str(found.pop("header")), path)
+    calibration = LitCalibration(header, **found)
+    if calibration.sha256 != sha256:
+        raise CalibrationRefused(
+            f"{path} is not what was written: its contents hash to {calibration.sha256[:12]}"
+        )
+    return calibration
+
+
+def _header(text: str, path: Path) -> tuple[CalibrationHeader, str]:
+    try:
+        outer = json.loads(text)
+        inner = dict(outer["header"])
+        skirt = dict(inner["skirt"])
+        inner["skirt"] = GelSkirt(tuple(skirt["kernels"]), skirt["final"], skirt["core"])
+        sha256 = str(outer["sha256"])
+    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+        raise CalibrationRefused(f"{path} has no readable header: {error!r}") from error
+    if set(inner) != {item.name for item in fields(CalibrationHeader)} or inner["schema"] != SCHEMA:
+        raise CalibrationRefused(
+            f"{path} has header keys {sorted(inner)} of schema {inner.get('schema')}; this version reads "
+            f"schema {SCHEMA}: fit it again"
+        )
+    return CalibrationHeader(**inner), sha256

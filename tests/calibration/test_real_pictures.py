@@ -1,0 +1,36 @@
+"""Real presses beside what is drawn of them by a calibration that has not seen them."""
+
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+from real_press import drawing, fitted, held_out_presses, judged
+
+from calibration.taxim.mark_free import Identity
+from calibration.taxim.pictures import read_pictures
+from harness.sim.optics import Optics
+
+R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
+
+
+def test_presses_of_the_papers_sensor_are_drawn_over_the_whole_frame(shared_data: Path) -> None:
+    """One fold of eight; all of them by ``tests/benchmarks/real_pictures.py``. Over a frame most of which is
+    never touched, drawing nothing scores 24 dB; within the contact it scores 14."""
+    pictures = read_pictures(shared_data / "tactile/objectfolder_calibs")
+    first: list[object] = []
+
+    def of_one_fold(press: object) -> bool:
+        first.append(press.model)  # type: ignore[attr-defined]
+        return first[0] is first[-1]
+
+    frame, contact, nothing = [], [], []
+    for press in takewhile(of_one_fold, held_out_presses(pictures, R15)):
+        skirt = press.calibration.header.skirt
+        drawn = fitted(press, drawing(Optics(press.calibration, "smooth"), skirt), skirt)
+        frame.append(drawn.frame)
+        contact.append(drawn.contact)
+        nothing.append(judged(press, pictures.background.astype(float), drawn.pose).frame)
+    assert len(frame) == 7
+    assert np.median(frame) >= 33.0
+    assert np.median(contact) >= 31.0
+    assert np.median(nothing) < 25.0
