@@ -151,7 +151,7 @@ def _together(
         tuple(name for name, fit in zip(names, fits, strict=True) if fit),
         None,
         source,
-        _hash(rest, images),
+        set_digest(rest, images),
         refused,
     )
 
@@ -173,6 +173,7 @@ def digest(image: ByteArray) -> str:
     return hashlib.sha256(np.ascontiguousarray(image).tobytes()).hexdigest()
 
 
-def _hash(rest: ByteArray, images: ByteArray) -> str:
+def set_digest(rest: ByteArray, images: ByteArray) -> str:
+    """Hash of a background and its presses, whatever their order."""
     every = "".join([digest(rest), *sorted(digest(image) for image in images)])
     return hashlib.sha256(every.encode()).hexdigest()

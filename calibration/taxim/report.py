@@ -2,13 +2,15 @@
 
 import numpy as np
 
+from calibration.taxim.arm_moves import ArmScale
+from calibration.taxim.arm_record import ArmPresses
 from calibration.taxim.mark_free import MarkFree, UsedPress
 from calibration.taxim.pictures import Pictures
 from calibration.taxim.rest import AWAY, SIGHTINGS
 from calibration.taxim.smooth_fit import contact_pixels, distance
 from calibration.taxim.table_fit import table_shades
 from harness.arrays import ByteArray, FloatArray
-from harness.report.calibration_page import CalibrationReport, Example, PressLine
+from harness.report.calibration_page import CalibrationReport, Example, MovesFigure, PressLine
 from harness.sim.tactile_calibration import TactileCalibration
 
 _SHARES = (0.0, 0.5, 1.0)
@@ -18,21 +20,29 @@ _MARGIN = 2.0
 """Contact radii shown about a press."""
 
 
-def report_of(made: MarkFree, pictures: Pictures, title: str) -> CalibrationReport:
+def report_of(
+    made: MarkFree,
+    pictures: Pictures,
+    title: str,
+    scale: ArmScale | None = None,
+    arm: ArmPresses | None = None,
+) -> CalibrationReport:
     """What the page of a calibration shows.
 
     Args:
         made: the calibration.
         pictures: that it was made of.
         title: of the page.
+        scale: by the arm's moves; None where none are known.
+        arm: the presses that it stands on.
     """
     header = made.calibration.header
     return CalibrationReport(
         title,
-        _cards(made),
+        [*_cards(made), *([] if scale is None else [_pitch_card(scale)])],
         [(name, str(value)) for name, value in vars(header).items()]
         + [("sha256", made.calibration.sha256), ("background", made.background_from)],
-        _notes(made),
+        [*_notes(made, scale), *([] if arm is None else [_watched(arm)])],
         [
             PressLine(press.name, press.centre, press.radius, press.depth, **vars(press.score))
             for press in made.used
@@ -42,7 +52,40 @@ def report_of(made: MarkFree, pictures: Pictures, title: str) -> CalibrationRepo
         made.coverage,
         made.left,
         _examples(made, pictures),
+        None if scale is None or arm is None else _moves(scale, arm),
     )
+
+
+def _pitch_card(scale: ArmScale) -> tuple[str, str, str]:
+    pitch = scale.pitch
+    return ("a pixel shows", f"{1e3 * pitch.value:.4f} mm", f"to {1e3 * pitch.within95:.4f} mm, by the arm")
+
+
+def _watched(arm: ArmPresses) -> str:
+    waited = np.array([one.seconds for one in arm.taken])
+    return (
+        f"Taken by the arm: {len(arm.taken)} presses, {len(arm.backgrounds)} pictures of the untouched gel. "
+        f"It moved by {arm.drift:.1f} grey levels as a whole at most, and by {arm.marked:.1f} at one place "
+        f"beside that. Pictures were waited for {np.median(waited):.1f} s in the median, {waited.max():.1f} "
+        "s at most."
+    )
+
+
+def _moves(scale: ArmScale, arm: ArmPresses) -> MovesFigure:
+    used = np.zeros(len(arm.taken), np.bool_)
+    used[list(scale.used)] = True
+    pitch, aspect, rotation, skew = scale.pitch, scale.aspect, scale.rotation, scale.skew
+    turned, askew = (
+        tuple(f"{np.degrees(v):.3f} deg" for v in (one.value, one.within95)) for one in (rotation, skew)
+    )
+    numbers = [
+        ("a pixel shows", f"{1e3 * pitch.value:.5f} mm", f"{1e3 * pitch.within95:.5f} mm"),
+        ("a pixel's height over its width", f"{aspect.value:.4f}", f"{aspect.within95:.4f}"),
+        ("picture against tool", turned[0], turned[1]),
+        ("rows and columns from square", askew[0], askew[1]),
+        ("a press about the map", f"{1e3 * scale.scatter:.3f} mm", ""),
+    ]
+    return MovesFigure(numbers, np.array([one.on_gel for one in arm.taken]), scale.residuals, used)
 
 
 def _cards(made: MarkFree) -> list[tuple[str, str, str]]:
@@ -59,7 +102,7 @@ def _cards(made: MarkFree) -> list[tuple[str, str, str]]:
     ]
 
 
-def _notes(made: MarkFree) -> list[str]:
+def _notes(made: MarkFree, scale: ArmScale | None) -> list[str]:
     header = made.calibration.header
     steepest = np.degrees(np.arcsin(header.slope_limit))
     return [
@@ -67,7 +110,11 @@ def _notes(made: MarkFree) -> list[str]:
         f"untouched. Slopes to {steepest:.0f} degrees are supported; "
         f"{made.calibration.support.mean():.0%} of the table's bins were reached. Took {made.seconds:.1f} s.",
         f"Pitch ({1e3 * header.pitch:g} mm a pixel) and ball ({1e3 * header.ball_radius:g} mm) were given, "
-        "not measured: balls of one size cannot tell a wrong pitch, because it only relabels the slopes.",
+        "not measured: balls of one size cannot tell a wrong pitch, because it only relabels the slopes. "
+        "Known moves of an arm tell it, with aspect and rotation; none are known of these pictures."
+        if scale is None
+        else f"The ball ({1e3 * header.ball_radius:g} mm) was given; {1e3 * header.pitch:.5g} mm a pixel "
+        f"were taken, by the arm it is {1e3 * scale.pitch.value:.5g} mm.",
         f"The contact line of all presses is a circle of {made.contact_radius:.1f} px to within "
         f"{made.roundness:.2f} px. Slopes of the smooth model, which knows no dimming by a contact, lean by "
         f"{np.degrees(made.lean):.1f} degrees against it; those of the table do not.",

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from harness.arrays import AnyArray, ByteArray, FloatArray, IntArray
+from harness.arrays import AnyArray, BoolArray, ByteArray, FloatArray, IntArray
 from harness.report.figures import Album, Picture
 from harness.report.style import ANSWER, INK, SOFT, TOOL, blank, styled
 from harness.report.template import rendered
@@ -17,6 +17,9 @@ from harness.report.tiles import DIFFERENCE_GAIN, difference, png
 
 PAGE = "calibration.html"
 """Name of the page in its folder."""
+
+_LONGER = 20.0
+"""Times as long as they are, arrows of what presses are off the arm's map."""
 
 _WORST_SHOWN = 30.0
 """Grey levels at which the map of what is left over ends."""
@@ -57,6 +60,23 @@ class Example:
 
 
 @dataclass(frozen=True, eq=False)
+class MovesFigure:
+    """Where the arm moved the ball over the gel, and where the pictures saw it.
+
+    Attributes:
+        numbers: name, value and what it is uncertain by.
+        on_gel: ``(presses, 2)`` m, by the arm.
+        residuals: ``(presses, 2)`` m, by which the arm's place is off the pictures'.
+        used: ``(presses,)`` whether a press is among those that the map stands on.
+    """
+
+    numbers: Sequence[tuple[str, str, str]]
+    on_gel: FloatArray
+    residuals: FloatArray
+    used: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
 class CalibrationReport:
     """Everything the page shows.
 
@@ -71,6 +91,7 @@ class CalibrationReport:
         coverage: ``(rows, columns)`` how many contacts reached a pixel.
         left: ``(rows, columns)`` grey levels rms left over on held-out presses; NaN where none was.
         examples: from the worst press to the best.
+        moves: of the arm between the presses; None where none are known.
     """
 
     title: str
@@ -83,6 +104,7 @@ class CalibrationReport:
     coverage: IntArray
     left: FloatArray
     examples: Sequence[Example]
+    moves: MovesFigure | None = None
 
 
 @dataclass(frozen=True)
@@ -112,6 +134,8 @@ def write_calibration_page(report: CalibrationReport, folder: Path) -> Path:
         scores=album.drawing("scores", scores_figure(report.presses)),
         rows=[_row(example, number, album) for number, example in enumerate(report.examples, start=1)],
         gain=f"{DIFFERENCE_GAIN:g}",
+        moved=None if report.moves is None else album.drawing("moves", moves_figure(report.moves)),
+        longer=f"{_LONGER:g}",
     )
     (folder / PAGE).write_text(page, encoding="utf-8")
     return folder / PAGE
@@ -144,6 +168,37 @@ def maps_figure(report: CalibrationReport) -> Figure:
             axes.set_xlim(-0.5, columns - 0.5)
             axes.set_ylim(rows - 0.5, -0.5)
             axes.set_axis_off()
+    return figure
+
+
+def moves_figure(moves: MovesFigure) -> Figure:
+    """Every press on the gel by the arm, with what it is off the map, drawn longer."""
+    x, y = 1e3 * moves.on_gel.T
+    right, down = 1e3 * _LONGER * moves.residuals.T
+    with styled():
+        figure = blank(7.6, 5.6)
+        figure.set_layout_engine("constrained")
+        axes = figure.add_subplot()
+        for which, colour, label in ((moves.used, ANSWER, "used"), (~moves.used, SOFT, "not used")):
+            if which.any():
+                axes.plot(x[which], y[which], ls="none", marker="o", ms=3.5, color=colour, label=label)
+        shown = np.isfinite(right)
+        axes.quiver(
+            x[shown],
+            y[shown],
+            right[shown],
+            down[shown],
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            width=0.003,
+            color=TOOL,
+        )
+        axes.set_aspect("equal")
+        axes.invert_yaxis()
+        axes.set_xlabel("x of the tool's gel frame, mm")
+        axes.set_ylabel("y, mm")
+        axes.legend(frameon=False, fontsize=9, loc="upper right")
     return figure
 
 

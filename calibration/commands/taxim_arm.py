@@ -1,0 +1,231 @@
+"""The part of ``touchstone calibrate taxim`` that moves the arm: plan, press, say how it goes."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from harness.errors import WrongUse
+from harness.output import CONSOLE, emit
+from harness.step_file import Step
+
+if TYPE_CHECKING:
+    from calibration.taxim.arm_moves import ArmScale, Measured
+    from calibration.taxim.arm_record import ArmPresses
+    from harness.recording import Recording
+
+NO_MOVES = (
+    "no arm moves are known of these pictures: ball presses alone cannot tell millimetres per pixel, aspect "
+    "or rotation, because another pitch only relabels the slopes; calibrate with --station"
+)
+
+_ASPECT = 0.01
+_MARKED = 8.0
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What was asked for by options, None where nothing was."""
+
+    station: str | None
+    scene: Path | None
+    resume: Path | None
+    run: Path | None
+    presses: int | None
+    depth: float | None
+    ball_radius: float | None
+    seed: int | None
+    gap: str | None
+
+    def require_none(self, why: str) -> None:
+        """Refuse options that only a new run of the arm can follow."""
+        given = {
+            "--scene": self.scene,
+            "--run": self.run,
+            "--presses": self.presses,
+            "--depth": self.depth,
+            "--seed": self.seed,
+            "--gap": self.gap,
+        }
+        named = [name for name, value in given.items() if value is not None]
+        if named:
+            raise WrongUse(f"{', '.join(named)}: {why}")
+
+
+def chosen(folder: Path | None, wanted: Wanted) -> None:
+    """Refuse anything but one of a folder, a station to move, or a run to go on with."""
+    ways = {"FOLDER": folder, "--station": wanted.station, "--resume": wanted.resume}
+    given = [name for name, value in ways.items() if value is not None]
+    if len(given) != 1:
+        raise WrongUse(
+            f"{' and '.join(given) or 'nothing'} given; give FOLDER (pictures, or a run that the arm made), "
+            "or --station NAME to press a ball with that bench's arm, or --resume RUN to go on with one"
+        )
+    if wanted.station is None:
+        wanted.require_none("they plan a new run of the arm; give --station, or leave them out")
+
+
+def pressed(wanted: Wanted, as_json: bool) -> Path | None:
+    """The folder of the run that the arm made or went on with; None where Ctrl-C ended it early."""
+    from calibration.taxim.arm_session import perform_on_bench
+
+    recording = _recording(wanted)
+    total = len(recording.header.plan["steps"])
+    if recording.committed < total:
+        CONSOLE.print(f"recording to {recording.folder}", markup=False)
+        with _progress(recording.committed, total) as told:
+            complete, _ = perform_on_bench(recording, told, told.say)
+        if not complete:
+            _stopped(recording, as_json)
+            return None
+    return recording.folder
+
+
+def _recording(wanted: Wanted) -> "Recording":
+    from calibration.taxim.arm_record import NAME
+    from harness.recording import Recording
+
+    if wanted.resume is not None:
+        recording = Recording(wanted.resume)
+        if recording.header.experiment != NAME:
+            raise WrongUse(
+                f"--resume {wanted.resume}: a run of {recording.header.experiment}; resume it with its own "
+                "command"
+            )
+        return recording
+    return _begun(wanted)
+
+
+def _begun(wanted: Wanted) -> "Recording":
+    from calibration.taxim.arm_plan import PressSettings
+    from calibration.taxim.arm_session import ball_scene, begin
+    from harness.objects.targets import BALL_RADIUS
+    from harness.scene import load_scene
+    from harness.station_file import load_station, station_path
+
+    scene = None if wanted.scene is None else load_scene(wanted.scene)
+    radius = wanted.ball_radius
+    if radius is None:
+        if scene is None:
+            raise WrongUse("--ball-radius is missing: the radius of the ball on the table, as 2mm")
+        radius = BALL_RADIUS * scene.object.scale
+    usual = PressSettings()
+    settings = PressSettings(
+        presses=usual.presses if wanted.presses is None else wanted.presses,
+        depth=0.4 * radius if wanted.depth is None else wanted.depth,
+    )
+    station = load_station(station_path(wanted.station or ""))
+    seed = 0 if wanted.seed is None else wanted.seed
+    with CONSOLE.status("planning the presses, rehearsing them in the twin"):
+        begun = begin(ball_scene(radius, scene), station, settings, seed, wanted.gap, wanted.run)
+    rehearsal = begun.plan.rehearsal
+    CONSOLE.print(
+        f"{settings.presses} presses of {1e3 * settings.depth:.2f} mm; rehearsed in the twin: "
+        f"{rehearsal.segments} motions, none refused; {len(rehearsal.warnings)} warnings"
+    )
+    return begun.recording
+
+
+def _stopped(recording: "Recording", as_json: bool) -> None:
+    said = (
+        f"stopped after step {recording.committed}; go on with "
+        f"`touchstone calibrate taxim --resume {recording.folder}`"
+    )
+    CONSOLE.print(said, markup=False)
+    if as_json:
+        emit({"schema": 1, "error": said, "exit_code": 130, "recording": str(recording.folder)})
+
+
+class _Told:
+    """A bar over the steps, and a line for each."""
+
+    def __init__(self, bar: Progress, done: int, total: int) -> None:
+        self._bar = bar
+        self._total = total
+        self._task = bar.add_task("presses", completed=done, total=total)
+
+    def began(self, step: Step) -> None:
+        self._bar.update(self._task, description=f"step {step.index + 1}: {step.kind}")
+
+    def ended(self, step: Step, seconds: float) -> None:
+        self._bar.advance(self._task)
+        self._bar.console.print(f"  step {step.index + 1} of {self._total} on the disk, {seconds:.1f} s")
+
+    def say(self, sentence: str) -> None:
+        """How the step that is being made went."""
+        self._bar.console.print(f"  {escape(sentence)}")
+
+
+@contextmanager
+def _progress(done: int, total: int) -> Iterator[_Told]:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=CONSOLE, transient=True) as bar:
+        yield _Told(bar, done, total)
+
+
+def scale_answer(scale: "ArmScale | None", arm: "ArmPresses | None") -> dict[str, Any]:
+    """What the arm's moves say, for the answer; why nothing, where there are none."""
+    if scale is None or arm is None:
+        return {"scale": None, "scale_reason": NO_MOVES}
+    return {
+        "scale": {
+            **_measured("pitch", "_m", scale.pitch),
+            **_measured("aspect", "", scale.aspect),
+            **_measured("rotation", "_rad", scale.rotation),
+            **_measured("skew", "_rad", scale.skew),
+            "gel_from_pixels_m": scale.gel_from_pixels.tolist(),
+            "scatter_m": scale.scatter,
+            "presses": len(scale.used),
+            "off": [arm.taken[k].name for k in scale.off],
+        },
+        "scale_reason": None,
+        "drift_levels": arm.drift,
+        "marked_levels": arm.marked,
+    }
+
+
+def _measured(name: str, unit: str, one: "Measured") -> dict[str, float]:
+    return {
+        f"{name}{unit}": one.value,
+        f"{name}_sigma{unit}": one.sigma,
+        f"{name}_within95{unit}": one.within95,
+    }
+
+
+def scale_lines(scale: "ArmScale") -> list[str]:
+    """The same for people."""
+    degrees = 57.29577951308232
+    return [
+        f"by the arm: {1e3 * scale.pitch.value:.5f} mm a pixel (to {1e3 * scale.pitch.within95:.5f}), "
+        f"aspect {scale.aspect.value:.4f} (to {scale.aspect.within95:.4f}), "
+        f"rotation {degrees * scale.rotation.value:.2f} deg (to {degrees * scale.rotation.within95:.2f}), "
+        "19 times of 20",
+        f"{len(scale.used)} presses scatter by {1e3 * scale.scatter:.3f} mm about it",
+    ]
+
+
+def doubts(scale: "ArmScale", arm: "ArmPresses") -> list[str]:
+    """What the operator should know of a measured scale."""
+    said = []
+    if abs(scale.aspect.value - 1.0) > max(_ASPECT, scale.aspect.within95):
+        said.append(
+            f"pixels are {scale.aspect.value:.3f} times as high as wide; colours are fitted as though they "
+            "were square, and slopes of rows and columns differ by that"
+        )
+    if abs(scale.skew.value) > scale.skew.within95:
+        said.append(
+            f"rows and columns stand askew by {57.3 * scale.skew.value:.2f} deg, more than the error: the "
+            "gel slips sideways, or the camera looks at it from the side"
+        )
+    if scale.off:
+        said.append(f"off the map and not used for it: {', '.join(arm.taken[k].name for k in scale.off)}")
+    if arm.marked > _MARKED:
+        said.append(
+            f"a place of the untouched gel changed by {arm.marked:.0f} grey levels since the first "
+            "background: an imprint that had not gone, dirt, or a gel that moved"
+        )
+    return said
