@@ -2,14 +2,20 @@
 
 from pathlib import Path
 
+import numpy as np
 from whole_run import Quiet
 
 from calibration.taxim.arm_plan import PressSettings
 from calibration.taxim.arm_session import BALL, Begun, ball_scene, begin, perform_on
+from harness.arrays import ByteArray, FloatArray
+from harness.device import Health, TactileCamera
+from harness.reading import Reading
 from harness.recording import Recording
+from harness.recording_codecs import decode_jpeg
 from harness.run_folder import RunFiles
 from harness.station import Bench, RunContext
 from harness.station_file import load_station, station_path
+from mocks.gelsight_stream import encode
 from mocks.in_process import in_process_bench
 
 RADIUS = 2e-3
@@ -37,3 +43,65 @@ def performed(folder: Path, presses: int = 15, seed: int = 1, gap: str | None = 
     complete, _ = perform_on(opened(recording), recording, Quiet())
     assert complete
     return recording
+
+
+class Creeping:
+    """A tactile camera in trouble: its gel creeps on after every change, its light fades, or it sees nothing.
+
+    Args:
+        inner: the camera whose pictures are changed.
+        lasts: s in which what is left of the creep falls by e.
+        share: of a change of the picture that comes late.
+        trembles: share of a change by which it comes and goes, twice a second.
+        fades: grey levels a second by which everything darkens.
+        blind: whether it shows the first picture for ever.
+    """
+
+    def __init__(
+        self,
+        inner: TactileCamera,
+        lasts: float = 1.0,
+        share: float = 0.0,
+        trembles: float = 0.0,
+        fades: float = 0.0,
+        blind: bool = False,
+    ) -> None:
+        self._inner = inner
+        self._lasts, self._share, self._fades, self._blind = lasts, share, fades, blind
+        self._trembles = trembles
+        self._late: FloatArray | None = None
+        self._first: FloatArray | None = None
+        self._time = 0.0
+
+    def open(self) -> None:
+        """Nothing to connect."""
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def health(self) -> Health:
+        """The inner one's."""
+        return self._inner.health()
+
+    def read(self, count: int, timeout: float) -> Reading:
+        """The inner one's next frames, as the trouble has them."""
+        frames = self._inner.read(count, timeout)
+        shown = [
+            self._shown(picture.astype(np.float64), float(time))
+            for picture, time in zip(frames.values, frames.times, strict=True)
+        ]
+        encoded = tuple(encode(picture) for picture in shown)
+        decoded = [np.asarray(decode_jpeg(jpeg)) for jpeg in encoded]
+        return Reading(frames.channel, frames.times, np.array(decoded), encoded)
+
+    def _shown(self, picture: FloatArray, time: float) -> ByteArray:
+        if self._first is None or self._late is None:
+            self._first, self._late, self._time = picture, picture, time
+        # What is late follows the picture as a spring in honey does.
+        part = 1.0 - np.exp(-(time - self._time) / self._lasts)
+        self._late = self._late + part * (picture - self._late)
+        self._time = time
+        seen = self._first if self._blind else (1.0 - self._share) * picture + self._share * self._late
+        seen = seen + self._trembles * np.cos(13.0 * time) * (seen - self._first)
+        faded = np.clip(np.round(seen - self._fades * time), 0.0, 255.0)
+        return np.asarray(faded, dtype=np.uint8)
