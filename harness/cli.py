@@ -84,7 +84,7 @@ COMMANDS = {
     ),
     "calibrate taxim": Command(
         "calibration.commands.taxim:taxim",
-        "Calibrate a tactile camera from pictures of ball presses, without marks.",
+        "Calibrate a tactile camera by ball presses, made by the arm or in pictures; no marks.",
     ),
     "sim modes": Command(
         "experiments.commands.sim:modes",

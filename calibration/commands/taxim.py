@@ -1,4 +1,4 @@
-"""``touchstone calibrate taxim``: a tactile camera's colours from ball presses, without marks."""
+"""``touchstone calibrate taxim``: a tactile camera from ball presses, by the arm or in pictures."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -8,41 +8,99 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from calibration.commands.taxim_arm import Wanted, chosen, doubts, pressed, scale_answer, scale_lines
 from harness import options
-from harness.output import ANSWERS, CONSOLE, emit
+from harness.output import ANSWERS, CONSOLE, emit, warn
 
 if TYPE_CHECKING:
+    from calibration.taxim.arm_moves import ArmScale
+    from calibration.taxim.arm_record import ArmPresses
     from calibration.taxim.mark_free import Identity, MarkFree
-    from calibration.taxim.pictures import Channels
+    from calibration.taxim.pictures import Channels, Pictures
+
+PITCH = "0.1245mm"
+"""Of pictures of which nothing else is said: the paper's sensor."""
 
 
 def taxim(
     folder: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
-            help="Pictures of one ball pressed all over the gel, one a press; or a dataPack.npz.",
+            help="Pictures of one ball pressed all over the gel, one a press; a dataPack.npz; or the folder "
+            "of a run that the arm made, which is read again without it.",
             metavar="FOLDER",
         ),
-    ],
+    ] = None,
+    station: Annotated[
+        str | None,
+        typer.Option(help="Press the ball with the arm of this bench: a name or a file.", metavar="NAME"),
+    ] = None,
     ball_radius: Annotated[
-        str, typer.Option("--ball-radius", help="Radius of the ball, as 2mm.", metavar="LENGTH")
-    ],
-    pitch: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="Length of gel that a pixel shows, as 0.0295mm; presses cannot tell it.", metavar="LENGTH"
+            "--ball-radius",
+            help="Radius (not diameter) of the ball, as 2mm; a run of the arm has it in its folder.",
+            metavar="LENGTH",
         ),
-    ] = "0.1245mm",
+    ] = None,
+    pitch: Annotated[
+        str | None,
+        typer.Option(
+            help="Length of gel that a pixel shows, as 0.0295mm. Presses cannot tell it, the arm can: "
+            f"what it measured if left out, or {PITCH} of pictures.",
+            metavar="LENGTH",
+        ),
+    ] = None,
+    scene: Annotated[
+        Path | None,
+        typer.Option(
+            help="Where the ball stands, as scenes/ball_target.toml; its top to 1.5 mm in height.",
+            metavar="FILE",
+        ),
+    ] = None,
+    presses: Annotated[
+        int | None, typer.Option(help="How many presses the arm makes; 49 if left out.", metavar="N")
+    ] = None,
+    depth: Annotated[
+        str | None,
+        typer.Option(
+            help="How deep, from where the picture first shows the ball; 0.4 radii if left out.",
+            metavar="LENGTH",
+        ),
+    ] = None,
+    run: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the arm's run; a dated one under runs/ if left out.", metavar="DIR"),
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(help="Go on with this run of the arm at its first missing press.", metavar="RUN"),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Of the places, and of a mocked world; 0 if left out.", min=0)
+    ] = None,
+    gap: Annotated[
+        str | None,
+        typer.Option(help="Reality gap of a mocked bench; target if left out.", metavar="NAME"),
+    ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="The artefact to write; <folder>_calibration.npz if left out.", metavar="FILE"),
+        typer.Option(
+            help="The artefact to write; <folder>_calibration.npz, or fitted.npz in a run of the arm, if "
+            "left out.",
+            metavar="FILE",
+        ),
     ] = None,
     polycalib: Annotated[
         Path | None,
         typer.Option(help="Write the colour table in Taxim's own layout too.", metavar="FILE"),
     ] = None,
     report: Annotated[
-        Path | None, typer.Option(help="Write a page with pictures into this folder.", metavar="DIR")
+        Path | None,
+        typer.Option(
+            help="Write a page with pictures into this folder; of a run of the arm always, into its report/.",
+            metavar="DIR",
+        ),
     ] = None,
     background: Annotated[
         Path | None,
@@ -68,55 +126,141 @@ def taxim(
     marks: Annotated[
         bool, typer.Option("--marks", help="Start from the circles that came with a data pack.")
     ] = False,
-    sensor: Annotated[str, typer.Option(help="Make of the sensor.", metavar="NAME")] = "GelSight",
+    sensor: Annotated[
+        str | None, typer.Option(help="Make of the sensor; a run of the arm knows it.", metavar="NAME")
+    ] = None,
     serial: Annotated[str, typer.Option(help="Of the very sensor.", metavar="NAME")] = "unknown",
     licence: Annotated[str, typer.Option(help="Of the pictures.", metavar="NAME")] = "not stated",
     json: options.Json = False,
 ) -> int:
-    """Calibrate a tactile camera from pictures of ball presses. Nobody marks anything.
+    """Calibrate a tactile camera by pressing its gel on one ball all over. Nobody marks anything.
+
+    With --station the arm does it: screw the ball down where --scene says, and let it press. The motion is
+    rehearsed in the twin first; a picture counts when it has come to rest; the untouched gel is looked at
+    before each press, and a changed light stops the run with the reason. Each press is on the disk before the
+    next begins: Ctrl-C once ends after the press, twice stops the arm, --resume goes on.
+
+    From the arm's known moves come millimetres per pixel, aspect and rotation of the picture, each with its
+    error. Pictures alone cannot give these: they are said to be missing, and the pitch is taken as given.
 
     Presses are found, damaged ones refused with the reason, colours and centres fitted in turns, and the
     result scored on presses held out of the fit: eight folds, only the centre refitted on a held-out press.
 
-    Try: touchstone calibrate taxim presses/ --ball-radius 2mm --pitch 0.1245mm --report page/
+    Try: touchstone calibrate taxim --station mock --ball-radius 2mm --run runs/r15
+
+    Then: touchstone calibrate taxim runs/r15        (again, without the arm)
+
+    Or: touchstone calibrate taxim presses/ --ball-radius 2mm --pitch 0.1245mm --report page/
     """
     from calibration.taxim.mark_free import calibrate
-    from calibration.taxim.pictures import read_pictures
     from calibration.taxim.polycalib import write_polycalib
-    from harness.sim.tactile_calibration import load_calibration, save_calibration
+    from harness.sim.lit_calibration import read_calibration
+    from harness.sim.tactile_calibration import save_calibration
 
-    who = _identity(sensor, serial, licence, pitch, ball_radius)
-    pictures = read_pictures(folder, background, _channels(channels))
-    known = None if like is None else load_calibration(like)
+    wanted = Wanted(
+        station,
+        scene,
+        resume,
+        run,
+        presses,
+        _length("--depth", depth) if depth is not None else None,
+        _length("--ball-radius", ball_radius) if ball_radius is not None else None,
+        seed,
+        gap,
+    )
+    chosen(folder, wanted)
+    source = folder if folder is not None else pressed(wanted, json)
+    if source is None:
+        return 130
+    arm, scale, pictures = _read(source, background, channels)
+    who = _identity(sensor, serial, licence, pitch, wanted.ball_radius, arm, scale)
+    known = None if like is None else read_calibration(like)
     made = calibrate(pictures, who, use_marks=marks, like=known)
-    artefact = out if out is not None else Path(f"{folder.resolve().stem}_calibration.npz")
+    artefact = out if out is not None else _place(source, arm is not None)
     save_calibration(made.calibration, artefact)
     if polycalib is not None:
         write_polycalib(made.calibration, polycalib)
     page = None
+    if report is None and arm is not None:
+        report = source / "report"
     if report is not None:
         from calibration.taxim.report import report_of
         from harness.report.calibration_page import write_calibration_page
 
-        page = write_calibration_page(report_of(made, pictures, f"{sensor}, {folder.name}"), report)
-    answer = _answer(made, artefact, polycalib, page)
+        page = write_calibration_page(
+            report_of(made, pictures, f"{who.sensor}, {source.name}", scale, arm), report
+        )
+    answer = {**_answer(made, artefact, polycalib, page), **scale_answer(scale, arm), "pitch_m": who.pitch}
+    if scale is not None and arm is not None:
+        _keep(answer["scale"], artefact)
+        for doubt in doubts(scale, arm):
+            warn(doubt)
     if json:
         emit(answer)
     else:
-        _say(made, answer)
+        _say(made, answer, scale)
     return 0
 
 
-def _identity(sensor: str, serial: str, licence: str, pitch: str, ball_radius: str) -> "Identity":
-    from calibration.taxim.mark_free import Identity
+def _read(
+    source: Path, background: Path | None, channels: str | None
+) -> "tuple[ArmPresses | None, ArmScale | None, Pictures]":
+    """Pictures and, where an arm made them, what its moves say."""
+    from calibration.taxim.arm_record import is_arm_run, read_arm_run
+    from calibration.taxim.pictures import read_pictures
+    from harness.errors import WrongUse
 
+    if not is_arm_run(source):
+        return None, None, read_pictures(source, background, _channels(channels))
+    if background is not None or channels is not None:
+        raise WrongUse("--background and --channels are of pictures; a run of the arm has both in its folder")
+    arm = read_arm_run(source)
+    return arm, arm.scale(), arm.pictures
+
+
+def _place(source: Path, by_arm: bool) -> Path:
+    return source / "fitted.npz" if by_arm else Path(f"{source.resolve().stem}_calibration.npz")
+
+
+def _keep(scale: dict[str, Any], artefact: Path) -> None:
+    """What the arm measured, beside the artefact, whose format has a place for the pitch alone."""
+    from json import dumps
+
+    from harness.recording import write_text_whole
+
+    path = artefact.with_name(f"{artefact.stem}.scale.json")
+    write_text_whole(path, dumps({"schema": 1, **scale}, indent=1, allow_nan=False) + "\n")
+
+
+def _identity(
+    sensor: str | None,
+    serial: str,
+    licence: str,
+    pitch: str | None,
+    ball_radius: float | None,
+    arm: "ArmPresses | None",
+    scale: "ArmScale | None",
+) -> "Identity":
+    """Who the sensor is, and its pitch: as given, else by the arm, else the paper's sensor's."""
+    from calibration.taxim.mark_free import Identity
+    from harness.errors import WrongUse
+
+    recorded = None if arm is None else arm.ball_radius
+    if ball_radius is None and recorded is None:
+        raise WrongUse("--ball-radius is missing: the radius of the ball that was pressed, as 2mm")
+    if ball_radius is not None and recorded is not None and abs(ball_radius / recorded - 1.0) > 1e-6:
+        raise WrongUse(
+            f"--ball-radius {1e3 * ball_radius:g} mm: this run was made with a ball of {1e3 * recorded:g} "
+            "mm; leave it out"
+        )
+    measured = None if scale is None else scale.pitch.value
     return Identity(
-        sensor=sensor,
-        serial=serial,
+        sensor=sensor or ("GelSight" if arm is None else arm.sensor),
+        serial=serial if arm is None or serial != "unknown" else arm.serial or serial,
         licence=licence,
         date=datetime.now(UTC).date().isoformat(),
-        pitch=_length("--pitch", pitch),
-        ball_radius=_length("--ball-radius", ball_radius),
+        pitch=measured if pitch is None and measured is not None else _length("--pitch", pitch or PITCH),
+        ball_radius=recorded if recorded is not None else ball_radius or 0.0,
     )
 
 
@@ -177,7 +321,7 @@ def _answer(made: "MarkFree", artefact: Path, polycalib: Path | None, page: Path
     }
 
 
-def _say(made: "MarkFree", answer: dict[str, Any]) -> None:
+def _say(made: "MarkFree", answer: dict[str, Any], scale: "ArmScale | None") -> None:
     for one in made.refused:
         CONSOLE.print(f"[yellow]refused:[/] {escape(one.name)}: {escape(one.reason)}")
     drawn = Table(title=f"{answer['artefact']}: {len(made.used)} presses, {len(made.refused)} refused")
@@ -188,6 +332,8 @@ def _say(made: "MarkFree", answer: dict[str, Any]) -> None:
     drawn.add_row("table, centre as detected", f"{answer['psnr_contact_unrefitted_db']:.2f}")
     drawn.add_row("untouched gel", f"{answer['psnr_untouched_db']:.2f}")
     ANSWERS.print(drawn)
+    for line in [escape(answer["scale_reason"])] if scale is None else scale_lines(scale):
+        ANSWERS.print(line)
     ANSWERS.print(f"background: {escape(answer['background'])}; {answer['seconds']:.1f} s")
     if answer["report"] is not None:
         ANSWERS.print(f"report: {escape(answer['report'])}")

@@ -12,7 +12,7 @@ from calibration.taxim.arm_plan import ball_on_gel
 from calibration.taxim.detect import shrunk
 from calibration.taxim.pictures import Pictures, Refused, set_digest
 from calibration.taxim.settled import look
-from calibration.taxim.touch_down import touch_downs
+from calibration.taxim.touch_down import middles_at_depth, touch_downs
 from harness.arrays import ByteArray, FloatArray, read_only
 from harness.errors import CalibrationRefused, RecordingDamaged
 from harness.geometry import rotation_from_quaternion, transform
@@ -88,8 +88,9 @@ class ArmPresses:
             CalibrationRefused: too few presses that began, or a map that cannot be.
         """
         ball = self.ball_radius / self.pitch
-        places = touch_downs([one.descent for one in self.taken], ball)
-        found = arm_scale(places, np.array([one.on_gel for one in self.taken]))
+        descents = [one.descent for one in self.taken]
+        on_gel = np.array([one.on_gel for one in self.taken])
+        found = arm_scale(touch_downs(descents, ball), on_gel, middles_at_depth(descents, ball))
         share = found.pitch.value / self.pitch
         if not 1.0 / LEAST_BALL < share < LEAST_BALL:
             raise CalibrationRefused(

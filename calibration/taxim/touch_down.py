@@ -81,6 +81,21 @@ def touch_downs(descents: list[FloatArray], ball: float) -> tuple[FloatArray, ..
     return tuple(np.array([_began(one, way) for one in seen]).reshape(-1, 2) for way in WAYS)
 
 
+def middles_at_depth(descents: list[FloatArray], ball: float) -> FloatArray:
+    """Where the middles are before they are carried back: in the deepest picture, by the first of ``WAYS``.
+
+    Args:
+        descents: as for ``touch_downs``.
+        ball: radius in pixels.
+
+    Returns:
+        ``(presses, 2)`` pixels (column, row), NaN where nothing was seen.
+    """
+    seen = [_contact(change, ball).strength for change in descents]
+    deepest = [_middle(_weight(one[-1], WAYS[0])) if len(one) else np.full(2, np.nan) for one in seen]
+    return np.array(deepest).reshape(-1, 2)
+
+
 @dataclass(frozen=True, eq=False)
 class _Contact:
     """The strength of change within reach of one contact: ``(pictures, rows, columns)`` grey levels."""
@@ -120,8 +135,11 @@ def _began(contact: _Contact, way: Way) -> FloatArray:
         return np.full(2, np.nan)
     middles = np.array([_middle(_weight(one, way)) for one in strength])
     total = np.sqrt((strength**2).sum(axis=(1, 2)))
-    powers = np.vander(total / total[-1], way.degree + 1, increasing=True)
-    return np.asarray(np.linalg.lstsq(powers, middles, rcond=None)[0][0], dtype=np.float64)
+    share = total / total[-1]
+    powers = np.vander(share, way.degree + 1, increasing=True)
+    # The noise of a middle is as one over its strength: so much less does a faint picture weigh.
+    solved = np.linalg.lstsq(powers * share[:, None], middles * share[:, None], rcond=None)[0]
+    return np.asarray(solved[0], dtype=np.float64)
 
 
 def _weight(strength: FloatArray, way: Way) -> FloatArray:

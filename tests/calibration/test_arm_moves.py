@@ -101,6 +101,19 @@ def test_ways_to_see_that_disagree_are_part_of_the_error() -> None:
     assert both.of_scatter < 1.1 * alone.of_scatter
 
 
+def test_a_part_of_a_correction_counts_as_error() -> None:
+    places = pixels()
+    on_gel = moved(places, matrix(), NOISE)
+    plain = arm_scale([places], on_gel)
+    same, much = arm_scale([places], on_gel, places), arm_scale([places], on_gel, places / 1.04)
+    assert values(same) == pytest.approx(values(plain))
+    assert same.pitch.sigma == pytest.approx(plain.pitch.sigma)
+    assert much.pitch.value == plain.pitch.value
+    by_correction = np.sqrt(much.pitch.sigma**2 - plain.pitch.sigma**2)
+    assert by_correction == pytest.approx(0.05 * 0.04 * PITCH, rel=0.01)
+    assert much.rotation.sigma == pytest.approx(plain.rotation.sigma)
+
+
 def test_a_press_that_slipped_is_named_and_not_used() -> None:
     places = pixels()
     on_gel = moved(places, matrix(), NOISE)
