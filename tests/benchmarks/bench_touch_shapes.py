@@ -62,14 +62,14 @@ PAPER = [189, 256, 256, 256, 256, 256 + 189, 256, 256, 256]
 def main() -> None:
     """One table for each object."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("objects", nargs="*", default=["mug"], choices=list(MATERIALS))
+    parser.add_argument("objects", nargs="*", metavar="OBJECT", help=f"built in: {', '.join(MATERIALS)}")
     parser.add_argument("--objectfile", type=Path)
     parser.add_argument("--profile", default="standard")
     parser.add_argument("--presses", type=int, default=200)
     parser.add_argument("--repeat", type=int, default=9)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, threadpool_limits(limits=1):
-        for name in asked.objects:
+        for name in asked.objects or ["mug"]:
             if asked.objectfile is None:
                 measure(_made(name, asked.profile, Path(folder) / name), asked)
         if asked.objectfile is not None:
@@ -119,6 +119,11 @@ def measure(of: ObjectFile, asked: argparse.Namespace) -> None:
     table.add_row("untouched gel", *_errors(np.zeros_like(truth), truth), "", "")
     console = Console(width=150)
     console.print(table)
+    apart = np.abs(compiled.at(presses) - graph.at(presses))
+    rms, high, most = 1e6 * np.sqrt((apart**2).mean()), 1e6 * np.quantile(apart, 0.999), 1e6 * apart.max()
+    console.print(
+        f"  compiled codes from their graph: {rms:.2g} um rms, {high:.2g} in 999 of 1000, {most:.2g} at most"
+    )
     twice = open_touch(of, "codes", threads=2)
     pairs = (
         ("codes, compiled", twice.maps),
@@ -234,6 +239,7 @@ def _halves(first: Maps, second: Maps) -> Maps:
 
 
 def _throughput(maps: Maps, presses: Presses, repeat: int) -> str:
+    presses = presses[: len(presses) - len(presses) % CHUNK]
     batches = [presses[k : k + CHUNK] for k in range(0, len(presses), CHUNK)]
     maps(batches[0])
     rates = []
