@@ -34,7 +34,7 @@ _BESIDE = (0.7, 0.85, 1.0, 1.15, 1.3)
 _CORES = (0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7)
 _START = 0.5
 _NARROWEST = 5
-_FEW, _MANY = 250.0, 2000.0
+_FEW, _MANY = 250.0, 1000.0
 """Pixels of a press: to choose the skirt by, and to fit the colours to."""
 
 _RIDGE, _PLACE_RIDGE = 1e-6, 1e-4
@@ -97,7 +97,7 @@ def fit_light(pack: PressPack, change: FloatArray, centres: FloatArray, edge: fl
     few = _samples(pack, change, centres, edge, _FEW)
 
     def misfit(skirt: GelSkirt) -> float:
-        return _solved(few, ball_profile(skirt, edge, ball, "fast"), edge, ball)[1]
+        return _solved(few, ball_profile(skirt, edge, ball, "fast"), edge, ball, turns=1)[1]
 
     best = min((skirt_of(width * edge, _START) for width in _WIDTHS), key=misfit)
     best = min((GelSkirt(best.kernels, best.final, core) for core in _CORES), key=misfit)
@@ -189,13 +189,15 @@ def _where(pack: PressPack, place: IntArray) -> FloatArray:
     return scaled_position(x, y, *pack.shape)
 
 
-def _solved(samples: _Samples, profile: Profile, edge: float, ball: float) -> tuple[FloatArray, float]:
+def _solved(
+    samples: _Samples, profile: Profile, edge: float, ball: float, turns: int = 2
+) -> tuple[FloatArray, float]:
     """The coefficients ``(156, 3)`` and the weighted rms of what they leave over, grey levels."""
     terms = _terms(profile, samples.offset, samples.where, edge / ball)
     inside = np.hypot(samples.offset[:, 0], samples.offset[:, 1]) <= edge
     fixed = np.where(inside, WITHIN_WEIGHT, 1.0)
     weight = fixed
-    for _ in range(2):
+    for _ in range(turns):
         weighted = terms * weight[:, None]
         gram = terms.T @ weighted
         solved = np.linalg.solve(gram + np.diag(_ridge(np.diag(gram))), weighted.T @ samples.seen)

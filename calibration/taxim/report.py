@@ -4,13 +4,15 @@ import numpy as np
 
 from calibration.taxim.arm_moves import ArmScale
 from calibration.taxim.arm_record import ArmPresses
+from calibration.taxim.light_fit import depth_of, pressed_ball
 from calibration.taxim.mark_free import MarkFree, UsedPress
 from calibration.taxim.pictures import Pictures
 from calibration.taxim.rest import AWAY, SIGHTINGS
-from calibration.taxim.smooth_fit import contact_pixels, distance
-from calibration.taxim.table_fit import table_shades
+from calibration.taxim.smooth_fit import distance
 from harness.arrays import ByteArray, FloatArray
 from harness.report.calibration_page import CalibrationReport, Example, MovesFigure, PressLine
+from harness.sim.gel import deform
+from harness.sim.optics import Optics
 from harness.sim.tactile_calibration import TactileCalibration
 
 _SHARES = (0.0, 0.5, 1.0)
@@ -92,7 +94,7 @@ def _cards(made: MarkFree) -> list[tuple[str, str, str]]:
     covered = float((made.coverage > 0).mean())
     return [
         ("held out, table", f"{made.median('table'):.1f} dB", "median PSNR within the contact"),
-        ("held out, smooth model", f"{made.median('smooth'):.1f} dB", "the level without bins"),
+        ("held out, smooth model", f"{made.median('smooth'):.1f} dB", "with skirt and light"),
         ("untouched gel", f"{made.median('nothing'):.1f} dB", "what predicting nothing scores"),
         (
             "presses",
@@ -116,8 +118,9 @@ def _notes(made: MarkFree, scale: ArmScale | None) -> list[str]:
         else f"The ball ({1e3 * header.ball_radius:g} mm) was given; {1e3 * header.pitch:.5g} mm a pixel "
         f"were taken, by the arm it is {1e3 * scale.pitch.value:.5g} mm.",
         f"The contact line of all presses is a circle of {made.contact_radius:.1f} px to within "
-        f"{made.roundness:.2f} px. Slopes of the smooth model, which knows no dimming by a contact, lean by "
-        f"{np.degrees(made.lean):.1f} degrees against it; those of the table do not.",
+        f"{made.roundness:.2f} px. The gel's skirt is {header.skirt.kernels[0]} px wide, and the "
+        f"balls reach {1e3 * made.depth:.2f} mm in. Slopes that an inverse starts from, which know no "
+        f"dimming by a contact, lean by {np.degrees(made.lean):.1f} degrees against that line.",
     ]
 
 
@@ -147,9 +150,13 @@ def _example(word: str, press: UsedPress, made: MarkFree, pictures: Pictures) ->
 
 
 def draw_press(calibration: TactileCalibration, centre: FloatArray, radius: float) -> ByteArray:
-    """``(rows, columns, 3)`` RGB of a ball pressed at a centre (column, row), without the gel's skirt."""
-    ball = calibration.header.ball_radius / calibration.header.pitch
-    place = contact_pixels((calibration.rows, calibration.columns), centre, radius, 1)
-    shown = calibration.background.astype(np.float64)
-    shown[place[:, 0], place[:, 1]] += table_shades(calibration.table, centre, place, ball)
-    return np.clip(np.round(shown), 0.0, 255.0).astype(np.uint8)
+    """``(rows, columns, 3)`` RGB of a ball in the gel at a centre (column, row), drawn as anything is drawn.
+
+    The smooth level, with the gel's skirt; ``radius`` in pixels is the contact line's.
+    """
+    header = calibration.header
+    ball = header.ball_radius / header.pitch
+    away = distance((calibration.rows, calibration.columns), centre)
+    reached = header.pitch * pressed_ball(away, depth_of(header.skirt, radius, ball), ball)
+    drawn: ByteArray = Optics(calibration, "smooth").render(deform(reached[None], header.skirt)).images[0]
+    return drawn
