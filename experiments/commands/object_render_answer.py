@@ -1,4 +1,4 @@
-"""What ``touchstone object render`` answers: a picture, one JSON object, or lines for people."""
+"""What ``touchstone object render audio`` answers: a picture, one JSON object, or lines for people."""
 
 import time
 from dataclasses import dataclass
