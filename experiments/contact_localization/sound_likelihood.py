@@ -11,26 +11,23 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import logsumexp
 
 from experiments.contact_localization.sound_analysis import Peak, SoundEvidence
 from experiments.contact_localization.sound_density import MOST_RANK, sound_scores
 from experiments.contact_localization.sound_gains import GainTable
 from experiments.contact_localization.sound_matching import (
+    Pairs,
     Scales,
     SoundNoise,
     group_starts,
     likely_scales,
+    pairs_of,
 )
 from harness.arrays import FloatArray, IntArray
 from harness.errors import WrongUse
 from harness.materials import Material
 from harness.sim.modes import Modes, dampings
-
-_FAR = 4.0
-"""Sigmas of frequency at which a mode is no longer considered for a peak."""
-
-_LEAST_DENSITY = 0.05
-"""Of modes at a peak, in units of one mode right at it: with fewer about, clutter gains."""
 
 
 @dataclass(frozen=True)
@@ -58,16 +55,6 @@ class ModeRow:
     model_damping: float
     probability: float
     nats: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Pairs:
-    """Which group may sound at which peak, pairs of a peak side by side."""
-
-    starts: IntArray
-    groups: IntArray
-    shares: FloatArray
-    clutter: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +114,7 @@ class SoundTerm:
         self._peaks = evidence.peaks if len(modes.frequencies) else ()
         frequencies = np.array([peak.frequency for peak in self._peaks])
         self.scales: Scales = likely_scales(frequencies, modes.frequencies, noise)
-        self._pairs = _pair(frequencies, self._group_frequencies(), self.scales.factors, noise)
+        self._pairs = pairs_of(frequencies, self._group_frequencies(), self.scales.factors, noise)
         self._gain_scales = self._unit_gains()
 
     @property
@@ -159,7 +146,7 @@ class SoundTerm:
         if not self.says_something or len(points) == 0:
             return np.zeros(len(points))
         struck = self._struck(points, directions, between)
-        return self._scores(struck, self._heard, self._pairs, self._noise.weight)
+        return self._scores(struck, self._heard, self._pairs, self.scales.log_shares, self._noise.weight)
 
     def mode_table(self, points: FloatArray, directions: FloatArray) -> tuple[ModeRow, ...]:
         """Every peak with the group of modes that explains it best at one set of places.
@@ -169,7 +156,18 @@ class SoundTerm:
             directions: ``(K, 3)`` unit.
         """
         struck = self._struck(points[None], directions, between=True)
-        return tuple(self._row(index, struck) for index in range(len(self._peaks)))
+        shares = self._scale_shares(struck)
+        return tuple(self._row(index, struck, shares) for index in range(len(self._peaks)))
+
+    def scale_at(self, points: FloatArray, directions: FloatArray) -> float:
+        """The most probable factor between the object's frequencies and the model's, at one set of places.
+
+        Args:
+            points: ``(K, 3)`` metres, in the object's frame.
+            directions: ``(K, 3)`` unit.
+        """
+        shares = self._scale_shares(self._struck(points[None], directions, between=True))
+        return float(self.scales.factors[int(np.argmax(shares))])
 
     @cached_property
     def _heard(self) -> _Heard:
@@ -190,7 +188,18 @@ class SoundTerm:
             np.ascontiguousarray(directions.reshape(-1, strikes, 3)),
         )
 
-    def _scores(self, struck: _Struck, heard: _Heard, pairs: _Pairs, weight: float) -> FloatArray:
+    def _scale_shares(self, struck: _Struck) -> FloatArray:
+        """``(S,)``: how probable each scale is at one set of places, summing to 1."""
+        nats = self.scales.log_shares.copy()
+        for s in range(len(nats) if self.says_something else 0):
+            nats[s] += self._scores(
+                struck, self._heard, self._pairs.under(s), np.zeros(1), self._noise.weight
+            )[0]
+        return np.asarray(np.exp(nats - logsumexp(nats)))
+
+    def _scores(
+        self, struck: _Struck, heard: _Heard, pairs: Pairs, log_shares: FloatArray, weight: float
+    ) -> FloatArray:
         return sound_scores(
             self._table.shapes,
             struck.samples,
@@ -208,7 +217,7 @@ class SoundTerm:
             pairs.shares,
             pairs.clutter,
             weight,
-            self.scales.log_shares,
+            log_shares,
         )
 
     def _group_frequencies(self) -> FloatArray:
@@ -225,11 +234,13 @@ class SoundTerm:
             result[a:b] = 1.0 / np.sqrt(squares[a:b].mean())
         return np.asarray(result / np.array(self._noise.spreads)[:, None])
 
-    def _row(self, index: int, struck: _Struck) -> ModeRow:
+    def _row(self, index: int, struck: _Struck, scale_shares: FloatArray) -> ModeRow:
         peak, pairs = self._peaks[index], self._pairs
         span = range(int(pairs.starts[index]), int(pairs.starts[index + 1]))
-        prior = np.exp(self.scales.log_shares)
-        odds = np.array([prior @ pairs.clutter[:, index]] + [prior @ pairs.shares[:, q] for q in span])
+        factor = self.scales.factors[int(np.argmax(scale_shares))]
+        odds = np.array(
+            [scale_shares @ pairs.clutter[:, index]] + [scale_shares @ pairs.shares[:, q] for q in span]
+        )
         fits = np.array([0.0] + [self._fit_of(peak, int(pairs.groups[q]), struck) for q in span])
         total = float(np.sum(odds * np.exp(fits)))
         chances = odds * np.exp(fits) / total
@@ -243,43 +254,22 @@ class SoundTerm:
             peak.residual,
             peak.level,
             modes,
-            float(at[0] * self.scales.factors[0]) if best else 0.0,
-            float(dampings(at * self.scales.factors[0], self._material)[0]) if best else 0.0,
+            float(at[0] * factor) if best else 0.0,
+            float(dampings(at * factor, self._material)[0]) if best else 0.0,
             float(chances[best]),
             float(np.log(total)),
         )
 
     def _fit_of(self, peak: Peak, group: int, struck: _Struck) -> float:
         """Nats of one peak if one group of modes made it."""
-        sure = _Pairs(
+        sure = Pairs(
             np.array([0, 1], dtype=np.int64),
             np.array([group], dtype=np.int64),
-            np.ones((len(self.scales.factors), 1)),
-            np.zeros((len(self.scales.factors), 1)),
+            np.ones((1, 1)),
+            np.zeros((1, 1)),
         )
         heard = _whitened((peak,), self._noise.spreads)
-        return float(self._scores(struck, heard, sure, 1.0)[0])
-
-
-def _pair(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> _Pairs:
-    starts, found, shares = [0], [], []
-    clutter = np.ones((len(factors), len(peaks)))
-    for index, peak in enumerate(peaks):
-        sigmas = (np.log(peak) - np.log(groups)[None] - np.log(factors)[:, None]) / noise.frequency
-        density = np.where(np.abs(sigmas) < _FAR, np.exp(-0.5 * sigmas**2), 0.0)
-        share = (1.0 - noise.clutter) * density / (density.sum(axis=1, keepdims=True) + _LEAST_DENSITY)
-        near = np.nonzero(share.any(axis=0))[0]
-        found.extend(near.tolist())
-        shares.append(share[:, near])
-        clutter[:, index] = 1.0 - share.sum(axis=1)
-        starts.append(len(found))
-    joined = np.concatenate(shares, axis=1) if shares else np.zeros((len(factors), 0))
-    return _Pairs(
-        np.array(starts, dtype=np.int64),
-        np.array(found, dtype=np.int64),
-        np.ascontiguousarray(joined),
-        clutter,
-    )
+        return float(self._scores(struck, heard, sure, np.zeros(1), 1.0)[0])
 
 
 def _whitened(peaks: tuple[Peak, ...], spreads: tuple[float, ...]) -> _Heard:

@@ -8,8 +8,14 @@ from scipy.special import logsumexp
 from harness.arrays import FloatArray, IntArray
 
 _GRID = 1.0e-3
-_APART = 8.0e-3
-"""Two scales whose logarithms are closer are one."""
+_FAR = 4.0
+"""Sigmas of frequency at which a mode is no longer considered for a peak."""
+
+_LEAST_DENSITY = 0.05
+"""Of modes at a peak, in units of one mode right at it: with fewer about, clutter gains."""
+
+_NEGLIGIBLE = -6.0
+"""Nats behind the most probable scale at which one is left out."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +28,7 @@ class SoundNoise:
         frequency: relative, one sigma of a mode's frequency about the common scale.
         scale: relative, one sigma of the common scale.
         scale_limits: within which a common scale is looked for.
-        scales: at most so many are kept.
+        scale_step: between the logarithms of the common scales that are weighed; as ``frequency`` or finer.
         scale_weight: factor on the nats by which two lists of frequencies prefer a scale.
         clutter: share of peaks that no mode explains.
         weight: factor on a peak's nats: the model's errors are shared between peaks.
@@ -34,7 +40,7 @@ class SoundNoise:
     frequency: float = 0.02
     scale: float = 0.05
     scale_limits: tuple[float, float] = (0.85, 1.15)
-    scales: int = 4
+    scale_step: float = 0.015
     scale_weight: float = 0.3
     clutter: float = 0.2
     weight: float = 0.2
@@ -53,6 +59,28 @@ class Scales:
 
     factors: FloatArray
     log_shares: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Which group of modes may sound at which peak, pairs of a peak side by side.
+
+    Attributes:
+        starts: ``(P + 1,)`` first pair of each peak.
+        groups: ``(Q,)`` group of each pair.
+        shares: ``(S, Q)`` prior share of a pair in its peak, under each scale.
+        clutter: ``(S, P)`` share left for anything else.
+    """
+
+    starts: IntArray
+    groups: IntArray
+    shares: FloatArray
+    clutter: FloatArray
+
+    def under(self, scale: int) -> "Pairs":
+        """The same, were one scale the only one."""
+        one = slice(scale, scale + 1)
+        return Pairs(self.starts, self.groups, self.shares[one], self.clutter[one])
 
 
 def group_starts(frequencies: FloatArray, noise: SoundNoise) -> IntArray:
@@ -77,7 +105,8 @@ def likely_scales(peaks: FloatArray, modes: FloatArray, noise: SoundNoise) -> Sc
     """Common factors under which the peaks fall on modes.
 
     Each peak is a normal mixture over the modes in log frequency, or clutter anywhere between them; the
-    factor is normal about 1. Several hills are kept: the highest is now and then not the true one.
+    factor is normal about 1. Where modes are dense their frequencies hardly tell one factor from another,
+    so that all that are likely are kept: the places struck must tell.
 
     Args:
         peaks: ``(P,)`` Hz.
@@ -94,17 +123,43 @@ def likely_scales(peaks: FloatArray, modes: FloatArray, noise: SoundNoise) -> Sc
         reach = float(np.log(modes.max() / modes.min())) + high - low
         score += np.log((1.0 - noise.clutter) * density + noise.clutter / reach).sum(axis=1)
     prior = -0.5 * (grid / noise.scale) ** 2
-    return _hills(grid, prior + noise.scale_weight * score, noise.scales)
+    return _even(grid, prior + noise.scale_weight * score, noise.scale_step)
 
 
-def _hills(grid: FloatArray, score: FloatArray, most: int) -> Scales:
-    edged = np.concatenate([[-np.inf], score, [-np.inf]])
-    tops = np.nonzero((score >= edged[:-2]) & (score > edged[2:]))[0]
-    factors: list[float] = []
-    logs: list[float] = []
-    for top in tops[np.argsort(-score[tops], kind="stable")]:
-        if len(factors) < most and all(abs(grid[top] - np.log(other)) >= _APART for other in factors):
-            factors.append(float(np.exp(grid[top])))
-            logs.append(float(score[top]))
-    log_shares = np.array(logs)
-    return Scales(np.array(factors), log_shares - logsumexp(log_shares))
+def _even(grid: FloatArray, score: FloatArray, step: float) -> Scales:
+    """Factors at even steps about the most probable, which comes first; what hardly weighs is left out."""
+    nats = score - score.max()
+    apart = max(1, round(step / (grid[1] - grid[0])))
+    chosen = np.arange(int(np.argmax(nats)) % apart, len(grid), apart)
+    chosen = chosen[nats[chosen] > _NEGLIGIBLE]
+    chosen = chosen[np.argsort(-nats[chosen], kind="stable")]
+    return Scales(np.exp(grid[chosen]), nats[chosen] - logsumexp(nats[chosen]))
+
+
+def pairs_of(peaks: FloatArray, groups: FloatArray, factors: FloatArray, noise: SoundNoise) -> Pairs:
+    """The groups near each peak, under each scale.
+
+    Args:
+        peaks: ``(P,)`` Hz.
+        groups: ``(G,)`` Hz, of the groups of modes.
+        factors: ``(S,)`` scales.
+        noise: of the frequencies.
+    """
+    starts, found, shares = [0], [], []
+    clutter = np.ones((len(factors), len(peaks)))
+    for index, peak in enumerate(peaks):
+        sigmas = (np.log(peak) - np.log(groups)[None] - np.log(factors)[:, None]) / noise.frequency
+        density = np.where(np.abs(sigmas) < _FAR, np.exp(-0.5 * sigmas**2), 0.0)
+        share = (1.0 - noise.clutter) * density / (density.sum(axis=1, keepdims=True) + _LEAST_DENSITY)
+        near = np.nonzero(share.any(axis=0))[0]
+        found.extend(near.tolist())
+        shares.append(share[:, near])
+        clutter[:, index] = 1.0 - share.sum(axis=1)
+        starts.append(len(found))
+    joined = np.concatenate(shares, axis=1) if shares else np.zeros((len(factors), 0))
+    return Pairs(
+        np.array(starts, dtype=np.int64),
+        np.array(found, dtype=np.int64),
+        np.ascontiguousarray(joined),
+        clutter,
+    )

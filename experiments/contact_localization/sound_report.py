@@ -44,7 +44,7 @@ def sound_of(scored: Scored) -> Sound | Missing:
         peaks=_peaks(found, heard),
         set_aside=len(evidence.rejected),
         band=evidence.band if evidence.band[1] > 0.0 else None,
-        scale=float(heard.term.scales.factors[0]),
+        scale=_scale(found, heard),
     )
 
 
@@ -134,10 +134,16 @@ def _pair(found: Answer, heard: Heard) -> SpectrogramPair | Missing:
     assert modes is not None
     assert material is not None
     direction = _directions(found, [index])[0]
-    factor = float(heard.term.scales.factors[0])
+    factor = _scale(found, heard)
     pair = sound_pair(strike, modes, material, found.last.contacts[index], direction, factor)
     recorded, simulated = pair.recorded, pair.simulated
     return SpectrogramPair(index + 1, recorded.times, recorded.frequencies, recorded.levels, simulated.levels)
+
+
+def _scale(found: Answer, heard: Heard) -> float:
+    """Of the object's frequencies over the model's, as the places of the answer have it."""
+    struck = [int(k) for k in heard.struck]
+    return heard.term.scale_at(found.last.contacts[struck], _directions(found, struck))
 
 
 def _directions(found: Answer, contacts: Sequence[int]) -> FloatArray:

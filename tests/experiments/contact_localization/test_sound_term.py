@@ -225,6 +225,22 @@ def _log_density(gains: FloatArray, rows: FloatArray, y: AnyArray) -> FloatArray
     return np.asarray(-np.linalg.slogdet(matrices)[1] - len(y) * np.log(quadratic))
 
 
+@pytest.mark.parametrize("factor", [0.92, 1.0, 1.08])
+def test_where_frequencies_tell_no_scale_the_places_do(factor: float) -> None:
+    """Modes so dense that every peak has one nearby under any scale, as a pitcher's are."""
+    rng = np.random.default_rng(2)
+    frequencies: FloatArray = 300.0 * 1.013 ** np.arange(160)
+    shapes = rng.normal(size=(len(MODES.points), 160, 3)).cumsum(axis=0) / 8.0
+    dense = replace(MODES, frequencies=frequencies, shapes=shapes - shapes.mean(axis=0))
+    places = _hypotheses(2, 60)
+    sounding = rng.choice(np.arange(20, 140), 12, replace=False)
+    gains = dense.gains(places[0], plate.down(K))[:, sounding]
+    evidence = _said(factor * frequencies[sounding], gains.T * _complex(rng, (12, 1)))
+    term = _term(evidence, dense)
+    assert np.argmax(term.log_likelihood(places, plate.down(K))) == 0
+    assert term.scale_at(places[0], plate.down(K)) == pytest.approx(factor, rel=0.02)
+
+
 def test_silence_and_noise_leave_every_place_alike() -> None:
     places = _hypotheses(6)
     nothing = SoundEvidence(np.ones(K, dtype=np.bool_), ("",) * K, (), (), (0.0, 0.0))
