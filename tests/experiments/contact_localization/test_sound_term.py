@@ -229,7 +229,7 @@ def _log_density(gains: FloatArray, rows: FloatArray, y: AnyArray) -> FloatArray
 def test_where_frequencies_tell_no_scale_the_places_do(factor: float) -> None:
     """Modes so dense that every peak has one nearby under any scale, as a pitcher's are."""
     rng = np.random.default_rng(2)
-    frequencies: FloatArray = 300.0 * 1.013 ** np.arange(160)
+    frequencies = np.geomspace(300.0, 300.0 * 1.013**159, 160)
     shapes = rng.normal(size=(len(MODES.points), 160, 3)).cumsum(axis=0) / 8.0
     dense = replace(MODES, frequencies=frequencies, shapes=shapes - shapes.mean(axis=0))
     places = _hypotheses(2, 60)
