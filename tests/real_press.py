@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize
@@ -11,7 +12,7 @@ from calibration.taxim.held_out import FOLDS, WITHIN, Model, decibels, teach
 from calibration.taxim.light_fit import depth_of, per_metre, pressed_ball
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pack import PressPack
-from calibration.taxim.pictures import Pictures
+from calibration.taxim.pictures import Pictures, read_pictures
 from calibration.taxim.smooth_fit import changes, distance, refined_centre
 from harness.arrays import BoolArray, ByteArray, FloatArray, IntArray, read_only
 from harness.image_metrics import ssim
@@ -19,6 +20,9 @@ from harness.sim.gel import R15_SKIRT, deform
 from harness.sim.lit_calibration import LitCalibration
 from harness.sim.optics import Optics
 from harness.sim.tactile_calibration import CalibrationHeader, GelSkirt
+
+R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
+FOTS = Identity("GelSight", "FOTS", "MIT", "2026-01-01", 1e-3 / 19.58, 2.35e-3)
 
 REGION = 1.6
 """Contact radii about a press: by these pixels its pose is fitted, and it is scored over them too."""
@@ -28,6 +32,14 @@ _EVALUATIONS = 60
 
 Drawing = Callable[[FloatArray], FloatArray]
 """From ``(rows, columns)`` metres that a ball reaches into the gel to ``(rows, columns, 3)`` grey levels."""
+
+
+def set_of(data: Path, word: str) -> Pictures:
+    """The pictures of ``r15`` or ``fots``."""
+    if word == "r15":
+        return read_pictures(data / "tactile/objectfolder_calibs")
+    folder = data / "tactile/fots_ball_presses"
+    return read_pictures(folder / "gelsight", folder / "gelsight_bg.png")
 
 
 @dataclass(frozen=True, eq=False)

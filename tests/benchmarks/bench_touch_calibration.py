@@ -40,7 +40,7 @@ def main() -> None:
     data = find_shared_data()
     if data is None:
         raise SystemExit(WHY_NOT)
-    wanted = options.what or ["r15", "fots", "damage"]
+    wanted = ["r15", "fots", "damage"] if "all" in options.what else options.what
     r15 = read_pictures(data / "tactile/objectfolder_calibs")
     if "r15" in wanted:
         made = _measured("R1.5, 49 presses of 160 x 120", r15, R15, options.repeats)
@@ -164,7 +164,7 @@ def _byte(values: AnyArray) -> ByteArray:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="*", choices=["r15", "fots", "damage"])
+    parser.add_argument("what", nargs="*", default="all", choices=["all", "r15", "fots", "damage"])
     parser.add_argument("--repeats", type=int, default=1)
     return parser.parse_args()
 

@@ -64,7 +64,7 @@ def main() -> None:
     data = find_shared_data()
     if data is None:
         raise SystemExit(WHY_NOT)
-    wanted = options.what or ["fots", "r15", "tmd"]
+    wanted = ["fots", "r15", "tmd"] if "all" in options.what else options.what
     folds = range(options.folds) if options.only_fold is None else [options.only_fold]
     if "fots" in wanted:
         folder = data / "tactile/fots_ball_presses"
@@ -194,7 +194,7 @@ def _draw(measured: list[Measured], path: Path) -> None:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="*", choices=["fots", "r15", "tmd"])
+    parser.add_argument("what", nargs="*", default="all", choices=["all", "fots", "r15", "tmd"])
     parser.add_argument("--folds", type=int, default=2)
     parser.add_argument("--only-fold", type=int)
     parser.add_argument("--every", type=int, default=1, help="of the held-out presses, one in so many")

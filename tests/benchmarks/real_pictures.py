@@ -11,20 +11,29 @@ from pathlib import Path
 
 import numpy as np
 from real_data import WHY_NOT, find_shared_data
-from real_press import Drawn, HeldOut, drawing, fitted, held_out_presses, judged, over_background
+from real_press import (
+    FOTS,
+    R15,
+    Drawn,
+    HeldOut,
+    drawing,
+    fitted,
+    held_out_presses,
+    judged,
+    over_background,
+    set_of,
+)
 from rich.console import Console
 from rich.table import Table
 
 from calibration.taxim.mark_free import Identity
-from calibration.taxim.pictures import Pictures, read_pictures
+from calibration.taxim.pictures import Pictures
 from harness.arrays import ByteArray, FloatArray
 from harness.sim.gel import R15_SKIRT
 from harness.sim.optics import Optics, OpticsLevel
 from harness.sim.published_pack import PublishedPack, read_published
 
 CONSOLE = Console(width=118, highlight=False)
-R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
-FOTS = Identity("GelSight", "FOTS", "MIT", "2026-01-01", 1e-3 / 19.58, 2.35e-3)
 LEVELS: tuple[OpticsLevel, ...] = ("smooth", "fast", "exact")
 
 NOTHING, OWN_NOTHING = "background alone: the one picture of it", "background alone: as taught"
@@ -42,17 +51,12 @@ def main() -> None:
     data = find_shared_data()
     if data is None:
         raise SystemExit(WHY_NOT)
-    tactile = data / "tactile"
-    wanted = options.what or ["r15", "fots"]
+    wanted = ["r15", "fots"] if "all" in options.what else options.what
     if "r15" in wanted:
-        pack = read_published(tactile / "objectfolder_calibs", R15.pitch)
-        pictures = read_pictures(tactile / "objectfolder_calibs")
-        _measure("GelSight R1.5, 160 x 120", pictures, R15, options, pack)
+        pack = read_published(data / "tactile/objectfolder_calibs", R15.pitch)
+        _measure("GelSight R1.5, 160 x 120", set_of(data, "r15"), R15, options, pack)
     if "fots" in wanted:
-        pictures = read_pictures(
-            tactile / "fots_ball_presses/gelsight", tactile / "fots_ball_presses/gelsight_bg.png"
-        )
-        _measure("FOTS GelSight, 240 x 320", pictures, FOTS, options, None)
+        _measure("FOTS GelSight, 240 x 320", set_of(data, "fots"), FOTS, options, None)
 
 
 def _measure(
@@ -157,7 +161,7 @@ def _draw(presses: list[HeldOut], drawn: list[Drawn], path: Path) -> None:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="*", choices=["r15", "fots"])
+    parser.add_argument("what", nargs="*", default="all", choices=["all", "r15", "fots"])
     parser.add_argument("--every", type=int, default=1, help="one press in so many")
     parser.add_argument("--picture", type=Path)
     return parser.parse_args()

@@ -4,19 +4,15 @@ from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
-from real_press import drawing, fitted, held_out_presses, judged
+from real_press import R15, drawing, fitted, held_out_presses, judged, set_of
 
-from calibration.taxim.mark_free import Identity
-from calibration.taxim.pictures import read_pictures
 from harness.sim.optics import Optics
-
-R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
 
 
 def test_presses_of_the_papers_sensor_are_drawn_over_the_whole_frame(shared_data: Path) -> None:
     """One fold of eight; all of them by ``tests/benchmarks/real_pictures.py``. Over a frame most of which is
     never touched, drawing nothing scores 24 dB; within the contact it scores 14."""
-    pictures = read_pictures(shared_data / "tactile/objectfolder_calibs")
+    pictures = set_of(shared_data, "r15")
     first: list[object] = []
 
     def of_one_fold(press: object) -> bool:
