@@ -25,6 +25,9 @@ CONSOLE = Console(width=118, highlight=False)
 EVERY = 3
 """Of the pixels, one in so many is scored."""
 
+_RADII = (1.0, 2.0, 3.0, 4.0)
+_RING = 0.15
+
 
 def main() -> None:
     """Measure what was asked for; both sets without a word."""
@@ -39,6 +42,7 @@ def main() -> None:
         pack = usable(pictures, who.ball)
         change = changes(pack)
         model = teach(pack, change, who.ball)
+        CONSOLE.print(_by_radius(pack, change - model.rest, model.fit.centres, model.light.edge))
         table = Table(title=f"{word}: medians over {len(change)} presses held out, dB", title_justify="left")
         for heading in ("the light's terms in the normal", "contact", "full frame"):
             table.add_column(heading, justify="left" if heading.startswith("the") else "right")
@@ -48,6 +52,16 @@ def main() -> None:
             scores = _scores(pack, change - model.rest, model.fit.centres, model.light, who.ball)
             table.add_row(words, *(f"{value:.2f}" for value in np.median(scores, axis=0)))
         CONSOLE.print(table)
+
+
+def _by_radius(pack: PressPack, clean: FloatArray, centres: FloatArray, edge: float) -> str:
+    away = np.array([distance(pack.shape, centre) for centre in centres]) / edge
+    size = np.mean(clean**2, axis=3)
+    rms = [np.sqrt(size[np.abs(away - radii) < _RING].mean()) for radii in _RADII]
+    apex = np.median(clean[away < _RING], axis=0)
+    words = ", ".join(f"{level:.0f} at {radii:g}" for level, radii in zip(rms, _RADII, strict=True))
+    colours = ", ".join(f"{level:.0f}" for level in apex)
+    return f"a press changes the picture, grey levels rms by contact radii: {words}; at its apex by {colours}"
 
 
 def _scores(
