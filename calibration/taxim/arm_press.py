@@ -6,7 +6,6 @@ from nothing. The picture does: it shows a ball that is a few hundredths of a mi
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -16,17 +15,14 @@ from calibration.taxim.arm_watch import Watch, touch_seen
 from calibration.taxim.settled import Settling, look, settle
 from harness.arrays import FloatArray
 from harness.errors import BenchFault, NotTouched
-from harness.pace import joint_speed
 from harness.reading import Channel, Reading
 from harness.recording import Recording
 from harness.station import PRESS, Bench
 from harness.step_file import Step
+from harness.travel import Way, travel
 
 AT_REST = 0.2
 """s of the arm's packets that are kept with a picture."""
-
-WHERE_PLANNED = 1e-3
-"""rad: an arm this near to where a travel was planned from is there."""
 
 MISSES = 3
 """Presses in a row that met nothing, after which the ball is taken to be somewhere else."""
@@ -49,13 +45,6 @@ class PressSpeeds:
     approach: float = 0.040
     press: float = 0.005
     acceleration: float = 0.2
-
-
-class Way(Protocol):
-    """Finds joint way points that hit nothing."""
-
-    def __call__(self, here: FloatArray, planned: FloatArray) -> FloatArray:
-        """``(m, 6)`` rad, from ``(6,)`` to the last of the ``(n, 6)`` postures of a planned travel."""
 
 
 class BallPresses:
@@ -189,15 +178,8 @@ class BallPresses:
         self._to(bench, motion, 0.0, self._speeds.approach)
 
     def _travel(self, motion: PressMotion, bench: Bench) -> None:
-        here = bench.arm.state().joints
-        if not len(motion.travel) and np.abs(here - motion.start).max() < WHERE_PLANNED:
-            return
-        planned = np.abs(here - motion.start).max() < WHERE_PLANNED
-        way = motion.travel if planned else self._way(here, np.vstack([motion.start, motion.travel]))
-        for joints in way:
-            speed = joint_speed(bench.station, here, joints, self._speeds.travel)
-            bench.arm.move_joints(joints, speed, self._speeds.travel_acceleration)
-            here = joints
+        speeds = self._speeds
+        travel(bench, motion.start, motion.travel, self._way, speeds.travel, speeds.travel_acceleration)
 
 
 def _numbers(settling: Settling, touched: bool) -> tuple[Reading, Reading]:

@@ -5,7 +5,7 @@ Everything a step needs is in its parameters, planned and rehearsed before the f
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,18 +15,15 @@ from harness.arrays import FloatArray
 from harness.device import Arm
 from harness.errors import BenchFault, NotTouched
 from harness.geometry import transform
-from harness.pace import joint_speed
 from harness.reading import Reading
 from harness.recording import Recording
 from harness.station import PRESS, Bench
 from harness.step_file import Step
+from harness.travel import Way, travel
 from harness.twin.motion import PlannedContact
 
 FRAMES_PER_CONTACT = 3
 """Frames kept of each press: enough to see whether the gel was still."""
-
-WHERE_PLANNED = 1e-3
-"""rad: an arm this near to where a travel was planned from is there."""
 
 SETTLE = 0.3
 """s between the end of the press and the first frame: the gel creeps for about that long."""
@@ -112,13 +109,6 @@ class Speeds:
     overtravel: float = 0.008
 
 
-class Way(Protocol):
-    """Finds joint way points that hit nothing."""
-
-    def __call__(self, here: FloatArray, planned: FloatArray) -> FloatArray:
-        """``(m, 6)`` rad, from ``(6,)`` to the last of the ``(n, 6)`` postures of a planned travel."""
-
-
 class ContactLocalization:
     """Presses the gel where the plan says, and hands on what was read there.
 
@@ -145,7 +135,7 @@ class ContactLocalization:
         motion = ContactMotion.from_parameters(step.parameters)
         arm = bench.arm
         bench.mark(step.index, -1)
-        self._travel(motion.start, motion.travel, bench)
+        self._travel(motion, bench)
         arm.zero_force()
         began = arm.state().time
         self._touch(step, motion, arm)
@@ -164,17 +154,12 @@ class ContactLocalization:
         if "strike" not in step.parameters:
             return strike_by_hand(step.index, bench, self.ask)
         motion = StrikeMotion.from_parameters(step.parameters["strike"])
-        self._travel(motion.start, motion.travel, bench)
+        self._travel(motion, bench)
         return strike(motion, step.index, moved, bench)
 
-    def _travel(self, start: FloatArray, travel: FloatArray, bench: Bench) -> None:
-        """Along the planned way points; from elsewhere than planned, by another way to the last of them."""
-        here = bench.arm.state().joints
-        planned = np.abs(here - start).max() < WHERE_PLANNED
-        for joints in travel if planned else self.way(here, np.vstack([start, travel])):
-            speed = joint_speed(bench.station, here, joints, self.speeds.travel)
-            bench.arm.move_joints(joints, speed, self.speeds.travel_acceleration)
-            here = joints
+    def _travel(self, motion: ContactMotion | StrikeMotion, bench: Bench) -> None:
+        speeds = self.speeds
+        travel(bench, motion.start, motion.travel, self.way, speeds.travel, speeds.travel_acceleration)
 
     def _press(self, motion: ContactMotion, arm: Arm, began: float) -> float:
         """On to the planned depth behind the first touch, wherever the search came to rest.
