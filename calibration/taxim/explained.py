@@ -31,7 +31,7 @@ def unexplained(
     worse: dict[int, Refused] = {}
     for k, name in enumerate(names):
         centre, clean = model.fit.centres[k], change[k] - model.rest
-        radius = contact_radius(pack, clean, centre, ball)
+        radius = contact_radius(clean, centre, ball)
         large = too_large(name, radius, ball, "its contact")
         gain = _own_gain(pack, clean, centre, model, ball)
         if large is not None:
@@ -53,8 +53,8 @@ def _own_gain(pack: PressPack, clean: FloatArray, centre: FloatArray, model: Mod
     return decibels(left) - decibels(nothing)
 
 
-def contact_radius(pack: PressPack, clean: FloatArray, centre: FloatArray, ball: float) -> float:
+def contact_radius(clean: FloatArray, centre: FloatArray, ball: float) -> float:
     """Pixels from the centre at which one press changes the colour most."""
-    rings = strength_by_radius(pack, clean, centre, ball)
+    rings = strength_by_radius(clean, centre, ball)
     smooth = np.convolve(rings, (0.25, 0.5, 0.25), mode="valid")
     return float(np.argmax(smooth)) + 1.5

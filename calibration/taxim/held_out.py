@@ -11,8 +11,8 @@ from calibration.taxim.rest import rest_change
 from calibration.taxim.smooth_fit import (
     Manner,
     SmoothFit,
+    aligned,
     contact_pixels,
-    fit_smooth,
     refined_centre,
     settled,
 )
@@ -86,11 +86,11 @@ def teach(pack: PressPack, change: FloatArray, ball: float) -> Model:
     """
     rest = rest_change(pack, change)
     clean = change - rest
-    plain = fit_smooth(pack, ball, PLAIN, clean)
-    loose = fit_smooth(replace(pack, centres=plain.centres), ball, OFFSET, clean)
-    circle = contact_circle(clean, loose.centres, ball)
-    fit = settled(pack, clean, loose.centres + circle.shift, circle.radius, ball, OFFSET)
-    plain = settled(pack, clean, plain.centres, circle.radius, ball, PLAIN)
+    slopes_alone, _ = aligned(pack, clean, ball, PLAIN)
+    loose, _ = aligned(replace(pack, centres=slopes_alone), clean, ball, OFFSET)
+    circle = contact_circle(clean, loose, ball)
+    fit = settled(pack, clean, loose + circle.shift, circle.radius, ball, OFFSET)
+    plain = settled(pack, clean, slopes_alone, circle.radius, ball, PLAIN)
     table, support = fit_table(pack, fit, ball, clean)
     bias = np.median(fit.centres - pack.centres, axis=0)
     light = fit_light(pack, clean, fit.centres, circle.radius, ball)

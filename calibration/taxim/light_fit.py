@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.taxim.moments import SLOPES, ColourTerms, colour_terms, place_products
 from calibration.taxim.pack import PressPack
-from calibration.taxim.smooth_fit import distance, huber
+from calibration.taxim.smooth_fit import distance, huber, scaled_place
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused
+from harness.sim import lit_calibration
 from harness.sim.gel import GelLevel, deform
-from harness.sim.lit_calibration import light_design
-from harness.sim.shading import KNEE, POSITION_TERMS, design, scaled_position
+from harness.sim.shading import KNEE, POSITION_TERMS
 from harness.sim.tactile_calibration import GelSkirt, smooth_terms
 
 REACH = 4.0
@@ -161,8 +162,8 @@ def per_metre(lit: FloatArray, pitch: float) -> FloatArray:
 
 def light_shades(pack: PressPack, light: Light, centre: FloatArray, place: IntArray) -> FloatArray:
     """``(n, 3)`` grey levels that contact and skirt of a press give pixels ``(n, 2)``, row and column."""
-    terms = _terms(light.profile, place[:, ::-1] - centre, _where(pack, place), light.limit)
-    return np.asarray(terms @ light.lit)
+    places = place_products(scaled_place(pack, place))
+    return _terms(light.profile, place[:, ::-1] - centre, places, light.limit).shades(light.lit)
 
 
 def _cap(away: FloatArray, ball: float) -> FloatArray:
@@ -172,10 +173,10 @@ def _cap(away: FloatArray, ball: float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """Pixels of all presses: from the press's centre (right, down), scaled place, and the change there."""
+    """Pixels of all presses: from the press's centre (right, down), by ``place_products``, and the change."""
 
     offset: FloatArray
-    where: FloatArray
+    places: FloatArray
     seen: FloatArray
 
 
@@ -190,43 +191,37 @@ def _samples(
         near = distance(pack.shape, centre)[first[0] :: stride, first[1] :: stride] < REACH * edge
         place = np.argwhere(near) * stride + first
         offset.append(place[:, ::-1] - centre)
-        where.append(_where(pack, place))
+        where.append(scaled_place(pack, place))
         seen.append(change[k][place[:, 0], place[:, 1]])
-    return _Samples(np.concatenate(offset), np.concatenate(where), np.concatenate(seen))
-
-
-def _where(pack: PressPack, place: IntArray) -> FloatArray:
-    y, x = (axis.astype(np.float64) for axis in place.T)
-    return scaled_position(x, y, *pack.shape)
+    return _Samples(np.concatenate(offset), place_products(np.concatenate(where)), np.concatenate(seen))
 
 
 def _solved(
     samples: _Samples, profile: Profile, edge: float, ball: float, turns: int = 2
 ) -> tuple[FloatArray, float]:
     """The coefficients ``(156, 3)`` and the weighted rms of what they leave over, grey levels."""
-    terms = _terms(profile, samples.offset, samples.where, edge / ball)
+    terms = _terms(profile, samples.offset, samples.places, edge / ball)
     inside = np.hypot(samples.offset[:, 0], samples.offset[:, 1]) <= edge
     fixed = np.where(inside, WITHIN_WEIGHT, 1.0)
     weight = fixed
     for _ in range(turns):
-        weighted = terms * weight[:, None]
-        gram = terms.T @ weighted
-        solved = np.linalg.solve(gram + np.diag(_ridge(np.diag(gram))), weighted.T @ samples.seen)
-        lit = np.asarray(solved, dtype=np.float64)
-        left = terms @ lit - samples.seen
+        gram, right = terms.normal_equations(weight, samples.seen)
+        lit = np.asarray(np.linalg.solve(gram + np.diag(_ridge(np.diag(gram))), right), dtype=np.float64)
+        left = terms.shades(lit) - samples.seen
         weight = fixed * huber(left)
     rms = float(np.sqrt((fixed * np.mean(left**2, axis=1)).sum() / fixed.sum()))
     return lit, rms
 
 
-def _terms(profile: Profile, offset: FloatArray, where: FloatArray, limit: float) -> FloatArray:
+def _terms(profile: Profile, offset: FloatArray, places: FloatArray, limit: float) -> ColourTerms:
     away: FloatArray = np.hypot(offset[:, 0], offset[:, 1])
     radii = np.arange(len(profile.sine), dtype=np.float64)
     slope: FloatArray = np.interp(away, radii, profile.sine, right=0.0)
     sine = _softly_limited(slope, limit)
     height: FloatArray = np.interp(away, radii, profile.height, right=0.0)
     normal = offset * (sine / np.maximum(away, 1e-9))[:, None]
-    return np.hstack([design(normal, where), light_design(normal, where) * height[:, None]])
+    light = tuple((a, b, 1) for a, b in lit_calibration.LIGHT_POWERS)
+    return colour_terms(SLOPES + light, normal, places, height)
 
 
 def _softly_limited(sine: FloatArray, limit: float) -> FloatArray:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from calibration.taxim.explained import contact_radius, too_large, unexplained
 from calibration.taxim.gates import CONTACT, LEAST_PRESSES, check_set, reached, refusals, sightings
@@ -129,6 +130,15 @@ def calibrate(
         CalibrationRefused: a set too damaged, or a fit too poor.
     """
     began = perf_counter()
+    # Products of a few hundred rows: threads cost more in waiting for one another than they compute.
+    with threadpool_limits(limits=1, user_api="blas"):
+        made = _calibrated(pictures, identity, use_marks, like)
+    return replace(made, seconds=perf_counter() - began)
+
+
+def _calibrated(
+    pictures: Pictures, identity: Identity, use_marks: bool, like: TactileCalibration | None
+) -> MarkFree:
     ball = identity.ball
     _check_ball(identity, pictures)
     ordered = _in_order_of_content(pictures)
@@ -147,11 +157,11 @@ def calibrate(
     scores, left, count = held_out(pack, change, ball, WITHIN * model.fit.edge)
     names = [ordered.names[k] for k in kept]
     used = [
-        _used(names[k], pack, change[k] - model.rest, model.fit.centres[k], identity, scores[k])
+        _used(names[k], change[k] - model.rest, model.fit.centres[k], identity, scores[k])
         for k in range(len(names))
     ]
     _check_gain(scores)
-    made = MarkFree(
+    return MarkFree(
         _artefact(pictures, pack, model, identity, scores),
         tuple(sorted(used, key=lambda press: pictures.names.index(press.name))),
         tuple(sorted([*refused, *pictures.refused], key=lambda one: one.name)),
@@ -164,7 +174,6 @@ def calibrate(
         pictures.background_from,
         0.0,
     )
-    return replace(made, seconds=perf_counter() - began)
 
 
 def _lean(model: Model, ball: float) -> float:
@@ -226,11 +235,9 @@ def _still_enough(pack: PressPack, refused: list[Refused]) -> None:
         )
 
 
-def _used(
-    name: str, pack: PressPack, clean: FloatArray, centre: FloatArray, identity: Identity, score: Score
-) -> UsedPress:
+def _used(name: str, clean: FloatArray, centre: FloatArray, identity: Identity, score: Score) -> UsedPress:
     ball = identity.ball
-    radius = min(contact_radius(pack, clean, centre, ball), ball)
+    radius = min(contact_radius(clean, centre, ball), ball)
     depth = identity.pitch * (ball - np.sqrt(ball**2 - radius**2))
     return UsedPress(name, (float(centre[0]), float(centre[1])), radius, float(depth), score)
 

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.taxim.moments import OFFSET, SLOPES, colour_terms, place_products
 from calibration.taxim.pack import PressPack
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused
 from harness.sim.lit_calibration import place_terms
-from harness.sim.shading import POSITION_TERMS, design, scaled_position, shades
+from harness.sim.shading import POSITION_TERMS, scaled_position, shades
 from harness.sim.tactile_calibration import POSITION_DEGREE, smooth_terms
 
 _HUBER = 10.0
@@ -101,13 +102,13 @@ def changes(pack: PressPack) -> FloatArray:
     return change
 
 
-def ball_edge(pack: PressPack, change: FloatArray, centres: FloatArray, ball: float) -> float:
+def ball_edge(change: FloatArray, centres: FloatArray, ball: float) -> float:
     """The radius in pixels where the gel is steepest: the ball's contact line, mean over the presses.
 
     Raises:
         CalibrationRefused: it is not inside the ball.
     """
-    profile = [strength_by_radius(pack, change[k], centres[k], ball) for k in range(len(change))]
+    profile = [strength_by_radius(change[k], centres[k], ball) for k in range(len(change))]
     edge = float(np.argmax(np.median(profile, axis=0))) + 0.5
     if not 3.0 <= edge < ball:
         raise CalibrationRefused(
@@ -117,12 +118,15 @@ def ball_edge(pack: PressPack, change: FloatArray, centres: FloatArray, ball: fl
     return edge
 
 
-def strength_by_radius(pack: PressPack, change: FloatArray, centre: FloatArray, ball: float) -> FloatArray:
+def strength_by_radius(change: FloatArray, centre: FloatArray, ball: float) -> FloatArray:
     """Mean change of colour of one press in rings of a pixel, out to one and a half balls."""
     reach = int(np.ceil(1.5 * ball))
-    ring = distance(pack.shape, centre).astype(np.int64)
+    low = np.maximum(np.floor(centre).astype(np.int64) - reach, 0)
+    high = np.floor(centre).astype(np.int64) + reach + 2
+    near = change[low[1] : max(high[1], 0), low[0] : max(high[0], 0)]
+    ring = distance((near.shape[0], near.shape[1]), centre - low).astype(np.int64)
     seen = ring < reach
-    strength = np.abs(change).sum(axis=2)
+    strength = np.abs(near).sum(axis=2)
     total = np.bincount(ring[seen], strength[seen], minlength=reach)
     return np.asarray(total / np.maximum(np.bincount(ring[seen], minlength=reach), 1))
 
@@ -143,23 +147,31 @@ def fit_smooth(
         CalibrationRefused: the presses contradict the ball.
     """
     change = changes(pack) if change is None else change
+    centres, edge = aligned(pack, change, ball, manner)
+    return settled(pack, change, centres, edge, ball, manner)
+
+
+def aligned(pack: PressPack, change: FloatArray, ball: float, manner: Manner) -> tuple[FloatArray, float]:
+    """Refined centres ``(presses, 2)`` and the contact line's radius, pixels; otherwise as ``fit_smooth``."""
     centres = pack.centres.copy()
-    edge = ball_edge(pack, change, centres, ball)
+    edge = ball_edge(change, centres, ball)
     for turn in range(manner.rounds):
         colours, _ = coefficients(pack, change, centres, edge, ball, manner)
         centres = np.stack(
             [refined_centre(pack, change[k], centres[k], colours, edge, ball) for k in range(len(centres))]
         )
         if manner.edge_again and turn == manner.rounds // 2:
-            edge = ball_edge(pack, change, centres, ball)
-    return settled(pack, change, centres, edge, ball, manner)
+            edge = ball_edge(change, centres, ball)
+    return centres, edge
 
 
 def settled(
     pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float, manner: Manner
 ) -> SmoothFit:
     """The fit of presses whose centres and contact line are known."""
-    colours, condition = coefficients(pack, change, centres, edge, ball, manner)
+    colours, normal = coefficients(pack, change, centres, edge, ball, manner)
+    scale = np.sqrt(np.diag(normal))
+    condition = float(np.linalg.cond(normal / np.outer(scale, scale)))
     left = [residual(pack, change[k], centres[k], colours, edge, ball) for k in range(len(centres))]
     rms = float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
     return SmoothFit(read_only(colours), read_only(centres), edge, condition, rms)
@@ -170,7 +182,7 @@ def residual(
 ) -> FloatArray:
     """``(pixels, 3)`` model less picture, grey levels, inside the contact of one press."""
     place = contact_pixels(pack.shape, centre, edge, 1)
-    return _shades(pack, centre, place, colours, ball)[0] - change[place[:, 0], place[:, 1]]
+    return ball_shades(pack, centre, place, colours, ball) - change[place[:, 0], place[:, 1]]
 
 
 def refined_centre(
@@ -184,14 +196,15 @@ def refined_centre(
 ) -> FloatArray:
     """The centre ``(2,)`` in pixels that explains one press best; Gauss-Newton steps of limited length."""
     place = contact_pixels(pack.shape, centre, edge, _stride(edge))
-    seen, longest = change[place[:, 0], place[:, 1]], max(1.0, _LONGEST_STEP * ball)
+    # What the contact adds by the place alone does not move with the centre.
+    seen = change[place[:, 0], place[:, 1]] - _offset(pack, place, colours)
+    longest = max(1.0, _LONGEST_STEP * ball)
     for _ in range(steps):
-        shade, by_normal = _shades(pack, centre, place, colours, ball)
+        shade, by_normal = _slope_shades(pack, centre, place, colours, ball)
         left = shade - seen
-        weight = huber(left)
-        jacobian = by_normal / -ball
-        normal = np.einsum("p,pca,pcb->ab", weight, jacobian, jacobian)
-        step = -np.linalg.solve(normal, np.einsum("p,pca,pc->a", weight, jacobian, left))
+        weight = np.sqrt(huber(left))[:, None]
+        jacobian = (by_normal * (weight / -ball)[:, None]).reshape(-1, 2)
+        step = -np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ (left * weight).ravel())
         centre = centre + step * min(1.0, longest / max(float(np.linalg.norm(step)), 1e-12))
     return centre
 
@@ -210,52 +223,52 @@ def contact_pixels(shape: tuple[int, int], centre: FloatArray, edge: float, stri
 def distance(shape: tuple[int, int], centre: FloatArray) -> FloatArray:
     """``(rows, columns)`` pixels from a centre (column, row)."""
     rows, columns = shape
-    away: FloatArray = np.hypot(np.arange(columns)[None, :] - centre[0], np.arange(rows)[:, None] - centre[1])
+    right, down = np.arange(columns) - centre[0], np.arange(rows) - centre[1]
+    away: FloatArray = np.sqrt((right**2)[None, :] + (down**2)[:, None])
     return away
 
 
 def coefficients(
     pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float, manner: Manner
-) -> tuple[FloatArray, float]:
-    """The colours ``(120 or 126, 3)`` that explain presses at known centres, and the problem's condition."""
+) -> tuple[FloatArray, FloatArray]:
+    """The colours ``(120 or 126, 3)`` that explain presses at known centres, and the normal matrix."""
     places = [contact_pixels(pack.shape, centre, edge, _stride(edge)) for centre in centres]
-    terms = np.concatenate(
-        [colour_terms(pack, c, p, ball, manner.offset) for c, p in zip(centres, places, strict=True)]
-    )
+    normal = np.concatenate([p[:, ::-1] - c for c, p in zip(centres, places, strict=True)]) / ball
     wanted = np.concatenate([change[k][place[:, 0], place[:, 1]] for k, place in enumerate(places)])
-    weight = np.ones(len(terms))
+    where = scaled_place(pack, np.concatenate(places))
+    terms = colour_terms(SLOPES + OFFSET if manner.offset else SLOPES, normal, place_products(where))
+    weight = np.ones(len(wanted))
     for _ in range(2):
-        weighted = terms * weight[:, None]
-        gram, right = terms.T @ weighted, weighted.T @ wanted
-        normal = gram + np.diag(_ridge(np.diag(gram), manner.place_ridge))
-        colours = np.linalg.solve(normal, right)
-        weight = huber(terms @ colours - wanted)
-    scale = np.sqrt(np.diag(normal))
-    return colours, float(np.linalg.cond(normal / np.outer(scale, scale)))
+        gram, right = terms.normal_equations(weight, wanted)
+        ridged = gram + np.diag(_ridge(np.diag(gram), manner.place_ridge))
+        colours = np.asarray(np.linalg.solve(ridged, right), dtype=np.float64)
+        weight = huber(terms.shades(colours) - wanted)
+    return colours, np.asarray(ridged, dtype=np.float64)
 
 
-def colour_terms(
-    pack: PressPack, centre: FloatArray, place: IntArray, ball: float, offset: bool
+def ball_shades(
+    pack: PressPack, centre: FloatArray, place: IntArray, colours: FloatArray, ball: float
 ) -> FloatArray:
-    """``(n, 120 or 126)`` the terms of the colours at pixels of one press."""
-    rows, columns = pack.shape
+    """``(n, 3)`` grey levels that a ball at a centre (column, row) gives pixels ``(n, 2)`` (row, column)."""
+    return _slope_shades(pack, centre, place, colours, ball)[0] + _offset(pack, place, colours)
+
+
+def scaled_place(pack: PressPack, place: IntArray) -> FloatArray:
+    """``(n, 2)`` in -1..1 of pixels ``(n, 2)``, row and column."""
     y, x = (axis.astype(np.float64) for axis in place.T)
-    where = scaled_position(x, y, rows, columns)
-    terms = design(np.stack([x - centre[0], y - centre[1]], axis=1) / ball, where)
-    return np.hstack([terms, place_terms(where)]) if offset else terms
+    return scaled_position(x, y, *pack.shape)
 
 
-def _shades(
+def _offset(pack: PressPack, place: IntArray, colours: FloatArray) -> FloatArray:
+    offset = colours[smooth_terms() :]
+    return place_terms(scaled_place(pack, place)) @ offset if len(offset) else np.zeros((len(place), 3))
+
+
+def _slope_shades(
     pack: PressPack, centre: FloatArray, place: IntArray, colours: FloatArray, ball: float
 ) -> tuple[FloatArray, FloatArray]:
-    rows, columns = pack.shape
-    normal = (place[:, ::-1] - centre) / ball
     shade, by_normal = np.empty((len(place), 3)), np.empty((len(place), 3, 2))
-    shades(colours, normal, place, rows, columns, shade, by_normal)
-    offset = colours[smooth_terms() :]
-    if len(offset):
-        y, x = (axis.astype(np.float64) for axis in place.T)
-        shade += place_terms(scaled_position(x, y, rows, columns)) @ offset
+    shades(colours, (place[:, ::-1] - centre) / ball, place, *pack.shape, shade, by_normal)
     return shade, by_normal
 
 

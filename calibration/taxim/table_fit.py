@@ -9,10 +9,10 @@ adds whatever its slope is let in over the first few degrees: flat gel keeps the
 import numpy as np
 
 from calibration.taxim.pack import PressPack
-from calibration.taxim.smooth_fit import SmoothFit, changes, colour_terms, contact_pixels
+from calibration.taxim.smooth_fit import SmoothFit, ball_shades, changes, contact_pixels
 from harness.arrays import BoolArray, FloatArray, IntArray
 from harness.sim.lit_calibration import place_terms
-from harness.sim.shading import design, scaled_position
+from harness.sim.shading import POSITION_TERMS, design, scaled_position
 from harness.sim.tactile_calibration import Float32Array
 
 BINS = 120
@@ -79,16 +79,15 @@ def _from_smooth(fit: SmoothFit, ball: float, rows: int, columns: int) -> FloatA
     sine = np.minimum(np.sin(magnitude), fit.edge / ball).ravel()
     # A height's gradient (a down, b right) has the normal's image part pointing the other way.
     normal = -np.stack([sine * np.cos(direction.ravel()), sine * np.sin(direction.ravel())], axis=1)
-    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, columns - 1, 3), np.linspace(0, rows - 1, 3)))
-    where = scaled_position(x, y, rows, columns)
-    shades = np.stack(
-        [design(normal, np.broadcast_to(place, normal.shape)) @ fit.smooth for place in where]
-    )  # (9, bins^2, 3)
+    slopes = design(normal, np.zeros_like(normal))[:, ::POSITION_TERMS]
+    by_place = np.tensordot(slopes, fit.smooth.reshape(-1, POSITION_TERMS, 3), axes=1)  # (bins^2, 6, 3)
     if len(fit.offset):
-        share = np.minimum(1.0, magnitude.ravel() / _LET_IN)
-        shades += share[None, :, None] * (place_terms(where) @ fit.offset)[:, None, :]
+        by_place += np.minimum(1.0, magnitude.ravel() / _LET_IN)[:, None, None] * fit.offset
+    # Both are all the quadratics of the place: nine places give the one from the other exactly.
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, columns - 1, 3), np.linspace(0, rows - 1, 3)))
     raw = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=1)
-    table: FloatArray = np.einsum("tp,pnc->ntc", np.linalg.pinv(raw), shades).reshape(BINS, BINS, 6, 3)
+    raw_from_scaled = np.linalg.pinv(raw) @ place_terms(scaled_position(x, y, rows, columns))
+    table: FloatArray = (raw_from_scaled @ by_place).reshape(BINS, BINS, 6, 3)
     return table
 
 
@@ -99,7 +98,7 @@ def _residuals(
     for k, centre in enumerate(fit.centres):
         place = contact_pixels(pack.shape, centre, fit.edge, 1)
         seen = change[k][place[:, 0], place[:, 1]]
-        left = seen - colour_terms(pack, centre, place, ball, len(fit.offset) > 0) @ fit.colours
+        left = seen - ball_shades(pack, centre, place, fit.colours, ball)
         at = _bins_of_ball(place[:, 1] - centre[0], place[:, 0] - centre[1], ball)
         np.add.at(total, at, left)
         np.add.at(count, at, 1.0)
