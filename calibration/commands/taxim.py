@@ -2,20 +2,19 @@
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
-from calibration.commands.taxim_arm import Wanted, chosen, doubts, pressed, scale_answer, scale_lines
+from calibration.commands.taxim_answer import answer_of, doubts, keep, say, scale_answer
+from calibration.commands.taxim_arm import Wanted, chosen, pressed
 from harness import options
-from harness.output import ANSWERS, CONSOLE, emit, warn
+from harness.output import emit, warn
 
 if TYPE_CHECKING:
     from calibration.taxim.arm_moves import ArmScale
     from calibration.taxim.arm_record import ArmPresses
-    from calibration.taxim.mark_free import Identity, MarkFree
+    from calibration.taxim.mark_free import Identity
     from calibration.taxim.pictures import Channels, Pictures
 
 PITCH = "0.1245mm"
@@ -190,15 +189,15 @@ def taxim(
         page = write_calibration_page(
             report_of(made, pictures, f"{who.sensor}, {source.name}", scale, arm), report
         )
-    answer = {**_answer(made, artefact, polycalib, page), **scale_answer(scale, arm), "pitch_m": who.pitch}
+    answer = {**answer_of(made, artefact, polycalib, page), **scale_answer(scale, arm), "pitch_m": who.pitch}
     if scale is not None and arm is not None:
-        _keep(answer["scale"], artefact)
+        keep(answer["scale"], artefact)
         for doubt in doubts(scale, arm):
             warn(doubt)
     if json:
         emit(answer)
     else:
-        _say(made, answer, scale)
+        say(made, answer, scale)
     return 0
 
 
@@ -220,16 +219,6 @@ def _read(
 
 def _place(source: Path, by_arm: bool) -> Path:
     return source / "fitted.npz" if by_arm else Path(f"{source.resolve().stem}_calibration.npz")
-
-
-def _keep(scale: dict[str, Any], artefact: Path) -> None:
-    """What the arm measured, beside the artefact, whose format has a place for the pitch alone."""
-    from json import dumps
-
-    from harness.recording import write_text_whole
-
-    path = artefact.with_name(f"{artefact.stem}.scale.json")
-    write_text_whole(path, dumps({"schema": 1, **scale}, indent=1, allow_nan=False) + "\n")
 
 
 def _identity(
@@ -285,55 +274,3 @@ def _channels(text: str | None) -> "Channels | None":
             known: Channels = order
             return known
     raise WrongUse(f"--channels: no order {text!r}; there are {' and '.join(get_args(Channels))}")
-
-
-def _answer(made: "MarkFree", artefact: Path, polycalib: Path | None, page: Path | None) -> dict[str, Any]:
-    header = made.calibration.header
-    return {
-        "schema": 1,
-        "artefact": str(artefact),
-        "sha256": made.calibration.sha256,
-        "psnr_contact_db": made.median("table"),
-        "psnr_contact_smooth_db": made.median("smooth"),
-        "psnr_contact_unrefitted_db": made.median("unrefitted"),
-        "psnr_untouched_db": made.median("nothing"),
-        "presses": len(made.used),
-        "refused": [vars(one) for one in made.refused],
-        "per_press": [
-            {
-                "name": press.name,
-                "centre_px": list(press.centre),
-                "radius_px": press.radius,
-                "depth_m": press.depth,
-                **{f"psnr_{name}_db": value for name, value in vars(press.score).items()},
-            }
-            for press in made.used
-        ],
-        "contact_radius_px": made.contact_radius,
-        "contact_line_scatter_px": made.roundness,
-        "smooth_lean_rad": made.lean,
-        "covered": float((made.coverage > 0).mean()),
-        "steepest": header.slope_limit,
-        "background": made.background_from,
-        "polycalib": None if polycalib is None else str(polycalib),
-        "report": None if page is None else str(page),
-        "seconds": made.seconds,
-    }
-
-
-def _say(made: "MarkFree", answer: dict[str, Any], scale: "ArmScale | None") -> None:
-    for one in made.refused:
-        CONSOLE.print(f"[yellow]refused:[/] {escape(one.name)}: {escape(one.reason)}")
-    drawn = Table(title=f"{answer['artefact']}: {len(made.used)} presses, {len(made.refused)} refused")
-    for heading in ("held-out PSNR within the contact", "median dB"):
-        drawn.add_column(heading, justify="right" if heading.endswith("dB") else "left")
-    drawn.add_row("table, centre refitted (levels exact and fast)", f"{answer['psnr_contact_db']:.2f}")
-    drawn.add_row("smooth model, centre refitted", f"{answer['psnr_contact_smooth_db']:.2f}")
-    drawn.add_row("table, centre as detected", f"{answer['psnr_contact_unrefitted_db']:.2f}")
-    drawn.add_row("untouched gel", f"{answer['psnr_untouched_db']:.2f}")
-    ANSWERS.print(drawn)
-    for line in [escape(answer["scale_reason"])] if scale is None else scale_lines(scale):
-        ANSWERS.print(line)
-    ANSWERS.print(f"background: {escape(answer['background'])}; {answer['seconds']:.1f} s")
-    if answer["report"] is not None:
-        ANSWERS.print(f"report: {escape(answer['report'])}")

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -14,17 +14,7 @@ from harness.output import CONSOLE, emit
 from harness.step_file import Step
 
 if TYPE_CHECKING:
-    from calibration.taxim.arm_moves import ArmScale, Measured
-    from calibration.taxim.arm_record import ArmPresses
     from harness.recording import Recording
-
-NO_MOVES = (
-    "no arm moves are known of these pictures: ball presses alone cannot tell millimetres per pixel, aspect "
-    "or rotation, because another pitch only relabels the slopes; calibrate with --station"
-)
-
-_ASPECT = 0.01
-_MARKED = 8.0
 
 
 @dataclass(frozen=True)
@@ -165,67 +155,3 @@ def _progress(done: int, total: int) -> Iterator[_Told]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=CONSOLE, transient=True) as bar:
         yield _Told(bar, done, total)
-
-
-def scale_answer(scale: "ArmScale | None", arm: "ArmPresses | None") -> dict[str, Any]:
-    """What the arm's moves say, for the answer; why nothing, where there are none."""
-    if scale is None or arm is None:
-        return {"scale": None, "scale_reason": NO_MOVES}
-    return {
-        "scale": {
-            **_measured("pitch", "_m", scale.pitch),
-            **_measured("aspect", "", scale.aspect),
-            **_measured("rotation", "_rad", scale.rotation),
-            **_measured("skew", "_rad", scale.skew),
-            "gel_from_pixels_m": scale.gel_from_pixels.tolist(),
-            "scatter_m": scale.scatter,
-            "presses": len(scale.used),
-            "off": [arm.taken[k].name for k in scale.off],
-        },
-        "scale_reason": None,
-        "drift_levels": arm.drift,
-        "marked_levels": arm.marked,
-    }
-
-
-def _measured(name: str, unit: str, one: "Measured") -> dict[str, float]:
-    return {
-        f"{name}{unit}": one.value,
-        f"{name}_sigma{unit}": one.sigma,
-        f"{name}_within95{unit}": one.within95,
-    }
-
-
-def scale_lines(scale: "ArmScale") -> list[str]:
-    """The same for people."""
-    degrees = 57.29577951308232
-    return [
-        f"by the arm: {1e3 * scale.pitch.value:.5f} mm a pixel (to {1e3 * scale.pitch.within95:.5f}), "
-        f"aspect {scale.aspect.value:.4f} (to {scale.aspect.within95:.4f}), "
-        f"rotation {degrees * scale.rotation.value:.2f} deg (to {degrees * scale.rotation.within95:.2f}), "
-        "19 times of 20",
-        f"{len(scale.used)} presses scatter by {1e3 * scale.scatter:.3f} mm about it",
-    ]
-
-
-def doubts(scale: "ArmScale", arm: "ArmPresses") -> list[str]:
-    """What the operator should know of a measured scale."""
-    said = []
-    if abs(scale.aspect.value - 1.0) > max(_ASPECT, scale.aspect.within95):
-        said.append(
-            f"pixels are {scale.aspect.value:.3f} times as high as wide; colours are fitted as though they "
-            "were square, and slopes of rows and columns differ by that"
-        )
-    if abs(scale.skew.value) > scale.skew.within95:
-        said.append(
-            f"rows and columns stand askew by {57.3 * scale.skew.value:.2f} deg, more than the error: the "
-            "gel slips sideways, or the camera looks at it from the side"
-        )
-    if scale.off:
-        said.append(f"off the map and not used for it: {', '.join(arm.taken[k].name for k in scale.off)}")
-    if arm.marked > _MARKED:
-        said.append(
-            f"a place of the untouched gel changed by {arm.marked:.0f} grey levels since the first "
-            "background: an imprint that had not gone, dirt, or a gel that moved"
-        )
-    return said

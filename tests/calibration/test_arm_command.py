@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from arm_presses import begun, performed
 
-from calibration.commands.taxim_arm import NO_MOVES, doubts, scale_answer
+from calibration.commands.taxim_answer import NO_MOVES, doubts, scale_answer
 from calibration.taxim.arm_record import read_arm_run
 from harness.cli import invoke
 from harness.recording import Recording

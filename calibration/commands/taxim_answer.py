@@ -1,0 +1,149 @@
+"""What ``touchstone calibrate taxim`` answers: numbers for programs, lines for people, and what to doubt."""
+
+from json import dumps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from harness.output import ANSWERS, CONSOLE
+
+if TYPE_CHECKING:
+    from calibration.taxim.arm_moves import ArmScale, Measured
+    from calibration.taxim.arm_record import ArmPresses
+    from calibration.taxim.mark_free import MarkFree
+
+NO_MOVES = (
+    "no arm moves are known of these pictures: ball presses alone cannot tell millimetres per pixel, aspect "
+    "or rotation, because another pitch only relabels the slopes; calibrate with --station"
+)
+
+_ASPECT = 0.01
+_MARKED = 8.0
+
+
+def answer_of(made: "MarkFree", artefact: Path, polycalib: Path | None, page: Path | None) -> dict[str, Any]:
+    """What the calibration says of itself, by the words of the answer."""
+    header = made.calibration.header
+    return {
+        "schema": 1,
+        "artefact": str(artefact),
+        "sha256": made.calibration.sha256,
+        "psnr_contact_db": made.median("table"),
+        "psnr_contact_smooth_db": made.median("smooth"),
+        "psnr_contact_unrefitted_db": made.median("unrefitted"),
+        "psnr_untouched_db": made.median("nothing"),
+        "presses": len(made.used),
+        "refused": [vars(one) for one in made.refused],
+        "per_press": [
+            {
+                "name": press.name,
+                "centre_px": list(press.centre),
+                "radius_px": press.radius,
+                "depth_m": press.depth,
+                **{f"psnr_{name}_db": value for name, value in vars(press.score).items()},
+            }
+            for press in made.used
+        ],
+        "contact_radius_px": made.contact_radius,
+        "contact_line_scatter_px": made.roundness,
+        "smooth_lean_rad": made.lean,
+        "covered": float((made.coverage > 0).mean()),
+        "steepest": header.slope_limit,
+        "background": made.background_from,
+        "polycalib": None if polycalib is None else str(polycalib),
+        "report": None if page is None else str(page),
+        "seconds": made.seconds,
+    }
+
+
+def say(made: "MarkFree", answer: dict[str, Any], scale: "ArmScale | None") -> None:
+    """The same for people."""
+    for one in made.refused:
+        CONSOLE.print(f"[yellow]refused:[/] {escape(one.name)}: {escape(one.reason)}")
+    drawn = Table(title=f"{answer['artefact']}: {len(made.used)} presses, {len(made.refused)} refused")
+    for heading in ("held-out PSNR within the contact", "median dB"):
+        drawn.add_column(heading, justify="right" if heading.endswith("dB") else "left")
+    drawn.add_row("table, centre refitted (levels exact and fast)", f"{answer['psnr_contact_db']:.2f}")
+    drawn.add_row("smooth model, centre refitted", f"{answer['psnr_contact_smooth_db']:.2f}")
+    drawn.add_row("table, centre as detected", f"{answer['psnr_contact_unrefitted_db']:.2f}")
+    drawn.add_row("untouched gel", f"{answer['psnr_untouched_db']:.2f}")
+    ANSWERS.print(drawn)
+    for line in [escape(answer["scale_reason"])] if scale is None else scale_lines(scale):
+        ANSWERS.print(line)
+    ANSWERS.print(f"background: {escape(answer['background'])}; {answer['seconds']:.1f} s")
+    if answer["report"] is not None:
+        ANSWERS.print(f"report: {escape(answer['report'])}")
+
+
+def scale_answer(scale: "ArmScale | None", arm: "ArmPresses | None") -> dict[str, Any]:
+    """What the arm's moves say, for the answer; why nothing, where there are none."""
+    if scale is None or arm is None:
+        return {"scale": None, "scale_reason": NO_MOVES}
+    return {
+        "scale": {
+            **_measured("pitch", "_m", scale.pitch),
+            **_measured("aspect", "", scale.aspect),
+            **_measured("rotation", "_rad", scale.rotation),
+            **_measured("skew", "_rad", scale.skew),
+            "gel_from_pixels_m": scale.gel_from_pixels.tolist(),
+            "scatter_m": scale.scatter,
+            "presses": len(scale.used),
+            "off": [arm.taken[k].name for k in scale.off],
+        },
+        "scale_reason": None,
+        "drift_levels": arm.drift,
+        "marked_levels": arm.marked,
+    }
+
+
+def _measured(name: str, unit: str, one: "Measured") -> dict[str, float]:
+    return {
+        f"{name}{unit}": one.value,
+        f"{name}_sigma{unit}": one.sigma,
+        f"{name}_within95{unit}": one.within95,
+    }
+
+
+def scale_lines(scale: "ArmScale") -> list[str]:
+    """The arm's part of it for people."""
+    degrees = 57.29577951308232
+    return [
+        f"by the arm: {1e3 * scale.pitch.value:.5f} mm a pixel (to {1e3 * scale.pitch.within95:.5f}), "
+        f"aspect {scale.aspect.value:.4f} (to {scale.aspect.within95:.4f}), "
+        f"rotation {degrees * scale.rotation.value:.2f} deg (to {degrees * scale.rotation.within95:.2f}), "
+        "19 times of 20",
+        f"{len(scale.used)} presses scatter by {1e3 * scale.scatter:.3f} mm about it",
+    ]
+
+
+def doubts(scale: "ArmScale", arm: "ArmPresses") -> list[str]:
+    """What the operator should know of a measured scale."""
+    said = []
+    if abs(scale.aspect.value - 1.0) > max(_ASPECT, scale.aspect.within95):
+        said.append(
+            f"pixels are {scale.aspect.value:.3f} times as high as wide; colours are fitted as though they "
+            "were square, and slopes of rows and columns differ by that"
+        )
+    if abs(scale.skew.value) > scale.skew.within95:
+        said.append(
+            f"rows and columns stand askew by {57.3 * scale.skew.value:.2f} deg, more than the error: the "
+            "gel slips sideways, or the camera looks at it from the side"
+        )
+    if scale.off:
+        said.append(f"off the map and not used for it: {', '.join(arm.taken[k].name for k in scale.off)}")
+    if arm.marked > _MARKED:
+        said.append(
+            f"a place of the untouched gel changed by {arm.marked:.0f} grey levels since the first "
+            "background: an imprint that had not gone, dirt, or a gel that moved"
+        )
+    return said
+
+
+def keep(scale: dict[str, Any], artefact: Path) -> None:
+    """What the arm measured, beside the artefact, whose format has a place for the pitch alone."""
+    from harness.recording import write_text_whole
+
+    path = artefact.with_name(f"{artefact.stem}.scale.json")
+    write_text_whole(path, dumps({"schema": 1, **scale}, indent=1, allow_nan=False) + "\n")
