@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import BadZipFile, is_zipfile
 
 import numpy as np
 import numpy.typing as npt
@@ -177,6 +177,11 @@ def load_calibration(path: Path) -> TactileCalibration:
     Raises:
         CalibrationRefused: missing, of another schema, incomplete, or not what was written.
     """
+    if path.is_file() and not is_zipfile(path):
+        raise CalibrationRefused(
+            f"{path} does not read as a calibration: it is no .npz archive; give what touchstone calibrate "
+            "taxim wrote"
+        )
     try:
         with np.load(path, allow_pickle=False) as archive:
             found = {name: archive[name] for name in archive.files}

@@ -100,6 +100,12 @@ def test_what_is_no_calibration_is_refused(tmp_path: Path) -> None:
         shipped_calibration("gelsight_r16")
 
 
+def test_an_array_alone_is_no_calibration(tmp_path: Path) -> None:
+    np.save(tmp_path / "heights.npy", np.zeros((2, 3)))
+    with pytest.raises(CalibrationRefused, match="no .npz archive"):
+        load_calibration(tmp_path / "heights.npy")
+
+
 def test_a_pickle_is_never_opened(bench: TactileCalibration, tmp_path: Path) -> None:
     path = tmp_path / "e.npz"
     save_calibration(bench, path)
