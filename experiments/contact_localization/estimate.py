@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.gate import Gate, gates, refuse_bad_fit, refuse_inside_out
-from experiments.contact_localization.heard import hear
+from experiments.contact_localization.heard import Heard, hear
 from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise
 from experiments.contact_localization.levels import Levels, Senses
 from experiments.contact_localization.methods import Solution, lap, solve_run
@@ -24,7 +24,11 @@ from experiments.contact_localization.posterior import (
     settled,
 )
 from experiments.contact_localization.search import Search
-from experiments.contact_localization.sound_gate import distinct_strikes, refuse_strange_sound
+from experiments.contact_localization.sound_gate import (
+    distinct_strikes,
+    doubts_of_sound_at,
+    refuse_strange_sound,
+)
 from harness.acquisition import Strike
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import WrongUse
@@ -58,7 +62,7 @@ class Estimate:
         points: ``(n, 3)`` metres: hypotheses of the last contact, for pictures.
         weights: ``(n,)`` of the hypotheses, summing to 1.
         seconds: by stage.
-        doubts: what a reader must know of an answer by sound alone.
+        doubts: what a reader must know of an answer whose sound may be another object's.
     """
 
     position_in_object: FloatArray
@@ -153,18 +157,34 @@ def locate(
         if heard is not None:
             lap(seconds, "sounds", start)
         found = solve_run(search, k, levels, seed, seconds, heard)
-        doubts: tuple[str, ...] = ()
-        if k == count and levels.senses == "audio" and heard is not None:
-            doubts = refuse_strange_sound(search, found.hypotheses, heard, k)
-        # The paper's filter has no measure of fit to be refused by.
-        if k == count and levels.method == "grid" and found.pictured:
-            refuse_bad_fit(search, found.members, found.fits)
-            top = int(np.argmax(found.hypotheses.log_weights))
-            best = found.hypotheses.gels[top], float(found.hypotheses.yaws[top])
-            refuse_inside_out(search, *best, found.members)
+        doubts = _judged(search, found, levels, heard, k, seconds) if k == count else ()
         floor = FLOORS[levels.senses if heard else "touch"]
         answers.append(_answer(search, k, found, seconds, floor, doubts))
     return tuple(answers)
+
+
+def _judged(
+    search: Search,
+    found: Solution,
+    levels: Levels,
+    heard: Heard | None,
+    count: int,
+    seconds: dict[str, float],
+) -> tuple[str, ...]:
+    """What a reader must know of an answer that is not refused."""
+    start = time.perf_counter()
+    doubts: tuple[str, ...] = ()
+    if heard is not None:
+        judge = refuse_strange_sound if levels.senses == "audio" else doubts_of_sound_at
+        doubts = judge(search, found.hypotheses, heard, count)
+    # The paper's filter has no measure of fit to be refused by.
+    if levels.method == "grid" and found.pictured:
+        refuse_bad_fit(search, found.members, found.fits)
+        top = int(np.argmax(found.hypotheses.log_weights))
+        best = found.hypotheses.gels[top], float(found.hypotheses.yaws[top])
+        refuse_inside_out(search, *best, found.members)
+    lap(seconds, "judge", start)
+    return doubts
 
 
 def _answer(

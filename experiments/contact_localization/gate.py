@@ -42,6 +42,46 @@ class Gate:
     repeats: int | None
 
 
+@dataclass(frozen=True)
+class Likeness:
+    """How contacts taken together fit one hypothesis.
+
+    Attributes:
+        typical: nats, the median of their fits.
+        quartile: nats, their lower quartile, or what all but the worst of a few exceed.
+        limit: nats, the least ``typical`` that is not refused.
+        many: whether they are enough to be judged by their quartile too.
+    """
+
+    typical: float
+    quartile: float
+    limit: float
+    many: bool
+
+    @property
+    def margin(self) -> float:
+        """Nats by which they are clear of being refused; below 0 they are."""
+        typical = self.typical - self.limit
+        return min(typical, self.quartile - REFUSE_QUARTILE_BELOW) if self.many else typical
+
+
+def likeness_of(search: Search, members: IntArray, fits: FloatArray) -> Likeness:
+    """How some contacts, at least one, fit where each fits with so many nats."""
+    # A press repeated at one place is one witness, however often it is heard.
+    heard = np.array([_repeated(search, int(k)) is None for k in members])
+    # Floored: the quantile's interpolation must not subtract one infinity from another.
+    floored = np.maximum(fits[heard], _FAR_BELOW)
+    # Of few contacts the quartile leans on the worst; it must leave one of them out all the same.
+    share = max(0.25, 1.0 / max(1, len(floored) - 1))
+    many = int(heard.sum()) >= _ENOUGH
+    return Likeness(
+        typical=float(np.median(floored)),
+        quartile=float(np.quantile(floored, share)),
+        limit=REFUSE_BELOW if many else REFUSE_FEW_BELOW,
+        many=many,
+    )
+
+
 def gates(search: Search, count: int, members: IntArray, fits: FloatArray) -> tuple[Gate, ...]:
     """One gate a contact, from the fits of those that were used."""
     fit_of = dict(zip(members.tolist(), fits.tolist(), strict=True))
@@ -70,17 +110,10 @@ def refuse_bad_fit(search: Search, members: IntArray, fits: FloatArray) -> None:
             "no tactile image shows a contact, so there is nothing to localize; "
             "check that the gel touches (press deeper) and that the background is of this sensor"
         )
-    # A press repeated at one place is one witness, however often it is heard.
-    heard = np.array([_repeated(search, int(k)) is None for k in members])
-    # Floored: the quantile's interpolation must not subtract one infinity from another.
-    floored = np.maximum(fits[heard], _FAR_BELOW)
-    # Of few contacts the quartile leans on the worst; it must leave one of them out all the same.
-    share = max(0.25, 1.0 / max(1, len(floored) - 1))
-    typical, quartile = float(np.median(floored)), float(np.quantile(floored, share))
-    many = int(heard.sum()) >= _ENOUGH
-    limit = REFUSE_BELOW if many else REFUSE_FEW_BELOW
-    if typical >= limit and (not many or quartile >= REFUSE_QUARTILE_BELOW):
+    likeness = likeness_of(search, members, fits)
+    if likeness.margin >= 0.0:
         return
+    typical, quartile, limit = likeness.typical, likeness.quartile, likeness.limit
     worst = int(np.argmin(fits))
     raise FitRefused(
         f"no place on this object explains the contacts: the median of their fits is {typical:.1f} nats "

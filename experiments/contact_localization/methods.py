@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.gate import refuse_bad_fit
+from experiments.contact_localization.gate import likeness_of, refuse_bad_fit
 from experiments.contact_localization.grid import on_samples, refine
 from experiments.contact_localization.heard import Heard
 from experiments.contact_localization.hypotheses import Hypotheses, anchors
@@ -63,12 +63,14 @@ def solve_run(
     if levels.method == "particle":
         return _by_particles(search, count, members, levels, seed, seconds)
     best: Solution | None = None
+    clear = -np.inf
     for anchor in anchors(members, _ANCHORS):
         found = _by_grid(search, members, int(anchor), levels, seed, seconds, heard)
-        if best is None or np.median(found.fits) > np.median(best.fits):
-            best = found
+        likeness = likeness_of(search, members, found.fits)
+        if best is None or likeness.margin > clear:
+            best, clear = found, likeness.margin
         of_anchor = float(found.fits[np.nonzero(members == anchor)[0][0]])
-        if min(of_anchor, float(np.median(found.fits))) > _SUSPICIOUS_BELOW:
+        if min(of_anchor, likeness.typical) > _SUSPICIOUS_BELOW and likeness.margin > 0.0:
             break
     assert best is not None
     return best

@@ -194,10 +194,10 @@ def _trade(scored: Scored) -> Any:
 
 
 def _doubts(found: Answer) -> tuple[str, ...]:
-    by_sound = found.by_sense.get("audio")
     of_sound = doubts_of_sound(found.observations)
-    if isinstance(by_sound, Estimate):
-        of_sound += by_sound.doubts
+    # Sense by sense the doubt may be the same one.
+    of_senses = [estimate.doubts for estimate in found.by_sense.values() if isinstance(estimate, Estimate)]
+    of_sound += tuple(dict.fromkeys(doubt for doubts in of_senses for doubt in doubts))
     if len(found.last.modes) < 2:
         return of_sound
     shares = ", ".join(f"{100 * mode.weight:.0f} %" for mode in found.last.modes)

@@ -226,6 +226,23 @@ def test_another_object_is_refused(senses: Senses, run: Run, station: Station) -
         by(senses, run.good, run, model_of("bowl", station))
 
 
+def raised(_: int, strike: Strike) -> Strike:
+    """The same strike of an object of the same shape and another material: every frequency 1.3 times."""
+    samples = np.arange(len(strike.pressure), dtype=np.float64)
+    since = samples - strike.onset
+    return replace(strike, pressure=np.interp(strike.onset + 1.3 * since, samples, strike.pressure))
+
+
+def test_where_the_images_fit_and_the_sound_does_not_the_answer_warns(
+    run: Run, whole: dict[Senses, Estimate]
+) -> None:
+    found = by("both", with_strikes(run, raised), run)
+    (doubt,) = found.doubts
+    assert doubt.endswith("by its sound this may be another object, or one of another wall or material")
+    assert whole["both"].doubts == ()
+    assert np.linalg.norm(found.position_in_object - run.true) < 5e-3
+
+
 def test_another_object_of_which_nothing_is_heard_is_refused(run: Run, station: Station) -> None:
     with pytest.raises(FitRefused, match="does not fit this object"):
         by("audio", with_strikes(run, silenced), run, model_of("bowl", station))

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_press import PRESSES
 
-from experiments.contact_localization.gate import gates, refuse_bad_fit, refuse_inside_out
+from experiments.contact_localization.gate import gates, likeness_of, refuse_bad_fit, refuse_inside_out
 from experiments.contact_localization.hypotheses import Contact, Noise
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.search import SAME_AXIS, SAME_PLACE, Search
@@ -65,6 +65,22 @@ def test_one_bad_contact_is_no_reason_to_refuse(six: Search, count: int) -> None
 def test_a_majority_of_bad_contacts_is(six: Search, count: int) -> None:
     bad = count // 2 + 1
     assert refused(six, [BAD] * bad + [GOOD] * (count - bad))
+
+
+@given(fits=st.lists(st.floats(-80.0, 0.0), min_size=1, max_size=6))
+@settings(max_examples=100, deadline=None)
+def test_what_is_refused_is_what_is_not_clear_of_it(six: Search, fits: list[float]) -> None:
+    likeness = likeness_of(six, np.arange(len(fits)), np.array(fits))
+    assert refused(six, fits) is (likeness.margin < 0.0)
+
+
+def test_a_compromise_is_clearer_than_four_good_contacts_and_two_impossible_ones(six: Search) -> None:
+    """By the median alone the second would be taken, and refused for its quartile."""
+    everyone = np.arange(6)
+    compromise = likeness_of(six, everyone, np.array([-4.5, -1.2, -7.9, -8.9, -3.7, -4.3]))
+    torn = likeness_of(six, everyone, np.array([-1.6, -1.7, -28.2, -28.4, -3.0, -0.6]))
+    assert torn.typical > compromise.typical
+    assert compromise.margin > 0.0 > torn.margin
 
 
 @given(fits=st.lists(st.floats(-80.0, 0.0), min_size=1, max_size=6), worse=st.integers(0, 5))
