@@ -102,7 +102,7 @@ def test_what_is_no_calibration_is_refused(tmp_path: Path) -> None:
 
 def test_an_array_alone_is_no_calibration(tmp_path: Path) -> None:
     np.save(tmp_path / "heights.npy", np.zeros((2, 3)))
-    with pytest.raises(CalibrationRefused, match="no .npz archive"):
+    with pytest.raises(CalibrationRefused, match=r"no \.npz archive"):
         load_calibration(tmp_path / "heights.npy")
 
 
