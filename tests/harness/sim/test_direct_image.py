@@ -56,8 +56,8 @@ def test_a_ball_is_lamberts_and_converges_to_him(light: DirectionalLight) -> Non
     # off by change all their light, and the root of that goes with the size.
     assert inner[0] / inner[2] > 6.0
     assert whole[0] / whole[2] > 3.5
-    # Corners 2 degrees apart: the outline, 16 pixels from the middle, is 2.4e-3 pixels in; of its 1600 samples
-    # a pixel wide less than four are missed, each 0.8 / 16 of a pixel of 2304.
+    # Corners 2 degrees apart: the outline, 16 pixels from the middle, is 2.4e-3 pixels in; of its 1600
+    # samples a pixel wide less than four are missed, each 0.8 / 16 of a pixel of 2304.
     assert whole[2] < 0.8 / 16 * np.sqrt(4.0 / 2304.0) * light.irradiance / np.pi
 
 
