@@ -2,9 +2,13 @@
 
 from dataclasses import replace
 from math import ceil
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+from exact_bars import astm_bending, astm_torsion
+from exact_plate import guided_plate, on_lower_edges, sliding_sides
 from exact_solids import exact_ball, exact_box, octant_shell, on_planes, radial_frequencies
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,9 +16,11 @@ from ritz_box import ritz_frequencies
 
 from harness.errors import WrongUse
 from harness.materials import MATERIALS, Material
+from harness.sim.modal_file import modes_of_file
 from harness.sim.modal_solve import solve_mesh
 
 STEEL = MATERIALS["steel"]
+NAFEMS = Material("", 8000.0, 2e11, 0.3, 0.0, 0.0)
 LAMB = {"T2": 2.501133, "S2": 2.639869}
 """Lamb's lowest two roots ``w R / c_s`` at Poisson's ratio 0.25 (Proc. London Math. Soc. 13, 1881)."""
 
@@ -22,17 +28,6 @@ LAMB = {"T2": 2.501133, "S2": 2.639869}
 def shear_speed(material: Material) -> float:
     """m/s."""
     return float(np.sqrt(material.young / (2.0 * (1.0 + material.poisson) * material.density)))
-
-
-def astm_e1876(length: float, width: float, thickness: float, mass: float, of: Material) -> float:
-    """Hz of a free bar's first bending across its thickness (ASTM E1876-15, equations 1 and 2)."""
-    ratio, nu = thickness / length, of.poisson
-    correction = (
-        1.0 + 6.585 * (1.0 + 0.0752 * nu + 0.8109 * nu**2) * ratio**2 - 0.868 * ratio**4
-        - 8.340 * (1.0 + 0.2023 * nu + 2.173 * nu**2) * ratio**4
-        / (1.0 + 6.338 * (1.0 + 0.1408 * nu + 1.536 * nu**2) * ratio**2)
-    )  # fmt: skip
-    return float(np.sqrt(of.young * width * thickness**3 / (0.9465 * mass * length**3 * correction)))
 
 
 def test_the_ritz_method_gives_the_published_cube() -> None:
@@ -44,8 +39,20 @@ def test_the_ritz_method_gives_the_published_cube() -> None:
 
 def test_the_ritz_method_and_the_standard_agree_on_a_bar() -> None:
     sides = (0.2, 0.02, 0.01)
-    expected = astm_e1876(*sides, STEEL.density * float(np.prod(sides)), STEEL)
+    expected = astm_bending(*sides, STEEL.density * float(np.prod(sides)), STEEL)
     assert ritz_frequencies(sides, STEEL, 14, (1, 1, -1))[0] == pytest.approx(expected, rel=5e-4)
+
+
+@pytest.mark.parametrize(
+    "sides", [(0.2, 0.02, 0.01), (0.2, 0.03, 0.01), (0.2, 0.02, 0.02), (0.1, 0.02, 0.01)]
+)
+def test_the_standard_s_torsion_is_within_a_thousandth_of_the_exact_one(
+    sides: tuple[float, float, float],
+) -> None:
+    """And never by chance: the bar twists slower without the warping that its section needs."""
+    weight = STEEL.density * float(np.prod(sides))
+    exact = ritz_frequencies(sides, STEEL, 16, (-1, -1, -1))[0]
+    assert astm_torsion(*sides, weight, STEEL) == pytest.approx(exact, rel=1e-3)
 
 
 @settings(max_examples=6, deadline=None)
@@ -109,11 +116,10 @@ def test_a_ball_on_its_exact_shape_rings_as_lamb_says() -> None:
 
 def test_a_thick_hollow_sphere_breathes_as_its_closed_form_says() -> None:
     """The sphere of NAFEMS FV42, one eighth of it between its planes of symmetry."""
-    material = Material("", 8000.0, 2e11, 0.3, 0.0, 0.0)
-    expected = radial_frequencies(1.8, 6.0, material, 900.0)
+    expected = radial_frequencies(1.8, 6.0, NAFEMS, 900.0)
     assert expected == pytest.approx([369.91, 838.03], rel=2e-4)
     eighth = octant_shell(1.8, 6.0, 5, 6)
-    modes = solve_mesh(eighth, material, 400.0, held=on_planes(eighth, (1, 1, 1))).modes
+    modes = solve_mesh(eighth, NAFEMS, 400.0, held=on_planes(eighth, (1, 1, 1))).modes
     outer = np.linalg.norm(modes.points, axis=1) > 6.0 - 1e-9
     out = modes.points[outer] / 6.0
     along = np.einsum("nmd,nd->nm", modes.shapes[outer], out)
@@ -124,13 +130,70 @@ def test_a_thick_hollow_sphere_breathes_as_its_closed_form_says() -> None:
 def test_a_bar_rings_as_the_standard_says() -> None:
     """ASTM E1876: a quarter of it, between the planes about which it bends alike."""
     sides = (0.2, 0.02, 0.01)
-    expected = astm_e1876(*sides, STEEL.density * float(np.prod(sides)), STEEL)
+    expected = astm_bending(*sides, STEEL.density * float(np.prod(sides)), STEEL)
     quarter = exact_box((0.1, 0.01, 0.01), (12, 2, 2))
     held = on_planes(quarter, (1, 1, 1))
     held[:, 2] = False
     found = solve_mesh(quarter, STEEL, 1.5 * expected, held=held).modes
     assert found.rigid == 1
     assert found.frequencies[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_bar_twists_as_the_standard_says_once_its_section_may_warp() -> None:
+    """ASTM E1876: an eighth. One cell in half of its thickness is not enough, however short it is."""
+    sides = (0.2, 0.02, 0.01)
+    standard = astm_torsion(*sides, STEEL.density * float(np.prod(sides)), STEEL)
+    exact = ritz_frequencies(sides, STEEL, 20, (-1, -1, -1))[0]
+    errors = []
+    for counts in ((12, 2, 1), (24, 2, 1), (14, 4, 2)):
+        eighth = exact_box((0.1, 0.01, 0.005), counts)
+        held = on_planes(eighth, (-1, -1, -1))
+        found = solve_mesh(eighth, STEEL, 1.1 * exact, held=held).modes.frequencies[0]
+        errors.append(found / exact - 1.0)
+    assert errors[1] == pytest.approx(errors[0], rel=0.1)
+    assert 4e-3 < errors[1] < 1e-2
+    assert 0.0 < errors[2] < 1e-3
+    assert found == pytest.approx(standard, rel=1e-3)
+
+
+def test_a_bar_given_by_its_surface_is_meshed_finely_enough_for_the_standard(tmp_path: Path) -> None:
+    """Both modes of ASTM E1876, at the element size that is chosen where nobody asks for one."""
+    sides = (0.2, 0.02, 0.01)
+    file, weight = tmp_path / "bar.stl", STEEL.density * float(np.prod(sides))
+    trimesh.creation.box(sides).export(file)
+    found = modes_of_file(file, STEEL, "m", limit=6e3).solution
+    assert found.certified
+    frequencies = found.modes.frequencies
+    assert frequencies[0] == pytest.approx(astm_bending(*sides, weight, STEEL), rel=1e-3)
+    assert frequencies[3] == pytest.approx(astm_torsion(*sides, weight, STEEL), rel=1e-3)
+    assert frequencies[3] == pytest.approx(ritz_frequencies(sides, STEEL, 16, (-1, -1, -1))[0], rel=1e-3)
+
+
+def test_a_plate_on_its_sides_rings_as_rayleigh_and_lamb_say() -> None:
+    """The plate of NAFEMS FV52 on supports that its solid has an exact answer for."""
+    exact = guided_plate(10.0, 1.0, NAFEMS)
+    errors = []
+    for across, layers in ((8, 1), (16, 2)):
+        mesh = exact_box((10.0, 10.0, 1.0), (across, across, layers))
+        solved = solve_mesh(mesh, NAFEMS, 140.0, held=sliding_sides(mesh))
+        assert solved.certified
+        assert len(solved.modes.frequencies) == 3
+        errors.append(solved.modes.frequencies / exact[:3] - 1.0)
+    assert errors[1].min() > 0.0
+    assert errors[1] == pytest.approx([0.0, 0.0, 0.0], abs=2.5e-3)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx([4.0] * 3, abs=0.6)
+
+
+def test_lines_hold_a_solid_the_less_the_finer_its_mesh() -> None:
+    """NAFEMS FV52, 45.897 Hz, as published: a coarse mesh is nearer to it than a fine one."""
+    lowest = []
+    for across, layers in ((4, 1), (8, 1), (16, 2)):
+        mesh = exact_box((10.0, 10.0, 1.0), (across, across, layers))
+        lowest.append(solve_mesh(mesh, NAFEMS, 60.0, held=on_lower_edges(mesh)).modes.frequencies[0])
+    assert lowest[0] > lowest[1] > lowest[2]
+    assert lowest[1] == pytest.approx(45.897, rel=0.04)
+    # What is still lost does not die away with the fourth power, as it does on sides that are held.
+    assert lowest[1] - lowest[2] > 0.2 * (lowest[0] - lowest[1])
 
 
 def test_a_cantilever_bends_as_beams_do() -> None:
@@ -159,8 +222,7 @@ def test_the_tapered_membrane_of_nafems() -> None:
     held = np.zeros(nodes.shape, dtype=np.bool_)
     held[unit.nodes[:, 0] == 0.0, :2] = True
     held[unit.nodes[:, 2] == 0.5, 2] = True
-    material = Material("", 8000.0, 2e11, 0.3, 0.0, 0.0)
-    solved = solve_mesh(replace(unit, nodes=nodes), material, 400.0, held=held)
+    solved = solve_mesh(replace(unit, nodes=nodes), NAFEMS, 400.0, held=held)
     expected = [44.623, 130.03, 162.70, 246.05, 379.90, 391.44]
     assert solved.modes.frequencies == pytest.approx(expected, rel=5e-3)
 
