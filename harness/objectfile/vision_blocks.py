@@ -1,0 +1,143 @@
+"""Samples sorted by network into blocks, and put together again along their rays."""
+
+import math
+
+import numpy as np
+
+from harness.arrays import AnyArray, FloatArray
+from harness.sim.compiled import compiled
+
+
+@compiled
+def sort_samples(
+    counts: AnyArray, most: int, networks: AnyArray, every: int, size: int, order: AnyArray, blocks: AnyArray
+) -> tuple[int, int]:
+    """Samples of one network next to each other, in blocks.
+
+    Args:
+        counts: ``(n,)`` samples of each ray.
+        most: places for samples of a ray.
+        networks: ``(n * most,)`` of each; -1 is left out.
+        every: networks that there are.
+        size: of a block at most.
+        order: ``(samples,)`` int32, written: their places.
+        blocks: ``(m, 3)`` int32, written: network, first in ``order``, samples. ``m`` of at least
+            ``samples // size + every`` is enough.
+
+    Returns:
+        Samples, and blocks.
+    """
+    begin = np.zeros(every + 1, np.int64)
+    for n in range(len(counts)):
+        for i in range(counts[n]):
+            network = networks[n * most + i]
+            if network >= 0:
+                begin[network + 1] += 1
+    made = 0
+    for network in range(every):
+        left, at = begin[network + 1], begin[network]
+        while left > 0:
+            blocks[made, 0], blocks[made, 1], blocks[made, 2] = network, at, min(left, size)
+            made, left, at = made + 1, left - size, at + size
+        begin[network + 1] += begin[network]
+    total = begin[every]
+    for n in range(len(counts)):
+        for i in range(counts[n]):
+            network = networks[n * most + i]
+            if network >= 0:
+                order[begin[network]] = n * most + i
+                begin[network] += 1
+    return total, made
+
+
+@compiled
+def composite(
+    rays: AnyArray,
+    counts: AnyArray,
+    most: int,
+    networks: AnyArray,
+    density: AnyArray,
+    scattered: AnyArray,
+    lengths: AnyArray,
+    places: AnyArray,
+    scale: float,
+    least: float,
+    resume: FloatArray,
+    optical: FloatArray,
+    sums: FloatArray,
+) -> None:
+    """Lay samples behind what their rays have met so far.
+
+    What is left of the light behind a sample is ``exp`` of a sum, and what a sample takes ``-expm1``: thin
+    ones are not lost. A ray with less than ``least`` left ends there, and what it saw counts as all.
+
+    Args:
+        rays: ``(n,)``.
+        counts: ``(n,)`` samples of each.
+        most: places for samples of a ray.
+        networks: ``(n * most,)``; -1 is nothing.
+        density: ``(n * most,)`` in units of ``scale``.
+        scattered: ``(n * most, 3)``.
+        lengths: ``(n * most,)`` m; infinite is opaque, whatever the density.
+        places: ``(n * most,)`` m along the ray.
+        scale: 1/m.
+        least: of the light; 0 ends no ray.
+        resume: ``(r,)`` m, becomes infinite where a ray ends.
+        optical: ``(r,)`` sum of density times length, raised.
+        sums: ``(r, 5)``: red, green, blue, opacity, opacity times m along the ray, raised.
+    """
+    for n in range(len(rays)):
+        ray = rays[n]
+        passed = optical[ray]
+        light = math.exp(-passed)
+        for at in range(n * most, n * most + counts[n]):
+            if networks[at] < 0:
+                continue
+            thick = np.inf if lengths[at] == np.inf else scale * density[at] * lengths[at]
+            weight = -light * math.expm1(-thick)
+            for c in range(3):
+                sums[ray, c] += weight * scattered[at, c]
+            sums[ray, 3] += weight
+            sums[ray, 4] += weight * places[at]
+            passed += thick
+            light = math.exp(-passed)
+            if light < least:
+                resume[ray] = np.inf
+                for c in range(5):
+                    sums[ray, c] /= 1.0 - light
+                break
+        optical[ray] = passed
+
+
+@compiled
+def aim(
+    rays: AnyArray,
+    places: AnyArray,
+    focal: float,
+    x: float,
+    y: float,
+    rotation: FloatArray,
+    ways: FloatArray,
+    views: AnyArray,
+    slant: FloatArray,
+) -> None:
+    """Where rays look.
+
+    Args:
+        rays: ``(n,)`` to be filled in.
+        places: ``(r, 2)`` x and y in the picture, pixels.
+        focal: pixels.
+        x: pixels, of the axis.
+        y: pixels.
+        rotation: ``(3, 3)`` object from camera.
+        ways: ``(r, 3)`` unit, written.
+        views: ``(r, 3)`` the same as float32, written.
+        slant: ``(r,)`` depth for a unit of length, written.
+    """
+    for ray in rays:
+        a, b = (places[ray, 0] - x) / focal, (places[ray, 1] - y) / focal
+        part = 1.0 / math.sqrt(a * a + b * b + 1.0)
+        for axis in range(3):
+            way = part * (rotation[axis, 0] * a + rotation[axis, 1] * b + rotation[axis, 2])
+            ways[ray, axis], views[ray, axis] = way, way
+        slant[ray] = part

@@ -1,0 +1,133 @@
+"""Samples of rays: as many in every stretch within the shell as its length asks for, one at least."""
+
+import numpy as np
+
+from harness.arrays import AnyArray, FloatArray
+from harness.objectfile.vision_voxels import walk
+from harness.sim.compiled import compiled
+
+_BESIDE = 1e-7
+"""Of a cell: how far beside its network's cell rounding may put a sample."""
+
+
+@compiled
+def network_at(table: AnyArray, place: FloatArray) -> int:
+    """The network of a place in cells, or of the nearest cell that rounding may have missed; -1 for none."""
+    for reach in (0.0, _BESIDE):
+        for corner in range(8 if reach > 0.0 else 1):
+            at, inside = (0, 0, 0), True
+            x = place[0] + (reach if corner & 1 else -reach)
+            y = place[1] + (reach if corner & 2 else -reach)
+            z = place[2] + (reach if corner & 4 else -reach)
+            inside = 0.0 <= x <= table.shape[0] and 0.0 <= y <= table.shape[1] and 0.0 <= z <= table.shape[2]
+            if inside:
+                # The greatest corner belongs to the last cell.
+                at = (
+                    min(int(x), table.shape[0] - 1),
+                    min(int(y), table.shape[1] - 1),
+                    min(int(z), table.shape[2] - 1),
+                )
+                if table[at] >= 0:
+                    return int(table[at])
+    return -1
+
+
+@compiled
+def _put(
+    at: int, place: FloatArray, network: int, cells: AnyArray, networks: AnyArray, local: AnyArray
+) -> None:
+    networks[at] = network
+    for axis in range(3):
+        within = 2.0 * (place[axis] - cells[max(network, 0), axis]) - 1.0
+        local[at, axis] = min(max(within, -1.0), 1.0)
+
+
+@compiled
+def march(
+    rays: AnyArray,
+    ways: FloatArray,
+    eye: FloatArray,
+    voxel: float,
+    per_cell: int,
+    words: AnyArray,
+    table: AnyArray,
+    cells: AnyArray,
+    step: float,
+    most: int,
+    runs_at_once: int,
+    resume: FloatArray,
+    counts: AnyArray,
+    networks: AnyArray,
+    local: AnyArray,
+    lengths: AnyArray,
+    places: AnyArray,
+) -> None:
+    """The next samples of rays.
+
+    Args:
+        rays: ``(n,)`` that go on.
+        ways: ``(r, 3)`` unit, of each ray.
+        eye: ``(3,)`` voxels from the lattice's least corner.
+        voxel: m.
+        per_cell: voxels along a cell.
+        words: of the shell.
+        table: of the grid.
+        cells: of the grid's networks.
+        step: m that a sample stands for at most.
+        most: samples of a ray; more are left for the next time.
+        runs_at_once: stretches of a ray; more are left for the next time.
+        resume: ``(r,)`` m: from where, and from where the next time; inf for nowhere.
+        counts: ``(n,)`` samples of each ray, written.
+        networks: ``(n * most,)`` int32, written; those of ray ``rays[i]`` from ``i * most`` on.
+        local: ``(n * most, 3)`` float32 in the cell, written.
+        lengths: ``(n * most,)`` float32 m that each sample stands for, written.
+        places: ``(n * most,)`` float32 m along the ray, written.
+    """
+    runs, way, place = np.empty((runs_at_once, 2)), np.empty(3), np.empty(3)
+    for n in range(len(rays)):
+        ray, count = rays[n], 0
+        for axis in range(3):
+            way[axis] = ways[ray, axis] / voxel
+        found, after = walk(eye, way, resume[ray], words, runs)
+        for run in range(found):
+            begin, end = runs[run, 0], runs[run, 1]
+            parts = max(1, int(np.ceil((end - begin) / step - 1e-9)))
+            part = (end - begin) / parts
+            taken = min(parts, most - count)
+            for i in range(taken):
+                at, t = n * most + count, begin + (i + 0.5) * part
+                for axis in range(3):
+                    place[axis] = (eye[axis] + t * way[axis]) / per_cell
+                _put(at, place, network_at(table, place), cells, networks, local)
+                lengths[at], places[at] = part, t
+                count += 1
+            if taken < parts:
+                after = begin + taken * part
+                break
+        counts[n], resume[ray] = count, after
+
+
+@compiled
+def take_surface(
+    rays: AnyArray,
+    ways: FloatArray,
+    eye: FloatArray,
+    voxel: float,
+    per_cell: int,
+    table: AnyArray,
+    cells: AnyArray,
+    away: AnyArray,
+    counts: AnyArray,
+    networks: AnyArray,
+    local: AnyArray,
+    lengths: AnyArray,
+    places: AnyArray,
+) -> None:
+    """One sample of each ray, ``away`` ``(r,)`` m along it; otherwise as ``march`` with ``most = 1``."""
+    place = np.empty(3)
+    for n in range(len(rays)):
+        ray = rays[n]
+        for axis in range(3):
+            place[axis] = (eye[axis] + away[ray] * ways[ray, axis] / voxel) / per_cell
+        _put(n, place, network_at(table, place), cells, networks, local)
+        counts[n], lengths[n], places[n] = 1, np.inf, away[ray]

@@ -1,0 +1,88 @@
+"""Which pixels a mesh covers and how much of each, and how deep it is there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.arrays import AnyArray
+from harness.mesh import Mesh
+from harness.objectfile.vision_raster import draw, look_through, projected
+from harness.objectfile.vision_work import Crew, Room
+from harness.pinhole import Pinhole
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A picture's pixels, those that show anything.
+
+    Attributes:
+        pixels: ``(n,)`` counted row by row.
+        cover: ``(n,)`` float32: share of each that is covered.
+        places: ``(n, 2)`` float32 x and y, pixels: the covered place that is nearest to its centre.
+        depth: ``(n,)`` float32 m, there; empty where it was not asked for.
+    """
+
+    pixels: AnyArray
+    cover: AnyArray
+    places: AnyArray
+    depth: AnyArray
+
+
+def centre_out(side: int) -> AnyArray:
+    """``(side * side, 2)`` int64 sub-pixels of a pixel, row and column, from its centre outwards."""
+    rows, columns = np.divmod(np.arange(side * side), side)
+    away = (rows - side // 2) ** 2 + (columns - side // 2) ** 2
+    chosen = np.argsort(away, kind="stable")
+    return np.stack([rows[chosen], columns[chosen]], axis=1)
+
+
+def is_closed(mesh: Mesh) -> bool:
+    """Whether a surface has no border, and its faces look outwards: some face then hides each one's back."""
+    edges = np.concatenate([mesh.faces[:, [a, (a + 1) % 3]] for a in range(3)])
+    there = np.unique(edges, axis=0)
+    matched = len(there) == len(edges) and np.array_equal(there, np.unique(edges[:, ::-1], axis=0))
+    low, high = mesh.corners[:, 0], np.cross(mesh.corners[:, 1], mesh.corners[:, 2])
+    return bool(matched and np.einsum("nx,nx->", low, high) > 0.0)
+
+
+def mesh_outline(mesh: Mesh, closed: bool, camera: Pinhole, side: int, crew: Crew, room: Room) -> Outline:
+    """What a mesh covers of a picture.
+
+    Args:
+        mesh: in metres.
+        closed: of ``is_closed``.
+        camera: that looks.
+        side: sub-pixels along a pixel, odd.
+        crew: shares the rows.
+        room: that arrays are taken from.
+    """
+    rows, columns = camera.height, camera.width
+    focal = side * camera.focal_px
+    x, y = side * camera.centre_px[0] - 0.5, side * camera.centre_px[1] - 0.5
+    seen = room.take("seen", (len(mesh.vertices), 6), np.float64)
+    nearness = room.take("nearness", (rows * side, columns * side), np.float32)
+    cover, depth = (room.take(name, (rows, columns), np.float32) for name in ("cover", "depth"))
+    outside = bool(((camera.eye < mesh.bounds[0]) | (camera.eye > mesh.bounds[1])).any())
+    places, offsets = room.take("at", (rows, columns, 2), np.float32), centre_out(side)
+
+    def project(first: int, last: int) -> None:
+        part = mesh.vertices[first:last]
+        projected(part, camera.camera_from_object, focal, x, y, seen[first:last])
+
+    def band(first: int, last: int) -> None:
+        nearness[first * side : last * side] = 0.0
+        draw(seen, mesh.faces, focal, x, y, first * side, last * side, closed and outside, nearness)
+        look_through(nearness, side, offsets, first, last, cover, places, depth)
+
+    crew.share(project, len(mesh.vertices), crew.threads)
+    crew.share(band, rows, 2 * crew.threads if crew.threads > 1 else 1)
+    pixels = np.flatnonzero(cover)
+    return Outline(pixels, cover.ravel()[pixels], places.reshape(-1, 2)[pixels], depth.ravel()[pixels])
+
+
+def whole_picture(camera: Pinhole) -> Outline:
+    """Every pixel, through its centre."""
+    count = camera.width * camera.height
+    rows, columns = np.divmod(np.arange(count), camera.width)
+    places = np.stack([columns + 0.5, rows + 0.5], axis=1).astype(np.float32)
+    return Outline(np.arange(count), np.ones(count, np.float32), places, np.empty(0, np.float32))

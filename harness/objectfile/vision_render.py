@@ -1,0 +1,139 @@
+"""Pictures of an object from its networks: rays, a shell, samples by cell, light along rays.
+
+Levels of one effect: ``fused`` asks a kernel made for it; ``onnx`` the file's graph alone, which gives the
+same picture; ``one_sample`` asks once a ray, where the mesh is, and takes what is there as opaque.
+"""
+
+import time
+
+import numpy as np
+
+from harness.arrays import AnyArray, FloatArray
+from harness.linear_image import LinearImage
+from harness.mesh import Mesh
+from harness.objectfile.runtime import Network
+from harness.objectfile.vision_blocks import aim
+from harness.objectfile.vision_fold import folded
+from harness.objectfile.vision_graph import FILE, graph_block, vision_model
+from harness.objectfile.vision_outline import Outline, is_closed, mesh_outline, whole_picture
+from harness.objectfile.vision_passes import Follower, Rays, Volume, Watch
+from harness.objectfile.vision_samples import Asker, FusedAsker, GraphAsker, Scene
+from harness.objectfile.vision_settings import Rendered, RenderSettings, VisionLevel
+from harness.objectfile.vision_shell import DEEP, PER_CELL, shell_for
+from harness.objectfile.vision_surface import SurfaceExtras
+from harness.objectfile.vision_tensors import vision_tensors
+from harness.objectfile.vision_work import Crew, Room
+from harness.pinhole import DirectionalLight, Pinhole
+
+
+class VisionRenderer:
+    """An object, ready to be looked at; one picture at a time.
+
+    Args:
+        data: of ``vision.onnx``.
+        mesh: of the object, in metres.
+        threads: None for as many as the process has cores.
+        per_cell: voxels of the shell along a cell.
+        deep: voxels that it goes on behind the surface.
+        name: of the file, for messages.
+
+    Raises:
+        DataRefused: the file is not one of networks of vision, or of another object than the mesh.
+    """
+
+    def __init__(
+        self,
+        data: bytes,
+        mesh: Mesh,
+        threads: int | None = None,
+        per_cell: int = PER_CELL,
+        deep: float = DEEP,
+        name: str = FILE,
+    ) -> None:
+        self._data, self._mesh, self._name = data, mesh, name
+        self.model = vision_model(data, name)
+        self.shell = shell_for(mesh, self.model.grid, per_cell, deep)
+        self._closed = is_closed(mesh)
+        self._crew, self._room = Crew(threads), Room()
+        self._follower = Follower(Volume(self.model, self.shell, per_cell), self._crew, self._room)
+        self._extras = SurfaceExtras(mesh, self.model.weights.size.extras)
+        self._askers: dict[str, Asker] = {}
+
+    def render(
+        self, camera: Pinhole, light: DirectionalLight, settings: RenderSettings | None = None
+    ) -> Rendered:
+        """A picture of the object under one light.
+
+        Args:
+            camera: that looks; anywhere, within the object too.
+            light: from far away.
+            settings: None for the default.
+        """
+        chosen, watch = settings or RenderSettings(), Watch()
+        asker = self._asker(chosen.level)
+        watch.lap("open")
+        outline = self._outline(camera, chosen)
+        watch.lap("outline")
+        rays, slant = self._rays(camera, light, outline, chosen)
+        watch.lap("rays")
+        samples = self._follower.follow(rays, asker, chosen, watch)
+        image = _picture(camera, outline, rays.sums, slant, light.irradiance / np.pi)
+        watch.lap("picture")
+        watch.seconds["render"] = time.perf_counter() - watch.begun
+        return Rendered(image, chosen.level, samples, len(slant), watch.seconds)
+
+    def _outline(self, camera: Pinhole, chosen: RenderSettings) -> Outline:
+        if chosen.coverage == 1 and chosen.marches:
+            return whole_picture(camera)
+        return mesh_outline(self._mesh, self._closed, camera, chosen.coverage, self._crew, self._room)
+
+    def _rays(
+        self, camera: Pinhole, light: DirectionalLight, outline: Outline, chosen: RenderSettings
+    ) -> tuple[Rays, FloatArray]:
+        """The rays, and depth for a unit of length along each."""
+        ways, views, slant = self._aim(camera, outline)
+        surface = outline.depth / slant if len(outline.depth) else np.full(len(slant), np.inf)
+        begin = np.zeros(len(slant))
+        if len(outline.depth) and np.isfinite(chosen.lead):
+            begin = np.maximum(surface - chosen.lead * self.shell.voxel, 0.0)
+        extras = self._extras(camera.eye, ways, light.direction)
+        return Rays(camera.eye, ways, surface, Scene(views, extras, light.direction), begin), slant
+
+    def _aim(self, camera: Pinhole, outline: Outline) -> tuple[FloatArray, AnyArray, FloatArray]:
+        count, (x, y) = len(outline.pixels), camera.centre_px
+        ways, slant = self._room.take("ways", (count, 3), np.float64), np.empty(count)
+        views, rays = self._room.take("views", (count, 3), np.float32), np.arange(count)
+        rotation = np.ascontiguousarray(camera.object_from_camera[:3, :3])
+
+        def work(first: int, last: int) -> None:
+            aim(rays[first:last], outline.places, camera.focal_px, x, y, rotation, ways, views, slant)
+
+        self._crew.share(work, count, self._crew.threads)
+        return ways, views, slant
+
+    def _asker(self, level: VisionLevel) -> Asker:
+        """The way to ask that a level has, made when it is first used."""
+        kind = "onnx" if level == "onnx" else "fused"
+        if kind not in self._askers:
+            self._askers[kind] = self._opened() if kind == "onnx" else FusedAsker(folded(self.model.weights))
+        return self._askers[kind]
+
+    def _opened(self) -> GraphAsker:
+        block = graph_block(self._data, self._name)
+        network = Network(self._data, self._name, *vision_tensors(self.model, block))
+        return GraphAsker(network, self.model.grid, self.model.weights.density_scale, block)
+
+
+def _picture(
+    camera: Pinhole, outline: Outline, sums: FloatArray, slant: FloatArray, radiance: float
+) -> LinearImage:
+    rows, columns = camera.height, camera.width
+    colour, alpha = np.zeros((rows * columns, 3)), np.zeros(rows * columns)
+    depth = np.full(rows * columns, np.inf)
+    colour[outline.pixels] = sums[:, :3] * (radiance * outline.cover[:, None])
+    alpha[outline.pixels] = np.minimum(sums[:, 3], 1.0) * outline.cover
+    seen = sums[:, 3] > 0.0
+    depth[outline.pixels[seen]] = sums[seen, 4] / sums[seen, 3] * slant[seen]
+    return LinearImage(
+        colour.reshape(rows, columns, 3), alpha.reshape(rows, columns), depth.reshape(rows, columns)
+    )

@@ -1,0 +1,158 @@
+"""Samples of a wave of rays, and two ways to ask the networks for what they are."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from harness.arrays import AnyArray, FloatArray
+from harness.objectfile.runtime import Network
+from harness.objectfile.vision_fold import FoldedWeights
+from harness.objectfile.vision_kernels import ask_blocks
+from harness.objectfile.vision_network import VisionGrid
+from harness.objectfile.vision_tiles import SAMPLES
+from harness.objectfile.vision_work import Crew, Room
+
+_AT_ONCE = 48
+"""Blocks in a run of the graph: what it computes between then stays in the second cache."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Of rays, ``most`` places each; places that are not filled have no meaning.
+
+    Attributes:
+        rays: ``(n,)`` int32, which go on.
+        most: places of each.
+        counts: ``(n,)`` int32, filled ones.
+        networks: ``(n * most,)`` int32, -1 where none answers.
+        local: ``(n * most, 3)`` float32, in the cell.
+        lengths: ``(n * most,)`` float32 m.
+        places: ``(n * most,)`` float32 m along the ray.
+        density: ``(n * most,)`` float32, answered, in units of the weights' scale.
+        scattered: ``(n * most, 3)`` float32, answered.
+    """
+
+    rays: AnyArray
+    most: int
+    counts: AnyArray
+    networks: AnyArray
+    local: AnyArray
+    lengths: AnyArray
+    places: AnyArray
+    density: AnyArray
+    scattered: AnyArray
+
+    @classmethod
+    def room_for(cls, rays: AnyArray, most: int, room: Room) -> "Samples":
+        """Places for samples, not filled."""
+        count = len(rays) * most
+        flat = {
+            name: room.take(name, (count,), kind)
+            for name, kind in (
+                *(("networks", np.int32), ("lengths", np.float32)),
+                *(("places", np.float32), ("density", np.float32)),
+            )
+        }
+        wide = {name: room.take(name, (count, 3), np.float32) for name in ("local", "scattered")}
+        return cls(rays, most, room.take("counts", (len(rays),), np.int32), **flat, **wide)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What all samples of a picture have in common.
+
+    Attributes:
+        views: ``(r, 3)`` float32 unit, of each ray.
+        extras: ``(r, 0)`` or ``(r, 4)`` float32, of each ray.
+        light: ``(3,)`` unit, towards the lamp.
+    """
+
+    views: AnyArray
+    extras: AnyArray
+    light: FloatArray
+
+
+class Asker(Protocol):
+    """Answers samples that were sorted into blocks."""
+
+    block: int
+
+    def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene, crew: Crew) -> None:
+        """Fill in ``density`` and ``scattered`` of the samples in ``order``."""
+
+
+class FusedAsker:
+    """By the kernel that does all layers of a block at once.
+
+    Args:
+        weights: folded.
+    """
+
+    block = SAMPLES
+
+    def __init__(self, weights: FoldedWeights) -> None:
+        self._weights = weights
+        self._light: FloatArray | None = None
+        self._lit: AnyArray = weights.bias
+
+    def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene, crew: Crew) -> None:
+        """As ``Asker``."""
+        weights, lit = self._weights, self._under(scene.light)
+        rays = np.repeat(samples.rays, samples.most)
+
+        def ask(first: int, last: int) -> None:
+            ask_blocks(
+                *(blocks[first:last], order, samples.local, rays, scene.views, scene.extras),
+                *(weights.packed, lit, weights.size.octaves, weights.size.turns),
+                *(samples.density, samples.scattered),
+            )
+
+        crew.share(ask, len(blocks), 4 * crew.threads)
+
+    def _under(self, light: FloatArray) -> AnyArray:
+        if self._light is None or not np.array_equal(light, self._light):
+            self._light, self._lit = light.copy(), self._weights.lit(light)
+        return self._lit
+
+
+class GraphAsker:
+    """By the file's graph alone.
+
+    Args:
+        network: opened.
+        grid: of its networks.
+        scale: 1/m, of its densities.
+        block: samples that it takes together.
+    """
+
+    def __init__(self, network: Network, grid: VisionGrid, scale: float, block: int) -> None:
+        self._network, self._grid, self._scale, self.block = network, grid, scale, block
+
+    def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene, crew: Crew) -> None:
+        """As ``Asker``."""
+
+        def ask(first: int, last: int) -> None:
+            for begin in range(first, last, _AT_ONCE):
+                self._ask(samples, order, blocks[begin : min(begin + _AT_ONCE, last)], scene)
+
+        crew.share(ask, len(blocks), 2 * crew.threads)
+
+    def _ask(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene) -> None:
+        lanes = np.arange(self.block)
+        # A block that is not full asks for its last sample again: every network that is asked is there.
+        chosen = order[blocks[:, 1, None] + np.minimum(lanes, blocks[:, 2, None] - 1)]
+        low, cell, network = self._grid.low, self._grid.cell, blocks[:, 0]
+        share = 0.5 * (samples.local[chosen].astype(np.float64) + 1.0)
+        rays = samples.rays[chosen // samples.most]
+        asked = {
+            "network": network[:, None].astype(np.int64),
+            "points": low + cell * (self._grid.cells[network][:, None] + share),
+            "views": scene.views[rays],
+            "light": np.broadcast_to(scene.light.astype(np.float32), (len(blocks), 3)),
+        }
+        if scene.extras.shape[1]:
+            asked["extras"] = scene.extras[rays]
+        found = self._network(asked)
+        samples.density[chosen] = found["density"][..., 0] / np.float32(self._scale)
+        samples.scattered[chosen] = found["scattered"]

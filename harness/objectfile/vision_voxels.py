@@ -1,0 +1,170 @@
+"""Which small cubes a triangle touches, and the way of a ray through those that some triangle does."""
+
+import numpy as np
+
+from harness.arrays import AnyArray, FloatArray
+from harness.sim.compiled import compiled
+
+_WIDER = 1e-6
+"""Of a voxel: by which it is enlarged, so that rounding leaves out no triangle that it touches."""
+
+
+@compiled
+def touch_voxels(corners: FloatArray, words: AnyArray) -> None:
+    """Mark every voxel that a triangle touches, after Akenine-Moeller (J. Graphics Tools 6(1), 2001).
+
+    Args:
+        corners: ``(m, 3, 3)`` in voxels from the lattice's least corner; what lies outside marks nothing.
+        words: ``(x, y, z)`` uint64 of 4 x 4 x 4 voxels each, written.
+    """
+    shape = (4 * words.shape[0], 4 * words.shape[1], 4 * words.shape[2])
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    for m in range(len(corners)):
+        face = corners[m]
+        for axis in range(3):
+            least = min(face[0, axis], face[1, axis], face[2, axis]) - _WIDER
+            most = max(face[0, axis], face[1, axis], face[2, axis]) + _WIDER
+            low[axis] = int(min(max(np.floor(least), 0.0), shape[axis]))
+            high[axis] = int(min(max(np.floor(most), -1.0), shape[axis] - 1))
+        for i in range(low[0], high[0] + 1):
+            for j in range(low[1], high[1] + 1):
+                for k in range(low[2], high[2] + 1):
+                    if _touches(face, i + 0.5, j + 0.5, k + 0.5):
+                        bit = ((i & 3) << 4) | ((j & 3) << 2) | (k & 3)
+                        words[i >> 2, j >> 2, k >> 2] |= np.uint64(1) << np.uint64(bit)
+
+
+@compiled
+def _touches(face: FloatArray, x: float, y: float, z: float) -> bool:
+    """Whether a triangle touches the unit cube around a place: no axis separates them."""
+    half = 0.5 + _WIDER
+    a = (face[0, 0] - x, face[0, 1] - y, face[0, 2] - z)
+    b = (face[1, 0] - x, face[1, 1] - y, face[1, 2] - z)
+    c = (face[2, 0] - x, face[2, 1] - y, face[2, 2] - z)
+    for axis in range(3):
+        if min(a[axis], b[axis], c[axis]) > half or max(a[axis], b[axis], c[axis]) < -half:
+            return False
+    e = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+    f = (c[0] - b[0], c[1] - b[1], c[2] - b[2])
+    g = (a[0] - c[0], a[1] - c[1], a[2] - c[2])
+    nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
+    if abs(nx * a[0] + ny * a[1] + nz * a[2]) > half * (abs(nx) + abs(ny) + abs(nz)):
+        return False
+    for edge in (e, f, g):
+        for axis in range(3):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            p, q = -edge[v], edge[u]
+            reach = half * (abs(p) + abs(q))
+            pa, pb, pc = p * a[u] + q * a[v], p * b[u] + q * b[v], p * c[u] + q * c[v]
+            if min(pa, pb, pc) > reach or max(pa, pb, pc) < -reach:
+                return False
+    return True
+
+
+@compiled
+def entered(eye: FloatArray, way: FloatArray, words: AnyArray) -> tuple[float, float]:
+    """From where to where a ray is in the lattice; from infinity where it is not.
+
+    A ray along a face of the box lies in it if its place does: nothing is multiplied by infinity.
+    """
+    begin, end = 0.0, np.inf
+    for axis in range(3):
+        size = 4.0 * words.shape[axis]
+        if way[axis] == 0.0:
+            if not 0.0 <= eye[axis] <= size:
+                return np.inf, np.inf
+        else:
+            a, b = -eye[axis] / way[axis], (size - eye[axis]) / way[axis]
+            begin, end = max(begin, min(a, b)), min(end, max(a, b))
+    return (begin, end) if begin < end else (np.inf, np.inf)
+
+
+@compiled
+def _clamped(place: float, least: int, most: int) -> int:
+    return int(min(max(np.floor(place), least), most))
+
+
+@compiled
+def walk(
+    eye: FloatArray, way: FloatArray, start: float, words: AnyArray, runs: FloatArray
+) -> tuple[int, float]:
+    """The stretches of a ray within marked voxels, from ``start`` on, in order.
+
+    Borders are computed from their own numbers, never summed up; cubes are entered by counting, so that a
+    ray along a face stays in one of its two cubes and no rounding leaves it in none.
+
+    Args:
+        eye: ``(3,)`` in voxels.
+        way: ``(3,)`` voxels for a unit of length, not zero; lengths are in that unit.
+        start: length from which on.
+        words: of the shell.
+        runs: ``(n, 2)`` from and to, written.
+
+    Returns:
+        How many stretches there are in ``runs``, and from where there may be more; inf for no more.
+    """
+    begin, end = entered(eye, way, words)
+    t = max(begin, start)
+    if not t < end:
+        return 0, np.inf
+    ex, ey, ez = eye[0], eye[1], eye[2]
+    wx, wy, wz = way[0], way[1], way[2]
+    # An infinity here is never multiplied: without a way along an axis its borders are at infinity.
+    rx = 1.0 / wx if wx != 0.0 else np.inf
+    ry = 1.0 / wy if wy != 0.0 else np.inf
+    rz = 1.0 / wz if wz != 0.0 else np.inf
+    sx, sy, sz = (1 if wx > 0.0 else -1), (1 if wy > 0.0 else -1), (1 if wz > 0.0 else -1)
+    ux, uy, uz = (1 if wx > 0.0 else 0), (1 if wy > 0.0 else 0), (1 if wz > 0.0 else 0)
+    nx, ny, nz = words.shape
+    bx = _clamped((ex + t * wx) * 0.25, 0, nx - 1)
+    by = _clamped((ey + t * wy) * 0.25, 0, ny - 1)
+    bz = _clamped((ez + t * wz) * 0.25, 0, nz - 1)
+    count, is_open = 0, False
+    while t < end:
+        tx = (4 * (bx + ux) - ex) * rx if wx != 0.0 else np.inf
+        ty = (4 * (by + uy) - ey) * ry if wy != 0.0 else np.inf
+        tz = (4 * (bz + uz) - ez) * rz if wz != 0.0 else np.inf
+        leave = min(tx, min(ty, tz))
+        word = words[np.uint64(bx), np.uint64(by), np.uint64(bz)]
+        if word == np.uint64(0):
+            if is_open:
+                is_open, count = False, count + 1
+                if count == len(runs):
+                    return count, runs[count - 1, 1]
+        else:
+            vx = _clamped(ex + t * wx, 4 * bx, 4 * bx + 3) - 4 * bx
+            vy = _clamped(ey + t * wy, 4 * by, 4 * by + 3) - 4 * by
+            vz = _clamped(ez + t * wz, 4 * bz, 4 * bz + 3) - 4 * bz
+            while 0 <= vx < 4 and 0 <= vy < 4 and 0 <= vz < 4:
+                px = (4 * bx + vx + ux - ex) * rx if wx != 0.0 else np.inf
+                py = (4 * by + vy + uy - ey) * ry if wy != 0.0 else np.inf
+                pz = (4 * bz + vz + uz - ez) * rz if wz != 0.0 else np.inf
+                out = min(px, min(py, pz))
+                if (word >> np.uint64((vx << 4) | (vy << 2) | vz)) & np.uint64(1):
+                    if not is_open:
+                        is_open = True
+                        runs[count, 0] = t
+                    t = max(t, out)
+                    runs[count, 1] = min(t, end)
+                else:
+                    if is_open:
+                        is_open, count = False, count + 1
+                        if count == len(runs):
+                            return count, runs[count - 1, 1]
+                    t = max(t, out)
+                if px <= py and px <= pz:
+                    vx += sx
+                elif py <= pz:
+                    vy += sy
+                else:
+                    vz += sz
+        t = max(t, leave)
+        if tx <= ty and tx <= tz:
+            bx += sx
+        elif ty <= tz:
+            by += sy
+        else:
+            bz += sz
+        if not (0 <= bx < nx and 0 <= by < ny and 0 <= bz < nz):
+            break
+    return count + (1 if is_open else 0), np.inf
