@@ -9,12 +9,14 @@ from calibration.taxim.arm_plan import PressSettings
 from calibration.taxim.arm_session import BALL, Begun, ball_scene, begin, perform_on
 from harness.arrays import ByteArray, FloatArray
 from harness.device import Health, TactileCamera
+from harness.gap import gap_path, load_gap
 from harness.reading import Reading
 from harness.recording import Recording
 from harness.recording_codecs import decode_jpeg
 from harness.run_folder import RunFiles
 from harness.station import Bench, RunContext
 from harness.station_file import load_station, station_path
+from mocks.gap_draw import GapDraw
 from mocks.gelsight_stream import encode
 from mocks.in_process import in_process_bench
 
@@ -43,6 +45,19 @@ def performed(folder: Path, presses: int = 15, seed: int = 1, gap: str | None = 
     complete, _ = perform_on(opened(recording), recording, Quiet())
     assert complete
     return recording
+
+
+def gap_of_aspect(folder: Path, aspect: float, seed: int) -> Path:
+    """A gap like ``target`` of which this seed draws pixels ``aspect`` times as high as wide."""
+    usual = load_gap("target")
+    sigmas = (GapDraw(usual, seed).run.aspect - 1.0) / usual.sensor.aspect
+    if (aspect - 1.0) * sigmas <= 0.0:
+        raise ValueError(f"seed {seed} draws an aspect on the other side of one; take another")
+    text = gap_path("target").read_text()
+    stated = next(line for line in text.splitlines() if line.startswith("aspect"))
+    path = folder / "aspect.toml"
+    path.write_text(text.replace(stated, f'aspect = "{100.0 * (aspect - 1.0) / sigmas!r} %"'))
+    return path
 
 
 class Creeping:

@@ -25,10 +25,12 @@ class DrawnGel:
     Attributes:
         dimming: grey levels that a contact takes from every channel.
         noise: grey levels.
+        aspect: a pixel's height over its width; lengths are in square pixels of the same area.
     """
 
     dimming: float = 0.0
     noise: float = 1.0
+    aspect: float = 1.0
 
     def rest(self) -> FloatArray:
         """``(rows, columns, 3)`` the untouched gel: a slope of brightness, and three different levels."""
@@ -43,7 +45,7 @@ class DrawnGel:
     def press(self, centre: tuple[float, float], seed: int, contact: float = CONTACT) -> FloatArray:
         """``(rows, columns, 3)`` a ball at (column, row), not yet rounded."""
         x, y = _places()
-        right, down = x - centre[0], y - centre[1]
+        right, down = (x - centre[0]) / np.sqrt(self.aspect), (y - centre[1]) * np.sqrt(self.aspect)
         away = np.hypot(right, down)
         sine = np.minimum(away, contact) / BALL * np.exp(-np.maximum(away - contact, 0.0) / _SKIRT)
         share = sine / np.maximum(away, 1e-9)

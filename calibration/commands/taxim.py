@@ -50,6 +50,14 @@ def taxim(
             metavar="LENGTH",
         ),
     ] = None,
+    aspect: Annotated[
+        float | None,
+        typer.Option(
+            help="A pixel's height over its width: pictures are made square by it, the pitch is that of a "
+            "square pixel of the same area. What the arm measured if left out, or 1 of pictures.",
+            metavar="RATIO",
+        ),
+    ] = None,
     scene: Annotated[
         Path | None,
         typer.Option(
@@ -152,6 +160,7 @@ def taxim(
     Or: touchstone calibrate taxim presses/ --ball-radius 2mm --pitch 0.1245mm --report page/
     """
     from calibration.taxim.mark_free import calibrate
+    from calibration.taxim.pictures import squared
     from calibration.taxim.polycalib import write_polycalib
     from harness.sim.lit_calibration import read_calibration
     from harness.sim.tactile_calibration import save_calibration
@@ -171,7 +180,8 @@ def taxim(
     source = folder if folder is not None else pressed(wanted, json)
     if source is None:
         return 130
-    arm, scale, pictures = _read(source, background, channels)
+    arm, scale, taken = _read(source, background, channels)
+    pictures = squared(taken, aspect if aspect is not None else 1.0 if scale is None else scale.aspect_taken)
     who = _identity(sensor, serial, licence, pitch, wanted.ball_radius, arm, scale)
     known = None if like is None else read_calibration(like)
     made = calibrate(pictures, who, use_marks=marks, like=known)
@@ -189,10 +199,15 @@ def taxim(
         page = write_calibration_page(
             report_of(made, pictures, f"{who.sensor}, {source.name}", scale, arm), report
         )
-    answer = {**answer_of(made, artefact, polycalib, page), **scale_answer(scale, arm), "pitch_m": who.pitch}
+    answer = {
+        **answer_of(made, artefact, polycalib, page),
+        **scale_answer(scale, arm),
+        "pitch_m": who.pitch,
+        "made_square_by": pictures.aspect,
+    }
     if scale is not None and arm is not None:
-        keep(answer["scale"], artefact)
-        for doubt in doubts(scale, arm):
+        keep({**answer["scale"], "made_square_by": pictures.aspect}, artefact)
+        for doubt in doubts(scale, arm, pictures.aspect):
             warn(doubt)
     if json:
         emit(answer)

@@ -19,7 +19,6 @@ NO_MOVES = (
     "or rotation, because another pitch only relabels the slopes; calibrate with --station"
 )
 
-_ASPECT = 0.01
 _MARKED = 8.0
 
 
@@ -84,6 +83,8 @@ def scale_answer(scale: "ArmScale | None", arm: "ArmPresses | None") -> dict[str
     return {
         "scale": {
             **_measured("pitch", "_m", scale.pitch),
+            **_measured("wide", "_m", scale.wide),
+            **_measured("high", "_m", scale.high),
             **_measured("aspect", "", scale.aspect),
             **_measured("rotation", "_rad", scale.rotation),
             **_measured("skew", "_rad", scale.skew),
@@ -110,7 +111,8 @@ def scale_lines(scale: "ArmScale") -> list[str]:
     """The arm's part of it for people."""
     degrees = 57.29577951308232
     return [
-        f"by the arm: {1e3 * scale.pitch.value:.5f} mm a pixel (to {1e3 * scale.pitch.within95:.5f}), "
+        f"by the arm: {1e3 * scale.pitch.value:.5f} mm a pixel (to {1e3 * scale.pitch.within95:.5f}; "
+        f"{1e3 * scale.wide.value:.5f} from column to column, {1e3 * scale.high.value:.5f} from row to row), "
         f"aspect {scale.aspect.value:.4f} (to {scale.aspect.within95:.4f}), "
         f"rotation {degrees * scale.rotation.value:.2f} deg (to {degrees * scale.rotation.within95:.2f}), "
         "19 times of 20",
@@ -118,13 +120,19 @@ def scale_lines(scale: "ArmScale") -> list[str]:
     ]
 
 
-def doubts(scale: "ArmScale", arm: "ArmPresses") -> list[str]:
-    """What the operator should know of a measured scale."""
+def doubts(scale: "ArmScale", arm: "ArmPresses", squared: float) -> list[str]:
+    """What the operator should know of a measured scale; pictures were made square by ``squared``."""
     said = []
-    if abs(scale.aspect.value - 1.0) > max(_ASPECT, scale.aspect.within95):
+    if squared != 1.0:
         said.append(
-            f"pixels are {scale.aspect.value:.3f} times as high as wide; colours are fitted as though they "
-            "were square, and slopes of rows and columns differ by that"
+            f"a pixel is {scale.aspect.value:.4f} times as high as wide (to {scale.aspect.within95:.4f}): "
+            f"the pictures were made square by {squared:.4f} before the fit, and live ones have to be "
+            "(harness.square_pixels) before they are compared with what is drawn"
+        )
+    if abs(squared - scale.aspect.value) > scale.aspect.within95:
+        said.append(
+            f"an aspect of {squared:.4f} was taken, and the arm measured {scale.aspect.value:.4f} to "
+            f"{scale.aspect.within95:.4f}: leave --aspect out"
         )
     if abs(scale.skew.value) > scale.skew.within95:
         said.append(

@@ -29,6 +29,9 @@ four per cent on the mocked bench, and is wrong there by 0.2 % on average and by
 _OFF = 4.0
 """Robust standard deviations beyond which a press is off the map."""
 
+LARGEST_SKEW = np.radians(2.0)
+"""Beyond, it is no picture by an ordinary lens, and no number would hold all over it."""
+
 _ROUNDS = 6
 _STEP = 1e-6
 
@@ -55,6 +58,8 @@ class ArmScale:
     """How the picture lies on the gel, by the arm.
 
     Attributes:
+        wide: m from column to column.
+        high: m from row to row.
         pitch: m a pixel, of a square one of the same area.
         aspect: a pixel's height over its width.
         rotation: rad, of the picture against the tool's frame of the gel, about the gel's z axis.
@@ -66,6 +71,8 @@ class ArmScale:
         residuals: ``(presses, 2)`` m, of all of them.
     """
 
+    wide: Measured
+    high: Measured
     pitch: Measured
     aspect: Measured
     rotation: Measured
@@ -75,6 +82,15 @@ class ArmScale:
     used: tuple[int, ...]
     off: tuple[int, ...]
     residuals: FloatArray
+
+    @property
+    def aspect_taken(self) -> float:
+        """The aspect by which pictures are made square: as measured where one is out of its interval, else 1.
+
+        What the presses cannot tell from a square pixel is not worth blurring every picture for.
+        """
+        told = abs(self.aspect.value - 1.0) > self.aspect.within95
+        return self.aspect.value if told else 1.0
 
 
 def arm_scale(
@@ -90,7 +106,8 @@ def arm_scale(
             ``places`` have had; ``_UNSURE`` of what it changes counts as error. None where there was none.
 
     Raises:
-        CalibrationRefused: too few presses, all at one place or in one line, or a mirrored picture.
+        CalibrationRefused: too few presses, all at one place or in one line, a mirrored picture, or rows and
+            columns further from square than any camera's.
     """
     maps = [_robust(seen, on_gel) for seen in places]
     every = np.array([_numbers(one.gel_from_pixels) for one in maps])
@@ -105,11 +122,14 @@ def arm_scale(
     freedom = 2 * min(int(one.kept.sum()) for one in maps) - 6
     factor = float(student.ppf(0.975, freedom))
     first = maps[0]
-    pitch, aspect, rotation, skew = (
+    pitch, aspect, rotation, skew, wide, high = (
         Measured(float(v), float(np.hypot(a, b)), float(a), factor * float(np.hypot(a, b)))
         for v, a, b in zip(values, by_scatter, by_seeing, strict=True)
     )
+    _require_square(skew)
     return ArmScale(
+        wide,
+        high,
         pitch,
         aspect,
         rotation,
@@ -183,18 +203,27 @@ def _require_spread(seen: FloatArray, found: _Map) -> None:
         )
 
 
+def _require_square(skew: Measured) -> None:
+    if abs(skew.value) > max(LARGEST_SKEW, skew.within95):
+        raise CalibrationRefused(
+            f"rows and columns stand {np.degrees(skew.value):+.2f} deg (to {np.degrees(skew.within95):.2f}) "
+            f"from square, and a camera's at most {np.degrees(LARGEST_SKEW):g}: the gel slips sideways as it "
+            "is pressed, the arm's frames are wrong, or the picture is warped; look at the map of the presses"
+        )
+
+
 def _numbers(gel_from_pixels: FloatArray) -> FloatArray:
-    """Pitch, aspect, rotation and skew of a map: ``(4,)``."""
+    """Pitch, aspect, rotation, skew, and the steps of columns and of rows, of a map: ``(6,)``."""
     column, row = gel_from_pixels.T
     wide, high = np.hypot(*column), np.hypot(*row)
     across, down = np.arctan2(column[1], column[0]), np.arctan2(-row[0], row[1])
     apart = np.mod(down - across + np.pi, 2.0 * np.pi) - np.pi
     middle = np.mod(across + 0.5 * apart + np.pi, 2.0 * np.pi) - np.pi
-    return np.array([np.sqrt(wide * high), high / wide, middle, apart])
+    return np.array([np.sqrt(wide * high), high / wide, middle, apart, wide, high])
 
 
 def _variances(one: _Map) -> FloatArray:
-    """Of the four numbers, by the scatter: first order, both axes of the arm alike."""
+    """Of the six numbers, by the scatter: first order, both axes of the arm alike."""
     slopes = _slopes(_numbers, one.gel_from_pixels)
     return np.array([sum(axis @ one.covariance @ axis for axis in slope) for slope in slopes])
 
@@ -202,7 +231,7 @@ def _variances(one: _Map) -> FloatArray:
 def _slopes(of: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
     """``(numbers, 2, 2)``, by central differences."""
     step = _STEP * float(np.abs(at).max())
-    slopes = np.zeros((4, 2, 2))
+    slopes = np.zeros((len(of(at)), 2, 2))
     for i in range(2):
         for j in range(2):
             moved = np.zeros((2, 2))

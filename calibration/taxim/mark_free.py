@@ -258,7 +258,8 @@ def _artefact(
         sensor=identity.sensor,
         serial=identity.serial,
         date=identity.date,
-        made_from=f"sha256 {pictures.sha256}, {len(pack.images)} presses without marks",
+        made_from=f"sha256 {pictures.sha256}, {len(pack.images)} presses without marks"
+        + (f", made square by {pictures.aspect:.5f}" if pictures.aspect != 1.0 else ""),
         licence=identity.licence,
         pitch=identity.pitch,
         ball_radius=identity.ball_radius,

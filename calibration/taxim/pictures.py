@@ -3,7 +3,7 @@
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -13,6 +13,7 @@ from calibration.taxim.pack import read_pack
 from harness.arrays import ByteArray, FloatArray, read_only
 from harness.errors import CalibrationRefused
 from harness.image_file import read_image
+from harness.square_pixels import made_square, square_places
 
 Channels = Literal["rgb", "bgr"]
 
@@ -50,6 +51,7 @@ class Pictures:
         source: of the pixels, in words.
         sha256: of background and images, whatever the order of the presses.
         refused: files that are no press of this set.
+        aspect: a pixel's height over its width in the files, where the pictures were made square by it.
     """
 
     background: ByteArray
@@ -60,6 +62,32 @@ class Pictures:
     source: str
     sha256: str
     refused: tuple[Refused, ...] = ()
+    aspect: float = 1.0
+
+
+def squared(pictures: Pictures, aspect: float) -> Pictures:
+    """The pictures made square; ``sha256`` stays that of the files.
+
+    Args:
+        pictures: as they were taken.
+        aspect: a pixel's height over its width; 1 changes nothing.
+
+    Raises:
+        OutOfDomain: an aspect that is none of a camera.
+    """
+    if aspect == 1.0:
+        return pictures
+    marks, (rows, columns) = pictures.marks, pictures.background.shape[:2]
+    if marks is not None:
+        marks = read_only(np.column_stack([square_places(marks[:, :2], rows, columns, aspect), marks[:, 2]]))
+    return replace(
+        pictures,
+        background=made_square(pictures.background, aspect),
+        background_from=f"{pictures.background_from}, made square by {aspect:.4f}",
+        images=made_square(pictures.images, aspect),
+        marks=marks,
+        aspect=aspect * pictures.aspect,
+    )
 
 
 def read_pictures(path: Path, background: Path | None = None, channels: Channels | None = None) -> Pictures:

@@ -82,6 +82,8 @@ def _moves(scale: ArmScale, arm: ArmPresses) -> MovesFigure:
     )
     numbers = [
         ("a pixel shows", f"{1e3 * pitch.value:.5f} mm", f"{1e3 * pitch.within95:.5f} mm"),
+        ("from column to column", f"{1e3 * scale.wide.value:.5f} mm", f"{1e3 * scale.wide.within95:.5f} mm"),
+        ("from row to row", f"{1e3 * scale.high.value:.5f} mm", f"{1e3 * scale.high.within95:.5f} mm"),
         ("a pixel's height over its width", f"{aspect.value:.4f}", f"{aspect.within95:.4f}"),
         ("picture against tool", turned[0], turned[1]),
         ("rows and columns from square", askew[0], askew[1]),

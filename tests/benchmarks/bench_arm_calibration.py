@@ -15,7 +15,7 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
-from arm_presses import performed
+from arm_presses import gap_of_aspect, performed
 
 from calibration.taxim.arm_record import ArmPresses, read_arm_run
 from harness.recording import Recording
@@ -27,13 +27,17 @@ def main() -> None:
     options.add_argument("seeds", type=int, nargs="+")
     options.add_argument("--presses", type=int, default=49)
     options.add_argument("--gap", default="target")
+    options.add_argument("--aspect", type=float, help="pixels drawn so many times as high as wide")
     options.add_argument("--colours", action="store_true")
     asked = options.parse_args()
     over = []
     for seed in asked.seeds:
         with tempfile.TemporaryDirectory() as folder:
             began = process_time()
-            recording = performed(Path(folder) / "run", asked.presses, seed, asked.gap)
+            gap = asked.gap
+            if asked.aspect is not None:
+                gap = str(gap_of_aspect(Path(folder), asked.aspect, seed))
+            recording = performed(Path(folder) / "run", asked.presses, seed, gap)
             pressed = process_time() - began
             run = read_arm_run(recording.folder)
             over.append(line(seed, run, recording, pressed))
@@ -74,9 +78,11 @@ def line(seed: int, run: ArmPresses, recording: Recording, pressed: float) -> li
 def colours(run: ArmPresses) -> None:
     """Print how well presses are predicted that the colours were not fitted to."""
     from calibration.taxim.mark_free import Identity, calibrate
+    from calibration.taxim.pictures import squared
 
-    who = Identity(run.sensor, run.serial, "mock", "2026-01-01", run.scale().pitch.value, run.ball_radius)
-    made = calibrate(run.pictures, who)
+    scale = run.scale()
+    who = Identity(run.sensor, run.serial, "mock", "2026-01-01", scale.pitch.value, run.ball_radius)
+    made = calibrate(squared(run.pictures, scale.aspect_taken), who)
     sys.stdout.write(
         f"  colours: {made.median('table'):.2f} dB held out, centre refitted; {made.median('unrefitted'):.2f}"
         f" as detected; {made.median('nothing'):.2f} untouched; {len(made.used)} presses, "

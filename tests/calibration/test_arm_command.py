@@ -59,12 +59,28 @@ def test_every_number_of_the_answer_has_its_error(done: Recording) -> None:
     run = read_arm_run(done.folder)
     answer = json.loads(json.dumps(scale_answer(run.scale(), run), allow_nan=False))
     scale = answer["scale"]
-    for name, unit in (("pitch", "_m"), ("aspect", ""), ("rotation", "_rad"), ("skew", "_rad")):
+    for name, unit in (
+        ("pitch", "_m"),
+        ("wide", "_m"),
+        ("high", "_m"),
+        ("aspect", ""),
+        ("rotation", "_rad"),
+        ("skew", "_rad"),
+    ):
         assert scale[f"{name}_within95{unit}"] > scale[f"{name}_sigma{unit}"] > 0.0
     assert scale["pitch_m"] == pytest.approx(0.1245e-3, rel=0.05)
     assert np.array(scale["gel_from_pixels_m"]).shape == (2, 2)
     assert answer["scale_reason"] is None
-    assert not any("off the map" in said for said in doubts(run.scale(), run))
+    assert not any("off the map" in said for said in doubts(run.scale(), run, 1.0))
+
+
+def test_it_is_told_that_pictures_were_made_square_and_when_another_aspect_was_taken(done: Recording) -> None:
+    run = read_arm_run(done.folder)
+    scale = run.scale()
+    assert not any("square by" in said or "--aspect" in said for said in doubts(scale, run, 1.0))
+    assert any("made square by 1.0300" in said for said in doubts(scale, run, 1.03))
+    far = scale.aspect.value + 2.0 * scale.aspect.within95
+    assert any("leave --aspect out" in said for said in doubts(scale, run, far))
 
 
 @pytest.mark.timeout(600)
@@ -82,6 +98,7 @@ def test_a_finished_run_is_resumed_without_a_bench(
     assert Path(answer["artefact"]) == folder / "fitted.npz"
     kept = json.loads((folder / "fitted.scale.json").read_text())
     assert kept["rotation_rad"] == answer["scale"]["rotation_rad"]
+    assert kept["made_square_by"] == answer["made_square_by"]
     page = Path(answer["report"]).read_text(encoding="utf-8")
     assert "By the arm's moves" in page
 

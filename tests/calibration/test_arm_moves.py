@@ -31,6 +31,10 @@ def moved(places: FloatArray, gel: FloatArray, noise: float = 0.0, seed: int = 1
     return on_gel + np.random.default_rng(seed).normal(0.0, noise, places.shape)
 
 
+def steps(scale: ArmScale) -> FloatArray:
+    return np.array([scale.wide.value, scale.high.value])
+
+
 def values(scale: ArmScale) -> FloatArray:
     return np.array([scale.pitch.value, scale.aspect.value, scale.rotation.value, scale.skew.value])
 
@@ -41,6 +45,7 @@ def test_without_errors_the_map_is_found_to_rounding(turned: float, aspect: floa
     places = pixels()
     found = arm_scale([places], moved(places, matrix(aspect=aspect, turned=turned)))
     assert values(found) == pytest.approx([PITCH, aspect, turned, SKEW], rel=1e-9, abs=1e-9)
+    assert steps(found) == pytest.approx(PITCH * np.array([aspect**-0.5, aspect**0.5]), rel=1e-9)
     assert found.scatter < 1e-15
     assert found.off == ()
 
@@ -68,19 +73,19 @@ def test_longer_moves_are_a_larger_pitch_and_turned_ones_a_rotation_and_nothing_
 
 def test_errors_are_what_they_are_said_to_be() -> None:
     """Of 300 draws the numbers' errors over their sigmas have a spread of one, and 95 % lie within 95 %."""
-    true = np.array([PITCH, ASPECT, ROTATION, SKEW])
+    true = np.array([PITCH, ASPECT, ROTATION, SKEW, PITCH * ASPECT**-0.5, PITCH * ASPECT**0.5])
     over, within = [], []
     for seed in range(300):
         places = pixels(20, seed)
         found = arm_scale([places], moved(places, matrix(), NOISE, seed + 1000))
-        each: list[Measured] = [found.pitch, found.aspect, found.rotation, found.skew]
-        off = values(found) - true
+        each: list[Measured] = [found.pitch, found.aspect, found.rotation, found.skew, found.wide, found.high]
+        off = np.concatenate([values(found), steps(found)]) - true
         over.append(off / [one.sigma for one in each])
         within.append(np.abs(off) <= [one.within95 for one in each])
     # A standard deviation of 300 normal numbers is known to 4 %, a share of 95 % to 1.3 %.
-    assert np.std(over, axis=0) == pytest.approx(np.ones(4), abs=0.2)
+    assert np.std(over, axis=0) == pytest.approx(np.ones(6), abs=0.2)
     assert np.abs(np.mean(over, axis=0)).max() < 0.25
-    assert np.mean(within, axis=0) == pytest.approx(np.full(4, 0.95), abs=0.045)
+    assert np.mean(within, axis=0) == pytest.approx(np.full(6, 0.95), abs=0.045)
 
 
 def test_four_times_as_many_presses_halve_the_scatters_part() -> None:
@@ -141,6 +146,27 @@ def test_presses_in_one_line_are_refused(direction: tuple[float, float]) -> None
     wavy = along + np.random.default_rng(0).normal(0.0, 0.3, along.shape)
     with pytest.raises(CalibrationRefused, match="narrowest"):
         arm_scale([wavy], moved(wavy, matrix(), NOISE))
+
+
+@pytest.mark.parametrize("skew", [-0.05, 0.05])
+def test_a_picture_askew_is_refused_and_a_little_is_told(skew: float) -> None:
+    places = pixels()
+    with pytest.raises(CalibrationRefused, match=r"2\.\d\d deg.*at most 2.*slips"):
+        arm_scale([places], moved(places, matrix(skew=skew), NOISE))
+    little = arm_scale([places], moved(places, matrix(skew=0.4 * skew), NOISE)).skew
+    assert little.value == pytest.approx(0.4 * skew, abs=3.0 * little.sigma)
+    assert abs(little.value) > little.within95
+
+
+def test_an_aspect_is_taken_where_the_presses_can_tell_it_from_one() -> None:
+    places = pixels()
+    told = arm_scale([places], moved(places, matrix(aspect=1.03), NOISE))
+    assert told.aspect_taken == told.aspect.value
+    assert told.aspect_taken == pytest.approx(1.03, abs=3.0 * told.aspect.sigma)
+    # With twenty times the noise three per cent are nothing that anybody could see.
+    lost = arm_scale([places], moved(places, matrix(aspect=1.03), 15.0 * NOISE))
+    assert lost.aspect.within95 > 0.03
+    assert lost.aspect_taken == 1.0
 
 
 def test_a_mirrored_picture_is_refused() -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arm_presses import RADIUS, Creeping, begun, opened, performed
+from arm_presses import RADIUS, Creeping, begun, gap_of_aspect, opened, performed
 from whole_run import Quiet
 
 from calibration.taxim.arm_plan import PressMotion, PressSettings, places
@@ -20,9 +20,11 @@ from calibration.taxim.arm_record import read_arm_run
 from calibration.taxim.arm_session import ball_scene, begin, perform_on
 from calibration.taxim.settled import look
 from harness.errors import CalibrationRefused, NotTouched, WrongUse
+from harness.gap import load_gap
 from harness.recording import Recording
 from harness.sensor import GELSIGHT_R15
 from harness.station_file import load_station, station_path
+from mocks.gap_draw import GapDraw
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +50,19 @@ def test_scale_aspect_and_rotation_are_the_drawn_ones_within_what_is_stated(done
     assert found.rotation.sigma < np.radians(0.25)
     # The drawn arm repeats to 0.03 mm; places in pictures add little.
     assert 0.02e-3 < found.scatter < 0.06e-3
+
+
+def test_pixels_three_per_cent_too_high_are_measured(tmp_path: Path) -> None:
+    aspect = 1.03 if GapDraw(load_gap("target"), 5).run.aspect > 1.0 else 0.97
+    recording = performed(tmp_path / "run", 20, seed=5, gap=str(gap_of_aspect(tmp_path, aspect, 5)))
+    assert truth(recording)["aspect"] == pytest.approx(aspect)
+    found = read_arm_run(recording.folder).scale()
+    assert abs(found.aspect.value - aspect) < 3.0 * found.aspect.sigma
+    assert found.aspect.within95 < 0.02
+    assert found.aspect_taken == found.aspect.value
+    wide = GELSIGHT_R15.pitch * truth(recording)["pitch_over_nominal"]
+    assert abs(found.wide.value - wide) < 3.0 * found.wide.sigma
+    assert abs(found.high.value - wide * aspect) < 3.0 * found.high.sigma
 
 
 def test_the_pitch_believed_before_is_contradicted_where_it_is_wrong(tmp_path: Path) -> None:
