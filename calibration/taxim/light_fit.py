@@ -25,7 +25,7 @@ from harness.sim.tactile_calibration import GelSkirt, smooth_terms
 REACH = 4.0
 """Contact radii from the centre that are looked at; in the published sets the skirt ends at 3.5."""
 
-WITHIN_WEIGHT = 3.0
+WITHIN_WEIGHT = 6.0
 """Of a pixel within the contact line against one of the skirt, of which there are ten times as many."""
 
 _WIDTHS = (0.25, 1.0, 2.0, 4.0, 6.0, 9.0, 13.0)
