@@ -71,8 +71,18 @@ def irradiance(places: Places, light: DirectionalLight, size: float) -> FloatArr
         light: from far away.
         size: m, of the object.
     """
-    cosines = lit_by(light.direction, places.points, places.normals, places.flat, places.lifted, size)
-    return np.asarray(light.irradiance * cosines)
+    return light.irradiance * cosines(places, light.direction[None], size)
+
+
+def cosines(places: Places, towards: FloatArray, size: float) -> FloatArray:
+    """``(n,)`` cosine between each place and what it faces, 0 where it faces away; nothing is in the way.
+
+    Args:
+        places: of the surface.
+        towards: ``(n, 3)`` unit, or ``(1, 3)`` for all.
+        size: m, of the object.
+    """
+    return lit_by(towards, places.points, places.normals, places.flat, places.lifted, size)
 
 
 def sees_light(rays: RayMesh, places: Places, light: DirectionalLight, asked: BoolArray) -> BoolArray:

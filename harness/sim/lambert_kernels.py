@@ -69,20 +69,20 @@ def faced_places(
 
 @compiled
 def lit_by(
-    light: FloatArray,
+    lights: FloatArray,
     points: FloatArray,
     facing: FloatArray,
     flat: FloatArray,
     lifted: FloatArray,
     size: float,
 ) -> FloatArray:
-    """``(n,)`` cosine between the surface and a light that it faces, else 0.
+    """``(n,)`` cosine between each place and a light that it faces, else 0.
 
     A place on its own face (not lifted) that looks away from the light as that face does is unlit, though
     its smooth normal may not say so yet: the face itself is in the light's way.
 
     Args:
-        light: ``(3,)`` unit, towards it.
+        lights: ``(n, 3)`` unit, towards it; or ``(1, 3)`` for all.
         points: see ``faced_places``; and so are ``facing``, ``flat`` and ``lifted``.
         facing: see above.
         flat: see above.
@@ -90,7 +90,9 @@ def lit_by(
         size: m, of the object.
     """
     lit = np.zeros(len(points))
+    one = len(lights) == 1
     for n in range(len(points)):
+        light = lights[0 if one else n]
         cosine = facing[n, 0] * light[0] + facing[n, 1] * light[1] + facing[n, 2] * light[2]
         if cosine <= 0.0:
             continue
