@@ -9,12 +9,15 @@ Modes lie in tiles of ``TILE``: a row of a table is, tile after tile, ``TILE`` f
 second parts, so that the first tiles of a row, those that still sound, are one piece of memory.
 """
 
+from typing import Any
+
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray, IntArray
-from harness.sim.compiled import compiled, compiled_fast
+from harness.sim.compiled import compiled
+from harness.sim.turning import SIXTEEN, turn_double, turn_single
 
-TILE = 16
+TILE = SIXTEEN
 """Modes side by side; two registers of eight double numbers."""
 
 
@@ -44,38 +47,59 @@ def block_counts(
     return counts
 
 
-@compiled_fast
 def fill(
     table: AnyArray, rows: IntArray, first: FloatArray, step: FloatArray, floor: float, swapped: bool
 ) -> None:
     """Powers of a complex step in every row of a table.
 
     Args:
-        table: ``(n, 2 TILE t)``, written to.
+        table: ``(n, 2 TILE t)``, float32 or float64, C-contiguous, written to.
         rows: ``(t,)``: how many rows of each tile are wanted; the others stay as they are.
-        first: ``(2, TILE t)`` real and imaginary part of row 0.
+        first: ``(2, TILE t)`` real and imaginary part of row 0, C-contiguous.
         step: ``(2, TILE t)`` likewise, from one row to the next.
         floor: what is smaller is zero, so that no product of two tables loses its leading bit.
         swapped: the imaginary parts come before the real ones in each tile.
     """
-    re, im = np.empty(TILE), np.empty(TILE)
-    step_re, step_im = np.empty(TILE), np.empty(TILE)
-    head = TILE if swapped else 0
-    tail = TILE - head
+    kernel = _fill_single if table.dtype == np.float32 else _fill_double
+    kernel(table, rows, first, step, floor * floor, swapped)
+
+
+@compiled
+def _fill_single(
+    table: AnyArray, rows: IntArray, first: FloatArray, step: FloatArray, least: float, swapped: bool
+) -> None:
+    size, wide = np.int64(4), table.shape[1]
+    out: Any = np.int64(table.ctypes.data)
+    ahead: Any = np.int64(first.ctypes.data)
+    on: Any = np.int64(step.ctypes.data)
+    below = 8 * first.shape[1]
     for tile in range(len(rows)):
-        at = tile * TILE
-        for lane in range(TILE):
-            re[lane], im[lane] = first[0, at + lane], first[1, at + lane]
-            step_re[lane], step_im[lane] = step[0, at + lane], step[1, at + lane]
-        for row in range(rows[tile]):
-            out = table[row, 2 * at : 2 * at + 2 * TILE]
-            for lane in range(TILE):
-                a, b = re[lane], im[lane]
-                out[head + lane] = a if abs(a) > floor else 0.0
-                out[tail + lane] = b if abs(b) > floor else 0.0
-                turned = a * step_im[lane] + b * step_re[lane]
-                re[lane] = a * step_re[lane] - b * step_im[lane]
-                im[lane] = turned
+        at = out + size * 2 * TILE * tile
+        real, imag = (at + size * TILE, at) if swapped else (at, at + size * TILE)
+        lane = 8 * TILE * tile
+        turn_single(
+            real, imag, size * wide, rows[tile], ahead + lane, ahead + below + lane, on + lane,
+            on + below + lane, least,
+        )  # fmt: skip
+
+
+@compiled
+def _fill_double(
+    table: AnyArray, rows: IntArray, first: FloatArray, step: FloatArray, least: float, swapped: bool
+) -> None:
+    size, wide = np.int64(8), table.shape[1]
+    out: Any = np.int64(table.ctypes.data)
+    ahead: Any = np.int64(first.ctypes.data)
+    on: Any = np.int64(step.ctypes.data)
+    below = 8 * first.shape[1]
+    for tile in range(len(rows)):
+        at = out + size * 2 * TILE * tile
+        real, imag = (at + size * TILE, at) if swapped else (at, at + size * TILE)
+        lane = 8 * TILE * tile
+        turn_double(
+            real, imag, size * wide, rows[tile], ahead + lane, ahead + below + lane, on + lane,
+            on + below + lane, least,
+        )  # fmt: skip
 
 
 @compiled

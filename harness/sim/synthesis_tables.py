@@ -4,9 +4,10 @@ The kernels of ``harness.sim.synthesis_kernels`` make the tables; here is which 
 long, and in which order they are multiplied.
 """
 
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.linalg.blas import dgemm, sgemm
@@ -33,6 +34,41 @@ _SEGMENT = 2048
 
 _LIKE = 0.75
 """Modes are multiplied together that sound for at least this share of the longest among them."""
+
+
+_KEPT = 1 << 24
+"""Bytes of working memory that a thread keeps from one sound to the next."""
+
+
+class _Memory(threading.local):
+    """Memory of one thread, handed out piece by piece and used again by its next sound.
+
+    Fresh memory has to be cleared by the system page by page, which took as long as all the
+    arithmetic of a sound of 512 modes.
+    """
+
+    def __init__(self) -> None:
+        self._bytes = np.empty(0, np.uint8)
+        self._used = self._wanted = 0
+
+    def forget(self) -> None:
+        """Begin a sound: all pieces are free again, and as many bytes there as the last one took."""
+        size = min(self._wanted, _KEPT)
+        if size > len(self._bytes):
+            self._bytes = np.empty(size, np.uint8)
+        self._used = self._wanted = 0
+
+    def piece(self, shape: tuple[int, int], kind: np.dtype[Any]) -> AnyArray:
+        """An array with whatever was there before."""
+        size = -(-int(np.prod(shape)) * kind.itemsize // 64) * 64
+        self._wanted += size
+        if self._used + size > len(self._bytes):
+            return np.empty(shape, kind)
+        begin, self._used = self._used, self._used + size
+        return self._bytes[begin : begin + size].view(kind)[: shape[0] * shape[1]].reshape(shape)
+
+
+_memory = _Memory()
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +112,7 @@ def fill_sound(steps: Steps, weights: AnyArray, sound: FloatArray, level: TableL
     loudest = float(sizes.max())
     if loudest == 0.0:
         return 0.0
+    _memory.forget()
     sizes /= loudest
     blocks, length = sound.shape
     seconds = length / steps.rate
@@ -123,7 +160,7 @@ class _Tables:
         self._groups = tuple(self._group(modes, counts, sample[modes]) for modes in _together(counts))
 
     def _group(self, modes: slice, counts: IntArray, sample: AnyArray) -> _Group:
-        within = np.empty((self._block, _width(len(sample))), self._type)
+        within = _memory.piece((self._block, _width(len(sample))), self._type)
         whole = np.full(within.shape[1] // (2 * TILE), self._block)
         fill(within, whole, _in_tiles(np.ones_like(sample)), _in_tiles(sample), self._floor, True)
         return _Group(modes, counts[modes][::TILE].copy(), within)
@@ -137,7 +174,8 @@ class _Tables:
             if rows <= 0:
                 break
             if not product.size:
-                product = np.zeros((rows, self._block), self._type)
+                product = _memory.piece((rows, self._block), self._type)
+                product[:] = 0.0
             starts = self._starts(group, begin, counts)
             self._gemm(1.0, group.within.T, starts.T, 1.0, product[:rows].T, trans_a=True, overwrite_c=True)
         np.multiply(product, scale, out=sound[: len(product)], dtype=np.float64)
@@ -147,7 +185,9 @@ class _Tables:
         weights = self._weights[group.modes]
         if begin:
             weights = weights * self._steps.over(begin * self._block)[group.modes]
-        starts = np.zeros((int(counts[0]), group.within.shape[1]), self._type)
+        starts = _memory.piece((int(counts[0]), group.within.shape[1]), self._type)
+        for tile, count in enumerate(counts):
+            starts[max(count, 0) :, 2 * TILE * tile : 2 * TILE * (tile + 1)] = 0.0
         fill(starts, counts, _in_tiles(weights), _in_tiles(self._ahead[group.modes]), self._floor, False)
         return starts
 

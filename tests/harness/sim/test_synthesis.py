@@ -1,5 +1,7 @@
 """The sum of struck modes: against many digits, an equation of motion, and the laws of sums."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import mpmath
 import numpy as np
 import pytest
@@ -189,6 +191,42 @@ def test_tables_hold_powers_and_no_subnormal_numbers(kind: type, decay: float) -
     assert (table[299] == 7.0).all()
     held = np.abs(table[:299][table[:299] != 0.0])
     assert held.min() >= np.finfo(kind).tiny
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_each_tile_of_a_table_has_its_own_steps_and_rows(kind: type) -> None:
+    random = np.random.default_rng(5)
+    step = np.exp(-random.uniform(0.0, 0.1, 3 * TILE) + 1j * random.uniform(-3.0, 3.0, 3 * TILE))
+    first = random.standard_normal(3 * TILE) + 1j * random.standard_normal(3 * TILE)
+    table: AnyArray = np.full((20, 6 * TILE), 7.0, kind)
+    rows = np.array([20, -4, 3])
+    ahead, on = (np.stack([parts.real, parts.imag]) for parts in (first, step))
+    fill(table, rows, ahead, on, 0.0, False)
+    powers = first * step ** np.arange(20)[:, None]
+    for tile, count in enumerate(rows):
+        lanes = slice(TILE * tile, TILE * (tile + 1))
+        real, imag = table[:, 2 * TILE * tile :][:, :TILE], table[:, 2 * TILE * tile + TILE :][:, :TILE]
+        wanted = powers[: max(count, 0), lanes]
+        assert np.abs(real[: len(wanted)] - wanted.real).max(initial=0.0) < 1e-6
+        assert np.abs(imag[: len(wanted)] - wanted.imag).max(initial=0.0) < 1e-6
+        assert (real[len(wanted) :] == 7.0).all()
+        assert (imag[len(wanted) :] == 7.0).all()
+
+
+def test_sounds_share_no_memory() -> None:
+    """Neither one after another nor side by side."""
+    cases = [(*drawn(seed, modes), 0.5 + 0.2 * seed) for seed, modes in enumerate((40, 300, 17, 120, 300, 5))]
+
+    def made(f: FloatArray, d: FloatArray, g: FloatArray, duration: float) -> FloatArray:
+        return synthesize(f, d, g, duration, RATE).sound
+
+    alone = [made(*case) for case in cases]
+    kept = [sound.copy() for sound in alone]
+    with ThreadPoolExecutor(3) as pool:
+        beside = list(pool.map(lambda case: made(*case), 4 * cases))
+    for number, sound in enumerate(beside):
+        assert (sound == kept[number % len(cases)]).all()
+    assert all((sound == copy).all() for sound, copy in zip(alone, kept, strict=True))
 
 
 def test_what_does_not_belong_together_is_refused() -> None:
