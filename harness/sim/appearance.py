@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from harness.arrays import ByteArray, FloatArray, IntArray, read_only
-from harness.errors import DataRefused, OutOfDomain
+from harness.errors import DataRefused, MeshRefused, OutOfDomain
 from harness.mesh import Mesh
 from harness.sim.appearance_kernels import albedo_at, smoothed_normals
 from harness.srgb import LINEAR_OF_BYTE
@@ -124,7 +124,12 @@ def smooth_normals(mesh: Mesh, crease: float = CREASE) -> FloatArray:
 
     Raises:
         OutOfDomain: an angle outside 0 to pi.
+        MeshRefused: a corner that is not finite.
     """
+    if not np.all(np.isfinite(mesh.corners)):
+        raise MeshRefused(
+            f"a mesh of {len(mesh.faces)} faces has corners that are not finite numbers; repair it first"
+        )
     if not 0.0 <= crease <= np.pi:
         raise OutOfDomain(f"a crease of {np.degrees(crease):g} deg was asked for; give 0 to 180 deg")
     if crease == 0.0:
