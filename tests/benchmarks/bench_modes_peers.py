@@ -2,8 +2,8 @@
 
 ``PYTHONPATH=tests python tests/benchmarks/bench_modes_peers.py [--unknowns N] [--modes N] [--repeats N]
 [--peer-repeats N] [--scipy] [--no-quiet]`` fills a mug, solves it, and prints medians with their
-extremes. Process time of one thread; the peers run on the same ten-node cells. Without CalculiX its
-rows say so.
+extremes after every round. Process time of one thread; the programs take turns, so that what else the
+machine does slows each alike, and solve the same ten-node cells. Without CalculiX it says so.
 """
 
 import argparse
@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from calculix import WHY_NOT, run, write_input
+from calculix import WHY_NOT, Run, run, write_input
 from rich.console import Console
 from rich.table import Table
 from scipy.sparse.linalg import eigsh
@@ -28,16 +28,7 @@ from harness.sim.modal_solve import Elasticity, solve_mesh
 from harness.sim.modal_system import modal_system
 
 CERAMIC = MATERIALS["ceramic"]
-
-
-def repeated(work: Callable[[], FloatArray], times: int) -> tuple[FloatArray, list[float]]:
-    """Hz of the last run, and process seconds of each."""
-    took, found = [], np.zeros(0)
-    for _ in range(times):
-        begun = time.process_time()
-        found = work()
-        took.append(time.process_time() - begun)
-    return found, took
+OURS = "ours, counted"
 
 
 def ours(mesh: QuadraticMesh, of: Material, count: int) -> FloatArray:
@@ -53,29 +44,54 @@ def plain_scipy(mesh: QuadraticMesh, of: Material, count: int) -> FloatArray:
     return np.asarray(np.sqrt(np.sort(values)[6:]) / (2.0 * np.pi))
 
 
-def calculix(mesh: QuadraticMesh, of: Material, count: int, quiet: bool, times: int) -> list[float]:
-    """Process seconds of each run of ``ccx``."""
+def calculix(mesh: QuadraticMesh, of: Material, count: int, quiet: bool) -> Run:
+    """One run of ``ccx``."""
     program = shutil.which("ccx")
     assert program is not None
     with TemporaryDirectory(prefix="touchstone-ccx-") as folder:
         write_input(Path(folder) / "job.inp", mesh, of, count + 6, quiet=quiet)
-        return [run(program, Path(folder), "job")[1] for _ in range(times)]
+        return run(program, Path(folder), "job")
 
 
-def forget_peak() -> None:
-    """Let the kernel note the process's peak of memory anew."""
-    Path("/proc/self/clear_refs").write_text("5")
+def here(work: Callable[[], FloatArray]) -> Run:
+    """Hz, process seconds and MB of what runs in this process."""
+    Path("/proc/self/clear_refs").write_text("5")  # the kernel notes the peak of memory anew
+    begun = time.process_time()
+    found = work()
+    return Run(found, time.process_time() - begun, peak())
 
 
-def peak() -> str:
+def peak() -> float:
     """MB of this process at its peak, the interpreter and the mesh among them."""
     status = Path("/proc/self/status").read_text()
-    return f"{int(status.split('VmHWM:')[1].split()[0]) / 1024:.0f}"
+    return int(status.split("VmHWM:")[1].split()[0]) / 1024
 
 
-def said(took: Sequence[float]) -> str:
+def said(numbers: Sequence[float]) -> str:
     """Median and extremes."""
-    return f"{np.median(took):.2f} ({min(took):.2f} to {max(took):.2f})"
+    return f"{np.median(numbers):.2f} ({min(numbers):.2f} to {max(numbers):.2f})"
+
+
+def shown(title: str, ran: dict[str, list[Run]]) -> Table:
+    """A row a program; ratios are of the two runs of one round."""
+    table = Table(title=title)
+    for heading in ("program", "runs", "CPU s", "times ours", "peak MB", "Hz apart"):
+        table.add_column(heading)
+    base = ran[OURS]
+    for name, runs in ran.items():
+        ratios = [one.seconds / other.seconds for one, other in zip(runs, base, strict=False)]
+        apart = hertz(name, runs[-1]) / base[-1].values - 1.0
+        most = max(one.peak for one in runs)
+        took = [one.seconds for one in runs]
+        table.add_row(
+            name, str(len(runs)), said(took), said(ratios), f"{most:.0f}", f"{np.abs(apart).max():.0e}"
+        )
+    return table
+
+
+def hertz(name: str, one: Run) -> FloatArray:
+    """CalculiX gives squares, the rigid motions among them."""
+    return np.sqrt(one.values[6:]) / (2.0 * np.pi) if name.startswith("CalculiX") else one.values
 
 
 def main() -> None:
@@ -84,34 +100,29 @@ def main() -> None:
     parser.add_argument("--unknowns", type=int, default=30_000)
     parser.add_argument("--modes", type=int, default=60)
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--peer-repeats", type=int, help="rounds in which the peers run too, the first ones")
     parser.add_argument("--scipy", action="store_true")
-    parser.add_argument("--peer-repeats", type=int)
-    parser.add_argument("--no-quiet", action="store_const", const=1, default=2, dest="outputs")
+    parser.add_argument("--no-quiet", action="store_true", help="CalculiX with its usual output alone")
     asked = parser.parse_args()
-    times = asked.peer_repeats or asked.repeats
-    mesh = mug(asked.unknowns)
+    mesh, console = mug(asked.unknowns), Console(width=120)
+    works: dict[str, Callable[[], Run]] = {OURS: lambda: here(lambda: ours(mesh, CERAMIC, asked.modes))}
+    if asked.scipy:
+        works["scipy eigsh"] = lambda: here(lambda: plain_scipy(mesh, CERAMIC, asked.modes))
+    if shutil.which("ccx") is None:
+        console.print(WHY_NOT)
+    else:
+        works["CalculiX"] = lambda: calculix(mesh, CERAMIC, asked.modes, quiet=False)
+        if not asked.no_quiet:
+            works["CalculiX, without output"] = lambda: calculix(mesh, CERAMIC, asked.modes, quiet=True)
     ours(mesh, CERAMIC, 1)
+    ran: dict[str, list[Run]] = {}
+    title = f"mug, {3 * len(mesh.nodes)} unknowns, {asked.modes} modes: median (extremes)"
     with threadpool_limits(limits=1):
-        forget_peak()
-        found, base = repeated(lambda: ours(mesh, CERAMIC, asked.modes), asked.repeats)
-        table = Table(title=f"mug, {3 * len(mesh.nodes)} unknowns, {asked.modes} modes: median (extremes)")
-        for heading in ("program", "CPU s", "times ours", "peak MB"):
-            table.add_column(heading)
-        table.add_row("ours, counted", said(base), "1", peak())
-        rows: list[tuple[str, list[float], str]] = []
-        if asked.scipy:
-            forget_peak()
-            theirs, took = repeated(lambda: plain_scipy(mesh, CERAMIC, asked.modes), times)
-            rows.append((f"scipy eigsh (apart by {np.abs(theirs / found - 1.0).max():.0e})", took, peak()))
-        if shutil.which("ccx") is None:
-            table.add_row(WHY_NOT, "", "", "")
-        else:
-            for name, quiet in (("CalculiX", False), ("CalculiX, without output", True))[: asked.outputs]:
-                took = calculix(mesh, CERAMIC, asked.modes, quiet, times)
-                rows.append((name, took, ""))
-    for name, took, most_mb in rows:
-        table.add_row(name, said(took), f"{np.median(took) / np.median(base):.1f}", most_mb)
-    Console(width=110).print(table)
+        for number in range(asked.repeats):
+            for name, work in works.items():
+                if name == OURS or number < (asked.peer_repeats or asked.repeats):
+                    ran.setdefault(name, []).append(work())
+            console.print(shown(title, ran))
 
 
 if __name__ == "__main__":
