@@ -34,6 +34,8 @@ class Sample:
         shared: s of CPU time for what is done alike at every setting that needs it: reading images.
         cpu: s of CPU time for the rest.
         wall: s on the clock for the rest.
+        work: what the run itself showed, before it was answered, of how much there is to do; what it
+            counts is the program's own. None where it was not counted.
     """
 
     run: str
@@ -43,6 +45,7 @@ class Sample:
     shared: float
     cpu: float
     wall: float
+    work: float | None = None
 
     def __post_init__(self) -> None:
         numbers = (self.error, 0.0 if self.radius is None else self.radius, self.shared, self.cpu, self.wall)
@@ -50,6 +53,8 @@ class Sample:
             raise WrongUse(
                 f"run {self.run}: error, radius and seconds must be finite and not negative, not {numbers}"
             )
+        if self.work is not None and not (np.isfinite(self.work) and self.work > 0.0):
+            raise WrongUse(f"run {self.run}: work must be finite and above zero, not {self.work}")
         if self.cpu == 0.0 or self.wall == 0.0:
             raise WrongUse(f"run {self.run}: an answer in 0 s was not measured; use a finer clock")
 

@@ -6,6 +6,7 @@ from scipy.special import digamma
 
 from harness.arrays import FloatArray
 from harness.cost import GROSS, Point, Sample
+from harness.cost_work import lines
 from harness.errors import WrongUse
 
 KEPT = 0.975
@@ -66,7 +67,13 @@ def likely_error(point: Point, name: str | None) -> float:
     return (_LENT_ERRORS * point.error.value + sum(own)) / (_LENT_ERRORS + len(own))
 
 
-def most_seconds(point: Point, name: str | None, speed: float = 1.0, spent: float | None = None) -> float:
+def most_seconds(
+    point: Point,
+    name: str | None,
+    speed: float = 1.0,
+    spent: float | None = None,
+    work: float | None = None,
+) -> float:
     """Seconds on the clock that an answer takes at most, in ``KEPT`` of runs.
 
     Args:
@@ -74,38 +81,42 @@ def most_seconds(point: Point, name: str | None, speed: float = 1.0, spent: floa
         name: of the object.
         speed: how many seconds a measured CPU second takes here and now.
         spent: s that the part shared by settings has taken already; predicted where None.
+        work: of the run, see ``Sample``; None where it is not known yet.
     """
     shared = max(s.shared for s in like(point, name)) * speed if spent is None else spent
-    return shared + _most_of_the_rest(point, name) * speed
+    return shared + _most_of_the_rest(point, name, work) * speed
 
 
-def _most_of_the_rest(point: Point, name: str | None) -> float:
+def _most_of_the_rest(point: Point, name: str | None, work: float | None) -> float:
     """The bound on the next run's own CPU seconds: about its object's mean, where that was measured.
 
     Objects differ in their seconds, and in how far these differ from run to run: a wrench takes much
     the same in every run, a tray ten times as long where places look alike. So the variance is the
     object's own, shrunk towards the geometric mean of all objects' as if that were known from
     ``_LENT`` degrees of freedom (Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6).
+
+    Where the run's work is known, the mean is that of a straight line through the object's own
+    logarithms, and the variance what is left about it, see ``harness.cost_work``.
     """
-    groups: dict[str, list[float]] = {}
-    for sample in point.samples:
-        groups.setdefault(sample.object, []).append(float(np.log(sample.cpu)))
-    pooled = len(point.samples) - len(groups)
-    if name not in groups or pooled < _ENOUGH:
+    found = lines(point, by_work=work is not None)
+    if name is None or name not in found.of or found.pooled < _ENOUGH:
         return predicted_at_most(np.array([sample.cpu for sample in point.samples]))
-    own, freedom = np.array(groups[name]), len(groups[name]) - 1
-    lent = np.mean([_log_variance(logs) for logs in groups.values() if len(logs) > 1])
-    squares = freedom * _variance(groups[name]) if freedom else 0.0
+    own = found.of[name]
+    freedom = len(own.rest) - 1
+    lent = np.mean([_log_variance(line.rest) for line in found.of.values() if len(line.rest) > 1])
+    squares = freedom * _variance(own.rest) if freedom else 0.0
     variance = (_LENT * float(np.exp(lent)) + squares) / (_LENT + freedom)
-    reach = float(stats.t.ppf(KEPT, _LENT + freedom)) * np.sqrt(variance * (1.0 + 1.0 / len(own)))
-    return float(np.exp(own.mean() + reach))
+    aside = float(np.log(work)) - own.work if work is not None and found.squares > 0.0 else 0.0
+    unsure = 1.0 + 1.0 / len(own.rest) + (aside**2 / found.squares if aside else 0.0)
+    reach = float(stats.t.ppf(KEPT, _LENT + freedom)) * np.sqrt(variance * unsure)
+    return float(np.exp(own.seconds + found.slope * aside + reach))
 
 
-def _variance(logs: list[float]) -> float:
+def _variance(logs: FloatArray) -> float:
     return max(float(np.var(logs, ddof=1)), _LEAST_SPREAD**2)
 
 
-def _log_variance(logs: list[float]) -> float:
+def _log_variance(logs: FloatArray) -> float:
     """Of the variance that few values were drawn with; the logarithm of theirs is lower on average."""
     half = 0.5 * (len(logs) - 1)
     return float(np.log(_variance(logs)) + np.log(half) - digamma(half))

@@ -30,7 +30,12 @@ class Budgeted:
 
 
 def for_budget(
-    points: Sequence[Point], budget: float, name: str | None, speed: float = 1.0, spent: float | None = None
+    points: Sequence[Point],
+    budget: float,
+    name: str | None,
+    speed: float = 1.0,
+    spent: float | None = None,
+    work: float | None = None,
 ) -> Budgeted:
     """The setting of least error on this object whose seconds, at most, keep a budget.
 
@@ -40,8 +45,9 @@ def for_budget(
         name: of the object, see ``Sample``.
         speed: s that a measured CPU second takes here and now.
         spent: s already taken by what settings share; predicted where None.
+        work: of the run, see ``Sample``; None where it is not known yet.
     """
-    prices = {point.name: most_seconds(point, name, speed, spent) for point in points}
+    prices = {point.name: most_seconds(point, name, speed, spent, work) for point in points}
     best = best_within(points, budget, prices, {point.name: likely_error(point, name) for point in points})
     if best is not None:
         return Budgeted(best, prices[best.name], fits=True)

@@ -12,7 +12,7 @@ from harness.errors import DataRefused, TouchstoneError
 from harness.recording import write_text_whole
 from harness.store import default_folder
 
-SCHEMA = 2
+SCHEMA = 3
 
 _DIGITS = 5
 """Significant ones that are kept: no clock and no bench tells more."""
@@ -88,6 +88,7 @@ _KEYS = {
     "shared": "shared_cpu_s",
     "cpu": "cpu_s",
     "wall": "wall_s",
+    "work": "work",
 }
 
 

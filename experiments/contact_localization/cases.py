@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from typing import Any
 
@@ -45,6 +45,7 @@ class Case:
     true_points: FloatArray
     mesh: Mesh
     _read: dict[bool, Readings] = field(init=False, default_factory=dict, repr=False)
+    _left: dict[int, float] = field(init=False, default_factory=dict, repr=False)
 
     def readings(self, setting: Setting) -> Readings:
         """As a setting takes them; timed on their second reading, when kernels are loaded."""
@@ -62,7 +63,23 @@ class Case:
         radius = None if solved.estimate is None else solved.estimate.credible90
         shared = readings.shared[0] if needs_images(setting) else 0.0
         error = self.error_of(solved, contacts)
-        return Sample(self.cell.name, self.run.object, error, radius, shared, solved.cpu, solved.wall)
+        return Sample(
+            self.cell.name,
+            self.run.object,
+            error,
+            radius,
+            shared,
+            solved.cpu,
+            solved.wall,
+            self.places_left(contacts),
+        )
+
+    def places_left(self, contacts: int) -> float:
+        """By the first contacts: how much there is to do."""
+        if contacts not in self._left:
+            run = replace(self.run, observations=self.run.observations[:contacts])
+            self._left[contacts] = run.places_left({})
+        return self._left[contacts]
 
     def error_of(self, solved: Solved, contacts: int) -> float:
         """m, of the last of the first contacts; a refused answer counts as a random one."""

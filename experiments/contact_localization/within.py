@@ -20,6 +20,7 @@ from experiments.contact_localization.front import Front, Target
 from experiments.contact_localization.model import Prior
 from experiments.contact_localization.model_of import model_of_run
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.places_left import places_left
 from experiments.contact_localization.solving import (
     Models,
     Readings,
@@ -36,6 +37,9 @@ from harness.cost_choice import for_budget, for_error
 from harness.errors import WrongUse
 from harness.recording import Recording
 from harness.run_folder import RunFiles
+
+_NOTHING = 1e-9
+"""s that are left of a budget which counting has spent: the cheapest setting answers, and too late."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +68,10 @@ class Run:
     def read(self, setting: Setting) -> Readings:
         """Its readings as a setting takes them."""
         return read(self.observations, self.models.at(setting), self.prior, self.seed, needs_images(setting))
+
+    def places_left(self, setting: Setting) -> float:
+        """How much there is to do, whatever the setting: on the object as a setting models it."""
+        return places_left(self.observations, self.models.at(setting), self.prior)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +146,7 @@ def ask(run: Run, front: Front, target: Target, loaded: bool = False) -> Asked:
         target: what is asked.
         loaded: whether this process has answered by every sense and method before.
     """
-    candidates = _candidates(front, target, run.object)
+    candidates = _candidates(run, front, target)
     for point in candidates:
         prepare(run.models.at(point.levels), point.levels)
     if not loaded:
@@ -157,26 +165,29 @@ def ask(run: Run, front: Front, target: Target, loaded: bool = False) -> Asked:
     return Asked(point, solved, taken[1], taken[0], predicted, promised, kept, tried)
 
 
-def _candidates(front: Front, target: Target, name: str) -> tuple[Point, ...]:
+def _candidates(run: Run, front: Front, target: Target) -> tuple[Point, ...]:
     """What may be taken, and is prepared for.
 
     For an error its tries; for a budget what fits on a machine as fast as the curve's and, should
     this one prove slower now, cheaper settings on the same samples and modes.
     """
+    name = run.object
     if target.error is not None:
         return for_error(front.points, target.error, name)
     assert target.seconds is not None
-    chosen = for_budget(front.points, target.seconds, name, front.scale)
+    # Counted here to know what to prepare, and once more on the clock.
+    work = run.places_left(front.points[0].levels)
+    chosen = for_budget(front.points, target.seconds, name, front.scale, work=work)
     cheaper = [
         point
         for point in front.points
         if point is chosen.point
         or (
-            most_seconds(point, name, front.scale) < 0.7 * chosen.seconds
+            most_seconds(point, name, front.scale, work=work) < 0.7 * chosen.seconds
             and _prepared_alike(point.levels, chosen.point.levels)
         )
     ]
-    cheapest = min(front.points, key=lambda point: most_seconds(point, name, front.scale))
+    cheapest = min(front.points, key=lambda point: most_seconds(point, name, front.scale, work=work))
     return tuple(dict.fromkeys((*cheaper, cheapest)))
 
 
@@ -198,14 +209,18 @@ def _load_kernels(run: Run, candidates: Sequence[Point]) -> None:
 def _in_time(
     run: Run, front: Front, seconds: float, candidates: Sequence[Point]
 ) -> tuple[Point, Solved, float]:
-    found = for_budget(candidates, seconds, run.object, front.scale)
+    start = time.perf_counter()
+    work = run.places_left(candidates[0].levels)
+    counting = time.perf_counter() - start
+    left = max(seconds - counting, _NOTHING)
+    found = for_budget(candidates, left, run.object, front.scale, work=work)
     readings = run.read(found.point.levels)
     if needs_images(found.point.levels):
         # Reading the images, which every such setting needs, has shown how fast this machine is now.
         speed = _speed(readings, front) * front.scale
-        found = for_budget(candidates, seconds, run.object, speed, readings.shared[1])
+        found = for_budget(candidates, left, run.object, speed, readings.shared[1], work)
     levels = found.point.levels
-    return found.point, solve(readings.under(run.models.at(levels)), levels), found.seconds
+    return found.point, solve(readings.under(run.models.at(levels)), levels), counting + found.seconds
 
 
 def _to_error(

@@ -251,6 +251,7 @@ def test_a_budget_takes_what_is_best_on_the_object_at_hand() -> None:
     assert for_budget([touch, sound], 10.0, "a stranger").point is sound
 
 
+@settings(deadline=None)
 @given(errors, errors, st.integers(1, 200))
 def test_an_object_s_own_runs_count_the_more_the_more_there_are(mug: float, tray: float, runs: int) -> None:
     few, many = of_two("p", mug, tray, runs), of_two("p", mug, tray, runs + 1)
