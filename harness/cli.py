@@ -86,6 +86,10 @@ COMMANDS = {
         "calibration.commands.taxim:taxim",
         "Calibrate a tactile camera by ball presses, made by the arm or in pictures; no marks.",
     ),
+    "calibrate markers": Command(
+        "calibration.commands.markers:markers",
+        "Find the dots printed on a gel, from pictures of it at rest.",
+    ),
     "sim modes": Command(
         "experiments.commands.sim:modes",
         "Frequencies and dampings of a mesh, counted so that none is missing.",

@@ -72,6 +72,10 @@ def touch(
             "known where the object touches."
         ),
     ] = None,
+    markers: Annotated[
+        Path | None,
+        typer.Option(help="Dots of the very gel, as calibrate markers wrote them.", metavar="FILE.json"),
+    ] = None,
     contact: Annotated[
         Three | None,
         typer.Option(help="Of a mesh: where, metres in the mesh file's frame.", metavar="X Y Z"),
@@ -136,7 +140,7 @@ def touch(
     begun = time.perf_counter()
     if shadow is None and heights_of == "gel" and reached is None:
         shadow = False
-    gel = sources.gel(sensor, calibration, pitch, thickness, background, shadow, noise, seed)
+    gel = sources.gel(sensor, calibration, pitch, thickness, background, shadow, noise, seed, markers)
     loaded = time.perf_counter() - begun
     if (mesh is None) == (height is None):
         refuse("say what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")

@@ -32,6 +32,7 @@ def gel(
     shadow: bool | None,
     noise: float,
     seed: int,
+    markers: Path | None = None,
 ) -> "Gel":
     """The gel that the options describe; ``WrongUse`` and ``CalibrationRefused`` as ``known_gel``."""
     from dataclasses import replace
@@ -39,6 +40,7 @@ def gel(
     from harness.image_file import read_image
     from harness.quantities import LENGTH
     from harness.sim.known_gel import known_gel
+    from harness.sim.marker_file import read_markers
 
     gel = known_gel(
         sensor,
@@ -50,7 +52,8 @@ def gel(
     )
     if not math.isfinite(noise):
         refuse(f"--noise of {noise} grey levels cannot be drawn; give a finite number")
-    return replace(gel, noise=noise, seed=seed)
+    gel = replace(gel, noise=noise, seed=seed)
+    return gel if markers is None else gel.with_dots(read_markers(markers))
 
 
 def _positive(option: str, value: float | None) -> float | None:

@@ -34,7 +34,10 @@ def rest_markers(sensor: TactileSensor) -> FloatArray:
 
 
 def marker_displacements(
-    penetration: FloatArray, sensor: TactileSensor, nodes_per_thickness: float = NODES_PER_THICKNESS
+    penetration: FloatArray,
+    sensor: TactileSensor,
+    nodes_per_thickness: float = NODES_PER_THICKNESS,
+    rest: FloatArray | None = None,
 ) -> FloatArray:
     """How far each dot is from its place at rest.
 
@@ -42,6 +45,8 @@ def marker_displacements(
         penetration: ``(n, rows, columns)`` metres, 0 or more: how deep the object reaches.
         sensor: with markers.
         nodes_per_thickness: of the load grid.
+        rest: ``(markers, 2)`` metres, x and y in ``gel``: the untouched dots as they were measured; the
+            sensor's centred grid where None.
 
     Returns:
         ``(n, markers, 2)`` metres, x and y in ``gel``; exactly zero without contact.
@@ -56,7 +61,7 @@ def marker_displacements(
         )
     if not (np.isfinite(penetration).all() and (penetration >= 0.0).all()):
         raise OutOfDomain("a penetration is negative or not finite; pass gaps through height_map.penetration")
-    dots = rest_markers(sensor)
+    dots = rest_markers(sensor) if rest is None else rest
     block = max(1, round(sensor.gel_thickness / (nodes_per_thickness * sensor.pitch)))
     reach = float(np.hypot(*sensor.window)) + float(np.hypot(*dots.T).max())
     kernel = layer_kernel(sensor.gel_thickness, block * sensor.pitch / 2.0, reach)
@@ -68,7 +73,11 @@ def marker_displacements(
 
 
 def draw_markers(
-    images: ByteArray, displacements: FloatArray, sensor: TactileSensor, ink: float = INK
+    images: ByteArray,
+    displacements: FloatArray,
+    sensor: TactileSensor,
+    ink: float = INK,
+    rest: FloatArray | None = None,
 ) -> ByteArray:
     """Print the dots over pictures: round, antialiased, each moved as a whole.
 
@@ -77,6 +86,7 @@ def draw_markers(
         displacements: ``(n, markers, 2)`` metres.
         sensor: with markers.
         ink: share of the light that a dot gives back.
+        rest: as for ``marker_displacements``; their radius is the sensor's.
 
     Returns:
         The pictures; a pixel that no dot touches is the same to the bit.
@@ -85,7 +95,7 @@ def draw_markers(
         OutOfDomain: shapes that disagree, displacements that are not finite, or an ink outside 0 to 1.
         WrongUse: a gel without markers.
     """
-    dots = rest_markers(sensor)
+    dots = rest_markers(sensor) if rest is None else rest
     if images.shape[1:] != (sensor.rows, sensor.columns, 3):
         raise OutOfDomain(f"pictures are {images.shape}, not (n, {sensor.rows}, {sensor.columns}, 3)")
     if displacements.shape != (len(images), *dots.shape) or not np.isfinite(displacements).all():

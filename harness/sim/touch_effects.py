@@ -12,7 +12,9 @@ from typing import Any, Literal
 from harness.accuracy import Level
 from harness.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from harness.effects import Effect
-from harness.sim.catalogue import EFFECTS, OPTICS, SUPERSAMPLING
+from harness.sim.catalogue import EFFECTS, MARKER_NODES, OPTICS, SUPERSAMPLING
+from harness.sim.gel import over_range
+from harness.sim.markers import draw_markers, marker_displacements
 from harness.sim.optics import TactileImages
 from harness.sim.shadow_image import darkening
 from harness.sim.tactile_calibration import TactileCalibration
@@ -24,14 +26,18 @@ Levels = Mapping[str, Level]
 REST = "sensor.rest"
 """Source: ``(rows, columns)`` metres, the untouched gel's surface towards the camera."""
 
+DOTS = "sensor.dots"
+"""Source: the ``MarkerFile`` of the very gel."""
 
-def press_effects(given: frozenset[str], own_rest: bool) -> tuple[Effect, ...]:
+
+def press_effects(given: frozenset[str], own_rest: bool, own_dots: bool = False) -> tuple[Effect, ...]:
     """The effects of a press.
 
     Args:
         given: quantities of the catalogue that come as sources: ``"touch.height_map"``, ``"touch.gel"``.
         own_rest: whether the untouched gel's surface is the source ``sensor.rest``; else it is the
             sensor's, flat or a dome.
+        own_dots: whether the untouched dots are the source ``sensor.dots``; else they are the sensor's grid.
     """
     effects = {effect.provides: effect for effect in EFFECTS if effect.provides not in given}
     effects["touch.colour"] = Effect("touch.colour", ("touch.drawn",), _colour)
@@ -43,6 +49,9 @@ def press_effects(given: frozenset[str], own_rest: bool) -> tuple[Effect, ...]:
     if own_rest:
         shadowed = effects["touch.darkening"]
         effects["touch.darkening"] = replace(shadowed, needs=(*shadowed.needs, REST), compute=_darkening)
+    if own_dots:
+        for name, compute in (("touch.marker_motion", _marker_motion), ("touch.markers", _markers)):
+            effects[name] = replace(effects[name], needs=(*effects[name].needs, DOTS), compute=compute)
     if own_rest and "touch.height_map" in effects:
         raster = effects["touch.height_map"]
         effects["touch.height_map"] = replace(raster, needs=(*raster.needs, REST), compute=_height_map)
@@ -92,6 +101,19 @@ def _darkening(given: Given, _levels: Levels) -> tuple[FloatArray, FloatArray]:
         given["sensor.shadow_table"],
         given[REST],
     )
+
+
+def _marker_motion(given: Given, levels: Levels) -> FloatArray:
+    """As the catalogue's, of dots that were measured."""
+    sensor, dots = given["sensor"], given[DOTS]
+    held, _ = over_range(given["touch.height_map"], sensor)
+    return marker_displacements(held, sensor, float(levels[MARKER_NODES.name]), dots.in_gel(sensor.pitch))
+
+
+def _markers(given: Given, _levels: Levels) -> ByteArray:
+    sensor, dots = given["sensor"], given[DOTS]
+    at = dots.in_gel(sensor.pitch)
+    return draw_markers(given["touch.shadow"], given["touch.marker_motion"], sensor, dots.ink, at)
 
 
 def _height_map(given: Given, levels: Levels) -> FloatArray:

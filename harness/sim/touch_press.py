@@ -16,9 +16,10 @@ from harness.plan import Plan, default_accuracy, plan
 from harness.scene import SceneFile
 from harness.sensor import TactileSensor
 from harness.sim.given_heights import MOST_BEYOND, Heights
+from harness.sim.marker_file import MarkerFile
 from harness.sim.shadow import ShadowTable
 from harness.sim.tactile_calibration import TactileCalibration
-from harness.sim.touch_effects import REST, contact_of, press_effects
+from harness.sim.touch_effects import DOTS, REST, contact_of, press_effects
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,7 @@ class Gel:
         shadow: of its light; None for one that casts none.
         noise: grey levels, sigma of the camera's; 0 for none.
         seed: of the noise.
+        dots: printed on it, as they were measured; None for the sensor's own grid, if it has one.
     """
 
     sensor: TactileSensor
@@ -40,6 +42,7 @@ class Gel:
     shadow: ShadowTable | None = None
     noise: float = 0.0
     seed: int = 0
+    dots: MarkerFile | None = None
 
     def __post_init__(self) -> None:
         seen = (self.calibration.rows, self.calibration.columns)
@@ -47,6 +50,20 @@ class Gel:
             raise DataRefused(
                 f"the calibration is of {seen[0]} x {seen[1]} pixels and {self.sensor.name} has "
                 f"{self.sensor.rows} x {self.sensor.columns}; give the sensor's own calibration"
+            )
+        if self.dots is not None:
+            self._require_own_dots(self.dots)
+
+    def with_dots(self, dots: MarkerFile) -> "Gel":
+        """The same gel with the dots measured on it; ``DataRefused`` for those of another picture."""
+        return replace(self, sensor=replace(self.sensor, markers=dots.grid(self.sensor.pitch)), dots=dots)
+
+    def _require_own_dots(self, dots: MarkerFile) -> None:
+        seen, own = (dots.picture_rows, dots.picture_columns), (self.sensor.rows, self.sensor.columns)
+        if seen != own:
+            raise DataRefused(
+                f"the dots were measured in a picture of {seen[0]} x {seen[1]} pixels and {self.sensor.name} "
+                f"has {own[0]} x {own[1]}; measure them at the sensor's own resolution"
             )
 
 
@@ -217,7 +234,7 @@ def press_knobs() -> Accuracy:
 def _pressed(
     given: Mapping[str, Any], of: Heights, gel: Gel, scene: SceneFile, levels: Sequence[str]
 ) -> Press:
-    effects = press_effects(frozenset(given), gel.rest is not None)
+    effects = press_effects(frozenset(given), gel.rest is not None, gel.dots is not None)
     chosen = press_knobs().with_texts(levels)
     known = default_accuracy(effects)
     accuracy = known.with_({name: level for name, level in chosen.items() if name in known.levels})
@@ -229,6 +246,7 @@ def _pressed(
         "sensor": gel.sensor,
         "sensor.calibration": gel.calibration,
         REST: gel.rest,
+        DOTS: gel.dots,
         "sensor.shadow_table": gel.shadow,
         "sensor.noise": gel.noise,
         "seed": gel.seed,

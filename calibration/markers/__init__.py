@@ -1,0 +1,1 @@
+"""The dots printed on a gel: found in pictures of it at rest."""

@@ -1,0 +1,153 @@
+"""What a calibration of dots hands on: the file, the answer and the page, of the same numbers."""
+
+from typing import Any
+
+import numpy as np
+
+from calibration.markers.at_rest import Printed, RestingMarkers
+from harness.arrays import FloatArray
+from harness.report.marker_page import MarkerReport
+from harness.sim.marker_file import MarkerDot, MarkerFile
+
+
+def file_of(made: RestingMarkers, printed: Printed, made_from: str) -> MarkerFile:
+    """The artefact; only dots on the grid are in it."""
+    dots, lattice = made.dots, made.lattice
+    order = [k for k in np.lexsort((lattice.index[:, 0], lattice.index[:, 1])) if lattice.on[k]]
+    across = lattice.step[:, 0]
+    return MarkerFile(
+        schema=1,
+        sensor=printed.sensor,
+        serial=printed.serial,
+        made_from=made_from,
+        picture_rows=made.picture.shape[0],
+        picture_columns=made.picture.shape[1],
+        pitch_m=made.pitch,
+        ink=float(np.median(dots.ink)),
+        rows=lattice.rows,
+        columns=lattice.columns,
+        spacing_px=lattice.spacing,
+        turned_rad=float(np.arctan2(across[1], across[0])),
+        dots=[
+            MarkerDot(
+                row=int(lattice.index[k, 1]),
+                column=int(lattice.index[k, 0]),
+                x_px=float(dots.places[k, 0]),
+                y_px=float(dots.places[k, 1]),
+                sigma_px=float(dots.sigma[k]),
+                radius_px=float(dots.radius[k]),
+            )
+            for k in order
+        ],
+    )
+
+
+def answer_of(made: RestingMarkers, file: MarkerFile) -> dict[str, Any]:
+    """The numbers, for programs."""
+    lattice, on = made.lattice, made.lattice.on
+    scale = made.scale
+    return {
+        "schema": 1,
+        "dots": int(on.sum()),
+        "rows": lattice.rows,
+        "columns": lattice.columns,
+        "missing": [{"row": int(row), "column": int(column)} for column, row in lattice.missing],
+        "misprinted": [
+            {"row": int(lattice.index[k, 1]), "column": int(lattice.index[k, 0])} for k in made.misprinted
+        ],
+        "cut_by_the_border": made.dots.cut,
+        "off_the_grid": int((~on).sum()) + len(made.dots.odd),
+        "sigma_px": float(np.median(made.dots.sigma[on])),
+        "wander_px": made.wander,
+        "spacing_px": file.spacing_px,
+        "radius_px": file.radius,
+        "turned_rad": file.turned_rad,
+        "ink": file.ink,
+        "bend_px": _rms(lattice.affine[on]),
+        "misprint_px": _rms(lattice.local[on]),
+        "from_a_centred_grid_px": _from_centred(made),
+        "pitch_m": made.pitch,
+        "spacing_m": None if made.pitch is None else made.pitch * file.spacing_px,
+        "scale": None
+        if scale is None
+        else {
+            name: {"value": one.value, "sigma": one.sigma, "within95": one.within95}
+            for name, one in (
+                ("pitch_m", scale.pitch),
+                ("wide_m", scale.wide),
+                ("high_m", scale.high),
+                ("aspect", scale.aspect),
+                ("rotation_rad", scale.rotation),
+                ("skew_rad", scale.skew),
+            )
+        },
+        "seconds": made.seconds,
+    }
+
+
+def report_of(made: RestingMarkers, file: MarkerFile, answer: dict[str, Any], title: str) -> MarkerReport:
+    """What the page shows."""
+    dots, lattice = made.dots, made.lattice
+    return MarkerReport(
+        title,
+        _cards(answer),
+        [(name, str(value)) for name, value in file.model_dump(by_alias=True).items() if name != "dots"],
+        _notes(answer),
+        made.picture,
+        dots.places,
+        dots.radius,
+        dots.sigma,
+        lattice.index,
+        lattice.origin,
+        lattice.step,
+        lattice.affine,
+        lattice.local,
+    )
+
+
+def _cards(answer: dict[str, Any]) -> list[tuple[str, str, str]]:
+    pitch = answer["pitch_m"]
+    spacing = f"{answer['spacing_px']:.3f} px" if pitch is None else f"{1e3 * answer['spacing_m']:.4f} mm"
+    return [
+        ("dots", f"{answer['dots']}", f"{answer['rows']} rows, {answer['columns']} columns"),
+        ("a dot's place", f"{answer['sigma_px']:.3f} px", "one standard uncertainty, median"),
+        ("from dot to dot", spacing, f"radius {answer['radius_px']:.2f} px"),
+        ("turned by", f"{np.degrees(answer['turned_rad']):.3f} deg", "rows of dots against the picture's"),
+    ]
+
+
+def _notes(answer: dict[str, Any]) -> list[str]:
+    wander, scale = answer["wander_px"], answer["scale"]
+    notes = [
+        f"Off the straight grid by {answer['bend_px']:.3f} px rms, off a smoothly bent one by "
+        f"{answer['misprint_px']:.3f}. A centred, straight grid, all that a sensor's description can hold, "
+        f"is off by up to {answer['from_a_centred_grid_px']:.1f} px: simulators are given this file "
+        "instead.",
+        f"{len(answer['missing'])} places of the grid have no dot, {answer['cut_by_the_border']} dots are "
+        f"cut by the border and not used, {answer['off_the_grid']} dark places are on no grid. A dot gives "
+        f"back {answer['ink']:.0%} of the light.",
+        "From picture to picture a dot wanders by "
+        + (f"{wander:.3f} px rms." if wander is not None else "an amount that one picture cannot tell."),
+    ]
+    if scale is not None:
+        notes.append(
+            f"By the print a pixel shows {1e3 * scale['pitch_m']['value']:.5f} mm, is "
+            f"{scale['aspect']['value']:.4f} times as high as wide (to {scale['aspect']['within95']:.4f}), "
+            "and the picture is turned against the dots by "
+            f"{np.degrees(scale['rotation_rad']['value']):.3f} deg. No error shows what the print's own "
+            "spacing is off by: one that is wrong by a hundredth is a pitch that is wrong by a hundredth."
+        )
+    return notes
+
+
+def _from_centred(made: RestingMarkers) -> float:
+    """Pixels, the most by which a dot is off a centred, straight grid of the same spacing."""
+    on, size = made.lattice.on, np.array([made.lattice.columns, made.lattice.rows])
+    rows, columns = made.picture.shape[:2]
+    middle = 0.5 * np.array([columns - 1.0, rows - 1.0])
+    centred = middle + (made.lattice.index[on] - (size - 1) / 2.0) * made.lattice.spacing
+    return float(np.hypot(*(made.dots.places[on] - centred).T).max())
+
+
+def _rms(off: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
