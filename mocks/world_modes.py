@@ -20,7 +20,10 @@ _THICKEST = 1.5
 """Of the median wall: behind a rim, straight inwards is along the wall and not across it."""
 
 _EASINGS = 20
-"""Rounds of carrying a cell whole; each takes in those that the last one turned."""
+"""Rounds of carrying a cell whole; each takes in those that the last one flattened."""
+
+_LEAST_LEFT = 0.2
+"""Share of a cell's volume that a change of a few per cent leaves of all but slivers."""
 
 _ROUNDS = 4
 """Of averaging a node's wall with its neighbours', so that the surface stays smooth."""
@@ -118,17 +121,19 @@ def _extended(nominal: Tetrahedra, outer: IntArray, way: FloatArray) -> FloatArr
 
 
 def _eased(nominal: Tetrahedra, way: FloatArray) -> FloatArray:
-    """``(n, 3)`` m: the same ways, but for cells that they would turn inside out: those are carried whole.
+    """``(n, 3)`` m: the same ways, but for cells that they would flatten: those are carried whole.
 
-    A sliver turns inside out for a hundredth of a millimetre. Its nodes all go their mean way, so that it
-    keeps its shape; where that flattens a cell beside it, the two are carried together.
+    A sliver is flat, or inside out, for a hundredth of a millimetre; curved edges then do the rest. Its
+    nodes all go their mean way, so that it keeps its shape; where that flattens a cell beside it, the two
+    are carried together.
     """
     eased, carried = way, np.zeros(len(nominal.cells), dtype=np.bool_)
     for _ in range(_EASINGS):
-        turned = signed_volumes(nominal.nodes + eased, nominal.cells) <= 0.0
-        if not turned.any():
+        left = signed_volumes(nominal.nodes + eased, nominal.cells)
+        flattened = left < _LEAST_LEFT * nominal.volumes
+        if not flattened.any():
             break
-        carried |= turned
+        carried |= flattened
         rigid = nominal.cells[carried]
         group = connected_components(_graph(rigid, len(nominal.nodes)))[1]
         count = np.bincount(group)

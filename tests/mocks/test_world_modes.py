@@ -46,7 +46,7 @@ def test_no_change_is_none(plate: Tetrahedra) -> None:
 
 @pytest.mark.parametrize("cell", [0, 5, 600])
 @pytest.mark.parametrize("change", [-0.08, 0.08])
-def test_a_sliver_is_carried_along_and_not_turned_inside_out(
+def test_a_sliver_is_carried_along_and_neither_flattened_nor_turned_inside_out(
     plate: Tetrahedra, cell: int, change: float
 ) -> None:
     nodes, corners = plate.nodes.copy(), plate.cells[cell]
@@ -57,7 +57,7 @@ def test_a_sliver_is_carried_along_and_not_turned_inside_out(
     sliver = tetrahedra(nodes, plate.cells)
     made = perturbed(sliver, change)
     assert (made.cells == sliver.cells).all()
-    assert (made.volumes > 0.0).all()
+    assert (made.volumes > 0.1 * sliver.volumes).all()
     ways, elsewhere = made.nodes - sliver.nodes, perturbed(plate, change).nodes - plate.nodes
     assert np.count_nonzero(np.abs(ways - elsewhere).max(axis=1) > 0.02e-3) <= 8
 
