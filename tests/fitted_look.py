@@ -58,7 +58,9 @@ def albedo(points: FloatArray) -> FloatArray:
 
 def lit(albedos: FloatArray, normals: FloatArray, lights: FloatArray) -> FloatArray:
     """``(n, 3)`` radiance of a matt surface under a lamp of irradiance pi, a little of it from everywhere."""
-    return albedos * (0.15 + 0.85 * np.maximum(np.einsum("nx,nx->n", normals, lights), 0.0))[:, None]
+    cosines = np.maximum(np.einsum("nx,nx->n", normals, lights), 0.0)
+    shone: FloatArray = albedos * (0.15 + 0.85 * cosines)[:, None]
+    return shone
 
 
 def fitted_look(
@@ -97,9 +99,8 @@ def _in_shell(shell: Shell, grid: VisionGrid, samples: int, random: np.random.Ge
     owner = grid.table[tuple((voxels // PER_CELL).T)]
     order = np.argsort(owner, kind="stable")
     starts = np.searchsorted(owner[order], np.arange(len(grid) + 1))
-    chosen: IntArray = (
-        starts[:-1, None] + random.random((len(grid), samples)) * np.diff(starts)[:, None]
-    ).astype(np.int64)
+    drawn = random.random((len(grid), samples)) * np.diff(starts)[:, None]
+    chosen: IntArray = (starts[:-1, None] + drawn).astype(np.int64)
     inside = voxels[order[chosen]] + random.random((len(grid), samples, 3))
     points: FloatArray = shell.low + shell.voxel * inside
     return points

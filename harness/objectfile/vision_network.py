@@ -28,6 +28,9 @@ EXTRAS = {"osf": 0, "osf-v": 4}
 MOST_CELLS = 128
 """Along a side."""
 
+_BESIDE = 1e-9
+"""Of a cell: how far beside the grid rounding may put its own corners."""
+
 
 @dataclass(frozen=True)
 class NetworkSize:
@@ -169,8 +172,8 @@ class VisionGrid:
         The greatest corner belongs to the last cube.
         """
         scaled = (np.asarray(points, np.float64) - self.low) / self.cell
-        inside: BoolArray = np.all((scaled >= 0.0) & (scaled <= self.shape), axis=1)
-        cube = np.minimum(np.where(inside[:, None], scaled, 0.0).astype(np.int64), self.shape - 1)
+        inside: BoolArray = np.all((scaled >= -_BESIDE) & (scaled <= self.shape + _BESIDE), axis=1)
+        cube = np.clip(np.where(inside[:, None], scaled, 0.0).astype(np.int64), 0, self.shape - 1)
         return np.where(inside, self.table[tuple(cube.T)], -1).astype(np.int64)
 
     def local(self, points: FloatArray, networks: IntArray) -> FloatArray:

@@ -91,7 +91,8 @@ def walk(
     """The stretches of a ray within marked voxels, from ``start`` on, in order.
 
     Borders are computed from their own numbers, never summed up; cubes are entered by counting, so that a
-    ray along a face stays in one of its two cubes and no rounding leaves it in none.
+    ray along a face stays in one of its two cubes and no rounding leaves it in none. Stretches without a
+    length are left out: who goes on where one ended always gets farther.
 
     Args:
         eye: ``(3,)`` in voxels.
@@ -128,7 +129,7 @@ def walk(
         word = words[np.uint64(bx), np.uint64(by), np.uint64(bz)]
         if word == np.uint64(0):
             if is_open:
-                is_open, count = False, count + 1
+                is_open, count = False, count + (1 if runs[count, 1] > runs[count, 0] else 0)
                 if count == len(runs):
                     return count, runs[count - 1, 1]
         else:
@@ -148,7 +149,7 @@ def walk(
                     runs[count, 1] = min(t, end)
                 else:
                     if is_open:
-                        is_open, count = False, count + 1
+                        is_open, count = False, count + (1 if runs[count, 1] > runs[count, 0] else 0)
                         if count == len(runs):
                             return count, runs[count - 1, 1]
                     t = max(t, out)
@@ -167,4 +168,6 @@ def walk(
             bz += sz
         if not (0 <= bx < nx and 0 <= by < ny and 0 <= bz < nz):
             break
-    return count + (1 if is_open else 0), np.inf
+    if is_open and runs[count, 1] > runs[count, 0]:
+        count += 1
+    return count, np.inf
