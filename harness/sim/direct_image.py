@@ -1,9 +1,9 @@
 """Pictures without noise: exact visibility, matt surfaces, light straight from its source.
 
-Every pixel is the mean over ``samples`` times ``samples`` places in it, spread so that no two share a column
-or a row of ``samples**2``: an edge along the pixels is caught as finely as a slanted one. What the samples
-leave unknown is told by their quarters, every other column of every other row. Error in places so spread goes
-with their number to the power of 3/4: of all together it is that of a quarter over the root of eight.
+Every pixel is the mean over places in it that lie as a lattice does and share no column and no row, so that
+an edge is caught as finely along the pixels as across them (``harness.sim.pixel_places``). What they leave
+unknown is told by their quarters, every fourth place. Error in places so spread goes with their number to
+the power of 3/4: of all together it is that of a quarter over the root of eight.
 """
 
 import time
@@ -14,15 +14,12 @@ from types import MappingProxyType
 import numpy as np
 
 from harness.arrays import FloatArray, IntArray, read_only
-from harness.errors import OutOfDomain
 from harness.linear_image import LinearImage
 from harness.pinhole import DirectionalLight, Pinhole
 from harness.sim.appearance import Appearance
 from harness.sim.lambert import Places, irradiance, places_seen, radiance, sees_light
+from harness.sim.pixel_places import QUARTERS, pixel_places, quarter_counts
 from harness.sim.ray_mesh import RayMesh
-
-MOST_SAMPLES = 64
-"""A side of a pixel: beyond it rounding of the places is not what is left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +91,7 @@ class LitObject:
         Raises:
             OutOfDomain: fewer or more samples.
         """
-        parts = [self._seen_at(camera, *each) for each in sample_places(samples)]
+        parts = [self._seen_at(camera, *each) for each in pixel_places(samples)]
         pixel, quarter, face, weights, away, depth = (
             np.concatenate(column) for column in zip(*parts, strict=True)
         )
@@ -163,27 +160,12 @@ class _Clock:
         self.seconds[done], self._since = now - self._since, now
 
 
-def sample_places(samples: int) -> list[tuple[tuple[float, float], int]]:
-    """(x, y) in a pixel, and which quarter each is of; errors as of ``LitObject.seen``.
-
-    A field of the chessboard each, shifted inside it so that columns and rows are all different
-    (Chiu, Shirley and Wang, Multi-jittered sampling, Graphics Gems IV, 1994, without the chance).
-    """
-    if not 1 <= samples <= MOST_SAMPLES:
-        raise OutOfDomain(f"{samples} samples a side of a pixel were asked for; give 1 to {MOST_SAMPLES}")
-    fields = [(a, b) for b in range(samples) for a in range(samples)]
-    return [
-        (((a + (b + 0.5) / samples) / samples, (b + (a + 0.5) / samples) / samples), a % 2 + 2 * (b % 2))
-        for a, b in fields
-    ]
-
-
 def gathered(seen: Seen, falling: FloatArray, clock: _Clock | None = None) -> DirectImage:
     """The picture of what falls on the samples, ``(n, lights)``."""
     clock = clock or _Clock()
     light = radiance(seen.places, falling.sum(axis=1))
     quarters = _summed(seen, np.column_stack([light, np.ones(len(light))]))
-    every = sum(sample_counts(seen.samples))
+    every = seen.samples**2
     total = quarters.sum(axis=0)
     colour, covered = total[..., :3], total[..., 3]
     hit = np.where(covered > 0.0, covered, 1.0)
@@ -201,26 +183,20 @@ def gathered(seen: Seen, falling: FloatArray, clock: _Clock | None = None) -> Di
     return DirectImage(image, normal, noise, alpha_noise, seen.samples, MappingProxyType(dict(clock.seconds)))
 
 
-def sample_counts(samples: int) -> tuple[int, int, int, int]:
-    """How many of a pixel's samples each quarter has."""
-    more, less = (samples + 1) // 2, samples // 2
-    return more * more, less * more, more * less, less * less
-
-
 def _summed(seen: Seen, values: FloatArray) -> FloatArray:
     """``(4, rows, columns, channels)`` sums of the samples' ``(n, channels)``, by quarters."""
     camera = seen.camera
     at = seen.quarter * camera.pixels + seen.pixel
-    sums = [np.bincount(at, values[:, k], 4 * camera.pixels) for k in range(values.shape[1])]
-    return np.asarray(np.stack(sums, axis=-1).reshape(4, camera.height, camera.width, -1), np.float64)
+    sums = [np.bincount(at, values[:, k], QUARTERS * camera.pixels) for k in range(values.shape[1])]
+    return np.asarray(np.stack(sums, axis=-1).reshape(QUARTERS, camera.height, camera.width, -1), np.float64)
 
 
 def _left_unknown(quarters: FloatArray, samples: int) -> float | None:
     """Error of the quarters' mean, root mean square over the picture; None where a quarter is empty."""
     if samples == 1:
         return None
-    means = quarters / np.array(sample_counts(samples))[:, None, None, None]
-    return float(np.sqrt(np.mean(np.var(means, axis=0, ddof=1) / 8.0)))
+    means = quarters / np.array(quarter_counts(samples))[:, None, None, None]
+    return float(np.sqrt(np.mean(np.var(means, axis=0, ddof=1)) / 8.0))
 
 
 def _mean_direction(total: FloatArray) -> FloatArray:

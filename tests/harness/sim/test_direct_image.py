@@ -11,7 +11,8 @@ from harness.mesh import Mesh
 from harness.pinhole import DirectionalLight, Pinhole
 from harness.sim.appearance import plain
 from harness.sim.appearance_source import builtin_appearance
-from harness.sim.direct_image import LitObject, sample_counts, sample_places
+from harness.sim.direct_image import LitObject
+from harness.sim.pixel_places import pixel_places
 
 UP = (0.0, 0.0, 1.0)
 GREY = (0.8, 0.5, 0.2)
@@ -30,7 +31,7 @@ def seen_from(eye: tuple[float, float, float], size: int = 64, fov: float = 0.4)
 def ball_in_closed_form(camera: Pinhole, radius: float, light: DirectionalLight, samples: int) -> FloatArray:
     """``(rows, columns)``: a white ball about the origin, at ``samples`` places a side of each pixel."""
     total = np.zeros((camera.height, camera.width))
-    for offset, _ in sample_places(samples):
+    for offset, _ in pixel_places(samples):
         ways = camera.directions(offset)
         along = ways @ camera.eye
         under = along**2 - (camera.eye @ camera.eye - radius**2)
@@ -114,22 +115,11 @@ def test_more_samples_come_nearer_and_the_stated_noise_is_true(name: str) -> Non
         errors.append(float(np.sqrt(np.mean((found.image.colour - best.colour) ** 2))))
         assert found.noise is not None
         stated.append(found.noise)
-    # Edges: between 1/N (an area of places without order) and 1/N^1.5 a doubling of the side N.
+    # Edges: between 1/N (places without order) and 1/N^1.5 for N a side.
     assert errors[0] / errors[2] > 4.0
-    # Quarters are shifted against each other, and edges so between them: a part of what they differ by
-    # cancels in their mean, and what is said is on the safe side.
+    # An estimate, of a picture of a few thousand samples beside edges, some of them long and straight.
     for error, said in zip(errors, stated, strict=True):
-        assert 0.4 * said < error < said
-
-
-def test_sample_places_share_no_column_and_no_row() -> None:
-    for samples in (1, 2, 3, 4, 8):
-        places = np.array([place for place, _ in sample_places(samples)])
-        strata = np.sort(np.floor(places * samples**2).astype(int), axis=0)
-        np.testing.assert_array_equal(strata, np.repeat(np.arange(samples**2)[:, None], 2, axis=1))
-        np.testing.assert_allclose(places.mean(axis=0), 0.5, atol=1e-12)
-        quarters = [quarter for _, quarter in sample_places(samples)]
-        assert sample_counts(samples) == tuple(map(quarters.count, range(4)))
+        assert 0.4 * said < error < 1.25 * said
 
 
 def test_an_upright_edge_is_covered_to_one_sample_of_all() -> None:
