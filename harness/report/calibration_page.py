@@ -194,6 +194,9 @@ def moves_figure(moves: MovesFigure) -> Figure:
             width=0.003,
             color=TOOL,
         )
+        # Arrows do not stretch the axes by themselves: their tips would be cut off.
+        axes.update_datalim(np.column_stack([x + right, y + down])[shown])
+        axes.autoscale_view()
         axes.set_aspect("equal")
         axes.invert_yaxis()
         axes.set_xlabel("x of the tool's gel frame, mm")
