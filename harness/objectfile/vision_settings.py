@@ -32,7 +32,7 @@ class RenderSettings:
     level: VisionLevel = "fused"
     step: float = 0.5
     termination: float = 0.03
-    coverage: int = 5
+    coverage: int = 3
     lead: float = 1.0
     wave: int = 4
 

@@ -30,7 +30,7 @@ from harness.objects.household import build
 from harness.pinhole import DirectionalLight, Pinhole
 from harness.sim.compiled import compiled_fast
 
-CONSOLE = Console(width=140, highlight=False)
+CONSOLE = Console(width=220, highlight=False)
 LIGHT = DirectionalLight(np.array([0.5, -0.4, 0.8]))
 PLAIN_SAMPLES = 384
 """Of a ray in the paper, between 0.01 and 4 of its units: 1.2 units are the box."""
