@@ -5,11 +5,13 @@ where the mug has one, which the number of samples depends on, and are no measur
 Seconds are of a whole picture, from camera to linear light. On a busy machine look at the CPU seconds.
 
 python tests/benchmarks/bench_vision_renderer.py --repeat 15 [--sizes 128 256] [--sheet out.png] [--plain]
+python tests/benchmarks/bench_vision_renderer.py --errors
 """
 
 import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -22,10 +24,12 @@ from harness.image_file import write_png
 from harness.mesh import Mesh
 from harness.objectfile.vision_graph import vision_graph
 from harness.objectfile.vision_network import SIZES, VisionModel
+from harness.objectfile.vision_outline import mesh_outline
 from harness.objectfile.vision_plain import Asked, evaluate
 from harness.objectfile.vision_render import VisionRenderer
-from harness.objectfile.vision_settings import RenderSettings, VisionLevel
+from harness.objectfile.vision_settings import COVERS, RenderSettings, VisionLevel
 from harness.objectfile.vision_tiles import LANES, OUTPUTS, SAMPLES, relu_tile
+from harness.objectfile.vision_work import Crew, Room
 from harness.objects.household import build
 from harness.pinhole import DirectionalLight, Pinhole
 from harness.sim.compiled import compiled_fast
@@ -116,6 +120,36 @@ def plain_seconds(model: VisionModel, mesh: Mesh, size: int, crop: int) -> float
     return (time.process_time() - begun) * float(inside.sum()) / max(len(met), 1)
 
 
+def errors(data: bytes, mesh: Mesh) -> None:
+    """What ending rays early, beginning them late and few sub-pixels change, at 256."""
+    renderer, camera = VisionRenderer(data, mesh), camera_of(mesh, 256)
+    every = RenderSettings(termination=0.0, lead=np.inf, coverage=5)
+    whole = renderer.render(camera, LIGHT, every)
+    CONSOLE.print(f"  whole shell, no ray ended: {whole.samples} samples")
+    for said, settings in (
+        ("rays end at 0.03", replace(every, termination=0.03)),
+        ("and begin 1 voxel before the mesh", replace(every, termination=0.03, lead=1.0)),
+        ("one sample", replace(every, level="one_sample")),
+    ):
+        found = renderer.render(camera, LIGHT, settings)
+        apart = 255.0 * np.abs(found.image.colour - whole.image.colour)
+        CONSOLE.print(
+            f"  {said}: {found.samples} samples, {np.sqrt(np.mean(apart**2)):.2f}/255 root mean square, "
+            f"{apart.max():.1f}/255 at most"
+        )
+    exact = covered(mesh, camera, 25)
+    for side in COVERS:
+        error = np.mean((covered(mesh, camera, side) - exact) ** 2)
+        CONSOLE.print(f"  coverage {side}: {-10.0 * np.log10(error):.1f} dB against 25 sub-pixels")
+
+
+def covered(mesh: Mesh, camera: Pinhole, side: int) -> FloatArray:
+    """``(pixels,)`` share of each that the mesh covers."""
+    found, cover = mesh_outline(mesh, True, camera, side, Crew(1), Room()), np.zeros(camera.pixels)
+    cover[found.pixels] = found.cover
+    return cover
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser()
@@ -124,6 +158,7 @@ def main() -> None:
     parser.add_argument("--cores", nargs="*", type=int, default=[1, 2])
     parser.add_argument("--sheet", type=Path)
     parser.add_argument("--plain", action="store_true", help="the paper's arithmetic too (half a minute)")
+    parser.add_argument("--errors", action="store_true", help="what knobs change, in place of times")
     given = parser.parse_args()
     mesh, most = build("mug"), peak()
     CONSOLE.print(f"peak of one core: {most / 1e9:.0f} GFLOP/s float32, {LANES} lanes (CPU seconds)")
@@ -133,6 +168,9 @@ def main() -> None:
         model, _ = fitted_look(mesh, size)
         data = vision_graph(model).SerializeToString(deterministic=True)
         CONSOLE.print(f"{name}: {len(model.grid)} networks, {len(data) / 1e6:.2f} MB")
+        if given.errors:
+            errors(data, mesh)
+            continue
         seen = [measure(name, data, mesh, cores, given, most) for cores in given.cores]
         rows.append(np.hstack(seen[0]))
         if given.plain:
@@ -141,7 +179,7 @@ def main() -> None:
                 f"  the paper's arithmetic plainly, {PLAIN_SAMPLES} samples a ray, numpy float64, one core: "
                 f"{seconds:.1f} s CPU at 256 (extrapolated from 16 x 16 pixels)"
             )
-    if given.sheet is not None:
+    if given.sheet is not None and rows:
         write_png(given.sheet, np.vstack(rows))
 
 
