@@ -51,7 +51,7 @@ class DrawnDots:
         y = self.spacing * (s * across + c * down).ravel() / np.sqrt(self.aspect)
         far = (x**2 + y**2) / (0.25 * (ROWS**2 + COLUMNS**2))
         x, y = x + self.barrel * x / COLUMNS * 2.0 * far, y + self.barrel * y / ROWS * 2.0 * far
-        return np.column_stack([x, y]) + np.array(self.middle)
+        return np.asarray(np.column_stack([x, y]) + np.array(self.middle))
 
     def picture(self, places: FloatArray | None = None, seed: int = 0) -> ByteArray:
         """``(rows, columns, 3)`` with dots at ``places``; at ``self.places()`` where None."""
