@@ -25,6 +25,9 @@ from harness.recording import write_text_whole
 from harness.scene import SceneFile
 from harness.station_file import Station
 
+_SCHEMA = 2
+"""Of a run's file; one of another schema is measured again."""
+
 _ROUND = 24
 """Runs performed side by side, then answered one at a time while nothing else runs."""
 
@@ -83,7 +86,7 @@ def measure(
     """
     folder.mkdir(parents=True, exist_ok=True)
     models = {} if models is None else models
-    stamp = {"machine": machine(), "sha256": code(ESTIMATOR)["sha256"]}
+    stamp = {"schema": _SCHEMA, "machine": machine(), "sha256": code(ESTIMATOR)["sha256"]}
     with workers_of(workers) as pool:
         for first in range(0, len(work.cells), _ROUND):
             cells = work.cells[first : first + _ROUND]
@@ -94,7 +97,7 @@ def measure(
                 points = known[cell]
                 if points is None:
                     points = _measured(cases.pop(cell), work, say) if cell in cases else []
-                    tree = {"schema": 1, **stamp, "work": _work_json(work)}
+                    tree: dict[str, Any] = {**stamp, "work": _work_json(work)}
                     tree["points"] = [_one_json(p) for p in points]
                     write_text_whole(folder / f"{cell.name}.json", json.dumps(tree, allow_nan=False))
                 yield cell, points

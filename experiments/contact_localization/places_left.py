@@ -12,8 +12,8 @@ from experiments.contact_localization.search import Search
 SPACING = 8.0e-3
 """Metres between the surface's samples: coarse, as counting must cost little beside any answer."""
 
-
 _ALL = 10**9
+"""Hypotheses: more than there are, so that none is left out of the count."""
 
 
 def places_left(observations: Sequence[Observation], model: Model, prior: Prior) -> float:

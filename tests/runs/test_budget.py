@@ -262,6 +262,15 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     monkeypatch.setattr("experiments.contact_localization.cases.perform", again)
     ((_, resumed),) = measure(two_settings, scenes, station, tmp_path, pytest.fail)
     assert [point.samples for point in resumed] == [point.samples for point in points]
+    (kept,) = tmp_path.glob("*.json")
+    whole = kept.read_text(encoding="utf-8")
+    tree = json.loads(whole)
+    for point in tree["points"]:
+        del point["sample"]["work"]
+    kept.write_text(json.dumps({**tree, "schema": 1}), encoding="utf-8")
+    with pytest.raises(AssertionError, match="performed again"):
+        list(measure(two_settings, scenes, station, tmp_path, pytest.fail))
+    kept.write_text(whole, encoding="utf-8")
     monkeypatch.setattr("experiments.contact_localization.costing.code", lambda _: {"sha256": "other"})
     with pytest.raises(AssertionError, match="performed again"):
         list(measure(two_settings, scenes, station, tmp_path, pytest.fail))
