@@ -74,9 +74,7 @@ def _lines(description: "Description") -> list[str]:
     ]
     lines += _audio_lines(description)
     lines += _touch_lines(description)
-    vision = description.vision
-    said = "none yet" if vision is None else f"{vision.file}, {_megabytes(vision.bytes)}"
-    return [*lines, f"  vision    {said}"]
+    return [*lines, *_vision_lines(description)]
 
 
 def _touch_lines(description: "Description") -> list[str]:
@@ -97,6 +95,18 @@ def _touch_lines(description: "Description") -> list[str]:
         size = _megabytes(touch.perceptron.bytes)
         lines.append(f"    perceptron {touch.perceptron.file}, {size}{_measured(touch.perceptron.measured)}")
     return lines
+
+
+def _vision_lines(description: "Description") -> list[str]:
+    vision = description.vision
+    if vision is None:
+        return ["  vision    none yet"]
+    grid, size, network = vision.grid, vision.size, vision.network
+    return [
+        f"  vision    {vision.level}: {grid.networks} networks {size.width} wide, in cubes of "
+        f"{grid.cell_m * 1e3:.4g} mm; {vision.colour}, camera as {vision.camera}",
+        f"    network {network.file}, {_megabytes(network.bytes)}{_measured(network.measured)}",
+    ]
 
 
 def _audio_lines(description: "Description") -> list[str]:

@@ -125,7 +125,8 @@ def _network(mesh: Mesh, part: AudioPart, graph: ModelProto, contents: dict[str,
     points, gains = network_tensors(len(part.modes.frequencies), part.near_surface)
     asked = {"points": SurfaceSearch(mesh).spread(_SELF_TEST_POINTS)[0]}
     measured = part.measured.get("network", {})
-    return network_entry(NetworkPart(NETWORK, graph, (points,), gains, asked, _TOLERANCE, measured), contents)
+    written = NetworkPart(NETWORK, graph, (points,), (gains,), asked, _TOLERANCE, measured)
+    return network_entry(written, contents)
 
 
 def _table(part: AudioPart, contents: dict[str, bytes]) -> TableEntry:

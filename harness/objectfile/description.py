@@ -18,6 +18,7 @@ from harness.objectfile.entries import (
     Provenance,
 )
 from harness.objectfile.touch_entries import TouchEntry
+from harness.objectfile.vision_entry import VisionEntry
 from harness.toml_file import validate
 
 SCHEMA = 1
@@ -38,7 +39,7 @@ class Description(Entry):
     provenance: Provenance
     audio: AudioEntry | None = None
     touch: TouchEntry | None = None
-    vision: NetworkEntry | None = None
+    vision: VisionEntry | None = None
 
     @property
     def files(self) -> tuple[FileEntry, ...]:
@@ -47,22 +48,26 @@ class Description(Entry):
         table = None if audio is None else audio.table
         network = None if audio is None else audio.network
         surface = None if table is None else table.surface
-        touch = () if self.touch is None else self.touch.files
-        listed = (self.mesh, network, table, surface, *touch, self.vision)
+        listed = (self.mesh, network, table, surface, *self._unheard)
         return tuple(entry for entry in listed if entry is not None)
 
     @property
     def sound_files(self) -> tuple[FileEntry, ...]:
         """Those that the sound is made of, and the mesh."""
-        other = (*(() if self.touch is None else self.touch.files), self.vision)
-        return tuple(entry for entry in self.files if entry not in other)
+        return tuple(entry for entry in self.files if entry not in self._unheard)
+
+    @property
+    def _unheard(self) -> tuple[FileEntry, ...]:
+        touch = () if self.touch is None else self.touch.files
+        return touch if self.vision is None else (*touch, *self.vision.files)
 
     @property
     def networks(self) -> Mapping[str, NetworkEntry]:
         """By modality, those that there are."""
         audio = None if self.audio is None else self.audio.network
         touch = {} if self.touch is None else self.touch.networks
-        every = {"audio": audio, **touch, "vision": self.vision}
+        vision = None if self.vision is None else self.vision.network
+        every = {"audio": audio, **touch, "vision": vision}
         return {name: entry for name, entry in every.items() if entry is not None}
 
     @model_validator(mode="after")

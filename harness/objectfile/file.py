@@ -27,11 +27,11 @@ from harness.objectfile.entries import (
     FileEntry,
     MaterialEntry,
     MeshEntry,
-    NetworkEntry,
     Provenance,
 )
 from harness.objectfile.surface_file import mesh_from_ply, ply_bytes
 from harness.objectfile.touch_entries import TouchEntry
+from harness.objectfile.vision_entry import VisionEntry
 
 MESH = "mesh.ply"
 
@@ -175,7 +175,7 @@ def copied(of: ObjectFile, folder: Path, files: Iterable[FileEntry]) -> ObjectFi
 def with_part(
     of: ObjectFile,
     modality: Modality,
-    entry: AudioEntry | TouchEntry | NetworkEntry,
+    entry: AudioEntry | TouchEntry | VisionEntry,
     contents: Mapping[str, bytes],
 ) -> ObjectFile:
     """The ObjectFile with a modality written, in place of what there was of it.

@@ -29,17 +29,17 @@ class NetworkPart:
         file: its name in the folder.
         graph: of the network.
         inputs: it takes.
-        output: it gives.
+        outputs: it gives.
         asked: the inputs of its self-test, by name.
-        tolerance: of the self-test, of the greatest output.
+        tolerance: of the self-test, of the greatest number of each output.
         measured: its errors, by a name with its unit.
-        kept: the places of the flat output that the self-test keeps.
+        kept: the places of a flat output that the self-test keeps.
     """
 
     file: str
     graph: ModelProto
     inputs: tuple[Input, ...]
-    output: Tensor
+    outputs: tuple[Tensor, ...]
     asked: Mapping[str, AnyArray]
     tolerance: float
     measured: Mapping[str, float] = field(default_factory=dict)
@@ -53,26 +53,29 @@ def network_entry(part: NetworkPart, contents: dict[str, bytes]) -> NetworkEntry
         DataRefused: a graph that must not be run, or that takes or gives something else.
     """
     data = part.graph.SerializeToString(deterministic=True)
-    network = Network(data, part.file, part.inputs, [part.output])
+    network = Network(data, part.file, part.inputs, part.outputs)
     contents[part.file] = data
     return NetworkEntry(
         **file_entry(part.file, data).model_dump(),
         inputs=part.inputs,
-        outputs=(part.output,),
+        outputs=part.outputs,
         self_test=_self_test(network, part),
         measured=dict(part.measured),
     )
 
 
 def _self_test(network: Network, part: NetworkPart) -> SelfTest:
-    name = part.output.name
-    found = network(part.asked)[name].ravel()
-    at = part.kept(found)
+    found = network(part.asked)
     return SelfTest(
         rows=len(next(iter(part.asked.values()))),
         inputs=tuple(
             Whole(name=key, values=tuple(values.ravel().tolist())) for key, values in part.asked.items()
         ),
-        outputs=(Sampled(name=name, at=tuple(at.tolist()), values=tuple(found[at].tolist())),),
+        outputs=tuple(_sampled(tensor.name, found[tensor.name].ravel(), part) for tensor in part.outputs),
         tolerance=part.tolerance,
     )
+
+
+def _sampled(name: str, found: AnyArray, part: NetworkPart) -> Sampled:
+    at = part.kept(found)
+    return Sampled(name=name, at=tuple(at.tolist()), values=tuple(found[at].tolist()))

@@ -183,7 +183,7 @@ def _codes(part: TouchPart, codes: CodesPart, contents: dict[str, bytes]) -> Cod
     poses[:, 2, 3] = _SELF_TEST_DEPTH
     asked = {"node": chosen, "node_from_gel": poses}
     contents[NODES] = nodes_bytes(codes.nodes)
-    written = NetworkPart(CODES, codes.graph, inputs, outputs[0], asked, _TOLERANCE, codes.measured, _seen)
+    written = NetworkPart(CODES, codes.graph, inputs, outputs, asked, _TOLERANCE, codes.measured, _seen)
     network = network_entry(written, contents)
     return CodesEntry(network=network, nodes=file_entry(NODES, contents[NODES]), most_off_m=codes.most_off)
 
@@ -193,7 +193,7 @@ def _perceptron(part: PerceptronPart, contents: dict[str, bytes]) -> NetworkEntr
     shares = np.random.default_rng(0).random((SELF_TEST_VALUES, len(part.least)))
     asked = {"pixel": part.least + shares * (part.most - part.least)}
     return network_entry(
-        NetworkPart(PERCEPTRON, part.graph, inputs, outputs[0], asked, _TOLERANCE, part.measured, _seen),
+        NetworkPart(PERCEPTRON, part.graph, inputs, outputs, asked, _TOLERANCE, part.measured, _seen),
         contents,
     )
 

@@ -13,6 +13,7 @@ from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.verify_network import look_at_domain, look_at_graph, look_at_self_test, opened_once
 from harness.objectfile.verify_touch import look_at_codes
+from harness.objectfile.verify_vision import look_at_looks, look_at_networks, look_at_weights
 
 _SAMPLES = 256
 """Places of the surface where network and table are compared."""
@@ -60,6 +61,11 @@ def _looks(of: ObjectFile) -> Iterator[tuple[str, Callable[[], str]]]:
     touch = of.description.touch
     if touch is not None and touch.codes is not None:
         yield "touch: codes and mesh", partial(look_at_codes, of, touch.codes)
+    vision = of.description.vision
+    if vision is not None:
+        yield "vision: networks", partial(look_at_networks, of, vision)
+        yield "vision: graph and weights", partial(look_at_weights, of, vision)
+        yield "vision: networks and surface", partial(look_at_looks, of)
 
 
 def _tried(name: str, look: Callable[[], str]) -> Check:

@@ -22,6 +22,7 @@ from harness.errors import DataRefused, WrongUse
 from harness.objectfile.graph import Nodes
 from harness.objectfile.graph_check import checked_graph, declared
 from harness.objectfile.vision_network import (
+    BLOCK,
     EXTRAS,
     Kind,
     NetworkSize,
@@ -32,9 +33,6 @@ from harness.objectfile.vision_network import (
 from harness.objectfile.vision_plain import scatter_rows
 
 FILE = "vision.onnx"
-
-BLOCK = 32
-"""Samples of one network that are asked together."""
 
 _GRID = ("low", "cell", "cells")
 _WEIGHTS = "networks."

@@ -28,6 +28,9 @@ EXTRAS = {"osf": 0, "osf-v": 4}
 MOST_CELLS = 128
 """Along a side."""
 
+BLOCK = 32
+"""Samples of one network that are asked together."""
+
 _BESIDE = 1e-9
 """Of a cell: how far beside the grid rounding may put its own corners."""
 

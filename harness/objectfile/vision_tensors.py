@@ -1,8 +1,9 @@
 """What the graph of an object's look takes and gives, in words, units and limits."""
 
 from harness.objectfile.entries import Domain, Input, Tensor
-from harness.objectfile.vision_graph import BLOCK
-from harness.objectfile.vision_network import VisionModel
+from harness.objectfile.vision_network import BLOCK, VisionModel
+
+Corner = tuple[float, float, float]
 
 
 def vision_tensors(model: VisionModel, block: int = BLOCK) -> tuple[tuple[Input, ...], tuple[Tensor, ...]]:
@@ -12,14 +13,29 @@ def vision_tensors(model: VisionModel, block: int = BLOCK) -> tuple[tuple[Input,
         model: of the object.
         block: samples of one network that are asked together.
     """
-    grid, extras = model.grid, model.weights.size.extras
-    low, high = grid.low.tolist(), grid.high.tolist()
+    grid = model.grid
+    (a, b, c), (d, e, f) = grid.low.tolist(), grid.high.tolist()
+    return box_tensors(len(grid), ((a, b, c), (d, e, f)), model.weights.size.extras, block)
+
+
+def box_tensors(
+    networks: int, box: tuple[Corner, Corner], extras: int, block: int
+) -> tuple[tuple[Input, ...], tuple[Tensor, ...]]:
+    """The same, of so many networks.
+
+    Args:
+        networks: one or more.
+        box: m, least and greatest corner of their grid.
+        extras: further inputs, 0 or 4.
+        block: samples of one network that are asked together.
+    """
+    low, high = box
     directions = Domain(low=(-1.0,) * 3 * block, high=(1.0,) * 3 * block)
     inputs = [
         _input("network", "int64", ("n", 1), "1", "which network, as counted in networks.first",
-               Domain(low=(0.0,), high=(len(grid) - 1.0,))),
+               Domain(low=(0.0,), high=(networks - 1.0,))),
         _input("points", "float64", ("n", block, 3), "m", "places in the network's cell, else moved to it",
-               Domain(low=tuple(low * block), high=tuple(high * block)), "object"),
+               Domain(low=low * block, high=high * block), "object"),
         _input("views", "float32", ("n", block, 3), "1", "unit, from the camera", directions, "object"),
         _input("light", "float32", ("n", 3), "1", "unit, towards the lamp",
                Domain(low=(-1.0,) * 3, high=(1.0,) * 3), "object"),

@@ -8,14 +8,17 @@ import pytest
 from object_bench import ENCODING, MODES, egg, exchange, normaliser, perceptron, rewrite, scales
 from onnx import TensorProto, helper, load_model_from_string, numpy_helper
 
+from harness.errors import DataRefused
 from harness.mesh import Mesh
 from harness.objectfile.audio import open_audio
 from harness.objectfile.audio_graph import OutputScales, audio_graph
 from harness.objectfile.audio_table import table_bytes
 from harness.objectfile.entries import Domain, Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
-from harness.objectfile.file import ObjectFile, file_entry, with_part
+from harness.objectfile.file import ObjectFile, file_entry
+from harness.objectfile.runtime import open_network
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.verify import verify
+from harness.objectfile.verify_network import look_at_domain, look_at_self_test
 
 SAMPLES = Path(__file__).parent / "samples"
 
@@ -168,15 +171,21 @@ def root_graph() -> bytes:
     return model.SerializeToString()
 
 
-@pytest.mark.parametrize("modality", ["vision"])
-def test_any_modality_is_verified_over_its_own_domain(spoiled: Path, modality: Any) -> None:
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [
+        ((-0.1, 0.0), (1.0, 20.0), "not finite within the domain it claims"),
+        ((0.0,), (1.0,), "1 numbers for queries of 2"),
+    ],
+)
+def test_a_network_is_asked_all_over_its_own_domain(
+    egg_object: ObjectFile, low: tuple[float, ...], high: tuple[float, ...], said: str
+) -> None:
     data = root_graph()
-    of = with_part(
-        ObjectFile.open(spoiled), modality, squares((0.0, 0.0), (1.0, 20.0), data), {"touch.onnx": data}
-    )
-    assert not failures(of)
-    assert sum(check.name.startswith(f"{modality}:") for check in verify(of)) == 3
-    of = with_part(of, modality, squares((-0.1, 0.0), (1.0, 20.0), data), {"touch.onnx": data})
-    assert set(failures(of)) == {f"{modality}: domain"}
-    of = with_part(of, modality, squares((0.0,), (1.0,), data), {"touch.onnx": data})
-    assert "1 numbers for queries of 2" in failures(of)[f"{modality}: domain"]
+    sound = squares((0.0, 0.0), (1.0, 20.0), data)
+    network = open_network(data, sound)
+    assert "finite at" in look_at_domain(egg_object, lambda: network)
+    assert "as when it was made" in look_at_self_test(lambda: network, sound.self_test)
+    wrong = open_network(data, squares(low, high, data))
+    with pytest.raises(DataRefused, match=said):
+        look_at_domain(egg_object, lambda: wrong)

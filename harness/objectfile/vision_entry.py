@@ -1,0 +1,91 @@
+"""The table of ``object.json`` that says what an object's look is."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from harness.objectfile.entries import Entry, FileEntry, NetworkEntry, Provenance
+from harness.objectfile.vision_network import EXTRAS, MOST_CELLS, Kind
+from harness.objectfile.vision_tensors import Corner, box_tensors
+
+Positive = Annotated[float, Field(gt=0.0)]
+Cells = Annotated[int, Field(ge=1, le=MOST_CELLS)]
+
+
+class VisionGridEntry(Entry):
+    """Where the networks answer: cubes of a lattice in the object's frame; which ones, the graph says."""
+
+    low_m: Corner
+    cell_m: Positive
+    cells: tuple[Cells, Cells, Cells]
+    networks: Annotated[int, Field(ge=1)]
+
+    @property
+    def box(self) -> tuple[Corner, Corner]:
+        """Least and greatest corner, m."""
+        x, y, z = (low + self.cell_m * count for low, count in zip(self.low_m, self.cells, strict=True))
+        return self.low_m, (x, y, z)
+
+
+class VisionSizeEntry(Entry):
+    """How large each network is, as ``vision_network.NetworkSize``, and the samples of a block."""
+
+    width: Annotated[int, Field(ge=8, le=256, multiple_of=8)]
+    octaves: Annotated[int, Field(ge=0, le=10)]
+    turns: Annotated[int, Field(ge=0, le=10)]
+    block: Annotated[int, Field(ge=1, le=1024)]
+
+
+class VisionShellEntry(Entry):
+    """How finely the surface is marched, and how far behind it the networks were made to answer."""
+
+    voxels_per_cell: Annotated[int, Field(ge=4, le=64, multiple_of=4)]
+    deep_voxels: Annotated[float, Field(ge=0.0, le=64.0)]
+
+
+class VisionEntry(Entry):
+    """The object's look: the networks, where they answer, and how their numbers are meant.
+
+    ``level`` is what a network is told: ``osf`` place, view and light, as the paper's; ``osf-v`` also the
+    light's visibility and the surface's normal. ``surface`` is what pictures are drawn along where that is
+    not the object's mesh.
+    """
+
+    level: Kind
+    metres_per_unit: Positive = 1.0
+    camera: Literal["OpenCV: x right, y down, z forward"] = "OpenCV: x right, y down, z forward"
+    pixel: Literal["row i, column j: centre at x = j + 0.5, y = i + 0.5"] = (
+        "row i, column j: centre at x = j + 0.5, y = i + 0.5"
+    )
+    views: Literal["unit, from the camera"] = "unit, from the camera"
+    light: Literal["unit, towards the lamp; irradiance pi"] = "unit, towards the lamp; irradiance pi"
+    colour: Literal["linear, sRGB primaries"] = "linear, sRGB primaries"
+    density_per_m: Positive
+    grid: VisionGridEntry
+    size: VisionSizeEntry
+    shell: VisionShellEntry
+    network: NetworkEntry
+    surface: FileEntry | None = None
+    provenance: Provenance
+
+    @property
+    def files(self) -> tuple[FileEntry, ...]:
+        """All that the folder must hold for it."""
+        return (self.network,) if self.surface is None else (self.network, self.surface)
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if self.metres_per_unit != 1.0:
+            raise ValueError(
+                f"metres_per_unit is {self.metres_per_unit}; graphs of vision take metres, and it must be 1"
+            )
+        inputs, outputs = box_tensors(self.grid.networks, self.grid.box, EXTRAS[self.level], self.size.block)
+        for wanted, found in ((inputs, self.network.inputs), (outputs, self.network.outputs)):
+            if found != wanted:
+                names = [tensor.name for tensor in found]
+                odd = [one.name for one, other in zip(wanted, found, strict=False) if one != other]
+                raise ValueError(
+                    f"its network has {names}, of which {odd or 'the number'} is not what the level "
+                    f"{self.level!r} with this grid and block takes and gives"
+                )
+        return self
