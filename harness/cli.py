@@ -79,6 +79,10 @@ COMMANDS = {
         "experiments.commands.object_render_touch:render",
         "Render a press at a place: what a gel's camera sees, and how far that is from the mesh's.",
     ),
+    "object render vision": Command(
+        "experiments.commands.object_render_vision:render",
+        "Render a picture from any side in any light, or a turntable of them, by the networks.",
+    ),
     "object verify": Command(
         "experiments.commands.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
     ),
@@ -104,7 +108,7 @@ GROUPS = {
     "tables": "The tables a paper would print, measured on the mocked bench.",
     "cost": "What accuracy costs in seconds, measured on this machine.",
     "object": "ObjectFiles: what is known of one object, in a folder of open files.",
-    "object render": "What an ObjectFile's networks say, for ears and eyes: audio, touch.",
+    "object render": "What an ObjectFile's networks say, for ears and eyes: audio, touch, vision.",
     "calibrate": "Instruments' own calibrations, each an artefact with its residual and its reasons.",
     "sim": "What the simulators compute, one at a time.",
 }

@@ -103,3 +103,25 @@ def quantity(option: str, text: str | None, kind: "Dimension") -> float | None:
         return kind.parse(text)
     except ValueError as refused:
         raise WrongUse(f"{option}: {refused}") from None
+
+
+def require_files(*files: tuple[str, Path | None, str]) -> None:
+    """Refuse names of files that say another kind, or one name for two of them.
+
+    Args:
+        files: option, its path or None, and how the name must end.
+
+    Raises:
+        WrongUse: naming the option.
+    """
+    from harness.errors import WrongUse
+
+    named: dict[Path, str] = {}
+    for option, path, suffix in files:
+        if path is None:
+            continue
+        if path.suffix != suffix:
+            raise WrongUse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
+        if path in named:
+            raise WrongUse(f"{named[path]} and {option} are both {path}; give them two names")
+        named[path] = option

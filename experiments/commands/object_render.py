@@ -133,9 +133,7 @@ def _check(
 ) -> None:
     from harness.errors import WrongUse
 
-    for option, path, suffix in (("--out", out, ".wav"), ("--picture", picture, ".png")):
-        if path is not None and path.suffix != suffix:
-            raise WrongUse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
+    options.require_files(("--out", out, ".wav"), ("--picture", picture, ".png"))
     if impulse and (hammer is not None or contact_time is not None):
         raise WrongUse("--impulse takes no time, and --hammer and --contact-time do; say one or the other")
 

@@ -70,7 +70,9 @@ def render(
     from harness.image_file import write_png
     from harness.quantities import ANGLE, LENGTH
 
-    _check_files(out, picture, height_out)
+    options.require_files(
+        ("--out", out, ".png"), ("--picture", picture, ".png"), ("--height-out", height_out, ".npy")
+    )
     deep = options.quantity("--depth", depth, LENGTH)
     tilted, towards, turned = (
         options.quantity(option, text, ANGLE)
@@ -153,20 +155,6 @@ def _level(text: str) -> "TouchLevel":
     raise WrongUse(
         f"no level {text!r} of a touch; --level takes codes, perceptron, or reference for the mesh's"
     )
-
-
-def _check_files(out: Path, picture: Path | None, height_out: Path | None) -> None:
-    from harness.errors import WrongUse
-
-    for option, path, suffix in (
-        ("--out", out, ".png"),
-        ("--picture", picture, ".png"),
-        ("--height-out", height_out, ".npy"),
-    ):
-        if path is not None and path.suffix != suffix:
-            raise WrongUse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
-    if out == picture:
-        raise WrongUse(f"--out and --picture are both {out}; give them two names")
 
 
 def _write_heights(path: Path, rendered: RenderedPress) -> None:

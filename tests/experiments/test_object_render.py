@@ -175,7 +175,7 @@ def test_what_cannot_be_rendered_is_one_sentence(
     assert not (tmp_path / "a.wav").exists()
 
 
-def test_an_object_without_a_sound_and_another_modality_are_refused(
+def test_an_object_without_what_is_asked_for_is_refused(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     silent = tmp_path / "silent"
@@ -185,9 +185,12 @@ def test_an_object_without_a_sound_and_another_modality_are_refused(
     (silent / "object.json").write_text(json.dumps(described))
     error = rendered(silent, tmp_path, capsys, "--vertex", "0", code=1)["error"]
     assert "has no sound; add it with `touchstone object build --only audio`" in error
-    arguments = ["object", "render", "vision", str(folder), "--out", str(tmp_path / "a.wav"), "--json"]
+    arguments = ["object", "render", "vision", str(folder), "--out", str(tmp_path / "a.png"), "--json"]
+    assert invoke(arguments) == 1
+    assert "has no vision; add it with" in json.loads(capsys.readouterr().out)["error"]
+    arguments = ["object", "render", "smell", str(folder), "--out", str(tmp_path / "a.wav"), "--json"]
     assert invoke(arguments) == 2
-    assert "No such command 'vision'" in json.loads(capsys.readouterr().out)["error"]
+    assert "No such command 'smell'" in json.loads(capsys.readouterr().out)["error"]
 
 
 def test_a_built_network_and_its_table_differ_by_what_the_file_says(

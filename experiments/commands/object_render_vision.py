@@ -1,0 +1,183 @@
+"""``touchstone object render vision``: a picture of an object by its networks."""
+
+import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from experiments.commands.object_render_vision_answer import (
+    RenderedLook,
+    View,
+    as_json,
+    print_answer,
+    sheet,
+    write_arrays,
+)
+from harness import options
+from harness.output import emit
+
+if TYPE_CHECKING:
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.vision import ObjectVision
+    from harness.objectfile.vision_settings import VisionLevel
+
+Three = tuple[float, float, float]
+
+_MOST_SHEET = 2**24
+"""Pixels of all pictures of a turntable."""
+
+
+def render(
+    folder: Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")],
+    out: Annotated[Path, typer.Option(help="The picture, before white, 8 bits sRGB.", metavar="FILE.png")],
+    camera: Annotated[
+        Three | None,
+        typer.Option(
+            help="Where the camera is, metres in the object's frame; else where all of it is seen.",
+            metavar="X Y Z",
+        ),
+    ] = None,
+    look_at: Annotated[
+        Three | None,
+        typer.Option(help="What is in the middle, metres; else the middle of the object.", metavar="X Y Z"),
+    ] = None,
+    up: Annotated[
+        Three | None, typer.Option(help="What is up in the picture; else the object's z.", metavar="X Y Z")
+    ] = None,
+    field_of_view: Annotated[str, typer.Option(help="Across the picture's width.", metavar="A")] = "40deg",
+    light: Annotated[
+        Three | None,
+        typer.Option(help="Towards the lamp, object's frame; else over the left shoulder.", metavar="X Y Z"),
+    ] = None,
+    size: Annotated[str, typer.Option(help="Pixels: a side, or columns x rows.", metavar="WxH")] = "256",
+    level: Annotated[
+        str,
+        typer.Option(help="fused (a kernel), onnx (the graph alone), or one_sample a pixel, at the mesh."),
+    ] = "fused",
+    turntable: Annotated[
+        int | None,
+        typer.Option(help="So many pictures of the object turned about its z, on one sheet.", metavar="N"),
+    ] = None,
+    depth_out: Annotated[
+        Path | None, typer.Option(help="Metres along the camera's axis; inf beside it.", metavar="FILE.npy")
+    ] = None,
+    alpha_out: Annotated[
+        Path | None, typer.Option(help="Share of each pixel that is covered.", metavar="FILE.npy")
+    ] = None,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Say how far it is from all samples of the same networks.")
+    ] = False,
+    threads: Annotated[
+        int | None, typer.Option(help="That share the work; as many as cores if left out.", min=1)
+    ] = None,
+    json: options.Json = False,
+) -> int:
+    """A picture of an object from any side in any light, by the networks of its ObjectFile.
+
+    Lengths are metres in the object's frame. A camera within the object is refused, and so is a light
+    without a direction. With --turntable the object turns before camera and lamp.
+
+    Try: touchstone object render vision objects/mug --camera 0.25 -0.2 0.2 --light 1 -1 1 --out mug.png
+    """
+    from harness.image_file import write_png
+    from harness.objectfile.vision import vision_level
+    from harness.quantities import ANGLE
+
+    options.require_files(
+        ("--out", out, ".png"), ("--depth-out", depth_out, ".npy"), ("--alpha-out", alpha_out, ".npy")
+    )
+    angle = options.quantity("--field-of-view", field_of_view, ANGLE)
+    chosen, pixels = vision_level(level), _pixels(size, turntable)
+    begun = time.perf_counter()
+    of, vision = _opened(folder, threads)
+    views = _views(vision, pixels, camera, look_at, up, light, angle, turntable)
+    found = _rendered(of, vision, views, chosen, compare, begun)
+    write_png(out, sheet(found))
+    if depth_out is not None:
+        write_arrays(depth_out, [picture.image.depth for picture in found.pictures])
+    if alpha_out is not None:
+        write_arrays(alpha_out, [picture.image.alpha for picture in found.pictures])
+    if json:
+        emit(as_json(found, out, depth_out, alpha_out))
+    else:
+        print_answer(found, out, depth_out, alpha_out)
+    return 0
+
+
+def _opened(folder: Path, threads: int | None) -> "tuple[ObjectFile, ObjectVision]":
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.vision import open_vision
+
+    of = ObjectFile.open(folder)
+    return of, open_vision(of, threads)
+
+
+def _pixels(text: str, turntable: int | None) -> tuple[int, int]:
+    """Columns and rows."""
+    from harness.errors import WrongUse
+    from harness.objectfile.vision_view import require_size
+
+    said = re.fullmatch(r"(\d{1,6})(?:[xX](\d{1,6}))?", text.strip())
+    if said is None:
+        raise WrongUse(
+            f"--size {text} is no number of pixels; say a side as 256, or columns x rows as 320x240"
+        )
+    width, height = int(said[1]), int(said[2] or said[1])
+    require_size(width, height)
+    if turntable is not None and not 1 <= turntable <= _MOST_SHEET // (width * height):
+        raise WrongUse(
+            f"--turntable {turntable} of {width} x {height} pixels each; say 1 to "
+            f"{_MOST_SHEET // (width * height)} pictures of that size, or smaller ones"
+        )
+    return width, height
+
+
+def _views(
+    vision: "ObjectVision",
+    pixels: tuple[int, int],
+    eye: Three | None,
+    target: Three | None,
+    up: Three | None,
+    light: Three | None,
+    angle: float,
+    turntable: int | None,
+) -> tuple[View, ...]:
+    import numpy as np
+
+    from harness.objectfile.vision_view import camera_for, light_for, turned
+    from harness.pinhole import DirectionalLight
+
+    mesh = vision.surface
+    camera = camera_for(mesh, *pixels, eye, target, up, angle)
+    lamp = light_for(camera) if light is None else DirectionalLight(np.array(light))
+    if turntable is None:
+        return ((camera, lamp),)
+    axis = mesh.bounds.mean(axis=0) if target is None else np.array(target)
+    return tuple(turned(camera, lamp, axis, -2.0 * np.pi * k / turntable) for k in range(turntable))
+
+
+def _rendered(
+    of: "ObjectFile",
+    vision: "ObjectVision",
+    views: tuple[View, ...],
+    level: "VisionLevel",
+    compare: bool,
+    begun: float,
+) -> RenderedLook:
+    from harness.objectfile.vision_settings import RenderSettings
+
+    settings = RenderSettings(level=level)
+    # The first picture loads the compiled loops for all that follow.
+    vision.picture(*views[0], settings)
+    loaded, begun = time.perf_counter() - begun, time.perf_counter()
+    pictures = tuple(vision.picture(*view, settings) for view in views)
+    seconds = {"load": loaded, "render": time.perf_counter() - begun}
+    if not compare:
+        return RenderedLook(of, vision, views, pictures, None, seconds)
+    begun = time.perf_counter()
+    every = RenderSettings(step=0.25, termination=0.0, lead=float("inf"), coverage=settings.coverage)
+    finest = tuple(vision.picture(*view, every) for view in views)
+    seconds["compare"] = time.perf_counter() - begun
+    return RenderedLook(of, vision, views, pictures, finest, seconds)
