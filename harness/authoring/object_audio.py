@@ -138,8 +138,8 @@ def _modes(wanted: ObjectRequest, store: Store | None) -> tuple[Mesh, Modes, Sou
         )
         modes = solved.solution.modes
         return Mesh(modes.points, modes.faces), modes, source, solved.said
-    mesh, said = surface_of(wanted.mesh, wanted.units, wanted.wall)
-    return mesh, _solved(wanted, mesh, store), source, said
+    taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
+    return taken.mesh, _solved(wanted, taken.mesh, store), source, taken.said
 
 
 def _solved(wanted: ObjectRequest, mesh: Mesh, store: Store | None) -> Modes:

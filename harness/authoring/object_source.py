@@ -1,6 +1,7 @@
 """What an ObjectFile is built from: a mesh's origin, its surface, and the folder's object."""
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 
 from harness.errors import MeshRefused, WrongUse
@@ -34,8 +35,23 @@ def source_of(mesh: str, licence: str) -> Source:
     return Source(what="mesh", origin=path.name, licence=licence, sha256=sha256)
 
 
-def surface_of(mesh: str, units: str | None, wall: float | None) -> tuple[Mesh, tuple[str, ...]]:
-    """The surface of an object's material, and what was done to the mesh and what to look at.
+@dataclass(frozen=True, eq=False)
+class TakenSurface:
+    """The surface of an object's material.
+
+    Attributes:
+        mesh: in metres.
+        units: of the file's numbers; None of a built-in object, which has none.
+        said: what was done to the mesh and what to look at.
+    """
+
+    mesh: Mesh
+    units: str | None
+    said: tuple[str, ...]
+
+
+def surface_of(mesh: str, units: str | None, wall: float | None) -> TakenSurface:
+    """The surface of an object's material.
 
     Args:
         mesh: a file of a surface, or ``builtin:`` and a name.
@@ -47,9 +63,10 @@ def surface_of(mesh: str, units: str | None, wall: float | None) -> tuple[Mesh, 
         WrongUse: units or a wall that cannot be.
     """
     if mesh.startswith(BUILTIN):
-        return build(mesh.removeprefix(BUILTIN)), ()
+        return TakenSurface(build(mesh.removeprefix(BUILTIN)), None, ())
     intake = take_in(Path(mesh), units, wall=wall)
-    return walled(intake.mesh, wall), (*intake.report.repairs, *intake.report.warnings)
+    said = (*intake.report.repairs, *intake.report.warnings)
+    return TakenSurface(walled(intake.mesh, wall), intake.report.units, said)
 
 
 def created_object(

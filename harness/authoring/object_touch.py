@@ -80,8 +80,8 @@ def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 
     begun = time.perf_counter()
     report("reading the mesh", 0.0)
     source = source_of(wanted.mesh, wanted.licence)
-    mesh, said = surface_of(wanted.mesh, wanted.units, wanted.wall)
-    taken = time.perf_counter() - begun
+    surface = surface_of(wanted.mesh, wanted.units, wanted.wall)
+    mesh, taken = surface.mesh, time.perf_counter() - begun
     created = created_object(wanted.mesh, wanted.licence, wanted.material, mesh, out, source)
     skirt = skirt_for(wanted.sensor)
     touch = author_touch(mesh, wanted.sensor, skirt, chosen, wanted.seed, out, report, threads)
@@ -106,4 +106,4 @@ def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 
     made = with_touch(created, part)
     (out / CHECKPOINT).unlink(missing_ok=True)
     seconds = {"mesh": taken, **touch.seconds, "write": time.perf_counter() - begun}
-    return BuiltTouch(made, touch, said, seconds)
+    return BuiltTouch(made, touch, surface.said, seconds)

@@ -17,6 +17,9 @@ _SHAPE = 1e-3
 """Of the diagonal, by which two surfaces of one object may differ, and of the volume: a frequency then
 differs by a thousandth or so, as the elements' own do."""
 
+_DRAWN = 1e-4
+"""Of the diagonal and of the area: a twentieth of a pixel of a picture of 512."""
+
 _CONSTANT = 1e-9
 """Relative, by which constants of one material may differ: more than JSON rounds them by."""
 
@@ -50,6 +53,16 @@ def require_same_shape(of: ObjectFile, surface: Mesh, instead: str) -> None:
     _refuse(of, _surfaces(of, surface), instead)
 
 
+def is_same_surface(there: Mesh, here: Mesh) -> bool:
+    """Whether two surfaces are one to the eye, however they are cut into faces: no seam, no hole mended."""
+    if not np.isclose(there.face_areas.sum(), here.face_areas.sum(), rtol=_DRAWN, atol=0.0):
+        return False
+    most = _DRAWN * here.diagonal
+    if np.abs(there.bounds - here.bounds).max() > most:
+        return False
+    return max(_farthest(there, here, most), _farthest(here, there, most)) <= most
+
+
 def _refuse(of: ObjectFile, different: list[str], instead: str) -> None:
     if different:
         raise WrongUse(
@@ -75,7 +88,7 @@ def _surfaces(of: ObjectFile, surface: Mesh) -> list[str]:
     low, high = np.array(of.description.mesh.low_m), np.array(of.description.mesh.high_m)
     if (np.abs(np.stack([low, high]) - surface.bounds) > most).any():
         return [f"it reaches {_box(np.stack([low, high]))}, the scene's object {_box(surface.bounds)}"]
-    gap = max(_farthest(surface, of.mesh), _farthest(of.mesh, surface))
+    gap = max(_farthest(surface, of.mesh, most), _farthest(of.mesh, surface, most))
     if gap > most:
         return [f"the surfaces are {gap * 1e3:.3g} mm apart, where {most * 1e3:.3g} mm are one object's"]
     there, here = signed_volume(of.mesh), signed_volume(surface)
@@ -84,10 +97,10 @@ def _surfaces(of: ObjectFile, surface: Mesh) -> list[str]:
     return []
 
 
-def _farthest(points: Mesh, surface: Mesh) -> float:
-    """m, of a vertex of one mesh from the surface of another."""
+def _farthest(points: Mesh, surface: Mesh, first: float) -> float:
+    """m, of a vertex of one mesh from the surface of another; it may well be within ``first`` m."""
     used = points.vertices[np.unique(points.faces)]
-    places, _ = SurfaceSearch(surface).nearest(used, _SHAPE * surface.diagonal)
+    places, _ = SurfaceSearch(surface).nearest(used, first)
     return float(np.linalg.norm(places - used, axis=1).max())
 
 
