@@ -1,6 +1,7 @@
 """A camera without lens errors, and a light from far away: what every level of vision is asked with.
 
-Frames: ``camera`` is OpenCV's, x right, y down, z forward; ``object`` is the mesh file's, in metres.
+Frames: ``camera`` is OpenCV's, x right, y down, z forward; ``object`` is that of what is
+pictured, in metres: the mesh file's of an object, the world's of a bench.
 A place in the picture is (x, y) in pixels from the upper left corner: the centre of the pixel of row i and
 column j is (j + 0.5, i + 0.5).
 """

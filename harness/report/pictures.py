@@ -10,7 +10,8 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from harness.arrays import FloatArray
 from harness.geometry import apply
 from harness.mesh import Mesh
-from harness.report.camera import Camera, look_at
+from harness.pinhole import Pinhole
+from harness.report.camera import look_at
 from harness.report.data import Bench, Contact, Part
 from harness.report.props import CLAY
 from harness.report.shading import Shot
@@ -70,14 +71,14 @@ def close_up(mesh: Mesh, place: FloatArray, away: FloatArray, width: float, pixe
     return Shot((Part(mesh, np.eye(4), CLAY),), camera)
 
 
-def _framing(mesh: Mesh, azimuth: float, pixels: int) -> Camera:
+def _framing(mesh: Mesh, azimuth: float, pixels: int) -> Pinhole:
     """A square view that the object fills but for a margin for the tool axes."""
     focus, width = mesh.bounds.mean(axis=0), mesh.diagonal
     camera = look_at(focus, azimuth, _ELEVATION, width, pixels, pixels)
     seen = camera.project(mesh.vertices)[0] / pixels
     low, high = seen.min(axis=0), seen.max(axis=0)
     aside = (0.5 * (low + high) - 0.5) * width
-    focus = focus + aside @ camera.camera_from_world[:2, :3]
+    focus = focus + aside @ camera.camera_from_object[:2, :3]
     return look_at(focus, azimuth, _ELEVATION, 1.22 * width * float((high - low).max()), pixels, pixels)
 
 
@@ -237,8 +238,8 @@ def _mark(
     )
 
 
-def _canvas(camera: Camera) -> tuple[Figure, Axes]:
-    figure = blank(camera.columns / DPI, camera.rows / DPI)
+def _canvas(camera: Pinhole) -> tuple[Figure, Axes]:
+    figure = blank(camera.width / DPI, camera.height / DPI)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     return figure, axes

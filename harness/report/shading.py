@@ -8,7 +8,8 @@ from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
 from harness.arrays import BoolArray, FloatArray, IntArray
 from harness.geometry import apply, inverse, transform
 from harness.mesh import Mesh
-from harness.report.camera import Camera, View, see
+from harness.pinhole import Pinhole
+from harness.report.camera import View, back_projected, see
 from harness.report.data import Part
 from harness.sim.height_map import RasterMesh, depth_image
 
@@ -30,19 +31,14 @@ class Shot:
         camera: its rows and columns are those of the pictures.
     """
 
-    def __init__(self, parts: tuple[Part, ...], camera: Camera) -> None:
+    def __init__(self, parts: tuple[Part, ...], camera: Pinhole) -> None:
         self.camera = camera
-        fine = Camera(
-            camera.camera_from_world,
-            camera.focal * _OVERSAMPLING,
-            camera.rows * _OVERSAMPLING,
-            camera.columns * _OVERSAMPLING,
-        )
+        fine = camera.resized(_OVERSAMPLING * camera.width, _OVERSAMPLING * camera.height)
         self._view = view = see(parts, fine)
         self._filled = filled = view.part >= 0
         if not filled.any():
             return
-        self._points = fine.back_projected(np.where(filled, view.depth, 1.0))[filled]
+        self._points = back_projected(fine, np.where(filled, view.depth, 1.0))[filled]
         normals = _normals(view, parts, self._points, filled)
         self._owner = view.part[filled]
         self._albedo = np.array([part.colour for part in parts])[self._owner]
@@ -53,8 +49,8 @@ class Shot:
     def hidden(self, points: FloatArray, clearance: float) -> BoolArray:
         """Whether each of ``(n, 3)`` points lies more than ``clearance`` metres behind what is seen."""
         pixels, depth = self._view.camera.project(points)
-        column = np.clip(pixels[:, 0].astype(int), 0, self._view.camera.columns - 1)
-        row = np.clip(pixels[:, 1].astype(int), 0, self._view.camera.rows - 1)
+        column = np.clip(pixels[:, 0].astype(int), 0, self._view.camera.width - 1)
+        row = np.clip(pixels[:, 1].astype(int), 0, self._view.camera.height - 1)
         return np.asarray(depth > self._view.depth[row, column] + clearance)
 
     def picture(self, painted: int = -1, paint: Paint | None = None) -> FloatArray:
@@ -68,7 +64,7 @@ class Shot:
                 albedo[own] += opaque[:, None] * (colour - albedo[own])
             shade = self._light[:, None] * albedo + self._shine[:, None]
             picture[self._filled] = np.clip(shade, 0.0, 1.0) * self._cue[:, None]
-        rows, columns = self.camera.rows, self.camera.columns
+        rows, columns = self.camera.height, self.camera.width
         blocks = picture.reshape(rows, _OVERSAMPLING, columns, _OVERSAMPLING, 3)
         return np.asarray(blocks.mean(axis=(1, 3)))
 
@@ -132,15 +128,15 @@ def _shares(corners: FloatArray, points: FloatArray) -> FloatArray:
     return np.asarray(shares / shares.sum(axis=1)[:, None])
 
 
-def _key_direction(camera: Camera) -> FloatArray:
+def _key_direction(camera: Pinhole) -> FloatArray:
     """Towards the main light: over the viewer's left shoulder."""
-    right, down, forward = camera.camera_from_world[:3, :3]
+    right, down, forward = camera.camera_from_object[:3, :3]
     direction = -0.65 * right - 0.50 * down - 0.80 * forward
     return np.asarray(direction / np.linalg.norm(direction))
 
 
 def _light(
-    normals: FloatArray, points: FloatArray, camera: Camera, lit: FloatArray
+    normals: FloatArray, points: FloatArray, camera: Pinhole, lit: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """``(n,)`` what the body's colour is multiplied by, and ``(n,)`` a soft highlight on top."""
     key = _key_direction(camera)
@@ -155,7 +151,7 @@ def _light(
     return _BASE + _KEY * towards + _FILL * ahead + _SKY * sky, _SHINE * gloss
 
 
-def _lit(parts: tuple[Part, ...], points: FloatArray, normals: FloatArray, camera: Camera) -> FloatArray:
+def _lit(parts: tuple[Part, ...], points: FloatArray, normals: FloatArray, camera: Pinhole) -> FloatArray:
     """``(n,)`` share of the main light that reaches each point: a blurred shadow map."""
     key = _key_direction(camera)
     aside = np.cross(key, [0.0, 0.0, 1.0])
@@ -185,7 +181,7 @@ def _depth_cue(view: View) -> FloatArray:
     least, most = view.depth[filled].min(), view.depth[filled].max()
     reach = max(float(most - least), 1e-6)
     depth = np.where(filled, view.depth, most)
-    blurred = gaussian_filter(depth, 0.012 * view.camera.columns)
+    blurred = gaussian_filter(depth, 0.012 * view.camera.width)
     hollow = np.clip((depth - blurred) / (0.25 * reach), 0.0, 1.0)
     jump = maximum_filter(depth, 3) - minimum_filter(depth, 3) > 0.02 * reach
     border = maximum_filter(view.part, 3) != minimum_filter(view.part, 3)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.geometry import translation
-from harness.report.camera import look_at, see
+from harness.report.camera import back_projected, look_at, see
 from harness.report.charts import error_chart
 from harness.report.data import Curve, Part
 from harness.report.pictures import Heat
@@ -27,7 +27,7 @@ def test_the_focus_is_the_centre_and_the_width_is_the_width(
 ) -> None:
     focus = np.array([0.1, -0.4, 0.3])
     camera = look_at(focus, azimuth, elevation, width, 200, 300)
-    aside = camera.camera_from_world[0, :3] * 0.5 * width
+    aside = camera.camera_from_object[0, :3] * 0.5 * width
     pixels, depth = camera.project(np.array([focus, focus + aside, focus - aside]))
     assert pixels[0] == pytest.approx([150.0, 100.0], abs=1e-6)
     assert pixels[1:, 0] == pytest.approx([300.0, 0.0], abs=1e-6)
@@ -38,7 +38,7 @@ def test_what_is_seen_lies_on_the_bodies_it_is_said_to_lie_on() -> None:
     view = see((CUBE,), CAMERA)
     filled = view.part == 0
     assert filled.any()
-    points = CAMERA.back_projected(np.where(filled, view.depth, 1.0))[filled]
+    points = back_projected(CAMERA, np.where(filled, view.depth, 1.0))[filled]
     assert np.abs(points).max(axis=1) == pytest.approx(0.02, abs=1e-9)
     corners = CUBE.mesh.corners[view.face[filled]]
     normal = CUBE.mesh.face_normals[view.face[filled]]
