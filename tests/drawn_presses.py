@@ -13,7 +13,7 @@ from harness.arrays import ByteArray, FloatArray
 ROWS, COLUMNS = 96, 128
 BALL = 12.0
 CONTACT = 9.0
-_LIGHTS = np.array([[0.8, 0.2, 0.6], [-0.5, 0.7, 0.6], [-0.2, -0.8, 0.6]])
+LIGHTS = np.array([[0.8, 0.2, 0.6], [-0.5, 0.7, 0.6], [-0.2, -0.8, 0.6]])
 _GAIN = np.array([95.0, 110.0, 100.0])
 _SKIRT = 3.0
 
@@ -50,7 +50,7 @@ class DrawnGel:
         sine = np.minimum(away, contact) / BALL * np.exp(-np.maximum(away - contact, 0.0) / _SKIRT)
         share = sine / np.maximum(away, 1e-9)
         normal = np.stack([share * right, share * down, np.sqrt(1.0 - sine**2)], axis=-1)
-        lit = normal @ _LIGHTS.T - _LIGHTS[:, 2]
+        lit = normal @ LIGHTS.T - LIGHTS[:, 2]
         bright = 1.0 + 0.15 * (x / COLUMNS - 0.5) - 0.1 * (y / ROWS - 0.5)
         dim = self.dimming * (away <= contact)
         noise = np.random.default_rng(seed).normal(0.0, self.noise, (ROWS, COLUMNS, 3))

@@ -13,12 +13,14 @@ from calibration.taxim.light_fit import depth_of, per_metre, pressed_ball
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures, read_pictures
+from calibration.taxim.shadow_fit import fit_shadow
 from calibration.taxim.smooth_fit import changes, distance, refined_centre
 from harness.arrays import BoolArray, ByteArray, FloatArray, IntArray, read_only
 from harness.image_metrics import ssim
 from harness.sim.gel import R15_SKIRT, deform
 from harness.sim.lit_calibration import LitCalibration
 from harness.sim.optics import Optics
+from harness.sim.shadow import ShadowTable
 from harness.sim.tactile_calibration import CalibrationHeader, GelSkirt
 
 R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
@@ -54,6 +56,7 @@ class HeldOut:
         start: ``(2,)`` pixels (column, row), from the detector and two numbers refined.
         ball: pixels, radius.
         drift: ``(3,)`` grey levels by which the light of this picture differs, from where it is untouched.
+        shadow: as the other folds' presses show it; None where they show none.
     """
 
     name: str
@@ -63,6 +66,7 @@ class HeldOut:
     start: FloatArray
     ball: float
     drift: FloatArray
+    shadow: ShadowTable | None
 
     def region(self, radii: float) -> BoolArray:
         """``(rows, columns)`` the pixels within so many contact radii."""
@@ -112,6 +116,8 @@ def held_out_presses(pictures: Pictures, who: Identity, folds: int = FOLDS) -> I
         taught: IntArray = np.nonzero(~out)[0]
         model = teach(pack.of(taught), change[taught], who.ball)
         calibration = lit_calibration(pictures.background, model, who)
+        clean = change[taught] - model.rest
+        shadow = fit_shadow(pack.of(taught), clean, model.fit.centres, model.light).in_metres(who.pitch)
         for k in np.nonzero(out)[0]:
             raw = pack.images[k].astype(np.float64) - pictures.background
             clean = change[k] - model.rest
@@ -126,7 +132,7 @@ def held_out_presses(pictures: Pictures, who: Identity, folds: int = FOLDS) -> I
             )
             drift = np.median((raw - change[k]).reshape(-1, 3), axis=0)
             name = pictures.names[pack.number[k]]
-            yield HeldOut(name, pack.images[k], model, calibration, start, who.ball, drift)
+            yield HeldOut(name, pack.images[k], model, calibration, start, who.ball, drift, shadow)
 
 
 def lit_calibration(background: ByteArray, model: Model, who: Identity) -> LitCalibration:

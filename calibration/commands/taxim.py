@@ -8,6 +8,7 @@ import typer
 
 from calibration.commands.taxim_answer import answer_of, doubts, keep, say, scale_answer
 from calibration.commands.taxim_arm import Wanted, chosen, pressed
+from calibration.commands.taxim_shadow import write_published
 from harness import options
 from harness.output import emit, warn
 
@@ -102,6 +103,14 @@ def taxim(
         Path | None,
         typer.Option(help="Write the colour table in Taxim's own layout too.", metavar="FILE"),
     ] = None,
+    shadow_table: Annotated[
+        Path | None,
+        typer.Option(
+            "--shadow-table",
+            help="Write the shadows in Taxim's own layout too, where the presses show any.",
+            metavar="FILE",
+        ),
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option(
@@ -161,7 +170,6 @@ def taxim(
     """
     from calibration.taxim.mark_free import calibrate
     from calibration.taxim.pictures import squared
-    from calibration.taxim.polycalib import write_polycalib
     from harness.sim.lit_calibration import read_calibration
     from harness.sim.tactile_calibration import save_calibration
 
@@ -187,8 +195,7 @@ def taxim(
     made = calibrate(pictures, who, use_marks=marks, like=known)
     artefact = out if out is not None else _place(source, arm is not None)
     save_calibration(made.calibration, artefact)
-    if polycalib is not None:
-        write_polycalib(made.calibration, polycalib)
+    write_published(made, polycalib, shadow_table)
     page = None
     if report is None and arm is not None:
         report = source / "report"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 from rich.table import Table
 
+from calibration.commands.taxim_shadow import shadow_answer, shadow_lines
 from harness.output import ANSWERS, CONSOLE
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def answer_of(made: "MarkFree", artefact: Path, polycalib: Path | None, page: Pa
         "smooth_lean_rad": made.lean,
         "covered": float((made.coverage > 0).mean()),
         "steepest": header.slope_limit,
+        **shadow_answer(made),
         "background": made.background_from,
         "polycalib": None if polycalib is None else str(polycalib),
         "report": None if page is None else str(page),
@@ -69,6 +71,8 @@ def say(made: "MarkFree", answer: dict[str, Any], scale: "ArmScale | None") -> N
     drawn.add_row("table, centre as detected", f"{answer['psnr_contact_unrefitted_db']:.2f}")
     drawn.add_row("untouched gel", f"{answer['psnr_untouched_db']:.2f}")
     ANSWERS.print(drawn)
+    for line in shadow_lines(made):
+        ANSWERS.print(escape(line))
     for line in [escape(answer["scale_reason"])] if scale is None else scale_lines(scale):
         ANSWERS.print(line)
     ANSWERS.print(f"background: {escape(answer['background'])}; {answer['seconds']:.1f} s")

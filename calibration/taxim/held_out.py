@@ -97,9 +97,26 @@ def teach(pack: PressPack, change: FloatArray, ball: float) -> Model:
     return Model(plain, fit, circle, light, table, support, rest, np.asarray(bias))
 
 
-def held_out(
-    pack: PressPack, change: FloatArray, ball: float, radius: float
-) -> tuple[list[Score], FloatArray, FloatArray]:
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Presses predicted by the others.
+
+    Attributes:
+        scores: of every press.
+        left: ``(rows, columns)`` what the table left over, summed over the presses, grey levels rms squared.
+        count: ``(rows, columns)`` how many presses each pixel was scored in.
+        centres: ``(presses, 2)`` pixels (column, row), refitted on the press by the other folds' model.
+        folds: of each its model, the presses it was taught by and those left out.
+    """
+
+    scores: list[Score]
+    left: FloatArray
+    count: FloatArray
+    centres: FloatArray
+    folds: list[tuple[Model, IntArray, IntArray]]
+
+
+def held_out(pack: PressPack, change: FloatArray, ball: float, radius: float) -> HeldOut:
     """Score every press by a model of the other folds' presses.
 
     Args:
@@ -107,38 +124,45 @@ def held_out(
         change: as for ``teach``.
         ball: radius in pixels.
         radius: pixels about a press's centre that are scored.
-
-    Returns:
-        The scores; what was left over, summed over the presses, ``(rows, columns)`` grey levels rms
-        squared; and how many presses each pixel was scored in, ``(rows, columns)``.
     """
     shape = change.shape[1:3]
     scores: dict[int, Score] = {}
-    left, count = np.zeros(shape), np.zeros(shape)
+    left, count, centres = np.zeros(shape), np.zeros(shape), np.zeros((len(change), 2))
+    folds: list[tuple[Model, IntArray, IntArray]] = []
     for fold in range(FOLDS):
         out = np.arange(len(change)) % FOLDS == fold
         taught: IntArray = np.nonzero(~out)[0]
         model = teach(pack.of(taught), change[taught], ball)
+        folds.append((model, taught, np.nonzero(out)[0]))
         for k in np.nonzero(out)[0]:
+            centres[k] = settled_centre(pack, change[k] - model.rest, pack.centres[k], model, ball)
             scores[int(k)], place, apart = score(pack, change[k], pack.centres[k], model, ball, radius)
             left[place[:, 0], place[:, 1]] += np.mean(apart**2, axis=1)
             count[place[:, 0], place[:, 1]] += 1.0
-    return [scores[k] for k in range(len(change))], left, count
+    return HeldOut([scores[k] for k in range(len(change))], left, count, centres, folds)
 
 
 def score(
     pack: PressPack, change: FloatArray, found: FloatArray, model: Model, ball: float, radius: float
 ) -> tuple[Score, IntArray, FloatArray]:
     """Score one press; also the pixels of it ``(n, 2)`` and what the table leaves over ``(n, 3)``."""
-    clean, edge = change - model.rest, model.fit.edge
+    clean = change - model.rest
     start = found + model.bias
-    centre = refined_centre(pack, clean, start, model.fit.colours, edge, ball, _SETTLE)
+    centre = settled_centre(pack, clean, found, model, ball)
     place, apart = _table_residual(pack, clean, centre, model.table, ball, radius)
     _, guessed = _table_residual(pack, clean, start, model.table, ball, radius)
     nothing = clean[place[:, 0], place[:, 1]]
     smooth = light_shades(pack, model.light, centre, place) - nothing
     answer = Score(decibels(apart), decibels(smooth), decibels(guessed), decibels(nothing))
     return answer, place, apart
+
+
+def settled_centre(
+    pack: PressPack, clean: FloatArray, found: FloatArray, model: Model, ball: float
+) -> FloatArray:
+    """``(2,)`` pixels (column, row): where a model puts a press that the detector ``found``."""
+    start = found + model.bias
+    return refined_centre(pack, clean, start, model.fit.colours, model.fit.edge, ball, _SETTLE)
 
 
 def decibels(left: FloatArray) -> float:

@@ -17,11 +17,13 @@ from calibration.taxim.held_out import WITHIN, Model, Score, held_out, teach
 from calibration.taxim.light_fit import per_metre
 from calibration.taxim.likeness import check_order
 from calibration.taxim.pack import PressPack
-from calibration.taxim.pictures import Pictures, Refused, digest
+from calibration.taxim.pictures import Pictures, Refused, in_order_of_content
+from calibration.taxim.shadow_fit import ShadowFit, fit_shadow
+from calibration.taxim.shadow_score import ShadowScore, score_shadow
 from calibration.taxim.smooth_fit import changes
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused
-from harness.sim.lit_calibration import LitCalibration
+from harness.sim.lit_calibration import LitCalibration, with_shadow
 from harness.sim.tactile_calibration import CalibrationHeader, TactileCalibration
 
 LEAST_GAIN = 12.0
@@ -91,6 +93,8 @@ class MarkFree:
         depth: metres that the balls reach past the untouched gel, by the contact line and the skirt.
         left: ``(rows, columns)`` grey levels rms left over on held-out presses, NaN where none was scored.
         coverage: ``(rows, columns)`` how many contacts reached a pixel.
+        shadow: what the presses show of shadows.
+        shadow_score: of them, on presses held out; None where the presses show none.
         background_from: in words.
         seconds: from pictures in memory to the artefact.
     """
@@ -104,8 +108,18 @@ class MarkFree:
     depth: float
     left: FloatArray
     coverage: IntArray
+    shadow: ShadowFit
+    shadow_score: ShadowScore | None
     background_from: str
     seconds: float
+
+    @property
+    def shadow_missing(self) -> str:
+        """Why no shadow is drawn; empty where one is."""
+        if self.shadow.table is None:
+            return "; ".join(f"{one.colour}: {one.missing}" for one in self.shadow.colours)
+        score = self.shadow_score
+        return "" if score is None or score.worth else score.sentence
 
     def median(self, which: str) -> float:
         """dB, median over the presses of one of the scores: table, smooth, unrefitted or nothing."""
@@ -141,7 +155,7 @@ def _calibrated(
 ) -> MarkFree:
     ball = identity.ball
     _check_ball(identity, pictures)
-    ordered = _in_order_of_content(pictures)
+    ordered = in_order_of_content(pictures)
     pack, kept, refused = _usable(ordered, ball, use_marks)
     change = changes(pack)
     model = teach(pack, change, ball)
@@ -154,23 +168,29 @@ def _calibrated(
         pack, change, kept = pack.of(np.nonzero(fine)[0]), change[fine], kept[fine]
         _still_enough(pack, refused)
         model = teach(pack, change, ball)
-    scores, left, count = held_out(pack, change, ball, WITHIN * model.fit.edge)
+    out = held_out(pack, change, ball, WITHIN * model.fit.edge)
+    scores = out.scores
     names = [ordered.names[k] for k in kept]
     used = [
         _used(names[k], change[k] - model.rest, model.fit.centres[k], identity, scores[k])
         for k in range(len(names))
     ]
     _check_gain(scores)
+    shadow = fit_shadow(pack, change - model.rest, model.fit.centres, model.light)
+    worth = None if shadow.table is None else score_shadow(pack, change, out, identity.pitch, ball)
+    drawn = None if worth is None or not worth.worth else shadow
     return MarkFree(
-        _artefact(pictures, pack, model, identity, scores),
+        _artefact(pictures, pack, model, identity, scores, drawn),
         tuple(sorted(used, key=lambda press: pictures.names.index(press.name))),
         tuple(sorted([*refused, *pictures.refused], key=lambda one: one.name)),
         model.fit.edge,
         model.circle.scatter,
         _lean(model, ball),
         model.light.depth * identity.pitch,
-        read_only(np.sqrt(left / np.where(count > 0.0, count, np.nan))),
+        read_only(np.sqrt(out.left / np.where(out.count > 0.0, out.count, np.nan))),
         reached(model.fit.centres, model.fit.edge, *pictures.background.shape[:2]).sum(axis=0),
+        shadow,
+        worth,
         pictures.background_from,
         0.0,
     )
@@ -189,16 +209,6 @@ def _check_ball(identity: Identity, pictures: Pictures) -> None:
             f"radius of {identity.ball:.1f} px; between {_SMALLEST_BALL:g} px and half the picture "
             f"({smallest / 2:g} px) is wanted: check radius (not diameter) and pitch"
         )
-
-
-def _in_order_of_content(pictures: Pictures) -> Pictures:
-    order = sorted(range(len(pictures.images)), key=lambda k: digest(pictures.images[k]))
-    return replace(
-        pictures,
-        images=pictures.images[order],
-        names=tuple(pictures.names[k] for k in order),
-        marks=None if pictures.marks is None else pictures.marks[order],
-    )
 
 
 def _usable(pictures: Pictures, ball: float, use_marks: bool) -> tuple[PressPack, IntArray, list[Refused]]:
@@ -252,7 +262,12 @@ def _check_gain(scores: list[Score]) -> None:
 
 
 def _artefact(
-    pictures: Pictures, pack: PressPack, model: Model, identity: Identity, scores: list[Score]
+    pictures: Pictures,
+    pack: PressPack,
+    model: Model,
+    identity: Identity,
+    scores: list[Score],
+    shadow: ShadowFit | None,
 ) -> LitCalibration:
     header = CalibrationHeader(
         sensor=identity.sensor,
@@ -272,4 +287,8 @@ def _artefact(
     )
     background = np.clip(np.round(pictures.background + model.rest), 0.0, 255.0).astype(np.uint8)
     lit = per_metre(model.light.lit, identity.pitch)
-    return LitCalibration(header, background, model.table, model.support, model.plain.colours, lit)
+    made = LitCalibration(header, background, model.table, model.support, model.plain.colours, lit)
+    table = None if shadow is None else shadow.in_metres(identity.pitch)
+    if shadow is None or table is None:
+        return made
+    return with_shadow(made, table, shadow.rim * identity.pitch)

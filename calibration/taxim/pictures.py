@@ -90,6 +90,17 @@ def squared(pictures: Pictures, aspect: float) -> Pictures:
     )
 
 
+def in_order_of_content(pictures: Pictures) -> Pictures:
+    """The presses by the hash of their pixels, so that a folder's order changes nothing."""
+    order = sorted(range(len(pictures.images)), key=lambda k: digest(pictures.images[k]))
+    return replace(
+        pictures,
+        images=pictures.images[order],
+        names=tuple(pictures.names[k] for k in order),
+        marks=None if pictures.marks is None else pictures.marks[order],
+    )
+
+
 def read_pictures(path: Path, background: Path | None = None, channels: Channels | None = None) -> Pictures:
     """Read presses from a folder of pictures, a folder with ``dataPack.npz``, or such a file.
 

@@ -8,9 +8,11 @@ from calibration.taxim.light_fit import depth_of, pressed_ball
 from calibration.taxim.mark_free import MarkFree, UsedPress
 from calibration.taxim.pictures import Pictures
 from calibration.taxim.rest import AWAY, SIGHTINGS
+from calibration.taxim.shadow_polar import SAMPLE_STEP
 from calibration.taxim.smooth_fit import distance
 from harness.arrays import ByteArray, FloatArray
 from harness.report.calibration_page import CalibrationReport, Example, MovesFigure, PressLine
+from harness.report.shadow_figure import ShadowFigure
 from harness.sim.gel import deform
 from harness.sim.optics import Optics
 from harness.sim.tactile_calibration import TactileCalibration
@@ -55,6 +57,7 @@ def report_of(
         made.left,
         _examples(made, pictures),
         None if scale is None or arm is None else _moves(scale, arm),
+        _shadow_figure(made),
     )
 
 
@@ -123,7 +126,41 @@ def _notes(made: MarkFree, scale: ArmScale | None) -> list[str]:
         f"{made.roundness:.2f} px. The gel's skirt is {header.skirt.kernels[0]} px wide, and the "
         f"balls reach {1e3 * made.depth:.2f} mm in. Slopes that an inverse starts from, which know no "
         f"dimming by a contact, lean by {np.degrees(made.lean):.1f} degrees against that line.",
+        _shadow_note(made),
     ]
+
+
+def _shadow_note(made: MarkFree) -> str:
+    score = made.shadow_score
+    if made.shadow_missing or score is None:
+        return f"No shadow is drawn. {made.shadow_missing}."
+    rim = 1e3 * made.calibration.header.pitch * made.shadow.rim
+    return (
+        f"Shadows were seen of rims {rim:.2f} mm deep; of others they are drawn by the law of the published "
+        f"depths. Over their own pixels held-out presses score {score.shaded:.1f} dB with them and "
+        f"{score.plain:.1f} without, and {score.better:.0%} are better."
+    )
+
+
+def _shadow_figure(made: MarkFree) -> ShadowFigure:
+    pitch, shadow = made.calibration.header.pitch, made.shadow
+    lines = [
+        (
+            one.colour,
+            "" if np.isnan(one.falls) else f"{np.degrees(one.falls):.1f} deg",
+            "" if np.isnan(one.falls_error) else f"{np.degrees(one.falls_error):.1f} deg",
+            f"{np.degrees(one.dark_side):.1f} deg",
+            f"{one.deepest:.1f}",
+            "" if np.isnan(one.deepest_error) else f"{one.deepest_error:.1f}",
+            f"{one.misfit:.1f}",
+            one.missing or "drawn",
+        )
+        for one in shadow.colours
+    ]
+    dark_sides = np.array([one.dark_side for one in shadow.colours])
+    return ShadowFigure(
+        lines, shadow.directions, pitch * SAMPLE_STEP, shadow.typical, shadow.cells, dark_sides
+    )
 
 
 def _examples(made: MarkFree, pictures: Pictures) -> list[Example]:

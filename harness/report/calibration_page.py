@@ -11,6 +11,7 @@ from matplotlib.patches import Circle
 
 from harness.arrays import AnyArray, BoolArray, ByteArray, FloatArray, IntArray
 from harness.report.figures import Album, Picture
+from harness.report.shadow_figure import ShadowFigure, shadow_figure
 from harness.report.style import ANSWER, INK, SOFT, TOOL, blank, styled
 from harness.report.template import rendered
 from harness.report.tiles import DIFFERENCE_GAIN, difference, png
@@ -92,6 +93,7 @@ class CalibrationReport:
         left: ``(rows, columns)`` grey levels rms left over on held-out presses; NaN where none was.
         examples: from the worst press to the best.
         moves: of the arm between the presses; None where none are known.
+        shadow: what presses leave over around their contacts.
     """
 
     title: str
@@ -105,6 +107,7 @@ class CalibrationReport:
     left: FloatArray
     examples: Sequence[Example]
     moves: MovesFigure | None = None
+    shadow: ShadowFigure | None = None
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,7 @@ def write_calibration_page(report: CalibrationReport, folder: Path) -> Path:
         gain=f"{DIFFERENCE_GAIN:g}",
         moved=None if report.moves is None else album.drawing("moves", moves_figure(report.moves)),
         longer=f"{_LONGER:g}",
+        shadowed=None if report.shadow is None else album.drawing("shadow", shadow_figure(report.shadow)),
     )
     (folder / PAGE).write_text(page, encoding="utf-8")
     return folder / PAGE

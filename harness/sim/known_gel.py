@@ -6,7 +6,7 @@ from pathlib import Path
 from harness.arrays import ByteArray
 from harness.errors import CalibrationRefused, WrongUse
 from harness.sensor import GELSIGHT_R15, TactileSensor
-from harness.sim.lit_calibration import read_calibration
+from harness.sim.lit_calibration import read_calibration, shadow_of
 from harness.sim.published_pack import SHADOWS, TABLE, PublishedPack, is_published, read_published
 from harness.sim.tactile_calibration import (
     TactileCalibration,
@@ -59,7 +59,7 @@ def known_gel(
         pitch: metres a pixel, where neither the make nor the calibration says it.
         thickness: metres of the gel, in place of the make's.
         background: ``(rows, columns, 3)`` RGB of the untouched gel, in place of the calibration's.
-        shadow: whether it casts shadows; None to go by whether a shadow table was published with it.
+        shadow: whether it casts shadows; None to go by whether a table of them comes with the calibration.
 
     Raises:
         WrongUse: an unknown make, or numbers that are missing or contradict each other.
@@ -70,7 +70,8 @@ def known_gel(
     sensor = _sensor(known, pack.calibration, pitch, thickness)
     if shadow and pack.shadow is None:
         raise WrongUse(
-            f"--shadow needs a table of shadows: {SHADOWS[0]} beside {TABLE} in --calibration FOLDER"
+            f"--shadow needs shadows that were measured: a calibration whose presses showed some, or "
+            f"{SHADOWS[0]} beside {TABLE} in --calibration FOLDER"
         )
     table = None if shadow is False else pack.shadow
     return Gel(replace(sensor, casts_shadow=table is not None), pack.calibration, pack.rest, table)
@@ -97,13 +98,13 @@ def _pack(
         return read_published(Path(calibration), stated, background)
     own = _own(make, calibration)
     if background is None:
-        return PublishedPack(own, None, None)
+        return PublishedPack(own, None, shadow_of(own))
     if background.shape != own.background.shape:
         raise CalibrationRefused(
             f"the background is {background.shape[0]} x {background.shape[1]} pixels and the calibration "
             f"{own.rows} x {own.columns}; give the camera's own picture, not cropped"
         )
-    return PublishedPack(with_background(own, background), None, None)
+    return PublishedPack(with_background(own, background), None, shadow_of(own))
 
 
 def _own(make: Make | None, calibration: str | None) -> TactileCalibration:

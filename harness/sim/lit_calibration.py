@@ -9,7 +9,8 @@ with the terms of ``harness.sim.shading`` for the slopes, and for the light a co
 to degree 2, by the same terms of the position. It is zero where the gel is untouched, and fitted to the
 skirt of the presses too (``calibration.taxim.light_fit``): pushed in, the gel is nearer to the lights' plane,
 and darker even where it is flat; they graze it, and one side of a bump is in the other's way.
-Without it the file is one of ``harness.sim.tactile_calibration``.
+Without it the file is one of ``harness.sim.tactile_calibration``. Presses that showed shadows besides give a
+``ShadowedCalibration``: the same with a table of them.
 """
 
 import json
@@ -19,9 +20,10 @@ from zipfile import BadZipFile, is_zipfile
 
 import numpy as np
 
-from harness.arrays import AnyArray, FloatArray
+from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.errors import CalibrationRefused
 from harness.sim.shading import POSITION_TERMS
+from harness.sim.shadow import ShadowTable
 from harness.sim.tactile_calibration import (
     POSITION_DEGREE,
     SCHEMA,
@@ -34,6 +36,9 @@ from harness.sim.tactile_calibration import (
 
 LIT = "lit"
 """Of the array in the file."""
+
+SHADOW = ("shadow_directions", "shadow_lengths", "shadow_values", "shadow_rays")
+"""Of the arrays of a shadow in the file."""
 
 LIGHT_DEGREE = 2
 LIGHT_POWERS = tuple((a, b) for a in range(LIGHT_DEGREE + 1) for b in range(LIGHT_DEGREE + 1 - a))
@@ -77,6 +82,75 @@ class LitCalibration(TactileCalibration):
         return self.lit[smooth_terms() :]
 
 
+@dataclass(frozen=True, eq=False)
+class ShadowedCalibration(LitCalibration):
+    """A calibration with the light of a press and the shadows that presses throw.
+
+    Attributes:
+        shadow_directions: ``(d,)`` rad; this and the next two as ``harness.sim.shadow.ShadowTable`` has them.
+        shadow_lengths: ``(3, d, k)``.
+        shadow_values: grey levels.
+        shadow_rays: ``(6,)`` metres where the first row of depths begins; metres from row to row; pixels from
+            sample to sample; rad of a fan to either side, and between its rays; metres, the depth of the rims
+            that were seen, which rows of other depths are derived from.
+    """
+
+    shadow_directions: FloatArray
+    shadow_lengths: IntArray
+    shadow_values: FloatArray
+    shadow_rays: FloatArray
+
+    def __post_init__(self) -> None:
+        if self.shadow_rays.shape != (6,) or not (np.isfinite(self.shadow_rays).all()):
+            raise CalibrationRefused(
+                f"shadow_rays is {self.shadow_rays.shape}, or not finite; six finite numbers are wanted: fit "
+                "the calibration again"
+            )
+        super().__post_init__()
+        # A table that does not hold together is refused here, not when it is first drawn with.
+        _ = self.shadow
+
+    @property
+    def arrays(self) -> dict[str, AnyArray]:
+        """Every array by its name in the file."""
+        shadow: dict[str, AnyArray] = {
+            "shadow_directions": self.shadow_directions,
+            "shadow_lengths": self.shadow_lengths,
+            "shadow_values": self.shadow_values,
+            "shadow_rays": self.shadow_rays,
+        }
+        return {**super().arrays, **shadow}
+
+    @property
+    def shadow(self) -> ShadowTable:
+        """The shadows as simulators throw them; ``CalibrationRefused`` where they do not hold together."""
+        lists = (self.shadow_directions, self.shadow_lengths, self.shadow_values)
+        return ShadowTable(*lists, *(float(value) for value in self.shadow_rays[:5]))
+
+    @property
+    def shadow_depth(self) -> float:
+        """Metres of indentation of the rims whose shadows were seen."""
+        return float(self.shadow_rays[5])
+
+
+def with_shadow(calibration: LitCalibration, table: ShadowTable, seen: float) -> ShadowedCalibration:
+    """The same calibration with the shadows of rims of ``seen`` metres."""
+    rays = (table.shallowest, table.depth_step, table.sample_step, table.fan, table.fan_step, seen)
+    parts = {item.name: vars(calibration)[item.name] for item in fields(LitCalibration)}
+    return ShadowedCalibration(
+        **parts,
+        shadow_directions=table.directions,
+        shadow_lengths=table.lengths,
+        shadow_values=table.values,
+        shadow_rays=np.array(rays),
+    )
+
+
+def shadow_of(calibration: TactileCalibration) -> ShadowTable | None:
+    """The shadows of a calibration; None where it has none."""
+    return calibration.shadow if isinstance(calibration, ShadowedCalibration) else None
+
+
 def light_design(normal: FloatArray, position: FloatArray) -> FloatArray:
     """``(n, 36)`` the light's terms at ``(n, 2)`` normals and scaled positions, for unit indentation."""
     powers = np.empty((len(normal), len(LIGHT_POWERS)))
@@ -116,10 +190,12 @@ def read_calibration(path: Path) -> TactileCalibration:
 
 def _lit(found: dict[str, AnyArray], path: Path) -> LitCalibration:
     wanted = {"header", "background", "table", "support", "smooth", LIT}
+    shadowed = not set(SHADOW).isdisjoint(found)
+    wanted |= set(SHADOW) if shadowed else set()
     if set(found) != wanted:
         raise CalibrationRefused(f"{path} holds {sorted(found)} where a calibration holds {sorted(wanted)}")
     header, sha256 = _header(str(found.pop("header")), path)
-    calibration = LitCalibration(header, **found)
+    calibration = ShadowedCalibration(header, **found) if shadowed else LitCalibration(header, **found)
     if calibration.sha256 != sha256:
         raise CalibrationRefused(
             f"{path} is not what was written: its contents hash to {calibration.sha256[:12]}"

@@ -23,12 +23,13 @@ class ShadowTable:
     """What pins pressed into the gel were seen to throw.
 
     Attributes:
-        directions: ``(d,)`` rad, evenly spaced from 0.
+        directions: ``(d,)`` rad, evenly spaced over a turn: the middle of a list's fan. The k-th list is of
+            slopes that fall in directions from k spacings to k + 1.
         lengths: ``(3, d, k)`` how many samples each channel, direction and depth has.
         values: the samples, one list after another in the order of ``lengths``: grey levels
             against the untouched gel, outwards from the pin.
         shallowest: metres, the depth at which the first of the ``k`` rows begins.
-        depth_step: metres from row to row.
+        depth_step: metres from row to row, above zero.
         sample_step: pixels between samples.
         fan: rad to either side of the slope's direction that are shaded too.
         fan_step: rad between rays.
@@ -51,6 +52,11 @@ class ShadowTable:
         if int(self.lengths.sum()) != len(self.values) or not np.isfinite(self.values).all():
             raise CalibrationRefused(
                 f"the shadow lists have {int(self.lengths.sum())} samples; {len(self.values)} came"
+            )
+        if not (self.depth_step > 0.0 and self.sample_step > 0.0 and self.fan_step > 0.0):
+            raise CalibrationRefused(
+                f"shadows in steps of {self.depth_step:g} m, {self.sample_step:g} px and "
+                f"{self.fan_step:g} rad cannot be: all three are above zero; fit the calibration again"
             )
 
 

@@ -20,6 +20,8 @@ SHALLOWEST = -0.2e-3
 """Metres: the first row as the published program reads it, 0.4 mm less the six rows it adds."""
 
 _CHANNELS = 3
+_DIRECTIONS, _TURN = 63, 0.1
+_DEPTHS, _DEPTH = 9, 0.1e-3
 _OWN_LISTS = 1
 _FLOAT = np.dtype("<f8")
 _NOTES = frozenset({"BINPUT", "LONG_BINPUT", "MEMOIZE"})
@@ -64,6 +66,29 @@ def read_shadow_table(path: Path, shallowest: float = SHALLOWEST) -> ShadowTable
     rgb = np.arange(lengths.size).reshape(lengths.shape)[::-1].ravel()
     turned = np.concatenate([lists[at] for at in rgb])
     return ShadowTable(read_only(directions), read_only(lengths[::-1].copy()), read_only(turned), shallowest)
+
+
+def write_shadow_table(table: ShadowTable, path: Path) -> None:
+    """Write shadows as Taxim publishes them: 63 directions 0.1 rad apart, nine depths, blue first.
+
+    A row of depths is that of the table where the file's row has its middle; directions are the nearest.
+
+    Args:
+        table: of the sensor.
+        path: ending in ``.npz``.
+    """
+    lists = np.empty((_CHANNELS, _DIRECTIONS, _DEPTHS), dtype=object)
+    towards = (np.arange(_DIRECTIONS) * _TURN).astype(np.float64)
+    row_of = (SHALLOWEST + (np.arange(_DEPTHS) + 0.5) * _DEPTH - table.shallowest) / table.depth_step
+    starts = np.concatenate([[0], np.cumsum(table.lengths.ravel())]).reshape(-1)[:-1]
+    starts = starts.reshape(table.lengths.shape)
+    for c, d, k in np.ndindex(lists.shape):
+        apart = (table.directions - towards[d] + np.pi) % (2.0 * np.pi) - np.pi
+        nearest, row = int(np.argmin(np.abs(apart))), min(int(row_of[k]), table.lengths.shape[2] - 1)
+        first = starts[c, nearest, max(row, 0)]
+        length = table.lengths[c, nearest, row] if row_of[k] >= 0.0 else 0
+        lists[_CHANNELS - 1 - c, d, k] = [float(v) for v in table.values[first : first + length]]
+    np.savez(path, shadowDirections=towards, shadowTable=lists)
 
 
 def _plain(path: Path) -> tuple[FloatArray, IntArray, FloatArray]:

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import ndimage
 
-from harness.arrays import ByteArray, FloatArray, read_only
+from harness.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.sensor import TactileSensor
 from harness.sim.gel import over_range
 from harness.sim.height_map import rest_surface
@@ -46,8 +46,23 @@ def darkening(
     untouched = -rest_surface(sensor) if rest is None else rest
     surface = (indentation + untouched) / calibration.header.pitch
     change = pictures.astype(np.float64) - calibration.background
+    return soft_shadows(change, indentation, surface, core, table, calibration.header.pitch)
+
+
+def soft_shadows(
+    change: FloatArray,
+    indentation: FloatArray,
+    surface: FloatArray,
+    core: BoolArray,
+    table: ShadowTable,
+    pitch: float,
+) -> tuple[FloatArray, FloatArray]:
+    """What ``cast_shadows`` takes from the colours, blurred as shadows are; otherwise as ``darkening``.
+
+    ``pitch`` in metres a pixel says how many pixels the blur is wide.
+    """
     shaded, outside = cast_shadows(change, indentation, surface, core, table)
-    sigma = SOFTNESS / calibration.header.pitch
+    sigma = SOFTNESS / pitch
     soft: FloatArray = ndimage.gaussian_filter(change - shaded, (0.0, sigma, sigma, 0.0))
     return read_only(soft), outside
 

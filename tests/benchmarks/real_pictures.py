@@ -26,12 +26,16 @@ from real_press import (
 from rich.console import Console
 from rich.table import Table
 
+from calibration.taxim.light_fit import pressed_ball
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pictures import Pictures
+from calibration.taxim.smooth_fit import distance
 from harness.arrays import ByteArray, FloatArray
-from harness.sim.gel import R15_SKIRT
+from harness.sensor import TactileSensor
+from harness.sim.gel import R15_SKIRT, deform
 from harness.sim.optics import Optics, OpticsLevel
 from harness.sim.published_pack import PublishedPack, read_published
+from harness.sim.shadow_image import darkening
 
 CONSOLE = Console(width=118, highlight=False)
 LEVELS: tuple[OpticsLevel, ...] = ("smooth", "fast", "exact")
@@ -40,6 +44,7 @@ NOTHING, OWN_NOTHING = "background alone: the one picture of it", "background al
 PUBLISHED = "published table, dome and skirt (fitted to these presses)"
 BEFORE = "fast, the one background, skirt of 11 px"
 TAUGHT = "{}, background and skirt as taught"
+SHADED = "smooth, with the shadows that the other folds show"
 LIT = "smooth, and the light of the moment given"
 FLOOR = 4.5
 """Contact radii beyond which a press shows the untouched gel alone."""
@@ -102,8 +107,22 @@ def _drawn(press: HeldOut, background: ByteArray, pack: PublishedPack | None) ->
         optics = Optics(press.calibration, level)
         answers[TAUGHT.format(level)] = fitted(press, drawing(optics, skirt), skirt)
     best = answers[TAUGHT.format("smooth")]
+    answers[SHADED] = judged(press, best.image - _shadow(press, best), best.pose)
     answers[LIT] = judged(press, best.image + press.drift, best.pose)
     return answers
+
+
+def _shadow(press: HeldOut, drawn: Drawn) -> FloatArray:
+    """Grey levels that shadows take from a drawing, as ``sim touch`` takes them."""
+    if press.shadow is None:
+        return np.zeros(drawn.image.shape)
+    header, (rows, columns) = press.calibration.header, drawn.image.shape[:2]
+    sensor = TactileSensor(header.sensor, rows, columns, header.pitch, gel_thickness=np.inf)
+    away = distance((rows, columns), drawn.pose[:2])
+    reached = header.pitch * pressed_ball(away, float(drawn.pose[2]), press.ball)[None]
+    gel = deform(reached, header.skirt)
+    taken, _ = darkening(drawn.image[None], reached, gel, sensor, press.calibration, press.shadow)
+    return np.asarray(taken[0], dtype=np.float64)
 
 
 def _untouched_rms(press: HeldOut) -> float:

@@ -2,7 +2,10 @@
 
 ``PYTHONPATH=tests python tests/benchmarks/real_shadows.py`` needs the real data. The last rows are what
 nobody can beat: the published pictures are JPEGs, and their compression is noise on exactly these pixels.
+With ``law``: how well the nine published depths follow from the deepest, by the law that calibrations take.
 """
+
+import sys
 
 import numpy as np
 from published_shadow import (
@@ -23,13 +26,18 @@ from harness.image_metrics import psnr
 from harness.sim.shadow import ShadowTable, cast_shadows
 
 CONSOLE = Console(width=118, highlight=False)
+_LEAST = 7
+"""Samples of a direction's deepest list, for it to say anything."""
 
 
 def main() -> None:
-    """Measure both objects."""
+    """Measure both objects, or the law of depths."""
     data = find_shared_data()
     if data is None:
         raise SystemExit(WHY_NOT)
+    if "law" in sys.argv[1:]:
+        CONSOLE.print(law_of_depths(shadow_table(data / "tactile/taxim/gelsight_lab")))
+        return
     taxim = data / "tactile/taxim"
     presses = {name: published_press(taxim, name) for name in TOPS}
     lists = shadow_table(taxim / "gelsight_lab")
@@ -47,6 +55,52 @@ def main() -> None:
     for words, cells in rows.items():
         table.add_row(words, *cells)
     CONSOLE.print(table)
+
+
+def law_of_depths(published: ShadowTable) -> Table:
+    """Grey levels rms by which rows that follow from the deepest one are off the published ones."""
+    depths = 0.4 + 0.1 * np.arange(published.lengths.shape[2])
+    lists = _by_cell(published)
+    kinds: dict[str, tuple[float, float]] = {
+        "no shadow": (np.nan, np.nan),
+        "the same at every depth": (0.0, 0.0),
+        "longer in proportion": (1.0, 0.0),
+        "longer in proportion, darker with the square root": (1.0, 0.5),
+        "longer and darker in proportion": (1.0, 1.0),
+    }
+    table = Table(
+        title="eight depths from the deepest, over all samples that either has", title_justify="left"
+    )
+    table.add_column("law")
+    table.add_column("grey levels rms", justify="right")
+    for words, (longer, darker) in kinds.items():
+        left = [
+            _follows(cell[-1], depths[k] / depths[-1], longer, darker, len(cell[k]))
+            - _padded(cell[k], cell[-1])
+            for cell in lists
+            if len(cell[-1]) > _LEAST
+            for k in range(len(depths) - 1)
+        ]
+        table.add_row(words, f"{np.sqrt(np.mean(np.concatenate(left) ** 2)):.1f}")
+    return table
+
+
+def _by_cell(table: ShadowTable) -> list[list[np.ndarray]]:
+    lists = np.split(table.values, np.cumsum(table.lengths.ravel())[:-1])
+    depths = table.lengths.shape[2]
+    return [lists[first : first + depths] for first in range(0, len(lists), depths)]
+
+
+def _padded(one: np.ndarray, deepest: np.ndarray) -> np.ndarray:
+    return np.pad(one, (0, max(0, len(deepest) - len(one))))
+
+
+def _follows(deepest: np.ndarray, share: float, longer: float, darker: float, samples: int) -> np.ndarray:
+    at = np.arange(max(samples, len(deepest)), dtype=np.float64)
+    if np.isnan(longer):
+        return np.zeros(len(at))
+    moved = np.interp(at / share**longer, np.arange(len(deepest)), deepest, right=0.0)
+    return np.asarray(share**darker * moved)
 
 
 def _ways(

@@ -108,8 +108,8 @@ def test_a_held_out_press_has_no_part_in_its_own_score(monkeypatch: pytest.Monke
     change = changes(pack)
     spoilt = change.copy()
     spoilt[3] *= 0.5
-    before, _, _ = held_out(pack, change, BALL, CONTACT)
-    after, _, _ = held_out(pack, spoilt, BALL, CONTACT)
+    before = held_out(pack, change, BALL, CONTACT).scores
+    after = held_out(pack, spoilt, BALL, CONTACT).scores
     assert [after[k] for k in (7, 11, 15)] == [before[k] for k in (7, 11, 15)]
     assert after[3].table < before[3].table - 6.0
     assert all(after[k] != before[k] for k in range(16) if k % 4 != 3)

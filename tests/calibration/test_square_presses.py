@@ -26,8 +26,8 @@ SLOPE = 0.4
 
 def colour(normal: FloatArray) -> FloatArray:
     """By the drawn gel's own lights, in the middle of the picture."""
-    lit = np.array([*normal, np.sqrt(1.0 - normal @ normal)]) @ drawn_presses._LIGHTS.T
-    shown: FloatArray = drawn_presses._GAIN * (lit - drawn_presses._LIGHTS[:, 2])
+    lit = np.array([*normal, np.sqrt(1.0 - normal @ normal)]) @ drawn_presses.LIGHTS.T
+    shown: FloatArray = drawn_presses._GAIN * (lit - drawn_presses.LIGHTS[:, 2])
     return shown
 
 
