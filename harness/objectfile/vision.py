@@ -1,8 +1,12 @@
 """The look of an ObjectFile: pictures of the object, at the levels that its networks can be asked."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from harness.arrays import FloatArray
 from harness.errors import DataRefused, WrongUse
+from harness.linear_image import LinearImage
 from harness.mesh import Mesh
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_file import mesh_from_ply
@@ -44,6 +48,23 @@ class ObjectVision:
         require_size(camera.width, camera.height)
         require_outside(self.surface, camera.eye)
         return self.renderer.render(camera, light, settings)
+
+    def lit(
+        self, camera: Pinhole, lights: Sequence[DirectionalLight], settings: RenderSettings | None = None
+    ) -> Rendered:
+        """A picture under any number of lights: light adds up. Under none the object is black.
+
+        Arguments and errors otherwise as of ``picture``.
+        """
+        dark = DirectionalLight(-camera.forward, 0.0)
+        found = [self.picture(camera, light, settings) for light in lights or (dark,)]
+        first = found[0]
+        if len(found) == 1:
+            return first
+        colour: FloatArray = np.sum([each.image.colour for each in found], axis=0)
+        seconds = {name: sum(each.seconds[name] for each in found) for name in first.seconds}
+        image = LinearImage(colour, first.image.alpha, first.image.depth)
+        return Rendered(image, first.level, sum(each.samples for each in found), first.rays, seconds)
 
 
 def vision_level(text: str) -> VisionLevel:

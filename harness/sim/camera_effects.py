@@ -50,7 +50,15 @@ def camera_effects(shadow: bool) -> tuple[Effect, ...]:
     Args:
         shadow: whether the object is in its own light's way.
     """
-    asked = Condition(lambda _facts: shadow, "shadows are asked for", "no shadow is asked for")
+    return effects_when(Condition(lambda _: shadow, "shadows are asked for", "no shadow is asked for"))
+
+
+def effects_when(shadow: Condition) -> tuple[Effect, ...]:
+    """The effects of a picture, the last of which is the picture.
+
+    Args:
+        shadow: when the object is in its own light's way.
+    """
     return (
         Effect("object.lit", ("object.appearance",), _lit),
         Effect("camera.seen", ("object.lit", "camera"), _seen, knobs=(SAMPLES,)),
@@ -59,7 +67,7 @@ def camera_effects(shadow: bool) -> tuple[Effect, ...]:
             "camera.shadow",
             ("camera.falling", "object.lit", "camera.seen", "camera.lights"),
             _shadow,
-            when=asked,
+            when=shadow,
             bypass="camera.falling",
         ),
         Effect("camera.image", ("camera.seen", "camera.shadow"), _image),

@@ -4,8 +4,9 @@ The functions here only take apart what the kernels take; the mathematics is the
 which the caller gives: ``object.mesh`` (``Mesh``), ``object.material`` (``Material``),
 ``contact.gel_from_object`` (``(n, 4, 4)``), ``sensor`` (``TactileSensor``),
 ``sensor.calibration`` (``TactileCalibration``), ``sensor.shadow_table`` (``ShadowTable``),
-``sensor.noise`` (grey levels), ``seed``; for sound those of ``harness.sim.sound_effects``; for touch from
-an ObjectFile those of ``harness.sim.touch_file_effects``.
+``sensor.noise`` (grey levels), ``seed``; for sound those of ``harness.sim.sound_effects``; for pictures
+those of ``harness.sim.camera_effects``; for touch and pictures from an ObjectFile those of
+``harness.sim.touch_file_effects`` and ``harness.sim.camera_file_effects``.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,6 +17,7 @@ import numpy as np
 from harness.accuracy import Knob, Level
 from harness.arrays import ByteArray, FloatArray
 from harness.effects import Condition, Effect
+from harness.sim.camera_file_effects import scene_camera_effects
 from harness.sim.gel import deform, over_range
 from harness.sim.height_map import RasterMesh
 from harness.sim.markers import draw_markers, marker_displacements
@@ -169,13 +171,6 @@ EFFECTS = (
     ),
     Effect("touch.image", ("touch.noise",), _image, when=TOUCH),
     *SOUND_EFFECTS,
-    Effect("camera.radiance", ("object.raster", "camera"), _later("camera.radiance"), when=CAMERA),
-    Effect(
-        "camera.shadow",
-        ("camera.radiance", "object.raster", "lights"),
-        _later("camera.shadow"),
-        when=LIGHTS,
-        bypass="camera.radiance",
-    ),
+    *scene_camera_effects(CAMERA, LIGHTS),
     Effect("arm.dynamics", ("arm.joints", "arm.model"), _later("arm.dynamics")),
 )

@@ -38,8 +38,9 @@ NOT_CALLED_FOR = (
     "object.sound",
     "room.reverberation",
     "microphone.pressure",
-    "camera.radiance",
+    "camera.seen",
     "camera.shadow",
+    "camera.image",
     "arm.dynamics",
 )
 

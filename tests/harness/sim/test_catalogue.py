@@ -88,7 +88,7 @@ def test_a_touch_scene_computes_no_sound_room_light_or_dynamics() -> None:
     assert skipped["object.modes"] == skipped["object.sound"] == "sensors.sound is false"
     assert skipped["microphone.pressure"] == "sensors.sound is false"
     assert skipped["room.reverberation"] == "the scene has no [room]"
-    assert skipped["camera.radiance"] == "sensors.camera is false"
+    assert skipped["camera.image"] == "sensors.camera is false"
     assert skipped["camera.shadow"] == "the scene has no [[lights]]"
     assert skipped["arm.dynamics"] == "nothing asked for arm.dynamics"
     assert len(explained["ran"]) + len(explained["skipped"]) == len(EFFECTS)
@@ -223,9 +223,12 @@ def test_shadows_only_darken_around_what_touches(mug: Mesh, calibration: Tactile
 
 def test_lights_call_for_shadows_of_the_scene_camera() -> None:
     light = Light(position=("0 m", "0 m", "2 m"))  # type: ignore[arg-type]
-    camera = with_sensors(camera=True).model_copy(update={"observe": ("camera.shadow",), "lights": (light,)})
-    ran = [step.effect.provides for step in scene_plan(camera, GELSIGHT_R15).ran]
-    assert ran == ["object.raster", "camera.radiance", "camera.shadow"]
+    camera = with_sensors(camera=True).model_copy(update={"observe": ("camera.image",)})
+    lit = camera.model_copy(update={"lights": (light,)})
+    drawn = ["object.lit", "camera.seen", "camera.falling", "camera.image"]
+    assert [step.effect.provides for step in scene_plan(camera, GELSIGHT_R15).ran] == drawn
+    drawn.insert(3, "camera.shadow")
+    assert [step.effect.provides for step in scene_plan(lit, GELSIGHT_R15).ran] == drawn
 
 
 def test_what_is_not_built_says_so_by_name() -> None:
