@@ -74,6 +74,7 @@ def modes(
     """
     from harness.quantities import FREQUENCY, LENGTH
     from harness.sim.modal_file import modes_of_file
+    from harness.store import Store, default_folder
 
     of = _material(material, young, poisson, density, alpha, beta)
     found = modes_of_file(
@@ -85,6 +86,7 @@ def modes(
         count=count,
         edge=options.quantity("--edge", edge, LENGTH),
         fixed=fixed or (),
+        store=Store(default_folder()),
     )
     if not json:
         for sentence in found.said:

@@ -12,37 +12,22 @@ from harness.arrays import BoolArray, IntArray
 from harness.errors import WrongUse
 from harness.materials import Material
 from harness.mesh import Mesh
+from harness.sim.element_edge import fine_edge
+from harness.sim.filled import filled
 from harness.sim.intake import take_in
-from harness.sim.modal import HEARING, curved, default_edge
+from harness.sim.modal import HEARING, curved
 from harness.sim.modal_mesh import QuadraticMesh
 from harness.sim.modal_solve import Elasticity, Solution, check_elasticity, check_limit, solve_mesh
-from harness.sim.surface_measure import enclosed_volume, thin_wall
-from harness.sim.tetrahedra import check_closed, tetrahedralize
+from harness.sim.tetrahedra import check_closed
 from harness.sim.volume_mesh import read_volume
 from harness.sim.walls import walled
+from harness.store import Store
 from harness.toml_file import nearest
-
-SHARE = 0.25
-"""Of the shortest wave below the limit, the edge of an element where none is asked for."""
-
-_ACROSS = 0.45
-"""Of the wall, an element's edge if the budget allows it."""
-
-_BUDGET = 3e4
-"""Unknowns, about, up to which elements become as small as the wall wants them."""
-
-_WARPED = 0.3
-"""Of the wall, an element's edge where a whole section may warp, as of a bar that twists: the twist of
-a bar of 200 x 20 x 10 mm is off by 4e-3 with 0.45, by 7e-4 with 0.3."""
-
-_WARPED_BUDGET = 7e4
-"""Unknowns, about, up to which they are that small: more than that, and it is a shell, which bends first."""
-
-_UNKNOWNS = 40.0
-"""Unknowns in a cube of the edge's side, as filling makes them."""
 
 _UNLIMITED = 1e12
 """Hz: beyond the modes of anything; where only their number is asked for, that decides the edge."""
+
+_KEPT = "its tetrahedra were kept from an earlier filling of the same surface with the same edge"
 
 _ON_SIDE = 1e-4
 """Of the diagonal, how near to its bounding box a node is on a side of the object."""
@@ -96,6 +81,7 @@ def modes_of_file(
     count: int | None = None,
     edge: float | None = None,
     fixed: Sequence[str] = (),
+    store: Store | None = None,
 ) -> FileModes:
     """The modes of an object given by a file.
 
@@ -109,6 +95,7 @@ def modes_of_file(
         edge: m, longest edge of an element; None for a share of the shortest wave; not for tetrahedra.
         fixed: sides of the object ("x-min", ..., "z-max") or sets of nodes that the file names,
             held in all axes or, as "z-min:z", in those after the colon.
+        store: where the tetrahedra of a surface are kept; None to fill it.
 
     Raises:
         WrongUse: options that cannot be, or that do not go together.
@@ -120,7 +107,7 @@ def modes_of_file(
     taken = _volume(path, units, wall, edge, seconds)
     volume = taken is not None
     if taken is None:
-        taken = _surface(path, units, wall, edge, material, _highest(limit, count), count, seconds)
+        taken = _surface(path, units, wall, edge, material, _highest(limit, count), count, seconds, store)
     held = _held(taken, fixed)
     highest = np.inf if limit is None and count is not None else _highest(limit, count)
     solution = solve_mesh(taken.mesh, material, highest, least=count, held=held)
@@ -165,26 +152,18 @@ def _surface(
     limit: float,
     count: int | None,
     seconds: dict[str, float],
+    store: Store | None,
 ) -> _Taken:
     with _timed(seconds, "intake"):
         intake = take_in(path, units, wall=wall)
         surface: Mesh = walled(intake.mesh, wall)
         check_closed(surface)
-        edge = _fine_edge(surface, material, limit, count) if edge is None else edge
+        edge = fine_edge(surface, material, limit, count) if edge is None else edge
     with _timed(seconds, "mesh"):
-        filled = tetrahedralize(surface, edge)
-        mesh = curved(filled, surface, filled)
-    said = (*intake.report.repairs, *intake.report.warnings)
-    return _Taken(mesh, {}, intake.report.units, filled.bodies, edge, said)
-
-
-def _fine_edge(surface: Mesh, material: Material, limit: float, count: int | None) -> float:
-    """Metres: small against the wave, and against the wall as far as the budget allows."""
-    wall, filling = thin_wall(surface, 0.5), _UNKNOWNS * enclosed_volume(surface)
-    across = max(_ACROSS * wall, np.cbrt(filling / _BUDGET))
-    if np.cbrt(filling / _WARPED_BUDGET) <= _WARPED * wall:
-        across = _WARPED * wall
-    return float(min(default_edge(surface, material, limit, count, SHARE), across))
+        inside, kept = filled(surface, edge, store)
+        mesh = curved(inside, surface, inside)
+    said = (*intake.report.repairs, *intake.report.warnings, *((_KEPT,) if kept else ()))
+    return _Taken(mesh, {}, intake.report.units, inside.bodies, edge, said)
 
 
 def _held(taken: _Taken, fixed: Sequence[str]) -> BoolArray:

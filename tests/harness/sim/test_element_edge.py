@@ -1,0 +1,91 @@
+"""Edges of elements from what is asked for, and fillings that are made once."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ritz_box import ritz_frequencies
+
+from harness.arrays import FloatArray
+from harness.materials import MATERIALS
+from harness.mesh import Mesh
+from harness.sim import filled as filling
+from harness.sim.element_edge import FINE_SHARE, fine_edge, weyl_frequency
+from harness.sim.modal import curved
+from harness.sim.modal_solve import solve_mesh
+from harness.store import Store
+
+STEEL = MATERIALS["steel"]
+CUBE = (0.06, 0.06, 0.06)
+UNLIMITED = 1e12
+
+
+def brick(sides: tuple[float, float, float]) -> Mesh:
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * np.array(sides)
+    sides_of = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return Mesh(
+        corners, np.array([[a, b, c] for i, j, k, m in sides_of for a, b, c in ((i, j, k), (i, k, m))])
+    )
+
+
+def shear_wave(frequency: float) -> float:
+    return float(np.sqrt(STEEL.young / (2.0 * (1.0 + STEEL.poisson) * STEEL.density))) / frequency
+
+
+@pytest.mark.parametrize("sides", [CUBE, (0.06, 0.045, 0.03), (0.06, 0.05, 0.02)], ids=str)
+@pytest.mark.parametrize("poisson", [0.1, 0.4])
+def test_weyls_law_finds_the_highest_of_the_modes_asked_for(
+    sides: tuple[float, float, float], poisson: float
+) -> None:
+    of = replace(STEEL, poisson=poisson)
+    exact: FloatArray = ritz_frequencies(sides, of, 13)
+    for count in (10, 30, 60):
+        found = weyl_frequency(brick(sides), of, count, float(np.prod(sides)))
+        assert 0.98 < found / exact[count - 1] < 1.4
+
+
+def test_ten_modes_of_a_cube_are_within_a_thousandth_of_ritz_without_more_unknowns_than_that_takes() -> None:
+    cube = brick(CUBE)
+    inside, _ = filling.filled(cube, fine_edge(cube, STEEL, UNLIMITED, 10), None)
+    solved = solve_mesh(curved(inside, cube, inside), STEEL, np.inf, least=10)
+    exact = ritz_frequencies(CUBE, STEEL, 14)[:10]
+    assert np.abs(solved.modes.frequencies[:10] / exact - 1.0).max() < 1e-3
+    assert solved.unknowns < 40_000
+
+
+def test_an_edge_grows_with_the_object_and_falls_with_the_modes_asked_for() -> None:
+    small, large = (brick((scale, 0.9 * scale, 0.8 * scale)) for scale in (0.05, 0.1))
+    few, more, many = (fine_edge(small, STEEL, UNLIMITED, count) for count in (5, 20, 80))
+    assert few > more > many
+    assert fine_edge(large, STEEL, UNLIMITED, 20) == pytest.approx(2.0 * more)
+
+
+def test_a_limit_below_the_modes_asked_for_decides() -> None:
+    cube = brick(CUBE)
+    limit = 0.8 * weyl_frequency(cube, STEEL, 40, float(np.prod(CUBE)))
+    assert fine_edge(cube, STEEL, limit, 40) == pytest.approx(FINE_SHARE * shear_wave(limit), rel=1e-6)
+    assert fine_edge(cube, STEEL, limit, None) >= fine_edge(cube, STEEL, limit, 40)
+
+
+def test_a_bar_of_any_length_is_cut_across_its_section() -> None:
+    """Its section warps where it twists, however long the waves are."""
+    assert fine_edge(brick((0.2, 0.02, 0.01)), STEEL, UNLIMITED, 3) == pytest.approx(3e-3, rel=0.02)
+
+
+def test_a_surface_is_filled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cube, store = brick(CUBE), Store(tmp_path)
+    first, kept = filling.filled(cube, 0.03, store)
+    assert not kept
+
+    def never(*_: object) -> None:
+        raise AssertionError("filled again")
+
+    monkeypatch.setattr(filling, "tetrahedralize", never)
+    again, kept = filling.filled(cube, 0.03, store)
+    assert kept
+    assert (again.nodes == first.nodes).all()
+    assert (again.cells == first.cells).all()
+    for mesh, edge in ((cube, 0.029), (brick((0.06, 0.06, 0.05)), 0.03)):
+        with pytest.raises(AssertionError, match="again"):
+            filling.filled(mesh, edge, store)
