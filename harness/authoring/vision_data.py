@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.arrays import BoolArray, FloatArray, read_only
+from harness.authoring.vision_places import cosine_about, is_closed, sphere, surface_places, uniform_about
 from harness.errors import OutOfDomain, WrongUse
 from harness.mesh import Mesh
 from harness.pinhole import DirectionalLight, Pinhole
 from harness.sim.direct_image import LitObject
 from harness.sim.lambert import cosines, places_seen, radiance
-from harness.sim.mesh_repair import is_watertight
 
 APART = float(np.radians(3.0))
 """rad between anything learned from and anything judged by."""
@@ -26,7 +26,7 @@ FACING = 0.85
 
 _CHUNK = 1 << 16
 
-_LEAST_YIELD = 1e-3
+LEAST_YIELD = 1e-3
 """Of a chunk: below it nothing of the surface can be seen and nothing will come."""
 
 
@@ -187,11 +187,11 @@ def draw_tuples(lit: LitObject, count: int, seed: int, held_out: HeldOut) -> Tup
         OutOfDomain: next to nothing of the surface can be seen from outside, clear of what is kept back.
     """
     random = np.random.default_rng([seed, 73])
-    both = not _is_closed(lit.appearance.mesh)
+    both = not is_closed(lit.appearance.mesh)
     parts: list[Tuples] = []
     while sum(map(len, parts)) < count or not parts:
         part = _chunk(lit, random, held_out, both)
-        if len(part) < _LEAST_YIELD * _CHUNK:
+        if len(part) < LEAST_YIELD * _CHUNK:
             raise OutOfDomain(
                 f"{len(part)} of {_CHUNK} places drawn can be seen from outside and are clear of what is "
                 "kept back; turn the mesh inside out, or keep back less"
@@ -210,9 +210,9 @@ def _chunk(lit: LitObject, random: np.random.Generator, held_out: HeldOut, both:
     faces, weights = surface_places(mesh, _CHUNK, random)
     side = np.where(random.random(_CHUNK) < 0.5, -1.0, 1.0) if both else np.ones(_CHUNK)
     outward = side[:, None] * mesh.face_normals[faces]
-    views = -_cosine_about(outward, random)
+    views = -cosine_about(outward, random)
     lights = np.where(
-        random.random((_CHUNK, 1)) < FACING, _uniform_about(outward, random), sphere(_CHUNK, random)
+        random.random((_CHUNK, 1)) < FACING, uniform_about(outward, random), sphere(_CHUNK, random)
     )
     corners = mesh.corners[faces]
     points = corners[:, 0] + np.einsum("nk,nkx->nx", weights, corners[:, 1:] - corners[:, :1])
@@ -229,44 +229,8 @@ def _chunk(lit: LitObject, random: np.random.Generator, held_out: HeldOut, both:
     return Tuples(places.points, views[seen], lights[seen], visible, places.normals, colours)
 
 
-def surface_places(mesh: Mesh, count: int, random: np.random.Generator) -> tuple[IntArray, FloatArray]:
-    """``(n,)`` faces and ``(n, 2)`` weights of their second and third corners, uniform over the area."""
-    share = np.cumsum(mesh.face_areas)
-    faces = np.searchsorted(share, random.random(count) * share[-1], side="right")
-    weights = random.random((count, 2))
-    # The far half of the square of weights, folded onto the triangle.
-    folded = np.where(weights.sum(axis=1, keepdims=True) > 1.0, 1.0 - weights, weights)
-    return np.minimum(faces, len(share) - 1).astype(np.int64), folded
-
-
-def sphere(count: int, random: np.random.Generator) -> FloatArray:
-    """``(n, 3)`` unit, uniform."""
-    drawn = random.standard_normal((count, 3))
-    return np.asarray(drawn / np.linalg.norm(drawn, axis=1, keepdims=True))
-
-
-def _uniform_about(normals: FloatArray, random: np.random.Generator) -> FloatArray:
-    drawn = sphere(len(normals), random)
-    away = np.sign(np.einsum("nx,nx->n", drawn, normals))
-    return np.asarray(drawn * np.where(away < 0.0, -1.0, 1.0)[:, None])
-
-
-def _cosine_about(normals: FloatArray, random: np.random.Generator) -> FloatArray:
-    """A unit normal plus a place on the unit ball is a direction drawn with the cosine."""
-    total = normals + (1.0 - 1e-6) * sphere(len(normals), random)
-    return np.asarray(total / np.linalg.norm(total, axis=1, keepdims=True))
-
-
 def _facing(cameras: tuple[Pinhole, ...], mesh: Mesh, random: np.random.Generator) -> FloatArray:
     """``(n, 3)`` unit: a light for each camera, from its side: what lies in the dark judges nothing."""
     middle = mesh.bounds.mean(axis=0)
     towards = np.stack([camera.eye - middle for camera in cameras])
-    return _uniform_about(towards, random)
-
-
-def _is_closed(mesh: Mesh) -> bool:
-    """Whether there is no border, seams of textures aside."""
-    _, place_of = np.unique(mesh.vertices, axis=0, return_inverse=True)
-    faces = place_of.reshape(-1)[mesh.faces]
-    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return is_watertight(faces[whole])
+    return uniform_about(towards, random)

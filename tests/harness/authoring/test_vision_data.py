@@ -11,9 +11,8 @@ from harness.authoring.vision_data import (
     draw_tuples,
     draw_views,
     held_out_pictures,
-    sphere,
-    surface_places,
 )
+from harness.authoring.vision_places import sphere, surface_places
 from harness.errors import OutOfDomain, WrongUse
 from harness.mesh import Mesh
 from harness.pinhole import DirectionalLight, Pinhole

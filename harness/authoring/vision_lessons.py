@@ -1,0 +1,153 @@
+"""What networks that are told visibility and normal learn from: places along views, and lamps.
+
+A matt surface that is told whether the lamp is seen needs no ray towards it: under any lamp on its side the
+light is albedo times cosine, and nothing where the lamp is hidden. So places are drawn once and lit anew at
+every step. Each place is moved along the view that sees it, before and behind the surface, as samples of a
+ray are: there the networks must answer with the same colour, and with a density that the ray stops at.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.arrays import AnyArray, FloatArray
+from harness.authoring.vision_data import LEAST_YIELD, HeldOut
+from harness.authoring.vision_places import cosine_about, is_closed, sphere, surface_places
+from harness.errors import OutOfDomain
+from harness.mesh import Mesh
+from harness.sim.direct_image import LitObject
+from harness.sim.lambert import places_seen
+
+AHEAD = 0.25
+"""Voxels before the surface at which the density begins, along the normal: what networks err by."""
+
+_CHUNK = 1 << 16
+
+_NEAR, _BEHIND, _BEFORE = 0.75, 0.5, 4.0
+"""Voxels along a view: before and behind the surface whose colours count, and farthest before it."""
+
+_SHALLOW = 1.8
+"""Voxels along the normal: farther before the surface the shell has no voxel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """Places that are asked, n of each.
+
+    Attributes:
+        points: ``(n, 3)`` m, object frame: beside the surface.
+        normals: ``(n, 3)`` float32 unit, of the surface there, on the side that is seen.
+        albedo: ``(n, 3)`` float32, linear.
+        depth: ``(n,)`` float32, voxels behind where the density begins, -1 to 1: below zero is empty.
+        weight: ``(n,)`` float32, of the colour; 0 where no ray takes it from.
+    """
+
+    points: FloatArray
+    normals: AnyArray
+    albedo: AnyArray
+    depth: AnyArray
+    weight: AnyArray
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def draw_lessons(lit: LitObject, count: int, voxel: float, seed: int, held_out: HeldOut) -> Lessons:
+    """So many places, as dense as pixels of pictures from everywhere far away.
+
+    Args:
+        lit: the object.
+        count: one or more.
+        voxel: m, of the shell.
+        seed: of all that is drawn.
+        held_out: no place is drawn as one of its cameras sees it.
+
+    Raises:
+        OutOfDomain: next to nothing of the surface can be seen from outside, clear of what is kept back.
+    """
+    random, mesh = np.random.default_rng([seed, 74]), lit.appearance.mesh
+    both, drawn = not is_closed(mesh), 0
+    parts: list[Lessons] = []
+    while drawn < count or not parts:
+        part = _chunk(lit, voxel, random, held_out, both)
+        if len(part) < LEAST_YIELD * _CHUNK:
+            raise OutOfDomain(
+                f"{len(part)} of {_CHUNK} places drawn can be seen from outside and are clear of what is "
+                "kept back; turn the mesh inside out, or keep back less"
+            )
+        parts.append(part)
+        drawn += len(part)
+    names = ("points", "normals", "albedo", "depth", "weight")
+    return Lessons(*(np.concatenate([part.__dict__[name] for part in parts])[:count] for name in names))
+
+
+def draw_lamps(count: int, seed: int, held_out: HeldOut) -> AnyArray:
+    """``(count, 3)`` float32 unit directions: neither one of them nor its opposite is near one kept back.
+
+    Raises:
+        OutOfDomain: what is kept back leaves no room.
+    """
+    random, found = np.random.default_rng([seed, 75]), np.empty((0, 3))
+    for _ in range(1000):
+        if len(found) >= count:
+            return found[:count].astype(np.float32)
+        drawn = sphere(count, random)
+        clear = held_out.clear_of_lights(drawn) & held_out.clear_of_lights(-drawn)
+        found = np.concatenate([found, drawn[clear]])
+    raise OutOfDomain(
+        f"{len(found)} of {count} lamps are clear of {len(held_out.lights)} kept back by "
+        f"{np.degrees(held_out.apart):g} deg; keep back fewer, or a smaller angle"
+    )
+
+
+def _chunk(
+    lit: LitObject, voxel: float, random: np.random.Generator, held_out: HeldOut, both: bool
+) -> Lessons:
+    faces, weights, points, views = _looked_at(lit.appearance.mesh, random, both)
+    offsets = _offsets(random)
+    clear = np.flatnonzero(held_out.clear_of_views(points, views))
+    seen = clear[lit.rays.free(points[clear], -views[clear], faces[clear])] if len(clear) else clear
+    places = places_seen(lit.appearance, faces[seen], weights[seen], views[seen])
+    slope = np.maximum(-np.einsum("nx,nx->n", views[seen], places.flat), 1e-3)
+    along, weight = _along(offsets[seen], slope)
+    return Lessons(
+        places.points + (along * voxel)[:, None] * views[seen],
+        places.normals.astype(np.float32),
+        places.albedo.astype(np.float32),
+        np.clip(AHEAD + along * slope, -1.0, 1.0).astype(np.float32),
+        weight.astype(np.float32),
+    )
+
+
+def _looked_at(
+    mesh: Mesh, random: np.random.Generator, both: bool
+) -> tuple[AnyArray, FloatArray, FloatArray, FloatArray]:
+    """Faces, weights, points and views, drawn as ``vision_data.draw_tuples`` does."""
+    faces, weights = surface_places(mesh, _CHUNK, random)
+    side = np.where(random.random(_CHUNK) < 0.5, -1.0, 1.0) if both else np.ones(_CHUNK)
+    views = -cosine_about(side[:, None] * mesh.face_normals[faces], random)
+    corners = mesh.corners[faces]
+    points = corners[:, 0] + np.einsum("nk,nkx->nx", weights, corners[:, 1:] - corners[:, :1])
+    return faces, weights, points, views
+
+
+def _offsets(random: np.random.Generator) -> FloatArray:
+    """``(n, 2)`` what kind of place along the view, and where of its kind, 0 to 1."""
+    return random.random((_CHUNK, 2))
+
+
+def _along(offsets: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Voxels behind the surface along the view, and how much the colour there counts.
+
+    Most are where rays take their colour from, some before it, some behind.
+
+    Args:
+        offsets: of ``_offsets``.
+        slope: ``(n,)`` cosine between view and face.
+    """
+    kind, share = offsets.T
+    near = -_NEAR + (_NEAR + _BEHIND) * share
+    before = -np.minimum(_SHALLOW * share / slope, _BEFORE)
+    along = np.where(kind < 0.65, near, np.where(kind < 0.85, before, _BEHIND + 0.5 * share))
+    weight = np.where(along < -_NEAR, 0.0, np.where(along <= _BEHIND, 1.0, 0.3))
+    return along, weight
