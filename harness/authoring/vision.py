@@ -14,9 +14,9 @@ from harness.authoring.training import Report, train
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
 from harness.authoring.vision_lessons import draw_lamps, draw_lessons
-from harness.authoring.vision_metrics import judge, picture_errors
+from harness.authoring.vision_metrics import network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision_profiles import CellsSpec, VisionProfile
-from harness.errors import WrongUse
+from harness.linear_image import LinearImage
 from harness.objectfile.vision_graph import vision_graph
 from harness.objectfile.vision_network import VisionModel
 from harness.objectfile.vision_render import VisionRenderer
@@ -30,7 +30,16 @@ CHECKPOINT = ".vision_training.npz"
 OPAQUE = 40.0
 """Optical thickness of a voxel as deep behind the surface as a voxel is wide."""
 
+STRICT = "strict_"
+"""Before the names of errors and times of networks that are told no more than the paper's."""
+
+STRICT_CHECKPOINT = ".vision_strict_training.npz"
+
 _LAMPS = 1 << 14
+"""That are drawn from."""
+
+_LAMPS_OF_A_PLACE = 4
+"""Of networks that are not told visibility: a ray for each."""
 
 Settings = dict[str, str | float | int | bool | None]
 
@@ -41,7 +50,8 @@ class AuthoredVision:
 
     Attributes:
         model: in float16, to be written; for the look's mesh.
-        errors: of pictures kept back, by a name with its unit (``vision_metrics.picture_errors``).
+        errors: of pictures kept back, by a name with its unit (``vision_metrics.picture_errors``); those of
+            networks told no more than the paper's begin with ``strict_``.
         settings: how they were made.
         seconds: s on the clock of each stage.
     """
@@ -71,46 +81,62 @@ def author_vision(
         threads: None for as many as the process has cores; the networks are the same for any number.
 
     Raises:
-        WrongUse: networks of a kind that this does not train.
         MeshRefused: a surface without extent.
         OutOfDomain: nothing of the surface can be seen from outside.
         DataRefused: a checkpoint in the folder that cannot be gone on from.
     """
-    clock = _Clock()
-    lit, spec = LitObject(look), profile.networks
+    clock, lit = _Clock(), LitObject(look)
     held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, seed)
-    report("drawing places", 0.0)
-    training = _training(lit, spec, held_out, seed, threads)
-    clock.lap("places")
-    train(training, training.epochs, folder / CHECKPOINT, report)
+    made = _Making(lit, held_out, seed, report, threads, clock)
+    training = made.trained(profile.networks, folder / CHECKPOINT, "")
     model = training.finish()
-    clock.lap("networks")
-    report("measuring", 0.0)
-    data = vision_graph(model).SerializeToString()
-    judged = judge(lit, VisionRenderer(data, look.mesh, threads), held_out, profile.samples)
-    clock.lap("measure")
-    errors = dict(picture_errors(judged.references, judged.found)) | {"bytes": float(len(data))}
-    return AuthoredVision(model, errors, _settings(spec, training), clock.seconds)
+    references = reference_pictures(lit, held_out, profile.samples)
+    errors = made.judged(model, references, "")
+    if profile.strict is not None:
+        strict = made.trained(profile.strict, folder / STRICT_CHECKPOINT, STRICT)
+        errors |= made.judged(strict.finish(), references, STRICT)
+    return AuthoredVision(model, errors, _settings(profile.networks, training), clock.seconds)
 
 
-def _training(
-    lit: LitObject, spec: CellsSpec, held_out: HeldOut, seed: int, threads: int | None
-) -> CellTraining:
-    if spec.size.kind != "osf-v":
-        raise WrongUse(
-            f"networks of kind {spec.size.kind!r} were asked for; those of kind 'osf-v' are trained here"
+@dataclass(frozen=True, eq=False)
+class _Making:
+    """What all networks of an object have in common; names of their times and errors begin with a word."""
+
+    lit: LitObject
+    held_out: HeldOut
+    seed: int
+    report: Report
+    threads: int | None
+    clock: "_Clock"
+
+    def trained(self, spec: CellsSpec, checkpoint: Path, word: str) -> CellTraining:
+        self.report(f"drawing places {word}".rstrip("_ "), 0.0)
+        lattice, told = lattice_of(self.lit.appearance.mesh, spec.cells), spec.size.kind == "osf-v"
+        shell = surface_shell(self.lit.appearance.mesh, lattice)
+        lessons = draw_lessons(
+            *(self.lit, spec.places, shell.voxel, self.seed, self.held_out), 0 if told else _LAMPS_OF_A_PLACE
         )
-    lattice = lattice_of(lit.appearance.mesh, spec.cells)
-    shell = surface_shell(lit.appearance.mesh, lattice)
-    lessons = draw_lessons(lit, spec.places, shell.voxel, seed, held_out)
-    lamps = draw_lamps(_LAMPS, seed, held_out)
-    return CellTraining(spec, grid_of(shell, lattice), lessons, lamps, OPAQUE / shell.voxel, seed, threads)
+        lamps = draw_lamps(_LAMPS if told else 0, self.seed, self.held_out)
+        grid, scale = grid_of(shell, lattice), OPAQUE / shell.voxel
+        training = CellTraining(spec, grid, lessons, lamps, scale, self.seed, self.threads)
+        self.clock.lap(f"{word}places")
+        train(training, training.epochs, checkpoint, self.report)
+        self.clock.lap(f"{word}networks")
+        return training
+
+    def judged(self, model: VisionModel, references: list[LinearImage], word: str) -> dict[str, float]:
+        self.report("measuring", 0.0)
+        data = vision_graph(model).SerializeToString()
+        renderer = VisionRenderer(data, self.lit.appearance.mesh, self.threads)
+        found = network_pictures(renderer, self.held_out)
+        self.clock.lap(f"{word}measure")
+        errors = dict(picture_errors(references, found)) | {"bytes": float(len(data))}
+        return {f"{word}{name}": value for name, value in errors.items()}
 
 
 def _settings(spec: CellsSpec, training: CellTraining) -> Settings:
     told = {key: value for key, value in asdict(spec).items() if key != "size"}
-    losses = training.losses
-    return asdict(spec.size) | told | {"last_loss": sum(losses) / len(losses)}
+    return asdict(spec.size) | told | {"last_loss": sum(training.losses) / len(training.losses)}
 
 
 class _Clock:

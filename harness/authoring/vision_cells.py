@@ -45,7 +45,8 @@ class CellTraining:
         spec: of the networks.
         grid: of the cells.
         lessons: what all learn from.
-        lamps: ``(m, 3)`` float32, whose light is drawn anew at every step.
+        lamps: ``(m, 3)`` float32, drawn anew at every step for networks that are told visibility and
+            normal; ``(0, 3)`` where each lesson has a lamp of its own.
         density_scale: 1/m of a density of 1.
         seed: of first weights, and of what is drawn.
         threads: None for as many as the process has cores.
@@ -72,7 +73,7 @@ class CellTraining:
         self._identity = digest(
             [
                 *("vision cells", VERSION, list(astuple(spec)), seed, grid.low, grid.cell, grid.cells),
-                *(lessons.points, lessons.normals, lessons.albedo, lamps, density_scale),
+                *(lessons.points, lessons.normals, lessons.colours, lessons.lamps, lamps, density_scale),
             ]
         )
 
@@ -157,9 +158,19 @@ class CellTraining:
         encoded = np.empty((len(at), size.place), np.float32)
         encode(place, octave_factors(size), 0, encoded)
         return Lesson(
-            *(encoded, np.empty((len(at), 0), np.float32), lessons.normals[at], lessons.albedo[at]),
+            *(encoded, self._told(at), lessons.normals[at], lessons.colours[at]),
             *(lessons.depth[at], lessons.weight[at], self._lamps),
         )
+
+    def _told(self, at: IntArray) -> AnyArray:
+        """What places with lamps of their own tell the later layer; nothing where lamps are drawn anew."""
+        size, lessons = self._spec.size, self._lessons
+        if not lessons.lamps.shape[1]:
+            return np.empty((len(at), 0), np.float32)
+        told, ones = np.empty((len(at), 2 * size.direction), np.float32), np.ones(size.turns, np.float32)
+        encode(lessons.views[at], ones, 0, told)
+        encode(lessons.lamps[at], ones, size.direction, told)
+        return told
 
 
 def local_places(grid: VisionGrid, cell: int, points: FloatArray) -> AnyArray:

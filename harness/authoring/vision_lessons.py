@@ -1,22 +1,24 @@
-"""What networks that are told visibility and normal learn from: places along views, and lamps.
+"""What tiny networks learn from: places along views, and lamps.
 
-A matt surface that is told whether the lamp is seen needs no ray towards it: under any lamp on its side the
-light is albedo times cosine, and nothing where the lamp is hidden. So places are drawn once and lit anew at
-every step. Each place is moved along the view that sees it, before and behind the surface, as samples of a
-ray are: there the networks must answer with the same colour, and with a density that the ray stops at.
+A network that is told whether the lamp is seen needs no ray towards it: under any lamp on its side a matt
+surface shines albedo times cosine, and nothing where the lamp is hidden. So its places are drawn once and
+lit anew at every step. One that is not told gets places with lamps of their own, each by a ray.
+
+Each place is moved along the view that sees it, before and behind the surface, as samples of a ray are:
+there the networks must answer with the same colour, and with a density that the ray stops at.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
-from harness.authoring.vision_data import LEAST_YIELD, HeldOut
-from harness.authoring.vision_places import cosine_about, is_closed, sphere, surface_places
+from harness.authoring.vision_data import FACING, LEAST_YIELD, HeldOut
+from harness.authoring.vision_places import cosine_about, is_closed, sphere, surface_places, uniform_about
 from harness.errors import OutOfDomain
 from harness.mesh import Mesh
 from harness.sim.direct_image import LitObject
-from harness.sim.lambert import places_seen
+from harness.sim.lambert import Places, cosines, places_seen, radiance
 
 AHEAD = 0.25
 """Voxels before the surface at which the density begins, along the normal: what networks err by."""
@@ -37,22 +39,28 @@ class Lessons:
     Attributes:
         points: ``(n, 3)`` m, object frame: beside the surface.
         normals: ``(n, 3)`` float32 unit, of the surface there, on the side that is seen.
-        albedo: ``(n, 3)`` float32, linear.
+        colours: ``(n, 3)`` float32, linear: albedo; what leaves it where it has a lamp of its own.
         depth: ``(n,)`` float32, voxels behind where the density begins, -1 to 1: below zero is empty.
         weight: ``(n,)`` float32, of the colour; 0 where no ray takes it from.
+        views: ``(n, 3)`` float32 unit, from the camera.
+        lamps: ``(n, 3)`` float32 unit, towards a lamp of its own; ``(n, 0)`` without.
     """
 
     points: FloatArray
     normals: AnyArray
-    albedo: AnyArray
+    colours: AnyArray
     depth: AnyArray
     weight: AnyArray
+    views: AnyArray
+    lamps: AnyArray
 
     def __len__(self) -> int:
         return len(self.points)
 
 
-def draw_lessons(lit: LitObject, count: int, voxel: float, seed: int, held_out: HeldOut) -> Lessons:
+def draw_lessons(
+    lit: LitObject, count: int, voxel: float, seed: int, held_out: HeldOut, lamps: int = 0
+) -> Lessons:
     """So many places, as dense as pixels of pictures from everywhere far away.
 
     Args:
@@ -60,7 +68,8 @@ def draw_lessons(lit: LitObject, count: int, voxel: float, seed: int, held_out: 
         count: one or more.
         voxel: m, of the shell.
         seed: of all that is drawn.
-        held_out: no place is drawn as one of its cameras sees it.
+        held_out: no place is drawn as one of its cameras sees it, and no lamp near one of its lights.
+        lamps: of its own that each place is asked with, one after the other; 0 for albedo in their stead.
 
     Raises:
         OutOfDomain: next to nothing of the surface can be seen from outside, clear of what is kept back.
@@ -69,7 +78,7 @@ def draw_lessons(lit: LitObject, count: int, voxel: float, seed: int, held_out: 
     both, drawn = not is_closed(mesh), 0
     parts: list[Lessons] = []
     while drawn < count or not parts:
-        part = _chunk(lit, voxel, random, held_out, both)
+        part = _chunk(lit, voxel, random, held_out, both, lamps)
         if len(part) < LEAST_YIELD * _CHUNK:
             raise OutOfDomain(
                 f"{len(part)} of {_CHUNK} places drawn can be seen from outside and are clear of what is "
@@ -77,7 +86,7 @@ def draw_lessons(lit: LitObject, count: int, voxel: float, seed: int, held_out: 
             )
         parts.append(part)
         drawn += len(part)
-    names = ("points", "normals", "albedo", "depth", "weight")
+    names = [field.name for field in fields(Lessons)]
     return Lessons(*(np.concatenate([part.__dict__[name] for part in parts])[:count] for name in names))
 
 
@@ -101,7 +110,7 @@ def draw_lamps(count: int, seed: int, held_out: HeldOut) -> AnyArray:
 
 
 def _chunk(
-    lit: LitObject, voxel: float, random: np.random.Generator, held_out: HeldOut, both: bool
+    lit: LitObject, voxel: float, random: np.random.Generator, held_out: HeldOut, both: bool, lamps: int
 ) -> Lessons:
     faces, weights, points, views = _looked_at(lit.appearance.mesh, random, both)
     offsets = _offsets(random)
@@ -110,13 +119,41 @@ def _chunk(
     places = places_seen(lit.appearance, faces[seen], weights[seen], views[seen])
     slope = np.maximum(-np.einsum("nx,nx->n", views[seen], places.flat), 1e-3)
     along, weight = _along(offsets[seen], slope)
-    return Lessons(
+    lessons = Lessons(
         places.points + (along * voxel)[:, None] * views[seen],
         places.normals.astype(np.float32),
         places.albedo.astype(np.float32),
         np.clip(AHEAD + along * slope, -1.0, 1.0).astype(np.float32),
         weight.astype(np.float32),
+        views[seen].astype(np.float32),
+        np.empty((len(seen), 0), np.float32),
     )
+    return _lit(lit, places, lessons, random, held_out, lamps) if lamps else lessons
+
+
+def _lit(
+    lit: LitObject,
+    places: Places,
+    lessons: Lessons,
+    random: np.random.Generator,
+    held_out: HeldOut,
+    lamps: int,
+) -> Lessons:
+    """Each place so many times, under a lamp of its own each time; those near one kept back are left out."""
+    at = np.repeat(np.arange(len(places)), lamps)
+    ways = np.where(
+        random.random((len(at), 1)) < FACING, uniform_about(places.flat[at], random), sphere(len(at), random)
+    )
+    kept = held_out.clear_of_lights(ways)
+    at, ways = at[kept], ways[kept]
+    again = Places(*(getattr(places, field.name)[at] for field in fields(Places)))
+    cosine = cosines(again, ways, lit.appearance.mesh.diagonal)
+    faced = np.flatnonzero(cosine > 0.0)
+    free = lit.rays.free(again.lifted[faced], ways[faced], again.faces[faced]) if len(faced) else faced > 0
+    cosine[faced[~free]] = 0.0
+    colours = radiance(again, np.pi * cosine).astype(np.float32)
+    repeated = {field.name: getattr(lessons, field.name)[at] for field in fields(Lessons)}
+    return replace(Lessons(**repeated), colours=colours, lamps=ways.astype(np.float32))
 
 
 def _looked_at(

@@ -1,7 +1,6 @@
 """What networks of vision are worth: pictures of cameras and lights that nothing was learned from."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,50 +9,39 @@ from harness.image_metrics import psnr, ssim
 from harness.linear_image import LinearImage
 from harness.objectfile.vision_render import VisionRenderer
 from harness.objectfile.vision_settings import RenderSettings
+from harness.pinhole import DirectionalLight, Pinhole
 from harness.sim.direct_image import LitObject
 
 BEHIND = 1.0
 """White, as ObjectFolder's pictures have it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """Pictures and what they are judged by.
-
-    Attributes:
-        references: exact, anti-aliased.
-        found: from the networks.
-        samples: networks were asked for, of all pictures.
-    """
-
-    references: tuple[LinearImage, ...]
-    found: tuple[LinearImage, ...]
-    samples: int
-
-
-def judge(
-    lit: LitObject,
-    renderer: VisionRenderer,
-    held_out: HeldOut,
-    samples: int,
-    settings: RenderSettings | None = None,
-) -> Judged:
-    """Draw every picture that was kept back, twice.
+def reference_pictures(lit: LitObject, held_out: HeldOut, samples: int) -> list[LinearImage]:
+    """Exact ones, anti-aliased.
 
     Args:
         lit: the object.
-        renderer: of its networks.
         held_out: one picture for each camera and its light.
-        samples: a side of a pixel, of the reference.
+        samples: a side of a pixel.
+    """
+    return [lit.render(camera, [light], samples).image for camera, light in _kept(held_out)]
+
+
+def network_pictures(
+    renderer: VisionRenderer, held_out: HeldOut, settings: RenderSettings | None = None
+) -> list[LinearImage]:
+    """The same from networks.
+
+    Args:
+        renderer: of them.
+        held_out: one picture for each camera and its light.
         settings: of the renderer; None for the default.
     """
-    references, found, asked = [], [], 0
-    for camera, light in zip(held_out.cameras, held_out.lights, strict=True):
-        references.append(lit.render(camera, [light], samples).image)
-        rendered = renderer.render(camera, light, settings)
-        found.append(rendered.image)
-        asked += rendered.samples
-    return Judged(tuple(references), tuple(found), asked)
+    return [renderer.render(camera, light, settings).image for camera, light in _kept(held_out)]
+
+
+def _kept(held_out: HeldOut) -> "zip[tuple[Pinhole, DirectionalLight]]":
+    return zip(held_out.cameras, held_out.lights, strict=True)
 
 
 def picture_errors(references: Sequence[LinearImage], found: Sequence[LinearImage]) -> Mapping[str, float]:

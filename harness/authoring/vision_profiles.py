@@ -1,7 +1,7 @@
 """Which networks of vision are made, and at what price: the profiles of ``object build --only vision``."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from harness.errors import WrongUse
@@ -56,6 +56,7 @@ class VisionProfile:
 
     Attributes:
         networks: that are made.
+        strict: networks told no more than the paper's, made and judged beside and not kept; None for none.
         pictures: kept back, by which they are judged.
         side: pixels of those pictures.
         samples: a side of a pixel of the reference.
@@ -63,10 +64,15 @@ class VisionProfile:
 
     networks: CellsSpec
     pictures: int
+    strict: CellsSpec | None = None
     side: int = 256
     samples: int = 4
 
     def __post_init__(self) -> None:
+        if self.strict is not None and self.strict.size.kind != "osf":
+            raise WrongUse(
+                f"networks of kind {self.strict.size.kind!r} are told more than the paper's, which is 'osf'"
+            )
         if min(self.pictures, self.side, self.samples) < 1:
             raise WrongUse(
                 f"{self.pictures} pictures of {self.side} pixels with {self.samples} samples judge nothing; "
@@ -78,7 +84,11 @@ _COMPACT = NetworkSize(width=32, octaves=6, turns=3, kind="osf-v")
 
 VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
     "smoke": VisionProfile(CellsSpec(_COMPACT), pictures=4),
-    "standard": VisionProfile(CellsSpec(_COMPACT, places=4_000_000, steps=20_000), pictures=12),
+    "standard": VisionProfile(
+        CellsSpec(_COMPACT, places=4_000_000, steps=20_000),
+        pictures=12,
+        strict=CellsSpec(replace(_COMPACT, kind="osf"), places=8_000_000, steps=4000),
+    ),
 })  # fmt: skip
 """None of them needs torch."""
 

@@ -206,7 +206,7 @@ def test_lessons_lie_along_views_of_the_surface() -> None:
     clear = np.abs(lessons.depth) < 1.0
     assert lessons.depth[clear] == pytest.approx(behind[clear] + AHEAD, abs=0.5)
     assert np.all(lessons.depth[behind < -1.6] == -1.0)
-    assert np.all(lessons.albedo == np.array([0.7, 0.4, 0.1], np.float32))
+    assert np.all(lessons.colours == np.array([0.7, 0.4, 0.1], np.float32))
 
 
 def test_lessons_and_lamps_are_clear_of_what_is_kept_back(lit: LitObject) -> None:
