@@ -56,6 +56,10 @@ COMMANDS = {
     "mock-lab": Command(
         "experiments.commands.mock_lab:mock_lab", "Keep a mocked bench running, to try drivers on."
     ),
+    "depth": Command(
+        "experiments.commands.depth:depth",
+        "How deep a gel is pressed, from live pictures of it, with the error of every pixel.",
+    ),
     "tables localization": Command(
         "experiments.commands.tables:localization",
         "Localization error over objects, seeds and methods; stops and resumes at will.",
@@ -66,7 +70,7 @@ COMMANDS = {
     ),
     "object build": Command(
         "experiments.commands.object_build:build",
-        "Build an object's sound: modes, a network of their shapes, and its errors.",
+        "Build an object's sound, touch or look: networks, and what they are off by.",
     ),
     "object info": Command(
         "experiments.commands.object:info", "Say what an ObjectFile holds: modes, networks, sources, licence."

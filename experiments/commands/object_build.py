@@ -25,7 +25,7 @@ def build(
     mesh: Annotated[str, typer.Argument(help="A mesh file, or builtin:mug and so on.", metavar="MESH")],
     out: Annotated[Path, typer.Option(help="The ObjectFile's folder.", metavar="FOLDER")],
     material: Annotated[str, typer.Option(help="What it is made of.", metavar="M")],
-    only: Annotated[str, typer.Option(help="Which modality: audio or touch.")] = "audio",
+    only: Annotated[str, typer.Option(help="Which modality: audio, touch or vision.")] = "audio",
     profile: Annotated[
         str, typer.Option(help="smoke or standard (no torch), small (of audio), or paper: its perceptrons.")
     ] = "standard",
@@ -45,11 +45,16 @@ def build(
     licence: Annotated[str, typer.Option(help="Of the mesh, and so of the ObjectFile.")] = "unknown",
     seed: Annotated[int, typer.Option(help="Of everything random.", min=0)] = 0,
     threads: Annotated[
-        int, typer.Option(help="Of a training; with 1 a resumed one ends in the same bits.", min=1)
-    ] = 1,
+        int | None,
+        typer.Option(
+            help="Of a training: 1, and as many as cores for vision; a resumed one of sound or touch "
+            "ends in the same bits with 1.",
+            min=1,
+        ),
+    ] = None,
     json: options.Json = False,
 ) -> int:
-    """Build an object's sound or touch: networks, and their errors where they never looked.
+    """Build an object's sound, touch or look: networks, and their errors where they never looked.
 
     Sound: a tenth of the nodes is held out. Errors there stand beside those of the nearest trained vertex,
     of linear interpolation, and of a float16 table at its own nodes. A stopped build goes on when it is
@@ -58,6 +63,9 @@ def build(
     Touch: the surface is coded, and its maps of presses that were never shown are compared with the
     simulator's (PSNR of 2 mm), beside the nearest coded place's and an untouched gel. --up-to, --modes and
     --edge are of sound alone.
+
+    Vision: tiny networks of the file's own colours, as the mesh's texture says them, measured on pictures
+    whose cameras and lights were kept back. A stopped training goes on when it is called again.
 
     Try: touchstone object build builtin:bowl --material ceramic --profile smoke --out objects/bowl
     """
@@ -71,9 +79,14 @@ def build(
         from experiments.commands.object_build_touch import build_touch_part
 
         thick = options.quantity("--wall", wall, LENGTH)
-        return build_touch_part(mesh, material, profile, units, thick, licence, seed, out, threads, json)
+        return build_touch_part(mesh, material, profile, units, thick, licence, seed, out, threads or 1, json)
+    if only == "vision":
+        from experiments.commands.object_build_vision import build_vision_part
+
+        thick = options.quantity("--wall", wall, LENGTH)
+        return build_vision_part(mesh, material, profile, units, thick, licence, seed, out, threads, json)
     if only != "audio":
-        raise WrongUse(f"--only {only} cannot be built; there is audio, and touch")
+        raise WrongUse(f"--only {only} cannot be built; there is audio, touch and vision")
     wanted = ObjectRequest(
         mesh=mesh,
         material=named(material),
@@ -87,7 +100,7 @@ def build(
         seed=seed,
     )
     with share_progress() as report:
-        built = build_audio(wanted, out, Store(default_folder()), report, threads)
+        built = build_audio(wanted, out, Store(default_folder()), report, threads or 1)
     for sentence in built.said:
         warn(sentence)
     if json:

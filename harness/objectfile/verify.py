@@ -82,6 +82,12 @@ def _bytes(of: ObjectFile, entry: FileEntry) -> str:
 def _no_others(of: ObjectFile) -> str:
     known = {DESCRIPTION, *(entry.file for entry in of.description.files)}
     others = sorted(path.name for path in of.folder.iterdir() if path.name not in known)
+    stopped = [name for name in others if name.startswith(".") and name.endswith("_training.npz")]
+    if stopped:
+        raise DataRefused(
+            f"{', '.join(stopped)}: a training was stopped; go on with it by the same "
+            "`touchstone object build`, or delete it"
+        )
     if others:
         raise DataRefused(
             f"{', '.join(others[:5])}: in the folder and not in object.json; "

@@ -68,7 +68,7 @@ def test_a_folder_of_another_object_is_refused(block: Path, capsys: pytest.Captu
     ("more", "said"),
     [
         (("--profile", "fine"), "no profile"),
-        (("--only", "vision"), "there is audio"),
+        (("--only", "smell"), "there is audio, touch and vision"),
         (("--up-to", "20"), "--up-to"),
         (("--material", "cheese"), "no material"),
     ],

@@ -1,0 +1,146 @@
+"""From a file with its colours to an ObjectFile with a look: intake, training, measurement, writing."""
+
+import hashlib
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.authoring.object_source import created_object, source_of, surface_of
+from harness.authoring.training import Report
+from harness.authoring.vision import CHECKPOINT, AuthoredVision, author_vision
+from harness.authoring.vision_profiles import vision_profile
+from harness.code_version import content_hash
+from harness.materials import Material
+from harness.mesh import Mesh
+from harness.objectfile.entries import Provenance, Source
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.same_object import is_same_surface
+from harness.objectfile.vision_part import VisionPart, with_vision
+from harness.scene import BUILTIN
+from harness.sim.appearance import Appearance
+from harness.sim.appearance_source import appearance_of
+
+
+@dataclass(frozen=True, eq=False)
+class VisionRequest:
+    """What is to be built.
+
+    Attributes:
+        mesh: a file of a surface with its colours, or ``builtin:`` and a name.
+        material: it is of; a look does not ask, an ObjectFile says.
+        profile: of ``vision_profiles.VISION_PROFILES``.
+        units: of the file's numbers; None to take the only ones that make sense.
+        wall: m, of a hollow thing of which the file has the outside; a picture is of the file's faces.
+        licence: of the mesh, and so of the ObjectFile.
+        seed: of everything random.
+    """
+
+    mesh: str
+    material: Material
+    profile: str = "standard"
+    units: str | None = None
+    wall: float | None = None
+    licence: str = "unknown"
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltVision:
+    """An ObjectFile and how it came about.
+
+    Attributes:
+        object: on disk.
+        vision: its networks and errors.
+        said: what was done to the mesh and its colours, and what to look at.
+        seconds: s on the clock of each stage.
+    """
+
+    object: ObjectFile
+    vision: AuthoredVision
+    said: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+
+def build_vision(wanted: VisionRequest, out: Path, report: Report, threads: int | None = None) -> BuiltVision:
+    """Build an object's look, or go on with a training that was stopped.
+
+    Args:
+        wanted: what.
+        out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
+        report: told of progress.
+        threads: of a training; None for as many as the process has cores.
+
+    Raises:
+        WrongUse: options that cannot be.
+        MeshRefused: a mesh that cannot stand for an object.
+        DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
+    """
+    chosen = vision_profile(wanted.profile)
+    begun = time.perf_counter()
+    report("reading the mesh and its colours", 0.0)
+    source = source_of(wanted.mesh, wanted.licence)
+    taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
+    look = appearance_of(wanted.mesh, taken.units)
+    created = created_object(wanted.mesh, wanted.licence, wanted.material, taken.mesh, out, source)
+    read = time.perf_counter() - begun
+    vision = author_vision(look, chosen, wanted.seed, out, report, threads)
+    begun = time.perf_counter()
+    report("writing", 1.0)
+    part = VisionPart(
+        model=vision.model,
+        provenance=Provenance(
+            code={"harness.authoring.object_vision": content_hash("harness.authoring.object_vision")},
+            seeds={"vision": wanted.seed},
+            settings={"profile": wanted.profile, **vision.settings},
+            sources=(source, *_textures(wanted, look)),
+            licence=wanted.licence,
+        ),
+        # JSON holds no infinity, which is what equal pictures have for decibels.
+        measured={name: value for name, value in vision.errors.items() if math.isfinite(value)},
+        surface=drawn_surface(taken.mesh, look.mesh),
+    )
+    made = with_vision(created, part)
+    (out / CHECKPOINT).unlink(missing_ok=True)
+    seconds = {"mesh": read, **vision.seconds, "write": time.perf_counter() - begun}
+    return BuiltVision(made, vision, (*taken.said, *look.remarks), seconds)
+
+
+def drawn_surface(mesh: Mesh, looked_at: Mesh) -> Mesh | None:
+    """What pictures are to be drawn along; None where the object's mesh will do.
+
+    A look's surface comes with seams where its texture has them; they are closed, since which pixels a
+    closed surface covers is found faster, and an eye within it is noticed.
+
+    Args:
+        mesh: of the object, in metres.
+        looked_at: of its look, in metres.
+    """
+    return None if is_same_surface(mesh, looked_at) else without_seams(looked_at)
+
+
+def without_seams(mesh: Mesh) -> Mesh:
+    """The same faces with one vertex a place; those that have then no area are left out."""
+    vertices, place_of = np.unique(mesh.vertices[np.unique(mesh.faces)], axis=0, return_inverse=True)
+    at = np.zeros(len(mesh.vertices), np.int64)
+    at[np.unique(mesh.faces)] = place_of.reshape(-1)
+    faces = at[mesh.faces]
+    return Mesh(vertices, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
+
+
+def _textures(wanted: VisionRequest, look: Appearance) -> tuple[Source, ...]:
+    """Of a file's textures, which lie beside it or within it, their pixels' hashes."""
+    if wanted.mesh.startswith(BUILTIN):
+        return ()
+    return tuple(
+        Source(
+            what=f"texture {number}, {texture.shape[1]} x {texture.shape[0]} texels",
+            origin=Path(wanted.mesh).name,
+            licence=wanted.licence,
+            sha256=hashlib.sha256(np.ascontiguousarray(texture).tobytes()).hexdigest(),
+        )
+        for number, texture in enumerate(look.textures)
+    )
