@@ -140,6 +140,19 @@ def test_views_along_the_axis_and_from_far_away(
     assert seen.alpha.max() > 0.99
 
 
+@pytest.mark.parametrize("level", ["fused", "onnx", "one_sample"])
+def test_a_camera_that_looks_away_sees_nothing_and_says_so(
+    box: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], level: str
+) -> None:
+    away = ("--camera", "0", "-0.5", "0", "--look-at", "0", "-1", "0", "--size", "12x8", "--compare")
+    seen = draw(box, tmp_path, capsys, *away, "--level", level)
+    assert (seen.image == 255).all()
+    assert not seen.alpha.any()
+    assert np.isinf(seen.depth).all()
+    assert (seen.said["samples"], seen.said["covered_share"]) == (0, 0.0)
+    assert seen.said["error_estimate"]["from_every_sample"]["image_psnr_db"] is None
+
+
 @pytest.mark.parametrize(
     ("more", "code", "said"),
     [
