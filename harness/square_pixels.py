@@ -3,8 +3,10 @@
 A camera that looks at the gel from the side, or a driver that scales a frame, shows other lengths of gel from
 row to row than from column to column. Everything here draws, fits and measures in square pixels. So such
 pictures are made square first, once, by the same function wherever they come from: presses of a calibration
-and live pictures alike.
+and live pictures alike. A calibration says in ``made_from`` by how much its presses were.
 """
+
+import re
 
 import numpy as np
 from scipy.ndimage import affine_transform
@@ -14,6 +16,33 @@ from harness.errors import OutOfDomain
 
 LEAST_ASPECT, MOST_ASPECT = 0.5, 2.0
 """Of a pixel's height over its width: beyond, rows or columns would be made up of too few."""
+
+
+_STATED = "made square by"
+
+
+def stated(aspect: float) -> str:
+    """What a calibration's ``made_from`` says of its presses' aspect; nothing where pixels were square."""
+    return "" if aspect == 1.0 else f", {_STATED} {aspect:.6f}"
+
+
+def aspect_stated(made_from: str) -> float:
+    """A pixel's height over its width by which a calibration's presses were made square; 1 where they were.
+
+    Live pictures of that sensor are made square by it before anything else looks at them.
+
+    Args:
+        made_from: of the calibration's header.
+
+    Raises:
+        OutOfDomain: an aspect that is none of a camera.
+    """
+    found = re.search(rf"{_STATED} ([0-9.]+)", made_from)
+    if found is None:
+        return 1.0
+    aspect = float(found.group(1))
+    check_aspect(aspect)
+    return aspect
 
 
 def made_square(pictures: ByteArray, aspect: float) -> ByteArray:

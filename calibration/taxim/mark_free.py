@@ -25,6 +25,7 @@ from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused
 from harness.sim.lit_calibration import LitCalibration, with_shadow
 from harness.sim.tactile_calibration import CalibrationHeader, TactileCalibration
+from harness.square_pixels import stated
 
 LEAST_GAIN = 12.0
 """dB over predicting nothing that presses left out must gain in the median; published sets gain 19."""
@@ -274,7 +275,7 @@ def _artefact(
         serial=identity.serial,
         date=identity.date,
         made_from=f"sha256 {pictures.sha256}, {len(pack.images)} presses without marks"
-        + (f", made square by {pictures.aspect:.5f}" if pictures.aspect != 1.0 else ""),
+        + stated(pictures.aspect),
         licence=identity.licence,
         pitch=identity.pitch,
         ball_radius=identity.ball_radius,

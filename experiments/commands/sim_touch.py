@@ -170,8 +170,9 @@ def _finish(
     json: bool,
 ) -> int:
     from harness.image_file import read_image, write_png
+    from harness.square_pixels import made_square
 
-    seen = None if live is None else read_image(live)
+    seen = None if live is None else made_square(read_image(live), touched.press.gel.aspect)
     whole = touched.compared(seen, before)
     write_png(out, whole.press.image)
     if height_out is not None:

@@ -18,6 +18,7 @@ from harness.errors import FitRefused, RecordingDamaged, WrongUse
 from harness.geometry import rotation_from_quaternion, transform
 from harness.reading import Reading
 from harness.run_folder import RunFiles
+from harness.square_pixels import aspect_stated, made_square
 from harness.step_file import StepRecord
 from harness.synchronise import synchronised
 
@@ -115,7 +116,10 @@ def prior_of(run: RunFiles) -> Prior:
 def observe(run: RunFiles) -> tuple[Observation, ...]:
     """The contacts of a run, from its images, arm poses and strikes."""
     flange_from_gel, acquisition = run.station.flange_from_gel, run.acquisition
-    return in_time([observe_step(record, flange_from_gel, acquisition) for record in run.recording.steps()])
+    aspect = aspect_stated(run.calibration.header.made_from)
+    return in_time(
+        [observe_step(record, flange_from_gel, acquisition, aspect) for record in run.recording.steps()]
+    )
 
 
 def in_time(seen: Sequence[Observation]) -> tuple[Observation, ...]:
@@ -129,7 +133,10 @@ def in_time(seen: Sequence[Observation]) -> tuple[Observation, ...]:
 
 
 def observe_step(
-    record: StepRecord, flange_from_gel: FloatArray, acquisition: AcquisitionCalibration | None = None
+    record: StepRecord,
+    flange_from_gel: FloatArray,
+    acquisition: AcquisitionCalibration | None = None,
+    aspect: float = 1.0,
 ) -> Observation:
     """One contact: its images, where the arm was at rest while they were taken, and its strike.
 
@@ -137,6 +144,7 @@ def observe_step(
         record: of the step.
         flange_from_gel: ``(4, 4)`` of the station.
         acquisition: what the hammer's counts mean; None for a run without sound.
+        aspect: a pixel's height over its width, as the gel's calibration says; images are made square by it.
 
     Raises:
         RecordingDamaged: the step has no images, or no pose of the arm with them.
@@ -152,7 +160,9 @@ def observe_step(
         )
     struck = acquisition is not None and FORCE in record.readings
     strike = strike_from_readings(record.readings, acquisition) if struck and acquisition else None
-    return Observation(_middle(poses.values[during]) @ flange_from_gel, images.values, strike)
+    return Observation(
+        _middle(poses.values[during]) @ flange_from_gel, made_square(images.values, aspect), strike
+    )
 
 
 def _middle(poses: FloatArray) -> FloatArray:

@@ -34,6 +34,7 @@ from harness.mesh import Mesh
 from harness.run_folder import station_acquisition, station_calibration
 from harness.scene import SceneFile, scene_from_json
 from harness.sim.scene_object import known_object
+from harness.square_pixels import aspect_stated
 from harness.station import RunContext
 from harness.station_file import Station
 from harness.step_file import Step, StepRecord
@@ -117,6 +118,8 @@ def run_cell(cell: Cell, scene: SceneFile, station: Station) -> dict[str, Any]:
 def perform_cell(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> PerformedRun:
     """Plan and perform one run on the bench in process, without answering it."""
     plan, acquisition = plan_run(scene, station, mesh, cell.seed), station_acquisition(scene, station)
+    calibration = station_calibration(station)
+    aspect = aspect_stated(calibration.header.made_from)
     experiment = ContactLocalization(lambda here, planned: way_between(plan.bench, here, planned))
     with TemporaryDirectory(prefix="touchstone-table-") as folder:
         context = RunContext(Path(folder) / "truth.json", mesh, cell.seed, cell.gap)
@@ -126,9 +129,9 @@ def perform_cell(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> 
             step = Step(index, "press", parameters)
             readings = {r.channel.name: r for r in experiment.perform(step, bench)}
             record = StepRecord(step, readings, 0.0)
-            observations.append(observe_step(record, station.flange_from_gel, acquisition))
+            observations.append(observe_step(record, station.flange_from_gel, acquisition, aspect))
         true = _truth(context.truth)
-    model = model_of_scene(scene, station, mesh, station_calibration(station))
+    model = model_of_scene(scene, station, mesh, calibration)
     return PerformedRun(in_time(observations), model, scene.base_from_object(mesh), true, cell.seed)
 
 

@@ -180,7 +180,9 @@ class _Slopes:
         bent = np.einsum("pca,pcb->pab", slope, slope) + _RIDGE * np.eye(2)
         self._gain = np.linalg.solve(bent, slope.transpose(0, 2, 1))
         # Two of three colours are taken up by the slope: what is left over shows a third of the error.
-        left = np.sqrt(3.0 * uniform_filter(fit[..., 0] ** 2, _WINDOW, mode="nearest"))
+        # The filter's running sum may leave a little below zero where nothing is left over.
+        around = uniform_filter(fit[..., 0] ** 2, _WINDOW, mode="nearest")
+        left = np.sqrt(3.0 * np.maximum(around, 0.0))
         left = left[place[:, 0], place[:, 1]]
         self._misfit = np.where(left > _STRANGE * noise, left, assumed.share * noise)
         size = np.hypot(*self._normal.T)

@@ -14,6 +14,7 @@ from harness.sim.tactile_calibration import (
     with_background,
 )
 from harness.sim.touch_press import Gel
+from harness.square_pixels import aspect_stated, made_square
 from harness.toml_file import nearest
 
 _SAME_PITCH = 0.01
@@ -58,7 +59,8 @@ def known_gel(
         calibration: a file of ours, a published folder or the name of a shipped one; None for the make's.
         pitch: metres a pixel, where neither the make nor the calibration says it.
         thickness: metres of the gel, in place of the make's.
-        background: ``(rows, columns, 3)`` RGB of the untouched gel, in place of the calibration's.
+        background: ``(rows, columns, 3)`` RGB of the untouched gel as its camera gives it, in place of the
+            calibration's; made square as the calibration's presses were.
         shadow: whether it casts shadows; None to go by whether a table of them comes with the calibration.
 
     Raises:
@@ -70,7 +72,7 @@ def known_gel(
     sensor = _sensor(known, pack.calibration, pitch, thickness)
     if shadow and pack.shadow is None:
         raise WrongUse(
-            f"--shadow needs shadows that were measured: a calibration whose presses showed some, or "
+            "--shadow needs a table of shadows: a calibration whose presses showed some, or "
             f"{SHADOWS[0]} beside {TABLE} in --calibration FOLDER"
         )
     table = None if shadow is False else pack.shadow
@@ -104,7 +106,8 @@ def _pack(
             f"the background is {background.shape[0]} x {background.shape[1]} pixels and the calibration "
             f"{own.rows} x {own.columns}; give the camera's own picture, not cropped"
         )
-    return PublishedPack(with_background(own, background), None, shadow_of(own))
+    square = made_square(background, aspect_stated(own.header.made_from))
+    return PublishedPack(with_background(own, square), None, shadow_of(own))
 
 
 def _own(make: Make | None, calibration: str | None) -> TactileCalibration:

@@ -20,6 +20,7 @@ from harness.sim.marker_file import MarkerFile
 from harness.sim.shadow import ShadowTable
 from harness.sim.tactile_calibration import TactileCalibration
 from harness.sim.touch_effects import DOTS, REST, contact_of, press_effects
+from harness.square_pixels import aspect_stated
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +54,11 @@ class Gel:
             )
         if self.dots is not None:
             self._require_own_dots(self.dots)
+
+    @property
+    def aspect(self) -> float:
+        """A pixel's height over its width in what the camera gives: live pictures are made square by it."""
+        return aspect_stated(self.calibration.header.made_from)
 
     def with_dots(self, dots: MarkerFile) -> "Gel":
         """The same gel with the dots measured on it; ``DataRefused`` for those of another picture."""

@@ -5,7 +5,7 @@ import pytest
 
 from harness.arrays import ByteArray, FloatArray
 from harness.errors import OutOfDomain
-from harness.square_pixels import made_square, square_places
+from harness.square_pixels import aspect_stated, made_square, square_places, stated
 
 ROWS, COLUMNS = 100, 130
 
@@ -71,3 +71,13 @@ def test_one_colour_stays_that_colour_out_to_the_border() -> None:
 def test_what_is_no_aspect_is_refused(aspect: float) -> None:
     with pytest.raises(OutOfDomain, match="times as high as wide"):
         made_square(np.zeros((4, 4, 3), np.uint8), aspect)
+
+
+@pytest.mark.parametrize("aspect", [1.0, 0.9637, 1.03])
+def test_what_a_calibration_states_of_its_aspect_is_read_back(aspect: float) -> None:
+    assert aspect_stated(f"sha256 ab, 49 presses without marks{stated(aspect)}") == pytest.approx(aspect)
+
+
+def test_an_aspect_of_no_camera_is_refused() -> None:
+    with pytest.raises(OutOfDomain, match="times as high as wide"):
+        aspect_stated("presses, made square by 30.0")

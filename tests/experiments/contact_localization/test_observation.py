@@ -17,6 +17,7 @@ from harness.reading import Channel, Reading
 from harness.sensor import GELSIGHT_R15
 from harness.sim.optics import Optics
 from harness.sim.tactile_calibration import shipped_calibration
+from harness.square_pixels import made_square
 from harness.step_file import Step, StepRecord
 
 IMAGE = Channel("gel.image", "count", (120, 160, 3), "uint8", "gel")
@@ -136,6 +137,17 @@ def record(
 def test_the_gel_is_where_the_flange_carries_it() -> None:
     found = observe_step(record(), FLANGE_FROM_GEL)
     assert found.base_from_gel == pytest.approx(AT @ FLANGE_FROM_GEL, abs=1e-12)
+
+
+def test_frames_are_made_square_as_the_presses_of_the_calibration_were() -> None:
+    step = record()
+    frames = np.random.default_rng(0).integers(0, 256, (2, 120, 160, 3)).astype(np.uint8)
+    readings = {**step.readings, "gel.image": Reading(IMAGE, np.array([0.01, 0.05]), frames)}
+    taken = StepRecord(step.step, readings, 1.0)
+    assert np.array_equal(observe_step(taken, FLANGE_FROM_GEL).images, frames)
+    square = observe_step(taken, FLANGE_FROM_GEL, aspect=1.04).images
+    assert np.array_equal(square, made_square(frames, 1.04))
+    assert not np.array_equal(square, frames)
 
 
 @pytest.mark.parametrize("without", ["gel.image", "arm.base_from_flange"])
