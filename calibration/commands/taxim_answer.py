@@ -130,8 +130,8 @@ def doubts(scale: "ArmScale", arm: "ArmPresses", squared: float) -> list[str]:
     if squared != 1.0:
         said.append(
             f"a pixel is {scale.aspect.value:.4f} times as high as wide (to {scale.aspect.within95:.4f}): "
-            f"the pictures were made square by {squared:.4f} before the fit, and live ones are by the same, as "
-            "the artefact's made_from says"
+            f"the pictures were made square by {squared:.4f} before the fit, and live ones are by the same, "
+            "as the artefact's made_from says"
         )
     if abs(squared - scale.aspect.value) > scale.aspect.within95:
         said.append(
