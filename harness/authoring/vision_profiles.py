@@ -29,9 +29,9 @@ class CellsSpec:
     size: NetworkSize
     cells: int = CELLS
     places: int = 2_000_000
-    steps: int = 2000
-    batch: int = 256
-    rate: float = 4e-3
+    steps: int = 4000
+    batch: int = 64
+    rate: float = 8e-3
     hidden: float = 0.2
     opacity: float = 0.02
     overlap: float = 0.06
@@ -83,11 +83,11 @@ class VisionProfile:
 _COMPACT = NetworkSize(width=32, octaves=6, turns=3, kind="osf-v")
 
 VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
-    "smoke": VisionProfile(CellsSpec(_COMPACT), pictures=4),
+    "smoke": VisionProfile(CellsSpec(_COMPACT, places=1_500_000), pictures=4),
     "standard": VisionProfile(
-        CellsSpec(_COMPACT, places=4_000_000, steps=20_000),
+        CellsSpec(_COMPACT, places=4_000_000, steps=20_000, batch=128),
         pictures=12,
-        strict=CellsSpec(replace(_COMPACT, kind="osf"), places=8_000_000, steps=4000),
+        strict=CellsSpec(replace(_COMPACT, kind="osf"), places=8_000_000),
     ),
 })  # fmt: skip
 """None of them needs torch."""

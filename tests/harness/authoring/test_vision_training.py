@@ -8,7 +8,7 @@ import pytest
 from seen_shapes import ball
 
 from harness.arrays import AnyArray
-from harness.authoring.vision import CHECKPOINT, OPAQUE, author_vision
+from harness.authoring.vision import CHECKPOINT, OPAQUE, STRICT_CHECKPOINT, author_vision
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
 from harness.authoring.vision_kernels import Lesson, _back, _forth, _wrong, batch_of, encode
@@ -219,6 +219,20 @@ def test_lessons_and_lamps_are_clear_of_what_is_kept_back(lit: LitObject) -> Non
         draw_lamps(500, 1, everywhere)
 
 
+def test_lamps_of_a_place_light_it(lit: LitObject) -> None:
+    """A ball is in the way of no lamp that its place faces; those kept back light nothing."""
+    held_out = held_out_pictures(lit.appearance.mesh, 3, 32, 32, 5, apart=np.radians(20.0))
+    lessons = draw_lessons(lit, 2000, 1e-3, 2, held_out, lamps=4)
+    cosine = np.einsum("nx,nx->n", lessons.normals, lessons.lamps)
+    assert np.count_nonzero(cosine < 0.0) > 50
+    faced = cosine > 0.1
+    lit_by = cosine[faced, None] * np.array([0.7, 0.4, 0.1])
+    assert lessons.colours[faced] == pytest.approx(lit_by, abs=1e-5)
+    assert not lessons.colours[cosine < -1e-6].any()
+    assert held_out.clear_of_lights(lessons.lamps.astype(np.float64)).all()
+    assert np.all(np.unique(lessons.points, axis=0, return_counts=True)[1] <= 4)
+
+
 def test_fewer_lessons_are_the_first_of_more(lit: LitObject) -> None:
     few, many = (draw_lessons(lit, count, 1e-3, 6, NOTHING) for count in (100, 300))
     for name in Lessons.__dataclass_fields__:
@@ -227,7 +241,8 @@ def test_fewer_lessons_are_the_first_of_more(lit: LitObject) -> None:
 
 def test_a_look_becomes_networks_that_show_it(lit: LitObject, tmp_path: Path) -> None:
     said: list[str] = []
-    profile = VisionProfile(TINY, pictures=2, side=48, samples=3)
+    strict = replace(TINY, size=replace(SIZE, kind="osf"))
+    profile = VisionProfile(TINY, pictures=2, strict=strict, side=48, samples=3)
     made = author_vision(
         lit.appearance,
         profile,
@@ -245,14 +260,20 @@ def test_a_look_becomes_networks_that_show_it(lit: LitObject, tmp_path: Path) ->
     flat = [LinearImage(image.alpha[..., None] * mean, image.alpha, image.depth) for image in exact]
     # The right outline in its mean colour is off by more than twice as much.
     assert made.errors["psnr_db"] > picture_errors(exact, flat)["psnr_db"] + 6.0
+    # Told only place, view and light, they learn where the dark begins too, if not as sharply.
+    assert made.errors["strict_psnr_db"] > picture_errors(exact, flat)["psnr_db"] + 3.0
     assert made.errors["psnr_db_object"] < made.errors["psnr_db"]
     assert len(made.model.weights) == len(made.model.grid)
     assert (tmp_path / CHECKPOINT).exists()
+    assert (tmp_path / STRICT_CHECKPOINT).exists()
     assert {"drawing places", "measuring"} < set(said)
-    assert set(made.seconds) == {"places", "networks", "measure"}
+    stages = ("places", "networks", "measure")
+    assert set(made.seconds) == {f"{word}{stage}" for word in ("", "strict_") for stage in stages}
 
 
 def test_what_cannot_be_trained_says_so(lit: LitObject, tmp_path: Path) -> None:
+    with pytest.raises(WrongUse, match="told more than the paper's"):
+        VisionProfile(TINY, pictures=1, strict=TINY)
     for wrong in ({"places": 0}, {"overlap": 0.7}, {"hidden": 1.5}, {"rate": 0.0}):
         with pytest.raises(WrongUse, match="give"):
             replace(TINY, **wrong)
