@@ -51,10 +51,13 @@ def train(training: Resumable, epochs: int, checkpoint: Path, report: Report) ->
 
 
 def median_seconds(call: Callable[[], Any], times: int) -> float:
-    """S on the clock that one of so many calls takes, in the median."""
+    """S of the processor (all threads of this program) that one of so many calls takes, in the median.
+
+    Not seconds on the clock: what else the machine does must not be written into an object's file.
+    """
     took = []
     for _ in range(times):
-        begun = time.perf_counter()
+        begun = time.process_time()
         call()
-        took.append(time.perf_counter() - begun)
+        took.append(time.process_time() - begun)
     return float(np.median(took))

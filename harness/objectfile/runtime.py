@@ -9,6 +9,7 @@ then on.
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import onnxruntime
 
 from harness.arrays import AnyArray
@@ -44,16 +45,24 @@ class Network:
         self._session = _session(data, name, threads)
 
     def __call__(self, inputs: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
-        """The outputs by name.
+        """The outputs by name; of no queries, outputs of none.
 
         Raises:
             DataRefused: onnxruntime cannot compute them.
         """
         names = [tensor.name for tensor in self.outputs]
+        if self._asks_nothing(inputs):
+            # onnxruntime's products cannot broadcast over none.
+            return {tensor.name: np.empty(_of_none(tensor), tensor.dtype) for tensor in self.outputs}
         try:
             return dict(zip(names, self._session.run(names, dict(inputs)), strict=True))
         except Exception as error:
             raise _failed(self.name, error) from error
+
+    def _asks_nothing(self, inputs: Mapping[str, AnyArray]) -> bool:
+        """Whether every input is there, in its shape, for no queries."""
+        wanted = {tensor.name: _of_none(tensor) for tensor in self.inputs}
+        return {name: array.shape for name, array in inputs.items()} == wanted
 
 
 def open_network(data: bytes, entry: NetworkEntry, threads: int = 1) -> Network:
@@ -73,6 +82,11 @@ def _session(data: bytes, name: str, threads: int) -> "onnxruntime.InferenceSess
         return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except Exception as error:
         raise _failed(name, error) from error
+
+
+def _of_none(tensor: Tensor) -> tuple[int, ...]:
+    """The shape for no queries: only the first size of a tensor is theirs."""
+    return (0, *(size for size in tensor.shape[1:] if size != "n"))
 
 
 def _failed(name: str, error: Exception) -> DataRefused:

@@ -13,7 +13,7 @@ from object_bench import exchange, rewrite
 from harness.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.presses import Presses
-from harness.objectfile.touch import open_touch
+from harness.objectfile.touch import CodeMaps, open_touch
 from harness.objectfile.touch_nodes import SurfaceNodes, nodes_bytes, nodes_from
 from harness.objectfile.touch_part import with_touch
 from harness.objectfile.verify import verify
@@ -61,6 +61,23 @@ def test_codes_and_reference_are_levels_of_one_quantity(peg_object: ObjectFile) 
     assert np.sqrt(((found - truth) ** 2).mean()) < 5e-5
     assert codes.entry.gel.sensor == tb.SENSOR
     assert codes.entry.gel.skirt == tb.SKIRT
+
+
+@pytest.mark.parametrize(("level", "compiled"), [("codes", True), ("codes", False), ("reference", True)])
+def test_no_presses_give_no_maps(peg_object: ObjectFile, level: Any, compiled: bool) -> None:
+    touch, none = open_touch(peg_object, level, compiled=compiled), presses()[:0]
+    for found in (touch.at(none), touch.maps(none)):
+        assert found.shape == (0, tb.SENSOR.rows, tb.SENSOR.columns)
+
+
+def test_a_graph_asked_for_some_inputs_and_not_others_says_so(peg_object: ObjectFile) -> None:
+    touch = open_touch(peg_object, "codes", compiled=False)
+    assert isinstance(touch.maps, CodeMaps)
+    asked = touch.maps.nodes.queries(presses())
+    with pytest.raises(DataRefused, match="cannot be run"):
+        touch.maps.network({name: array[:0] for name, array in asked.items() if name == "node"})
+    with pytest.raises(DataRefused, match="cannot be run"):
+        touch.maps.network({name: array[: 0 if name == "node" else None] for name, array in asked.items()})
 
 
 @pytest.mark.parametrize("level", ["codes", "reference"])
