@@ -13,9 +13,10 @@ from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
 from calibration.markers.dots import Dots, find_dots
-from calibration.markers.lattice import Lattice, lay_lattice
+from calibration.markers.lattice import lay_lattice
 from calibration.taxim.arm_moves import ArmScale, arm_scale
 from harness.arrays import BoolArray, ByteArray, FloatArray, read_only
+from harness.dot_lattice import Lattice
 from harness.errors import CalibrationRefused, OutOfDomain
 
 LARGEST_LOCAL = 0.06

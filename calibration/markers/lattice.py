@@ -6,12 +6,12 @@ lies, and smooth polynomials what a lens does to it; what is left of a resting g
 """
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from harness.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.dot_lattice import Lattice
 from harness.errors import CalibrationRefused
 
 LEAST_DOTS = 12
@@ -29,48 +29,6 @@ _NEAR = 0.35
 
 _OFF = 4.0
 _TURNS = 8
-
-
-@dataclass(frozen=True, eq=False)
-class Lattice:
-    """A grid laid through dots.
-
-    Attributes:
-        index: ``(n, 2)`` column and row of each dot from 0; -1 where it is on no grid.
-        origin: ``(2,)`` pixels (column, row), of the grid's first column and row.
-        step: ``(2, 2)`` pixels: first column to the next column of dots, second to the next row.
-        affine: ``(n, 2)`` pixels, by which dots are off the linear grid; NaN off the grid.
-        local: ``(n, 2)`` pixels, the same once a lens's smooth bend is taken out.
-        missing: ``(m, 2)`` column and row of places of the grid without a dot.
-    """
-
-    index: IntArray
-    origin: FloatArray
-    step: FloatArray
-    affine: FloatArray
-    local: FloatArray
-    missing: IntArray
-
-    @property
-    def on(self) -> BoolArray:
-        """``(n,)`` whether a dot is on the grid."""
-        on: BoolArray = self.index[:, 0] >= 0
-        return on
-
-    @property
-    def spacing(self) -> float:
-        """Pixels from dot to dot: of a square grid with as many dots on the same area."""
-        return float(np.sqrt(abs(np.linalg.det(self.step))))
-
-    @property
-    def columns(self) -> int:
-        """Of the grid."""
-        return int(self.index[:, 0].max()) + 1
-
-    @property
-    def rows(self) -> int:
-        """Of the grid."""
-        return int(self.index[:, 1].max()) + 1
 
 
 def lay_lattice(places: FloatArray) -> Lattice:

@@ -87,7 +87,7 @@ def answer_of(made: RestingMarkers, file: MarkerFile) -> dict[str, Any]:
 
 def report_of(made: RestingMarkers, file: MarkerFile, answer: dict[str, Any], title: str) -> MarkerReport:
     """What the page shows."""
-    dots, lattice = made.dots, made.lattice
+    dots = made.dots
     return MarkerReport(
         title,
         _cards(answer),
@@ -97,11 +97,7 @@ def report_of(made: RestingMarkers, file: MarkerFile, answer: dict[str, Any], ti
         dots.places,
         dots.radius,
         dots.sigma,
-        lattice.index,
-        lattice.origin,
-        lattice.step,
-        lattice.affine,
-        lattice.local,
+        made.lattice,
     )
 
 

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from harness.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from harness.arrays import ByteArray, FloatArray
+from harness.dot_lattice import Lattice
 from harness.report.figures import Album
 from harness.report.style import ANSWER, SOFT, TOOL, blank, styled
 from harness.report.template import rendered
@@ -37,11 +38,7 @@ class MarkerReport:
         places: ``(n, 2)`` pixels (column, row), of the dots.
         radius: ``(n,)`` pixels.
         sigma: ``(n,)`` pixels.
-        index: ``(n, 2)`` column and row of the grid; -1 for a dot on none.
-        origin: ``(2,)`` pixels, of the grid.
-        step: ``(2, 2)`` pixels, of the grid: to the next column, to the next row.
-        affine: ``(n, 2)`` pixels off the straight grid.
-        local: ``(n, 2)`` pixels off the smoothly bent grid.
+        lattice: the grid laid through them.
     """
 
     title: str
@@ -52,22 +49,7 @@ class MarkerReport:
     places: FloatArray
     radius: FloatArray
     sigma: FloatArray
-    index: IntArray
-    origin: FloatArray
-    step: FloatArray
-    affine: FloatArray
-    local: FloatArray
-
-    @property
-    def on(self) -> BoolArray:
-        """``(n,)`` whether a dot is on the grid."""
-        on: BoolArray = self.index[:, 0] >= 0
-        return on
-
-    @property
-    def spacing(self) -> float:
-        """Pixels."""
-        return float(np.sqrt(abs(np.linalg.det(self.step))))
+    lattice: Lattice
 
 
 def write_marker_page(report: MarkerReport, folder: Path) -> Path:
@@ -97,7 +79,7 @@ def found_figure(report: MarkerReport) -> Figure:
             axes.set_axis_off()
         whole.set_title("every dot that was found, and the straight grid through them", fontsize=10)
         middle = report.places[np.argmin(np.hypot(*(report.places - np.median(report.places, axis=0)).T))]
-        reach = _CLOSE * report.spacing
+        reach = _CLOSE * report.lattice.spacing
         part.set_xlim(max(-0.5, middle[0] - reach), min(columns - 0.5, middle[0] + reach))
         high = reach * rows / columns
         part.set_ylim(min(rows - 0.5, middle[1] + high), max(-0.5, middle[1] - high))
@@ -108,15 +90,18 @@ def found_figure(report: MarkerReport) -> Figure:
 def off_figure(report: MarkerReport) -> Figure:
     """By how much dots are off the straight grid, and what is left once a lens's bend is taken out."""
     rows, columns = report.picture.shape[:2]
-    panels = (("off the straight grid", report.affine), ("off the smoothly bent grid", report.local))
+    panels = (
+        ("off the straight grid", report.lattice.affine),
+        ("off the smoothly bent grid", report.lattice.local),
+    )
     with styled():
         figure = blank(12.0, 6.0 * rows / columns + 0.6)
         figure.set_layout_engine("constrained")
         for axes, (words, off) in zip(np.asarray(figure.subplots(1, 2)), panels, strict=True):
-            x, y = report.places[report.on].T
-            right, down = off[report.on].T
+            x, y = report.places[report.lattice.on].T
+            right, down = off[report.lattice.on].T
             longest = max(float(np.hypot(right, down).max()), 1e-9)
-            longer = _ARROW * report.spacing / longest
+            longer = _ARROW * report.lattice.spacing / longest
             axes.plot(x, y, ls="none", marker="o", ms=2.5, color=ANSWER)
             along = (longer * right, longer * down)
             axes.quiver(x, y, *along, angles="xy", scale_units="xy", scale=1.0, width=0.004, color=TOOL)
@@ -133,27 +118,27 @@ def off_figure(report: MarkerReport) -> Figure:
 
 def _dots(axes: Axes, report: MarkerReport, thick: float) -> None:
     axes.imshow(report.picture)
-    across, down = report.index[report.on].max(axis=0)
+    across, down = report.lattice.index[report.lattice.on].max(axis=0)
     for ends in [((0, row), (across, row)) for row in range(down + 1)] + [
         ((column, 0), (column, down)) for column in range(across + 1)
     ]:
-        line = report.origin + np.array(ends, dtype=np.float64) @ report.step.T
+        line = report.lattice.origin + np.array(ends, dtype=np.float64) @ report.lattice.step.T
         axes.plot(*line.T, color="white", lw=0.6 * thick)
-    for place, radius, on in zip(report.places, report.radius, report.on, strict=True):
+    for place, radius, on in zip(report.places, report.radius, report.lattice.on, strict=True):
         axes.add_patch(Circle((place[0], place[1]), radius, fill=False, ec=TOOL if on else SOFT, lw=thick))
         axes.plot(*place, marker="+", ms=4.0 * thick, color="white", mew=0.8 * thick)
 
 
 def _lines(report: MarkerReport) -> list[tuple[str, ...]]:
-    order = np.lexsort((report.index[:, 0], report.index[:, 1]))
+    order = np.lexsort((report.lattice.index[:, 0], report.lattice.index[:, 1]))
     return [
         (
-            f"{report.index[k, 1]}, {report.index[k, 0]}" if report.on[k] else "none",
+            f"{report.lattice.index[k, 1]}, {report.lattice.index[k, 0]}" if report.lattice.on[k] else "none",
             f"{report.places[k, 0]:.3f}, {report.places[k, 1]:.3f}",
             f"{report.sigma[k]:.3f}",
             f"{report.radius[k]:.2f}",
-            f"{np.hypot(*report.affine[k]):.3f}" if report.on[k] else "",
-            f"{np.hypot(*report.local[k]):.3f}" if report.on[k] else "",
+            f"{np.hypot(*report.lattice.affine[k]):.3f}" if report.lattice.on[k] else "",
+            f"{np.hypot(*report.lattice.local[k]):.3f}" if report.lattice.on[k] else "",
         )
         for k in order
     ]
