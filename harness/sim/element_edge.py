@@ -10,7 +10,7 @@ from harness.sim.surface_measure import enclosed_volume, thin_wall
 SHARE = 0.25
 """Of the shortest wave of bending or shear below the limit, an element's edge at most."""
 
-FINE_SHARE = 0.1
+FINE_SHARE = 0.12
 """Of the shortest wave of shear: solids are then within 1e-3 of their exact frequencies up to it."""
 
 _FINE_BUDGET, _COUNTED_BUDGET = 1e5, 2.5e5
@@ -27,13 +27,13 @@ _WARPED = 0.3
 a bar of 200 x 20 x 10 mm is off by 4e-3 with 0.45, by 7e-4 with 0.3."""
 
 _WARPED_BUDGET = 7e4
-"""Unknowns, about, up to which they are that small: more than that, and it is a shell, which bends first."""
+"""Unknowns, about, up to which they come near to that: with many more, it is a shell, which bends first."""
 
 _UNKNOWNS = 40.0
 """Unknowns in a cube of the edge's side, as filling makes them."""
 
-_SPARE = 3
-"""Modes more than asked for: the lowest lie above what Weyl's law has."""
+_SPARE = 12
+"""Modes more than asked for: the lowest bend, and so need shorter edges than their frequency says."""
 
 
 def fine_edge(surface: Mesh, material: Material, limit: float, count: int | None) -> float:
@@ -50,7 +50,9 @@ def fine_edge(surface: Mesh, material: Material, limit: float, count: int | None
         count: modes asked for, the lowest; None for all up to the limit.
     """
     volume = enclosed_volume(surface)
-    highest = limit if count is None else min(limit, weyl_frequency(surface, material, count, volume))
+    highest = limit
+    if count is not None:
+        highest = min(limit, weyl_frequency(surface, material, count + _SPARE, volume))
     budget = _FINE_BUDGET if count is None else _COUNTED_BUDGET
     short = max(FINE_SHARE * _shear_speed(material) / highest, _affordable(volume, budget))
     across = _across(thin_wall(surface, 0.5), volume)
@@ -58,7 +60,7 @@ def fine_edge(surface: Mesh, material: Material, limit: float, count: int | None
 
 
 def weyl_frequency(surface: Mesh, material: Material, count: int, volume: float) -> float:
-    """Hz below which a free solid has about ``count`` elastic modes, or more.
+    """Hz below which a free solid has about ``count`` elastic modes.
 
     Weyl's law of an elastic body with the term of its free surface (Dupuis, Mazo and Onsager,
     J. Chem. Phys. 33, 1960). What is thin against the wave has more modes, which bend.
@@ -76,13 +78,14 @@ def weyl_frequency(surface: Mesh, material: Material, count: int, volume: float)
     skin = np.pi / 4.0 * float(surface.face_areas.sum())
     skin *= (2.0 * ratio**2 - 3.0 * ratio + 3.0) / (1.0 - ratio) / shear**2
     # Of its three roots one is positive; the others' real parts are negative.
-    return float(np.roots([inside, skin, 0.0, -float(count + _SPARE)]).real.max())
+    return float(np.roots([inside, skin, 0.0, -float(count)]).real.max())
 
 
 def _across(wall: float, volume: float) -> float:
     """Metres: short against the wall, as far as budgets allow."""
-    if _affordable(volume, _WARPED_BUDGET) <= _WARPED * wall:
-        return _WARPED * wall
+    fine = max(_WARPED * wall, _affordable(volume, _WARPED_BUDGET))
+    if fine <= _ACROSS * wall:
+        return fine
     return max(_ACROSS * wall, _affordable(volume, _BUDGET))
 
 

@@ -103,7 +103,9 @@ def tetrahedra(nodes: FloatArray, cells: IntArray) -> Tetrahedra:
     return Tetrahedra(read_only(nodes), read_only(cells))
 
 
-def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Tetrahedra:
+def tetrahedralize(
+    mesh: Mesh, edge: float, envelope: float | None = None, stop: float = _STOP_ENERGY
+) -> Tetrahedra:
     """Fill a closed surface with fTetWild (Hu et al., Fast Tetrahedral Meshing in the Wild, 2020).
 
     Args:
@@ -111,6 +113,8 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
         edge: m, longest edge aimed at; where the surface bends or is thin they are shorter.
         envelope: m, how far the cells may leave the surface; None for a fifth of the thinnest
             wall, and no more than 3 % of the edge and 0.2 % of the mesh's diagonal.
+        stop: the energy of the worst cell at which fTetWild stops; above 3, that of a regular one. It
+            also stops there where edges are still longer than asked for.
 
     Raises:
         WrongUse: an edge or an envelope that cannot be.
@@ -130,13 +134,13 @@ def tetrahedralize(mesh: Mesh, edge: float, envelope: float | None = None) -> Te
             f"an envelope of {envelope * 1e3:.3g} mm lets a wall of {wall * 1e3:.3g} mm close up; say one "
             f"above 0 and up to {0.25 * wall * 1e3:.3g} mm"
         )
-    found = tetrahedra(*_filled(mesh, edge, envelope))
+    found = tetrahedra(*_filled(mesh, edge, envelope, stop))
     _check_volume(found, mesh, envelope)
     _check_bodies(found, mesh)
     return found
 
 
-def _filled(mesh: Mesh, edge: float, envelope: float) -> tuple[FloatArray, IntArray]:
+def _filled(mesh: Mesh, edge: float, envelope: float, stop: float) -> tuple[FloatArray, IntArray]:
     from pytetwild.pytetwild import tetrahedralize as fill
 
     fewer = _simplified(mesh, _SIMPLIFIED * envelope)
@@ -148,7 +152,7 @@ def _filled(mesh: Mesh, edge: float, envelope: float) -> tuple[FloatArray, IntAr
             edge_length_abs=edge,
             simplify=False,
             epsilon=envelope / fewer.diagonal,
-            stop_energy=_STOP_ENERGY,
+            stop_energy=stop,
             num_threads=1,
             vtk_ordering=True,
         )
