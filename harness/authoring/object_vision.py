@@ -11,7 +11,7 @@ import numpy as np
 
 from harness.authoring.object_source import created_object, source_of, surface_of
 from harness.authoring.training import Report
-from harness.authoring.vision import CHECKPOINT, AuthoredVision, author_vision
+from harness.authoring.vision import CHECKPOINT, STRICT_CHECKPOINT, AuthoredVision, author_vision
 from harness.authoring.vision_profiles import vision_profile
 from harness.code_version import content_hash
 from harness.materials import Material
@@ -104,7 +104,8 @@ def build_vision(wanted: VisionRequest, out: Path, report: Report, threads: int 
         surface=drawn_surface(taken.mesh, look.mesh),
     )
     made = with_vision(created, part)
-    (out / CHECKPOINT).unlink(missing_ok=True)
+    for checkpoint in (CHECKPOINT, STRICT_CHECKPOINT):
+        (out / checkpoint).unlink(missing_ok=True)
     seconds = {"mesh": read, **vision.seconds, "write": time.perf_counter() - begun}
     return BuiltVision(made, vision, (*taken.said, *look.remarks), seconds)
 
