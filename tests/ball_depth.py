@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from calibration.taxim.artefact import calibration_of
 from calibration.taxim.gates import CONTACT, check_set, refusals, sightings
 from calibration.taxim.held_out import teach
 from calibration.taxim.mark_free import Identity
@@ -12,7 +13,7 @@ from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures
 from calibration.taxim.smooth_fit import changes
 from harness.arrays import BoolArray, FloatArray, IntArray, read_only
-from harness.sim.tactile_calibration import CalibrationHeader, TactileCalibration
+from harness.sim.tactile_calibration import TactileCalibration
 
 WITHIN = 0.95
 """Of the contact's radius: as held-out presses are scored in colour."""
@@ -120,20 +121,6 @@ def taught(pack: PressPack, change: FloatArray | None, which: IntArray, who: Ide
     """Calibrate from some of the presses, as ``calibration.taxim.mark_free`` does from all."""
     change = changes(pack) if change is None else change
     model = teach(pack.of(which), change[which], who.ball)
-    header = CalibrationHeader(
-        sensor=who.sensor,
-        serial=who.serial,
-        date=who.date,
-        made_from=f"sha256 {pack.sha256}, {len(which)} presses",
-        licence=who.licence,
-        pitch=who.pitch,
-        ball_radius=who.ball_radius,
-        slope_limit=model.plain.edge / who.ball,
-        held_out_db=0.0,
-        held_out_table_db=0.0,
-        residual_rms=model.plain.residual_rms,
-        condition=model.plain.condition,
-    )
-    background = np.clip(np.round(pack.background + model.rest), 0.0, 255.0).astype(np.uint8)
-    calibration = TactileCalibration(header, background, model.table, model.support, model.plain.colours)
+    made_from = f"sha256 {pack.sha256}, {len(which)} presses"
+    calibration = calibration_of(pack.background, model, who, made_from)
     return Taught(calibration, model.bias, model.fit.edge)

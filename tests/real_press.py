@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
+from calibration.taxim.artefact import calibration_of
 from calibration.taxim.gates import CONTACT, check_set, refusals, sightings
 from calibration.taxim.held_out import FOLDS, WITHIN, Model, decibels, teach
-from calibration.taxim.light_fit import depth_of, per_metre, pressed_ball
+from calibration.taxim.light_fit import depth_of, pressed_ball
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures, read_pictures
@@ -21,7 +22,7 @@ from harness.sim.gel import R15_SKIRT, deform
 from harness.sim.lit_calibration import LitCalibration
 from harness.sim.optics import Optics
 from harness.sim.shadow import ShadowTable
-from harness.sim.tactile_calibration import CalibrationHeader, GelSkirt
+from harness.sim.tactile_calibration import GelSkirt
 
 R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
 FOTS = Identity("GelSight", "FOTS", "MIT", "2026-01-01", 1e-3 / 19.58, 2.35e-3)
@@ -115,7 +116,7 @@ def held_out_presses(pictures: Pictures, who: Identity, folds: int = FOLDS) -> I
         out = np.arange(len(change)) % folds == fold
         taught: IntArray = np.nonzero(~out)[0]
         model = teach(pack.of(taught), change[taught], who.ball)
-        calibration = lit_calibration(pictures.background, model, who)
+        calibration = calibration_of(pictures.background, model, who, "presses of other folds")
         clean = change[taught] - model.rest
         shadow = fit_shadow(pack.of(taught), clean, model.fit.centres, model.light).in_metres(who.pitch)
         for k in np.nonzero(out)[0]:
@@ -133,28 +134,6 @@ def held_out_presses(pictures: Pictures, who: Identity, folds: int = FOLDS) -> I
             drift = np.median((raw - change[k]).reshape(-1, 3), axis=0)
             name = pictures.names[pack.number[k]]
             yield HeldOut(name, pack.images[k], model, calibration, start, who.ball, drift, shadow)
-
-
-def lit_calibration(background: ByteArray, model: Model, who: Identity) -> LitCalibration:
-    """The artefact of a model, without what a set of presses says of its own quality."""
-    header = CalibrationHeader(
-        sensor=who.sensor,
-        serial=who.serial,
-        date=who.date,
-        made_from="presses of other folds",
-        licence=who.licence,
-        pitch=who.pitch,
-        ball_radius=who.ball_radius,
-        slope_limit=model.fit.edge / who.ball,
-        held_out_db=0.0,
-        held_out_table_db=0.0,
-        residual_rms=model.light.residual_rms,
-        condition=model.plain.condition,
-        skirt=model.light.skirt,
-    )
-    seen = np.clip(np.round(background + model.rest), 0.0, 255.0).astype(np.uint8)
-    lit = per_metre(model.light.lit, who.pitch)
-    return LitCalibration(header, seen, model.table, model.support, model.plain.colours, lit)
 
 
 def drawing(optics: Optics, skirt: GelSkirt) -> Drawing:

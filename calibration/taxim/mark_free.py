@@ -11,10 +11,10 @@ from time import perf_counter
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from calibration.taxim.artefact import calibration_of
 from calibration.taxim.explained import contact_radius, too_large, unexplained
 from calibration.taxim.gates import CONTACT, LEAST_PRESSES, check_set, reached, refusals, sightings
 from calibration.taxim.held_out import WITHIN, Model, Score, held_out, teach
-from calibration.taxim.light_fit import per_metre
 from calibration.taxim.likeness import check_order
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures, Refused, in_order_of_content
@@ -24,7 +24,7 @@ from calibration.taxim.smooth_fit import changes
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused
 from harness.sim.lit_calibration import LitCalibration, with_shadow
-from harness.sim.tactile_calibration import CalibrationHeader, TactileCalibration
+from harness.sim.tactile_calibration import TactileCalibration
 from harness.square_pixels import stated
 
 LEAST_GAIN = 12.0
@@ -181,7 +181,7 @@ def _calibrated(
     worth = None if shadow.table is None else score_shadow(pack, change, out, identity.pitch, ball)
     drawn = None if worth is None or not worth.worth else shadow
     return MarkFree(
-        _artefact(pictures, pack, model, identity, scores, drawn),
+        _artefact(pictures, len(pack.images), model, identity, scores, drawn),
         tuple(sorted(used, key=lambda press: pictures.names.index(press.name))),
         tuple(sorted([*refused, *pictures.refused], key=lambda one: one.name)),
         model.fit.edge,
@@ -264,32 +264,21 @@ def _check_gain(scores: list[Score]) -> None:
 
 def _artefact(
     pictures: Pictures,
-    pack: PressPack,
+    presses: int,
     model: Model,
     identity: Identity,
     scores: list[Score],
     shadow: ShadowFit | None,
 ) -> LitCalibration:
-    header = CalibrationHeader(
-        sensor=identity.sensor,
-        serial=identity.serial,
-        date=identity.date,
-        made_from=f"sha256 {pictures.sha256}, {len(pack.images)} presses without marks"
-        + stated(pictures.aspect),
-        licence=identity.licence,
-        pitch=identity.pitch,
-        ball_radius=identity.ball_radius,
-        slope_limit=model.plain.edge / identity.ball,
+    made_from = f"sha256 {pictures.sha256}, {presses} presses without marks{stated(pictures.aspect)}"
+    made = calibration_of(pictures.background, model, identity, made_from)
+    header = replace(
+        made.header,
         held_out_db=float(np.median([one.smooth for one in scores])),
         held_out_table_db=float(np.median([one.table for one in scores])),
-        residual_rms=model.plain.residual_rms,
-        condition=model.plain.condition,
-        skirt=model.light.skirt,
     )
-    background = np.clip(np.round(pictures.background + model.rest), 0.0, 255.0).astype(np.uint8)
-    lit = per_metre(model.light.lit, identity.pitch)
-    made = LitCalibration(header, background, model.table, model.support, model.plain.colours, lit)
+    scored = replace(made, header=header)
     table = None if shadow is None else shadow.in_metres(identity.pitch)
     if shadow is None or table is None:
-        return made
-    return with_shadow(made, table, shadow.rim * identity.pitch)
+        return scored
+    return with_shadow(scored, table, shadow.rim * identity.pitch)

@@ -1,0 +1,45 @@
+"""What a fit of ball presses hands on: the calibration of its model."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calibration.taxim.held_out import Model
+from calibration.taxim.light_fit import per_metre
+from harness.arrays import ByteArray
+from harness.sim.lit_calibration import LitCalibration
+from harness.sim.tactile_calibration import CalibrationHeader
+
+if TYPE_CHECKING:
+    from calibration.taxim.mark_free import Identity
+
+
+def calibration_of(
+    background: ByteArray, model: Model, identity: "Identity", made_from: str
+) -> LitCalibration:
+    """The artefact of a model, which says nothing of its quality yet.
+
+    Args:
+        background: ``(rows, columns, 3)`` RGB of the untouched gel, before the presses corrected it.
+        model: of the presses.
+        identity: pitch, ball and names.
+        made_from: in words.
+    """
+    header = CalibrationHeader(
+        sensor=identity.sensor,
+        serial=identity.serial,
+        date=identity.date,
+        made_from=made_from,
+        licence=identity.licence,
+        pitch=identity.pitch,
+        ball_radius=identity.ball_radius,
+        slope_limit=model.plain.edge / identity.ball,
+        held_out_db=0.0,
+        held_out_table_db=0.0,
+        residual_rms=model.plain.residual_rms,
+        condition=model.plain.condition,
+        skirt=model.light.skirt,
+    )
+    seen = np.clip(np.round(background + model.rest), 0.0, 255.0).astype(np.uint8)
+    lit = per_metre(model.light.lit, identity.pitch)
+    return LitCalibration(header, seen, model.table, model.support, model.plain.colours, lit)
