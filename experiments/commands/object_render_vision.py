@@ -28,6 +28,9 @@ Three = tuple[float, float, float]
 _MOST_SHEET = 2**24
 """Pixels of all pictures of a turntable."""
 
+_FIRST = 256
+"""Columns, at most, of the picture that nobody sees."""
+
 
 def render(
     folder: Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")],
@@ -169,8 +172,11 @@ def _rendered(
     from harness.objectfile.vision_settings import RenderSettings
 
     settings = RenderSettings(level=level)
-    # The first picture loads the compiled loops for all that follow.
-    vision.picture(*views[0], settings)
+    # The first picture, a small one, loads the compiled loops for all that follow.
+    camera, light = views[0]
+    width = min(camera.width, _FIRST)
+    first = camera.resized(width, max(1, round(camera.height * width / camera.width)))
+    vision.picture(first, light, settings)
     loaded, begun = time.perf_counter() - begun, time.perf_counter()
     pictures = tuple(vision.picture(*view, settings) for view in views)
     seconds = {"load": loaded, "render": time.perf_counter() - begun}
