@@ -4,6 +4,10 @@
 are of the processor, one process.
 """
 
+import gzip
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -15,9 +19,14 @@ from scipy.spatial import cKDTree
 
 from calibration.markers.dots import find_dots
 from calibration.markers.lattice import lay_lattice
+from harness.arrays import FloatArray
 from harness.image_file import read_image
+from harness.sensor import GELSIGHT_R15, MarkerGrid
+from harness.sim.marker_tensors import tensor_map
+from harness.sim.markers import marker_displacements
 
 CONSOLE = Console(width=118, highlight=False)
+_TIMES = 15
 
 DRAWN = {
     "radius 6 px, black ink, noise of 1.5 grey levels": DrawnDots(),
@@ -33,7 +42,8 @@ DRAWN = {
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print both tables, and what moving dots takes."""
+    CONSOLE.print(_motion())
     table = Table(title="drawn dots: pixels off their true places", title_justify="left")
     for heading in ("case", "dots", "rms", "worst", "stated", "rms over stated", "seconds"):
         table.add_column(heading, justify="left" if heading == "case" else "right")
@@ -73,6 +83,53 @@ def main() -> None:
             f"{scatter.round(2)}, {far} by more than 2; stated {np.median(dots.sigma):.3f} px; off the grid "
             f"by {bent.max():.1f} px at most, {out} dots by more than 6 %"
         )
+
+
+def _motion() -> str:
+    """Seconds of the processor for a press of a ball on a gel with 100 dots, and for a tensor map."""
+    sensor = replace(GELSIGHT_R15, markers=MarkerGrid(10, 10, 1.5e-3, 0.3e-3))
+    y, x = np.mgrid[:120, :160].astype(np.float64)
+    away = sensor.pitch * np.hypot(x - 70.0, y - 55.0)
+    pressed = np.maximum(0.0, np.sqrt(np.maximum(6e-3**2 - away**2, 0.0)) - 5e-3)[None]
+    marker_displacements(pressed, sensor)
+    took = [
+        _seconds(lambda nodes=nodes: marker_displacements(pressed, sensor, nodes))
+        for nodes in (2.0, 4.0, 8.0)
+    ]
+    words = ", ".join(f"{1e3 * one:.1f}" for one in took)
+    said = f"100 dots under a ball, 2, 4 and 8 nodes to a thickness: {words} ms"
+    data = find_shared_data()
+    if data is None:
+        return said
+    offsets, press, slide = _dome(data)
+    began = process_time()
+    known = tensor_map(offsets, press, slide, 0.3e-3)
+    made = process_time() - began
+    return f"{said}; tensor map of {len(known.offsets)} published nodes: {made:.2f} s"
+
+
+def _seconds(call: Callable[[], object]) -> float:
+    took = []
+    for _ in range(_TIMES):
+        began = process_time()
+        call()
+        took.append(process_time() - began)
+    return float(np.median(took))
+
+
+def _dome(data: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Offsets from the apex, and displacements pressed and slid, metres."""
+    cases = []
+    for case in ("dz", "dxdz"):
+        parts = []
+        for axis in "xyz":
+            with gzip.open(data / f"tactile/taxim/fem_markers/dome_{case}_0.3_{axis}.txt.gz") as lines:
+                parts.append(np.loadtxt(lines, skiprows=1))
+        cases.append(parts)
+    places = cases[0][0][:, 1:4]
+    middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+    press, slide = (np.stack([part[:, 4] for part in parts], axis=1) for parts in cases)
+    return places[:, :2] - middle[:2], press, slide
 
 
 if __name__ == "__main__":

@@ -192,6 +192,19 @@ def test_pictures_and_displacements_that_do_not_fit_are_refused() -> None:
         draw_markers(white, np.zeros((1, 63, 2)), DOTTED, ink=1.5)
 
 
+def test_dots_alone_move_as_in_the_field_of_every_pixel() -> None:
+    """Only places of dots are evaluated: nothing is lost against the whole superposition."""
+    x = (np.arange(DOTTED.columns) + 0.5 - DOTTED.columns / 2) * DOTTED.pitch
+    y = (np.arange(DOTTED.rows) + 0.5 - DOTTED.rows / 2) * DOTTED.pitch
+    every = np.stack(np.meshgrid(x, y), axis=-1)[::3, ::3].reshape(-1, 2)
+    some = np.arange(0, len(every), 21)[:100]
+    pressed = _ball(1e-3, 0.004, -0.002)
+    whole = marker_displacements(pressed, DOTTED, rest=every)[0]
+    alone = marker_displacements(pressed, DOTTED, rest=every[some])[0]
+    assert len(alone) == 100
+    assert np.abs(alone - whole[some]).max() <= 1e-12 * np.abs(whole).max()
+
+
 # Finite elements
 
 
