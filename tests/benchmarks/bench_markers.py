@@ -7,6 +7,7 @@ are of the processor, one process.
 import gzip
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import process_time
 
@@ -92,10 +93,7 @@ def _motion() -> str:
     away = sensor.pitch * np.hypot(x - 70.0, y - 55.0)
     pressed = np.maximum(0.0, np.sqrt(np.maximum(6e-3**2 - away**2, 0.0)) - 5e-3)[None]
     marker_displacements(pressed, sensor)
-    took = [
-        _seconds(lambda nodes=nodes: marker_displacements(pressed, sensor, nodes))
-        for nodes in (2.0, 4.0, 8.0)
-    ]
+    took = [_seconds(partial(marker_displacements, pressed, sensor, nodes)) for nodes in (2.0, 4.0, 8.0)]
     words = ", ".join(f"{1e3 * one:.1f}" for one in took)
     said = f"100 dots under a ball, 2, 4 and 8 nodes to a thickness: {words} ms"
     data = find_shared_data()
