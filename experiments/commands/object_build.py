@@ -111,6 +111,8 @@ def build(
 
 
 def _as_json(built: "BuiltAudio") -> dict[str, Any]:
+    from harness.sim.stage_seconds import cpu, wall
+
     audio, modes = built.audio, built.modes
     entry = built.object.description.audio
     assert entry is not None
@@ -124,7 +126,8 @@ def _as_json(built: "BuiltAudio") -> dict[str, Any]:
         "held_out": len(audio.split.held_out),
         "settings": dict(audio.settings),
         "errors": {name: dict(errors) for name, errors in audio.errors.items()},
-        "seconds": dict(built.seconds),
+        "seconds": wall(built.seconds),
+        "cpu_seconds": cpu(built.seconds),
     }
 
 
@@ -139,8 +142,18 @@ def _print(built: "BuiltAudio") -> None:
     for name, errors in audio.errors.items():
         drawn.add_row(_ROWS[name], *_cells(errors))
     ANSWERS.print(drawn)
-    said = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in built.seconds.items())
-    ANSWERS.print(said, markup=False)
+    _print_seconds(built.seconds)
+
+
+def _print_seconds(seconds: Mapping[str, float]) -> None:
+    from harness.sim.stage_seconds import cpu, wall
+
+    stages = {**wall(seconds), "together": sum(wall(seconds).values())}
+    worked = {**cpu(seconds), "together": sum(cpu(seconds).values())}
+    drawn = Table(*stages, title="seconds, and below them those of the processor")
+    for row in (stages, worked):
+        drawn.add_row(*(f"{row[stage]:.1f}" for stage in stages))
+    ANSWERS.print(drawn)
 
 
 def _cells(errors: Mapping[str, float]) -> list[str]:

@@ -1,6 +1,5 @@
 """From modes to the network of an object's sound, and what it is worth on nodes it never saw."""
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +29,7 @@ from harness.objectfile.audio_table import scaled
 from harness.objectfile.runtime import Network
 from harness.sim.modal_sound import audible
 from harness.sim.modes import Modes
+from harness.sim.stage_seconds import timed
 from harness.sim.synthesis import synthesize
 
 CHECKPOINT = ".audio_training.npz"
@@ -52,7 +52,7 @@ class AuthoredAudio:
         errors: of each way to the shapes at held-out nodes, ``"network"``, ``"nearest_trained"``,
             ``"linear"``, and ``"table_float16"`` at the nodes themselves: by a name with its unit.
         settings: how it was made.
-        seconds: s on the clock of each stage.
+        seconds: s of ``"train"`` and ``"measure"`` (``stage_seconds.timed``).
     """
 
     graph: ModelProto
@@ -86,16 +86,13 @@ def author_audio(
         DataRefused: a checkpoint in the folder that cannot be gone on from.
     """
     split = split_nodes(len(modes.points), seed=seed)
-    begun = time.perf_counter()
-    with threadpool_limits(limits=threads, user_api="blas"):
+    seconds: dict[str, float] = {}
+    with timed(seconds, "train"), threadpool_limits(limits=threads, user_api="blas"):
         graph, settings = _made(modes, split, profile, seed, folder, report, threads)
-    made = time.perf_counter() - begun
     report("measuring", 0.0)
-    begun = time.perf_counter()
-    errors = measure_audio(modes, dampings, split, graph, profile.sounds)
-    return AuthoredAudio(
-        graph, split, errors, settings, {"network": made, "measure": time.perf_counter() - begun}
-    )
+    with timed(seconds, "measure"):
+        errors = measure_audio(modes, dampings, split, graph, profile.sounds)
+    return AuthoredAudio(graph, split, errors, settings, seconds)
 
 
 def _made(

@@ -1,6 +1,5 @@
 """From a file to an ObjectFile with a sound: intake, modes, network, measurement, writing."""
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,20 +12,30 @@ from harness.authoring.audio_profiles import profile
 from harness.authoring.object_source import created_object, source_of, surface_of
 from harness.authoring.training import Report
 from harness.code_version import content_hash
-from harness.errors import MeshRefused
+from harness.errors import DataRefused, MeshRefused
 from harness.materials import Material
 from harness.mesh import Mesh
 from harness.objectfile.audio_part import AudioPart, with_audio
 from harness.objectfile.entries import Provenance, Source
-from harness.objectfile.file import ObjectFile
-from harness.sim.modal import HEARING, default_edge, modes_of
+from harness.objectfile.file import ObjectFile, with_part
+from harness.objectfile.verify import verify
+from harness.sim.modal import HEARING, default_edge, solved_once
 from harness.sim.modal_file import modes_of_file
 from harness.sim.modes import Modes, dampings
+from harness.sim.stage_seconds import CPU, cpu, renamed, timed, wall
 from harness.sim.volume_mesh import read_volume
 from harness.store import Store
 
+STAGES = ("intake", "mesh", "assemble", "solve", "order", "train", "measure", "export", "verify")
+"""In their order; ``"order"`` gives signs and groups of modes one meaning (``audio_data.canonical``)."""
+
 MODES = 128
 """At most, where nobody asks for another number."""
+
+_SOLVED = {"tetrahedra": "mesh", "assembly": "assemble", "solve": "solve"}
+"""Names of stages, by those that the solver gives them."""
+
+_KEPT = "its modes were kept from an earlier solution, and so are the seconds of mesh, assemble and solve"
 
 _NEAR = 0.02
 """Of the diagonal, how far from the surface a query may be: more than a mesh is off by."""
@@ -70,7 +79,8 @@ class BuiltAudio:
         modes: canonical.
         audio: its network and errors.
         said: what was done to the mesh and what to look at.
-        seconds: s on the clock of each stage.
+        seconds: s of each of ``STAGES`` (``stage_seconds.timed``). Where modes were kept from an earlier
+            solution, ``"mesh"``, ``"assemble"`` and ``"solve"`` are what they took then.
     """
 
     object: ObjectFile
@@ -95,18 +105,20 @@ def build_audio(
     Raises:
         WrongUse: options that cannot be.
         MeshRefused: a mesh that cannot stand for an object, or none of whose modes is in reach.
-        DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
+        DataRefused: a checkpoint or an ObjectFile in the folder that is of something else; or what was
+            written does not read back.
     """
     chosen = profile(wanted.profile)
-    begun = time.perf_counter()
     report("modes", 0.0)
-    mesh, found, source, said = _modes(wanted, store)
-    modes = _lowest(canonical(found), wanted.most)
+    seconds: dict[str, float] = {}
+    mesh, found, source, said = _modes(wanted, store, seconds)
+    with timed(seconds, "order"):
+        modes = _lowest(canonical(found), wanted.most)
     rates = dampings(modes.frequencies, wanted.material)
-    solved = time.perf_counter() - begun
-    created = created_object(wanted.mesh, wanted.licence, wanted.material, mesh, out, source)
+    with timed(seconds, "export"):
+        created = created_object(wanted.mesh, wanted.licence, wanted.material, mesh, out, source)
     audio = author_audio(modes, rates, chosen, wanted.seed, out, report, threads)
-    begun = time.perf_counter()
+    seconds |= audio.seconds
     report("writing", 0.0)
     provenance = Provenance(
         code={"harness.authoring.object_audio": content_hash("harness.authoring.object_audio")},
@@ -123,30 +135,68 @@ def build_audio(
         graph=audio.graph,
         measured={"network": audio.errors["network"], "table": audio.errors["table_float16"]},
     )
-    made = with_audio(created, part)
+    with timed(seconds, "export"):
+        made = with_audio(created, part)
     (out / CHECKPOINT).unlink(missing_ok=True)
-    seconds = {"modes": solved, **audio.seconds, "write": time.perf_counter() - begun}
-    return BuiltAudio(made, modes, audio, said, seconds)
+    with timed(seconds, "verify"):
+        _check(made)
+    ordered = {before + stage: seconds[before + stage] for before in ("", CPU) for stage in STAGES}
+    return BuiltAudio(_with_seconds(made, ordered), modes, audio, said, ordered)
 
 
-def _modes(wanted: ObjectRequest, store: Store | None) -> tuple[Mesh, Modes, Source, tuple[str, ...]]:
-    source = source_of(wanted.mesh, wanted.licence)
-    if source.sha256 is not None and read_volume(Path(wanted.mesh), wanted.units) is not None:
-        path = Path(wanted.mesh)
-        solved = modes_of_file(
-            path, wanted.material, wanted.units, wanted.wall, wanted.limit, edge=wanted.edge
+def _check(made: ObjectFile) -> None:
+    """Read what was written.
+
+    Raises:
+        DataRefused: it is not what it says.
+    """
+    failed = [check for check in verify(made) if not check.passed]
+    if failed:
+        raise DataRefused(
+            f"{made.folder}: {failed[0].name}: {failed[0].said}; delete the folder and build again"
         )
-        modes = solved.solution.modes
-        return Mesh(modes.points, modes.faces), modes, source, solved.said
-    taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
-    return taken.mesh, _solved(wanted, taken.mesh, store), source, taken.said
 
 
-def _solved(wanted: ObjectRequest, mesh: Mesh, store: Store | None) -> Modes:
+def _with_seconds(made: ObjectFile, seconds: Mapping[str, float]) -> ObjectFile:
+    """The same files, and in ``object.json`` what they took."""
+    audio = made.description.audio
+    assert audio is not None
+    spent = {"seconds": wall(seconds), "cpu_seconds": cpu(seconds)}
+    provenance = audio.provenance.model_copy(update=spent)
+    return with_part(made, "audio", audio.model_copy(update={"provenance": provenance}), {})
+
+
+def _modes(
+    wanted: ObjectRequest, store: Store | None, seconds: dict[str, float]
+) -> tuple[Mesh, Modes, Source, tuple[str, ...]]:
+    whole: dict[str, float] = {}
+    with timed(whole, "intake"):
+        source = source_of(wanted.mesh, wanted.licence)
+        volume = source.sha256 is not None and read_volume(Path(wanted.mesh), wanted.units) is not None
+    if volume:
+        mesh, modes, said = _of_volume(wanted)
+    else:
+        with timed(whole, "intake"):
+            taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
+        modes, kept = _solved(wanted, taken.mesh, store)
+        mesh, said = taken.mesh, (*taken.said, *((_KEPT,) if kept else ()))
+    none = dict.fromkeys([before + stage for before in ("", CPU) for stage in _SOLVED.values()], 0.0)
+    seconds |= whole | none | renamed(modes.seconds, _SOLVED)
+    return mesh, modes, source, said
+
+
+def _of_volume(wanted: ObjectRequest) -> tuple[Mesh, Modes, tuple[str, ...]]:
+    path = Path(wanted.mesh)
+    solved = modes_of_file(path, wanted.material, wanted.units, wanted.wall, wanted.limit, edge=wanted.edge)
+    modes = solved.solution.modes
+    return Mesh(modes.points, modes.faces), modes, solved.said
+
+
+def _solved(wanted: ObjectRequest, mesh: Mesh, store: Store | None) -> tuple[Modes, bool]:
     edge = wanted.edge
     if edge is None:
         edge = default_edge(mesh, wanted.material, wanted.limit, wanted.most)
-    return modes_of(mesh, wanted.material, wanted.limit, edge, wanted.most, store)
+    return solved_once(mesh, wanted.material, wanted.limit, edge, wanted.most, store)
 
 
 def _lowest(modes: Modes, most: int) -> Modes:

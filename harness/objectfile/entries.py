@@ -47,7 +47,7 @@ class Source(Entry):
 
 
 class Provenance(Entry):
-    """How a part came to be, so that it can be made again."""
+    """How a part came to be, so that it can be made again; ``seconds`` by stage, where they were taken."""
 
     code: dict[str, str] = Field(default_factory=dict)
     seeds: dict[str, int] = Field(default_factory=dict)
@@ -55,6 +55,8 @@ class Provenance(Entry):
     sources: tuple[Source, ...] = ()
     licence: str
     made: str | None = None
+    seconds: dict[str, float] = Field(default_factory=dict)
+    cpu_seconds: dict[str, float] = Field(default_factory=dict)
 
 
 class MaterialEntry(Entry):

@@ -1,6 +1,5 @@
 """From a surface and a material to the modes of the object."""
 
-import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +15,7 @@ from harness.sim.modal_mesh import QuadraticMesh, least_determinant, middles_of,
 from harness.sim.modal_snap import snapped, straightened
 from harness.sim.modal_solve import Elasticity, check_limit, solve_mesh
 from harness.sim.modes import Modes
+from harness.sim.stage_seconds import timed
 from harness.sim.surface_measure import enclosed_volume, thin_wall
 from harness.sim.tetrahedra import Tetrahedra, tetrahedralize
 from harness.store import Store, digest
@@ -55,18 +55,25 @@ def modes_of(
         WrongUse: a limit, an edge or a count that cannot be.
         MeshRefused: a surface that cannot be filled, or a volume mesh that cannot be solved.
     """
+    return solved_once(mesh, material, limit, edge, most, store)[0]
+
+
+def solved_once(
+    mesh: Mesh, material: Material, limit: float, edge: float | None, most: int | None, store: Store | None
+) -> tuple[Modes, bool]:
+    """``modes_of``, and whether the modes were in the store; their seconds are then of that time."""
     edge = default_edge(mesh, material, limit, most) if edge is None else edge
     key = digest(["modes", VERSION, mesh.vertices, mesh.faces, material, float(limit), float(edge), most])
     kept = store.get(key) if store is not None else None
     if isinstance(kept, Mapping):
-        return from_arrays(kept)
-    begun = time.perf_counter()
-    filled = tetrahedralize(mesh, edge)
-    meshed = time.perf_counter() - begun
-    solved = solve_modes(filled, material, limit, mesh, most=most, meshed=meshed)
+        return from_arrays(kept), True
+    spent: dict[str, float] = {}
+    with timed(spent, "tetrahedra"):
+        filled = tetrahedralize(mesh, edge)
+    solved = solve_modes(filled, material, limit, mesh, most=most, spent=spent)
     if store is not None:
         store.put(key, to_arrays(solved))
-    return solved
+    return solved, False
 
 
 def default_edge(
@@ -96,7 +103,7 @@ def solve_modes(
     limit: float = HEARING,
     surface: Mesh | None = None,
     most: int | None = None,
-    meshed: float = 0.0,
+    spent: Mapping[str, float] | None = None,
     undeformed: Tetrahedra | None = None,
 ) -> Modes:
     """The modes of a volume mesh.
@@ -107,7 +114,7 @@ def solve_modes(
         limit: Hz, above zero.
         surface: onto which the nodes of the volume mesh's surface are moved; None for as it is.
         most: modes at most, the lowest; None for all up to the limit.
-        meshed: s that the volume mesh took, to be listed.
+        spent: s that earlier stages took (``stage_seconds.timed``), to be listed.
         undeformed: the same cells where ``surface`` belongs to them, if ``tetrahedra`` were moved
             away from it since; None if they were not.
 
@@ -118,10 +125,10 @@ def solve_modes(
     cells = len(tetrahedra.cells)
     elasticity = Elasticity.uniform(material, cells) if isinstance(material, Material) else material
     with threadpool_limits(limits=1, user_api="blas"):
-        begun = time.perf_counter()
-        mesh = curved(tetrahedra, surface, undeformed or tetrahedra)
-        spent = {"tetrahedra": meshed, "assembly": time.perf_counter() - begun}
-        return solve_mesh(mesh, elasticity, limit, most, spent=spent).modes
+        seconds = {"tetrahedra": 0.0, **(spent or {})}
+        with timed(seconds, "assembly"):
+            mesh = curved(tetrahedra, surface, undeformed or tetrahedra)
+        return solve_mesh(mesh, elasticity, limit, most, spent=seconds).modes
 
 
 def curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra) -> QuadraticMesh:

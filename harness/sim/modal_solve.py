@@ -1,6 +1,5 @@
 """From ten-node tetrahedra to modes: free, or held at some of their nodes."""
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -15,6 +14,7 @@ from harness.sim.modal_lanczos import DENSE, EigenPairs, modes_below
 from harness.sim.modal_mesh import QuadraticMesh
 from harness.sim.modal_system import MassRule, ModalSystem, modal_system
 from harness.sim.modes import Modes
+from harness.sim.stage_seconds import timed
 
 _SHARE_OF_UNKNOWNS = 0.1
 """Above it, the modes of a mesh are those of its elements and not of the object."""
@@ -86,7 +86,8 @@ def solve_mesh(
         least: modes at least, if there are as many below the limit; a few more come with them.
         held: ``(n, 3)``, which displacement of which node is held at zero; None for a free object.
         rule: how mass is integrated.
-        spent: s that earlier stages took, to be listed; more is added to ``"assembly"`` and ``"solve"``.
+        spent: s that earlier stages took (``stage_seconds.timed``), to be listed; more is added to
+            ``"assembly"`` and ``"solve"``.
 
     Raises:
         WrongUse: a limit or a count that cannot be, elasticity that is not one, or nothing left free.
@@ -96,17 +97,14 @@ def solve_mesh(
     check_limit(1.0, least)
     elasticity = Elasticity.uniform(material, len(mesh.cells)) if isinstance(material, Material) else material
     check_elasticity(elasticity, len(mesh.cells))
-    with threadpool_limits(limits=1, user_api="blas"):
-        begun = time.perf_counter()
-        system = modal_system(mesh, elasticity.lame, elasticity.density, rule)
-        if held is not None and held.any():
-            system = _held(system, held, len(mesh.nodes))
-        assembled = time.perf_counter()
-        pairs, reached = _found(system, limit, most, least)
-        solved = time.perf_counter()
     seconds = dict(spent or {})
-    seconds["assembly"] = seconds.get("assembly", 0.0) + assembled - begun
-    seconds["solve"] = seconds.get("solve", 0.0) + solved - assembled
+    with threadpool_limits(limits=1, user_api="blas"):
+        with timed(seconds, "assembly"):
+            system = modal_system(mesh, elasticity.lame, elasticity.density, rule)
+            if held is not None and held.any():
+                system = _held(system, held, len(mesh.nodes))
+        with timed(seconds, "solve"):
+            pairs, reached = _found(system, limit, most, least)
     modes = _modes(mesh, system, pairs, reached, seconds)
     return Solution(modes, pairs.certified, system.stiffness.shape[0])
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from harness.authoring.object_audio import STAGES
 from harness.cli import invoke
 from harness.objectfile.audio import open_audio
 from harness.objectfile.file import ObjectFile
@@ -35,10 +36,14 @@ def test_a_block_becomes_an_object_file_that_verifies(
     assert build(block) == 0
     answer = json.loads(capsys.readouterr().out)
     assert len(answer["frequencies_hz"]) == 12
-    assert set(answer["seconds"]) == {"modes", "network", "measure", "write"}
+    assert list(answer["seconds"]) == list(answer["cpu_seconds"]) == list(STAGES)
+    assert min(answer["seconds"].values()) >= 0.0
     errors = answer["errors"]
     assert errors["network"]["gain_error_median"] < errors["linear"]["gain_error_median"]
     of = ObjectFile.open(block.parent / "object")
+    assert of.description.audio is not None
+    assert of.description.audio.provenance.seconds == answer["seconds"]
+    assert of.description.audio.provenance.cpu_seconds == answer["cpu_seconds"]
     assert all(check.passed for check in verify(of))
     network, table = open_audio(of, "network"), open_audio(of, "table")
     points = table.as_modes().points[::7]
@@ -50,8 +55,13 @@ def test_a_block_becomes_an_object_file_that_verifies(
 def test_building_again_gives_the_same_bytes(block: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert build(block) == 0
     first = (block.parent / "object" / "audio.onnx").read_bytes()
+    solved = json.loads(capsys.readouterr().out)["seconds"]
     assert build(block) == 0
     assert (block.parent / "object" / "audio.onnx").read_bytes() == first
+    shown = capsys.readouterr()
+    again = json.loads(shown.out)["seconds"]
+    assert "modes were kept" in shown.err
+    assert [again[stage] for stage in ("mesh", "solve")] == [solved[stage] for stage in ("mesh", "solve")]
 
 
 def test_a_folder_of_another_object_is_refused(block: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,38 @@
+"""What each stage of a computation took: on the clock, and of the processor."""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+CPU = "cpu."
+"""Before a stage's name where its seconds are those of the processor, all threads together."""
+
+
+@contextmanager
+def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Add what happens meanwhile to the seconds of a stage, under its name and under ``CPU`` and its name."""
+    begun, worked = time.perf_counter(), time.process_time()
+    yield
+    seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - begun
+    seconds[CPU + stage] = seconds.get(CPU + stage, 0.0) + time.process_time() - worked
+
+
+def renamed(seconds: Mapping[str, float], names: Mapping[str, str]) -> dict[str, float]:
+    """The seconds of some stages under other names; stages that were not there are left out.
+
+    Args:
+        seconds: as ``timed`` fills them.
+        names: of stages, by their old names.
+    """
+    pairs = [(before + old, before + new) for before in ("", CPU) for old, new in names.items()]
+    return {new: seconds[old] for old, new in pairs if old in seconds}
+
+
+def wall(seconds: Mapping[str, float]) -> dict[str, float]:
+    """On the clock, by stage."""
+    return {stage: took for stage, took in seconds.items() if not stage.startswith(CPU)}
+
+
+def cpu(seconds: Mapping[str, float]) -> dict[str, float]:
+    """Of the processor, by stage."""
+    return {stage.removeprefix(CPU): took for stage, took in seconds.items() if stage.startswith(CPU)}
