@@ -25,7 +25,9 @@ SPACING = Knob(
     "localization.spacing", (4e-3, 3e-3, 2e-3, 1.5e-3), "m", "number", 2e-3, "between surface samples"
 )
 ROUNDS = Knob("localization.rounds", (0, 1, 2, 3), "rounds", "number", 3, "refinements after the grid")
-SAMPLES = Knob("localization.samples", (300, 600, 1200), "", "number", 600, "hypotheses a refinement draws")
+SAMPLES = Knob(
+    "localization.samples", (600, 1500, 3000, 6000), "", "number", 3000, "hypotheses a refinement draws"
+)
 PARTICLES = Knob(
     "localization.particles", (300, 1000, 3000, 10_000), "", "number", 1000, "of the paper's filter"
 )
@@ -53,19 +55,19 @@ def _by_sound(spacing: float) -> dict[str, Level]:
 
 
 _GRIDS = (
-    (4e-3, 0, 600, 16),
-    (3e-3, 0, 600, 16),
-    (2e-3, 0, 600, 16),
-    (2e-3, 0, 600, 8),
-    (3e-3, 1, 600, 16),
-    (2e-3, 1, 600, 16),
-    (2e-3, 3, 600, 16),
-    (2e-3, 3, 600, 8),
-    (1.5e-3, 3, 1200, 8),
+    (4e-3, 0, 3000, 16),
+    (3e-3, 0, 3000, 16),
+    (2e-3, 0, 3000, 16),
+    (2e-3, 0, 3000, 8),
+    (3e-3, 1, 1500, 16),
+    (2e-3, 1, 1500, 16),
+    (2e-3, 3, 1500, 8),
+    (2e-3, 3, 3000, 8),
+    (1.5e-3, 3, 6000, 8),
 )
 """Spacing, rounds, samples and block: from the cheapest to the finest, where the front is likely to lie."""
 
-FINEST = _grid("both", 1.5e-3, 3, 1200, 8)
+FINEST = _grid("both", 1.5e-3, 3, 6000, 8)
 """What is asked after an answer, to say what more time would have given."""
 
 
@@ -124,8 +126,8 @@ def settings(thorough: bool = False, sound: bool = True, objectfile: bool = Fals
 
 def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
     """The few settings that are measured with fewer contacts too."""
-    cheapest = _grid("touch", 4e-3, 0, 600, 16)
-    dials = ((2e-3, 0, 600, 16), (2e-3, 3, 600, 8))
+    cheapest = _grid("touch", 4e-3, 0, 3000, 16)
+    dials = ((2e-3, 0, 3000, 16), (2e-3, 3, 3000, 8))
     touch = [cheapest, *(_grid("touch", *each) for each in dials)]
     both = [_grid("both", *each) for each in dials]
     return [*touch, *both, _by_sound(4e-3), _by_sound(2e-3)] if sound else touch
@@ -134,7 +136,7 @@ def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
 def _other_modes() -> list[dict[str, Level]]:
     """Fewer modes, and modes of coarser elements, than the default ones."""
     few: tuple[dict[str, Level], ...] = ({MODES.name: 16}, {MODES.name: 32}, {EDGE.name: 0.7})
-    full, quick = _grid("both", 2e-3, 3, 600, 8), _grid("both", 4e-3, 0, 600, 16)
+    full, quick = _grid("both", 2e-3, 3, 3000, 8), _grid("both", 4e-3, 0, 3000, 16)
     return [*({**full, **level} for level in few), {**quick, **few[0]}, {**_by_sound(2e-3), **few[1]}]
 
 
@@ -143,14 +145,14 @@ def _other_shapes() -> list[dict[str, Level]]:
     others: list[dict[str, Level]] = [
         {SHAPES.name: level} for level in SHAPES.levels if level != SHAPES.default
     ]
-    quick = (_grid("both", 4e-3, 0, 600, 16), _grid("both", 2e-3, 3, 600, 8), _by_sound(2e-3))
+    quick = (_grid("both", 4e-3, 0, 3000, 16), _grid("both", 2e-3, 3, 3000, 8), _by_sound(2e-3))
     return [{**setting, **shapes} for shapes in others for setting in quick]
 
 
 def _turned(sound: bool) -> Iterator[dict[str, Level]]:
     """Every dial of the grid turned from its default, one at a time."""
     for senses in ("touch", "both") if sound else ("touch",):
-        default = _grid(senses, 2e-3, 3, 600, 8)
+        default = _grid(senses, 2e-3, 3, 3000, 8)
         for knob in (SPACING, ROUNDS, SAMPLES, BLOCK, *((MODES, EDGE) if senses == "both" else ())):
             for level in knob.levels:
                 if level == knob.default:
@@ -159,7 +161,7 @@ def _turned(sound: bool) -> Iterator[dict[str, Level]]:
 
 
 def setting_name(setting: Mapping[str, Level]) -> str:
-    """For people: ``"both, grid, spacing 2 mm, rounds 3, samples 600, block 8"``."""
+    """For people: ``"both, grid, spacing 2 mm, rounds 3, samples 3000, block 8"``."""
     knobs = {knob.name: knob for knob in KNOBS}
     said = [str(setting[name]) for name in (SENSES.name, METHOD.name) if name in setting]
     for name, level in setting.items():

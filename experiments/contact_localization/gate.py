@@ -4,15 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.search import SAME_AXIS, SAME_PLACE, Search
+from experiments.contact_localization.contact_scales import SAME_AXIS, SAME_PLACE
+from experiments.contact_localization.hypotheses import Hypotheses
+from experiments.contact_localization.search import Search
 from harness.arrays import FloatArray, IntArray
 from harness.errors import FitRefused
 
 REFUSE_BELOW = -9.0
-"""Nats: the median of the contacts' fits at the best hypothesis. Calibration runs: -7.2 to -0.5."""
+"""Nats: the median of the contacts' fits at the best hypothesis. Calibration runs: -3.0 to -0.5."""
 
 REFUSE_QUARTILE_BELOW = -14.0
-"""Nats: the lower quartile, of four contacts or more. Calibration runs: -12.4 to -0.8."""
+"""Nats: the lower quartile, of four contacts or more. Calibration runs: -4.3 to -0.8."""
 
 REFUSE_FEW_BELOW = -20.0
 """Nats: the median of fewer than four contacts, of which a single odd one may be half."""
@@ -123,13 +125,13 @@ def refuse_bad_fit(search: Search, members: IntArray, fits: FloatArray) -> None:
     )
 
 
-def refuse_inside_out(search: Search, gel: FloatArray, yaw: float, members: IntArray) -> None:
+def refuse_inside_out(search: Search, one: Hypotheses, members: IntArray) -> None:
     """Raise where most contacts touch the surface from the side its normals call inside.
 
     Raises:
         FitRefused: naming the contact that faces away most.
     """
-    facing = np.array([_facing(search, int(k), gel, yaw) for k in members])
+    facing = np.array([_facing(search, int(k), one) for k in members])
     if np.median(facing) > 0.0:
         worst = int(members[np.argmax(facing)])
         raise FitRefused(
@@ -140,12 +142,11 @@ def refuse_inside_out(search: Search, gel: FloatArray, yaw: float, members: IntA
         )
 
 
-def _facing(search: Search, contact: int, gel: FloatArray, yaw: float) -> float:
+def _facing(search: Search, contact: int, one: Hypotheses) -> float:
     """Cosine between the tool's axis and the outward normal at a contact; -1 for a square press."""
-    yaws = np.array([yaw])
-    point = search.surface_points(contact, gel[None], yaws)[0]
+    point = search.surface_points(contact, one.gels, one.yaws, one.shared)[0]
     normal = search.surface.normals[search.surface.tree.query(point)[1]]
-    axis = search.prior.object_from_base(yaws)[0] @ search.contacts[contact].axis
+    axis = search.prior.object_from_base(one.yaws)[0] @ search.contacts[contact].axis
     return float(normal @ axis)
 
 

@@ -1,10 +1,14 @@
 """The exact posterior over a grid of places and yaws, then refined between the grid's points."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from experiments.contact_localization.heard import Heard
 from experiments.contact_localization.hypotheses import Hypotheses, best_of
+from experiments.contact_localization.model import Prior
 from experiments.contact_localization.search import Search
+from experiments.contact_localization.shared_errors import UNKNOWNS, around, log_prior, stepped
 from harness.arrays import FloatArray, IntArray
 from harness.sim.compiled import compiled
 
@@ -13,6 +17,12 @@ _WORTH_A_LOOK = 12.0
 _MOST_LOOKS = 3000
 _DRAWS_EACH = 8.0
 _FILLED = 0.15
+_WIDTH = np.array([0.8e-3, 0.8e-3, 0.6e-3])
+_NARROW = 0.65
+"""Times as wide are the draws of a round as those of the one before."""
+
+_STEP = 0.75
+"""Of the shared errors between rounds, in their sigmas."""
 
 
 def on_samples(search: Search, members: IntArray, anchor: int, heard: Heard | None = None) -> Hypotheses:
@@ -36,8 +46,8 @@ def on_samples(search: Search, members: IntArray, anchor: int, heard: Heard | No
         looked = search.look(start, members, _DROPPED_AT, told[kept])
     closer = looked.best(_WORTH_A_LOOK, _MOST_LOOKS)
     search.settle(closer.yaws)
-    log_weights = _weighed(search, closer.gels, closer.yaws, members, 2, 1, heard)
-    return Hypotheses(closer.gels, closer.yaws, log_weights - log_weights.max())
+    log_weights = _weighed(search, closer, members, 2, 1, heard)
+    return replace(closer, log_weights=log_weights - log_weights.max())
 
 
 def refine(
@@ -49,11 +59,12 @@ def refine(
     seed: int,
     heard: Heard | None = None,
 ) -> Hypotheses:
-    """The posterior in continuous place and yaw, by repeated importance sampling.
+    """The posterior in continuous place, yaw and shared errors, by repeated importance sampling.
 
     Each round draws from the last round's hypotheses widened by a Gaussian and weighs by the
     posterior over the whole mixture it drew from (Cappé et al., Population Monte Carlo, JCGS
-    13(4), 2004), so that no draw is favoured for having many neighbours.
+    13(4), 2004), so that no draw is favoured for having many neighbours. Errors that all contacts share
+    (``shared_errors``) are not in the grid; the first round draws them from their prior.
 
     Args:
         search: the run.
@@ -69,37 +80,75 @@ def refine(
     current = start
     for attempt in range(rounds):
         draws = int(np.clip(_DRAWS_EACH * _perplexity(current.weights), samples, 5 * samples))
-        width = np.array([0.8e-3, 0.8e-3, 0.6e-3]) * 0.65**attempt
-        turn = _turn(search) * 0.65**attempt
-        parents = _systematic(current.weights, draws, rng)
-        gels = current.gels[parents] + rng.normal(size=(draws, 3)) * width
-        yaws = current.yaws[parents] + rng.normal(size=draws) * turn
-        unique, repeats = np.unique(parents, return_counts=True)
-        log_density = _mixture(
-            _in_widths(gels, yaws, width, turn),
-            _in_widths(current.gels[unique], current.yaws[unique], width, turn),
-            repeats / draws,
-        )
-        finest = attempt == rounds - 1
-        step = 1 if finest else 2
-        log_weights = _weighed(search, gels, yaws, members, step, 2, heard) - log_density
-        current = Hypotheses(gels, yaws, log_weights - log_weights.max())
+        drawn, log_density = _Kernel.of_round(search, members, attempt).draw(current, draws, rng)
+        step = 1 if attempt == rounds - 1 else 2
+        log_weights = _weighed(search, drawn, members, step, 2, heard) - log_density
+        current = replace(drawn, log_weights=log_weights - log_weights.max())
         if 1.0 / np.sum(current.weights**2) > _FILLED * draws:
             break
     return current
 
 
+@dataclass(frozen=True, eq=False)
+class _Kernel:
+    """What a round's draws are widened by: a Gaussian of place and yaw, a step of the shared errors.
+
+    The place is that of the contacts' middle, about which a turn moves none of them far: drawn so, place and
+    yaw of a good hypothesis make another good one.
+    """
+
+    prior: Prior
+    middle: FloatArray
+    width: FloatArray
+    turn: float
+
+    @classmethod
+    def of_round(cls, search: Search, members: IntArray, attempt: int) -> "_Kernel":
+        narrower, middle = _NARROW**attempt, search.positions[members].mean(axis=0)
+        return cls(search.prior, middle, _WIDTH * narrower, _turn(search) * narrower)
+
+    def _middles(self, gels: FloatArray, yaws: FloatArray, way: float = 1.0) -> FloatArray:
+        """Places of the contacts' middle from those of the first gel, or with -1 back."""
+        return np.asarray(gels + way * (self.prior.object_from_base(yaws) @ self.middle))
+
+    def draw(
+        self, current: Hypotheses, draws: int, rng: np.random.Generator
+    ) -> tuple[Hypotheses, FloatArray]:
+        """Hypotheses, all of one weight, and the ``(draws,)`` logarithm of the density they are drawn from.
+
+        Shared errors that were not named before are drawn from their prior, and what is drawn from the prior
+        has the prior's density.
+        """
+        parents = _systematic(current.weights, draws, rng)
+        places = self._middles(current.gels, current.yaws)
+        drawn = places[parents] + rng.normal(size=(draws, 3)) * self.width
+        yaws = current.yaws[parents] + rng.normal(size=draws) * self.turn
+        unique, repeats = np.unique(parents, return_counts=True)
+        points, centres = [drawn / self.width], [places[unique] / self.width]
+        if self.turn > 0.0:
+            points.append(yaws[:, None] / self.turn)
+            centres.append(current.yaws[unique, None] / self.turn)
+        if current.shared is None:
+            shared = rng.normal(size=(draws, UNKNOWNS))
+            named: FloatArray | float = log_prior(shared)
+        else:
+            shared, named = stepped(current.shared[parents], _STEP, rng), 0.0
+            points.append(shared / _STEP)
+            centres.append(around(current.shared[unique], _STEP) / _STEP)
+        log_density = _mixture(np.hstack(points), np.hstack(centres), repeats / draws) + named
+        gels = self._middles(drawn, yaws, -1.0)
+        return Hypotheses(gels, yaws, np.zeros(draws), shared), log_density
+
+
 def _weighed(
-    search: Search,
-    gels: FloatArray,
-    yaws: FloatArray,
-    members: IntArray,
-    step: int,
-    rings: int,
-    heard: Heard | None,
+    search: Search, at: Hypotheses, members: IntArray, step: int, rings: int, heard: Heard | None
 ) -> FloatArray:
-    total = search.weigh(gels, yaws, members, step=step, rings=rings)
-    return total if heard is None else np.asarray(total + heard.nats(search, gels, yaws, between=True))
+    total = search.weigh(at.gels, at.yaws, members, step, rings, at.shared)
+    if heard is None:
+        return total
+    # A hammer strikes within a millimetre of where it is aimed: shared errors, less than that, do not show in
+    # sound, and what its modes are wrong by would only be taken for them.
+    return np.asarray(total + heard.nats(search, at.gels, at.yaws, between=True))
 
 
 def _turn(search: Search) -> float:
@@ -107,10 +156,6 @@ def _turn(search: Search) -> float:
     if not search.yaw_observable:
         return 0.0
     return float(np.radians(0.8 if search.prior.yaw == "known" else 1.5))
-
-
-def _in_widths(gels: FloatArray, yaws: FloatArray, width: FloatArray, turn: float) -> FloatArray:
-    return gels / width if turn == 0.0 else np.column_stack([gels / width, yaws / turn])
 
 
 def _perplexity(weights: FloatArray) -> float:
@@ -133,6 +178,9 @@ def _mixture(points: FloatArray, centres: FloatArray, shares: FloatArray) -> Flo
             gap = 0.0
             for d in range(points.shape[1]):
                 gap += (points[i, d] - centres[j, d]) ** 2
+                # Most centres are far in place already.
+                if gap >= 60.0:
+                    break
             if gap < 60.0:
                 total += shares[j] * np.exp(-0.5 * gap)
         result[i] = np.log(total)

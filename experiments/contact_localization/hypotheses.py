@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from experiments.contact_localization.likelihood import GeometryNoise
+from experiments.contact_localization.shared_errors import SharedNoise
 from experiments.contact_localization.touch import TouchMap, TouchNoise
 from harness.arrays import FloatArray, IntArray
 
@@ -57,11 +58,13 @@ class Hypotheses:
         gels: ``(n, 3)`` metres, in the object's frame.
         yaws: ``(n,)`` rad away from the nominal one.
         log_weights: ``(n,)`` nats, the greatest 0.
+        shared: ``(n, 6)`` errors that all contacts share (``shared_errors``); None where not named.
     """
 
     gels: FloatArray
     yaws: FloatArray
     log_weights: FloatArray
+    shared: FloatArray | None = None
 
     @property
     def weights(self) -> FloatArray:
@@ -71,7 +74,18 @@ class Hypotheses:
     def best(self, within: float, most: int) -> "Hypotheses":
         """Those within so many nats of the best, evenly thinned where they are more than ``most``."""
         kept = best_of(self.log_weights, within, most)
-        return Hypotheses(self.gels[kept], self.yaws[kept], self.log_weights[kept])
+        return self.taken(kept, self.log_weights[kept])
+
+    def taken(self, chosen: IntArray, log_weights: FloatArray) -> "Hypotheses":
+        """Those of ``(m,)`` indices, with other weights."""
+        shared = None if self.shared is None else self.shared[chosen]
+        return Hypotheses(self.gels[chosen], self.yaws[chosen], log_weights, shared)
+
+    @property
+    def top(self) -> "Hypotheses":
+        """The most probable one alone."""
+        best = int(np.argmax(self.log_weights))
+        return self.taken(np.array([best], dtype=np.int64), np.zeros(1))
 
 
 @dataclass(frozen=True)
@@ -84,12 +98,14 @@ class Noise:
             known there, so that the surface met may face elsewhere than the one that was aimed at.
         touch: of the images.
         temperature: factor on the images' share: their errors are shared between contacts.
+        shared: of what all contacts share, and of what is left to each where that is named.
     """
 
     geometry: GeometryNoise = field(default_factory=GeometryNoise)
     unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3, angle=np.radians(4.0)))
     touch: TouchNoise = field(default_factory=TouchNoise)
     temperature: float = 0.3
+    shared: SharedNoise = field(default_factory=SharedNoise)
 
 
 def anchors(members: IntArray, most: int) -> IntArray:

@@ -27,4 +27,4 @@ class Levels:
     particles: int = 1000
     block: int = 8
     rounds: int = 3
-    samples: int = 600
+    samples: int = 3000

@@ -91,8 +91,7 @@ def _by_grid(
     start = time.perf_counter()
     samples = levels.samples * (1 if search.prior.yaw == "known" else _UNKNOWN_YAW_FACTOR)
     refined = refine(search, coarse, members, samples, levels.rounds, seed, heard)
-    top = int(np.argmax(refined.log_weights))
-    fits = search.gates(refined.gels[top], float(refined.yaws[top]), members)
+    fits = search.gates(refined.top, members)
     lap(seconds, "refine", start)
     return Solution(refined, members, fits)
 
@@ -116,8 +115,7 @@ def _by_particles(
     gels_at_last = particles.points + search.contacts[last].indentation * inward
     gels = gels_at_last - rotations @ search.positions[last]
     found = Hypotheses(gels, particles.yaws, particles.log_weights)
-    top = int(np.argmax(found.log_weights))
-    fits = search.gates(gels[top], float(found.yaws[top]), members)
+    fits = search.gates(found.top, members)
     lap(seconds, "particles", start)
     return Solution(found, members, fits)
 

@@ -9,9 +9,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from experiments.contact_localization.contact_scales import contact_scales, place_noise
 from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise, best_of
 from experiments.contact_localization.likelihood import arrange, geometry_scores, possible_anchors
 from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.shared_errors import log_prior, moves
 from experiments.contact_localization.surface import Surface
 from experiments.contact_localization.touch import TouchMap, View, best_fit, touch_terms
 from experiments.contact_localization.view import view_along
@@ -28,12 +30,6 @@ _PRUNE = 30.0
 
 MOST_HYPOTHESES = 20_000
 """That a grid keeps; of more, an even choice."""
-
-SAME_PLACE = 1.5e-3
-"""Metres between two presses that count as one place."""
-
-SAME_AXIS = np.radians(4.0)
-"""rad between their tools."""
 
 
 class Search:
@@ -56,6 +52,10 @@ class Search:
         self.positions -= self.positions[0]
         self.axes = np.array([contact.axis for contact in contacts])
         self._pitch = next((c.touch.pitch for c in contacts if c.touch is not None), 1.0e-3)
+        attitudes = np.array([contact.base_from_gel[:3, :3] for contact in contacts])
+        shown = np.array([contact.shows_contact for contact in contacts])
+        self._shared_moves = moves(noise.shared, self.positions, attitudes, shown if shown.any() else ~shown)
+        self._turned = self.axes, self.axes  # no yaws have been asked for
         self._views: dict[tuple[int, int, bool], View] = {}
 
     def view(self, contact: int, picture: int, coarse: bool = False) -> View:
@@ -118,7 +118,13 @@ class Search:
         return Hypotheses(gels, yaws, total - total.max())
 
     def weigh(
-        self, gels: FloatArray, yaws: FloatArray, members: IntArray, step: int, rings: int
+        self,
+        gels: FloatArray,
+        yaws: FloatArray,
+        members: IntArray,
+        step: int,
+        rings: int,
+        shared: FloatArray | None = None,
     ) -> FloatArray:
         """``(n,)`` nats: the posterior of hypotheses, up to a constant.
 
@@ -128,11 +134,12 @@ class Search:
             members: ``(m,)`` indices of contacts whose image shows a contact.
             step: fine view pixels between the cells over which the arm's error is integrated.
             rings: cells on each side.
+            shared: ``(n, 6)`` errors that all contacts share; None counts them to each contact's own.
         """
-        total = self.log_yaw_prior(yaws)
+        total = self.log_yaw_prior(yaws) + log_prior(shared)
         cells = max(1, step // 2) if self._rough else step
-        for k, sigma, temperature in self._scales(members):
-            total = total + self._term(k, gels, yaws, cells, rings, sigma, temperature, self._rough)
+        for k, sigma, temperature in self._scales(members, shared is not None):
+            total += self._term(k, gels, yaws, cells, rings, sigma, temperature, self._rough, shared)
         return total
 
     def _term(
@@ -145,51 +152,76 @@ class Search:
         sigma: float,
         temperature: float,
         coarse: bool,
+        shared: FloatArray | None = None,
     ) -> FloatArray:
         term = np.empty(len(gels))
-        touch, noise = self.touch(contact, coarse), self.noise.touch
-        for chosen, view, places in self.placed(contact, gels, yaws, coarse):
+        touch, noise = self.touch(contact, coarse), place_noise(self.noise, shared is not None)
+        for chosen, view, places in self.placed(contact, gels, yaws, coarse, shared):
             term[chosen] = touch_terms(view, touch, noise, places, step, rings, sigma, temperature)
         return term
 
-    def _scales(self, members: IntArray) -> Iterator[tuple[int, float, float]]:
+    def _scales(self, members: IntArray, named: bool = False) -> Iterator[tuple[int, float, float]]:
         """Contact, sigma of its place and temperature of its image."""
-        sigmas, temperatures = self._place_sigmas(members), self._temperatures(members)
-        for k, sigma, temperature in zip(members, sigmas, temperatures, strict=True):
-            yield int(k), float(sigma), float(temperature)
+        per_metre = self.geometry.gap_per_metre
+        return contact_scales(self.positions, self.axes, members, self.noise, per_metre, named)
 
-    def gates(self, gel: FloatArray, yaw: float, members: IntArray) -> FloatArray:
-        """``(m,)`` nats: how well each contact fits at one hypothesis, untempered and uncapped."""
+    def gates(self, one: Hypotheses, members: IntArray) -> FloatArray:
+        """``(m,)`` nats: how well each contact fits at one hypothesis, untempered and uncapped.
+
+        Its places may be off by all that a bench may be off by, named or not.
+        """
         values = np.empty(len(members))
         for column, (k, sigma, _) in enumerate(self._scales(members)):
-            ((_, view, places),) = self.placed(k, gel[None], np.array([yaw]))
+            ((_, view, places),) = self.placed(k, one.gels, one.yaws, shared=one.shared)
             values[column] = best_fit(view, self.touch(k), self.noise.touch, places[0], sigma)
         return values
 
     def placed(
-        self, contact: int, gels: FloatArray, yaws: FloatArray, coarse: bool = False
+        self,
+        contact: int,
+        gels: FloatArray,
+        yaws: FloatArray,
+        coarse: bool = False,
+        shared: FloatArray | None = None,
     ) -> Iterator[tuple[IntArray, View, FloatArray]]:
         """Hypotheses by the picture that serves them, with the gel's centre in view coordinates."""
-        places_in_object = self.gel_centres(contact, gels, yaws)
+        places_in_object = self.gel_centres(contact, gels, yaws, shared)
         pictures = self.pictures(yaws, coarse)
         for picture in (0,) if self.prior.yaw == "known" else np.unique(pictures):
             chosen = np.nonzero(pictures == picture)[0].astype(np.int64)
             view = self.view(contact, int(picture), coarse)
             yield chosen, view, places_in_object[chosen] @ view.object_from_view
 
-    def gel_centres(self, contact: int, gels: FloatArray, yaws: FloatArray) -> FloatArray:
+    def gel_centres(
+        self, contact: int, gels: FloatArray, yaws: FloatArray, shared: FloatArray | None = None
+    ) -> FloatArray:
         """``(n, 3)`` metres, in the object's frame, at one contact."""
-        moved = self.prior.object_from_base(yaws) @ self.positions[contact]
-        return np.asarray(gels + moved)
+        return np.asarray(gels + self.moved(contact, self._rotations(yaws), shared))
 
-    def surface_points(self, contact: int, gels: FloatArray, yaws: FloatArray) -> FloatArray:
+    def _rotations(self, yaws: FloatArray) -> FloatArray:
+        """``(n, 3, 3)``, object from base; all contacts of one set of hypotheses ask for the same in turn."""
+        if yaws is not self._turned[0]:
+            self._turned = yaws, self.prior.object_from_base(yaws)
+        return self._turned[1]
+
+    def moved(self, contact: int, rotations: FloatArray, shared: FloatArray | None) -> FloatArray:
+        """``(n, 3)`` metres, in the object's frame, from the first contact's gel to this one's."""
+        moved = self.positions[contact]
+        if shared is None:
+            return np.asarray(rotations @ moved)
+        off = shared @ self._shared_moves[contact]
+        return np.asarray(np.matmul(rotations, (moved + off)[:, :, None])[:, :, 0])
+
+    def surface_points(
+        self, contact: int, gels: FloatArray, yaws: FloatArray, shared: FloatArray | None = None
+    ) -> FloatArray:
         """``(n, 3)`` metres: where the tool's line first meets the object, to a view's pixel.
 
         Where it meets nothing within the gel's thickness, the sample nearest to the gel's centre:
         what lies behind an edge that was just missed was not touched.
         """
-        points = self.gel_centres(contact, gels, yaws)
-        for chosen, view, places in self.placed(contact, gels, yaws, self._rough):
+        points = self.gel_centres(contact, gels, yaws, shared)
+        for chosen, view, places in self.placed(contact, gels, yaws, self._rough, shared):
             row, column = np.round((places[:, :2] - view.origin) / view.pitch).astype(np.int64).T[::-1]
             rows, columns = view.depth.shape
             inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
@@ -206,7 +238,7 @@ class Search:
         """``(n, 3)`` metres: where a contact lies if the gel's centre was pressed in as it seems."""
         rotations = self.prior.object_from_base(hypotheses.yaws)
         inward = rotations @ self.axes[contact]
-        gels = hypotheses.gels + rotations @ self.positions[contact]
+        gels = hypotheses.gels + self.moved(contact, rotations, hypotheses.shared)
         return np.asarray(gels - self.contacts[contact].indentation * inward)
 
     def touch(self, contact: int, coarse: bool = False) -> TouchMap:
@@ -241,17 +273,6 @@ class Search:
             self.surface, arrangement, samples, yaws, prior, geometry, use_axis, _PRUNE
         )
         return samples, yaws, log_weights
-
-    def _place_sigmas(self, members: IntArray) -> FloatArray:
-        centre = self.positions[members].mean(axis=0)
-        reach = np.linalg.norm(self.positions[members] - centre, axis=1)
-        return np.asarray(np.hypot(self.noise.touch.shift, self.geometry.gap_per_metre * reach))
-
-    def _temperatures(self, members: IntArray) -> FloatArray:
-        """A press repeated at one place shares its errors: its images together count as one."""
-        gaps = np.linalg.norm(self.positions[members][:, None] - self.positions[members][None], axis=2)
-        alike = (gaps < SAME_PLACE) & (self.axes[members] @ self.axes[members].T > np.cos(SAME_AXIS))
-        return np.asarray(self.noise.temperature / alike.sum(axis=1))
 
     @property
     def yaw_observable(self) -> bool:

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.contact_localization.contact_scales import SAME_AXIS, SAME_PLACE
 from experiments.contact_localization.heard import Heard
 from experiments.contact_localization.hypotheses import Hypotheses, anchors
 from experiments.contact_localization.likelihood import arrange, geometry_scores
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.search import SAME_AXIS, SAME_PLACE, Search
+from experiments.contact_localization.search import Search
 from experiments.contact_localization.sound_analysis import analyse
 from experiments.contact_localization.sound_places import ANCHORS, strike_places
 from harness.acquisition import Strike
@@ -86,15 +87,13 @@ def fit_by_sound(search: Search, hypotheses: Hypotheses, heard: Heard, count: in
         heard: the run's strikes.
         count: contacts that count.
     """
-    top = int(np.argmax(hypotheses.log_weights))
-    gels, yaws = hypotheses.gels[top : top + 1], hypotheses.yaws[top : top + 1]
-    best = Hypotheses(gels, yaws, np.zeros(1))
-    points, directions = strike_places(search, heard.struck, gels, yaws)
+    best = hypotheses.top
+    points, directions = strike_places(search, heard.struck, best.gels, best.yaws)
     rows = heard.term.mode_table(points[0], directions[0])
     return SoundFit(
         places=_places(search, best, count),
-        yaw=float(search.log_yaw_prior(yaws)[0]),
-        sound=float(heard.nats(search, gels, yaws)[0]),
+        yaw=float(search.log_yaw_prior(best.yaws)[0]),
+        sound=float(heard.nats(search, best.gels, best.yaws)[0]),
         resonances=len(rows),
         unexplained=sum(not row.modes for row in rows),
     )

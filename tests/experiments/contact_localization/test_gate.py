@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_press import PRESSES
 
+from experiments.contact_localization.contact_scales import SAME_AXIS, SAME_PLACE
 from experiments.contact_localization.gate import gates, likeness_of, refuse_bad_fit, refuse_inside_out
-from experiments.contact_localization.hypotheses import Contact, Noise
+from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.search import SAME_AXIS, SAME_PLACE, Search
+from experiments.contact_localization.search import Search
 from harness.arrays import FloatArray
 from harness.errors import FitRefused
 from harness.geometry import frame_facing, transform
@@ -150,9 +151,9 @@ def test_a_repeat_is_the_same_place_and_the_same_attitude(block: Model, prior: P
 def test_an_object_inside_out_is_refused_and_one_that_is_not_is_not(
     search: Search, block: Model, contacts: tuple[Contact, ...], prior: Prior
 ) -> None:
-    gel = np.asarray(PRESSES[0].object_from_gel[:3, 3])
+    truth = Hypotheses(PRESSES[0].object_from_gel[None, :3, 3], np.zeros(1), np.zeros(1))
     members = np.arange(len(PRESSES))
-    refuse_inside_out(search, gel, 0.0, members)
+    refuse_inside_out(search, truth, members)
     inverted = Model(Mesh(block.mesh.vertices, block.mesh.faces[:, ::-1]), block.sensor, block.calibration)
     with pytest.raises(FitRefused, match=r"inside out.*contact \d.*turn the faces"):
-        refuse_inside_out(Search(contacts, inverted, prior, 3e-3, Noise()), gel, 0.0, members)
+        refuse_inside_out(Search(contacts, inverted, prior, 3e-3, Noise()), truth, members)

@@ -15,28 +15,49 @@ MEMBERS = np.array([0])
 SIGMAS = np.array([0.5e-3, 0.4e-3, 0.3e-3, np.radians(0.7)])
 CENTRE = np.array([0.3e-3, -0.6e-3, 0.2e-3, np.radians(0.4)])
 APART = np.array([30e-3, 0.0, 0.0, 0.0])
+READ = np.array([0.8, -0.5, 0.2])
 
 
 class Known:
-    """A run whose posterior is a sum of Gaussians in place and yaw."""
+    """A run whose posterior is a sum of Gaussians in place and yaw.
+
+    ``carries`` metres of place go with each sigma of a shared error, which is read to ``told`` sigmas.
+    """
 
     def __init__(
-        self, shares: tuple[float, ...] = (1.0,), yaw: Literal["known", "unknown"] = "known"
+        self,
+        shares: tuple[float, ...] = (1.0,),
+        yaw: Literal["known", "unknown"] = "known",
+        carries: float = 0.0,
+        told: float = np.inf,
     ) -> None:
         self.prior = Prior(np.eye(3), yaw)
         self.shares = shares
+        self.positions = np.zeros((1, 3))
         self.yaw_observable = True
+        self.carries, self.told = carries, told
 
     def weigh(
-        self, gels: FloatArray, yaws: FloatArray, members: IntArray, step: int, rings: int
+        self,
+        gels: FloatArray,
+        yaws: FloatArray,
+        members: IntArray,
+        step: int,
+        rings: int,
+        shared: FloatArray | None = None,
     ) -> FloatArray:
         """Nats, up to a constant that is not zero."""
+        known = 0.0
+        if shared is not None:
+            gels = gels - self.carries * shared[:, :3]
+            known = -0.5 * np.sum(shared**2, axis=1)
+            known = known - 0.5 * np.sum(((shared[:, :3] - READ) / self.told) ** 2, axis=1)
         at = np.column_stack([gels, yaws])
         parts = [
             np.log(share) - 0.5 * np.sum(((at - CENTRE - k * APART) / SIGMAS) ** 2, axis=1)
             for k, share in enumerate(self.shares)
         ]
-        return np.asarray(np.logaddexp.reduce(parts)) - 123.4
+        return np.asarray(np.logaddexp.reduce(parts)) + known - 123.4
 
 
 def start_of(known: Known, seed: int = 0) -> Hypotheses:
@@ -118,6 +139,26 @@ def test_draws_that_crowd_one_bump_do_not_make_it_heavier() -> None:
         found = refine(cast(Search, known), crowded, MEMBERS, 1200, 2, seed)
         shares.append(float(found.weights[found.gels[:, 0] < 15e-3].sum()))
     assert np.mean(shares) == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_shared_errors_are_told_as_well_as_prior_and_readings_tell_them(seed: int) -> None:
+    """In closed form: a normal prior and a normal reading, and a place that is carried along."""
+    found = refined(Known(carries=0.4e-3, told=0.7), samples=3000, seed=seed)
+    assert found.shared is not None
+    variance = 1.0 / (1.0 + 0.7**-2)
+    shared = np.zeros(6)
+    shared[:3] = READ * variance * 0.7**-2
+    sigma = np.sqrt(np.r_[np.full(3, variance), np.ones(3)])
+    error = 4.0 / np.sqrt(effective(found))
+    mean = found.weights @ found.shared
+    assert (mean - shared) / sigma == pytest.approx(0.0, abs=error)
+    spread = np.sqrt(found.weights @ (found.shared - mean) ** 2)
+    assert spread / sigma == pytest.approx(1.0, abs=error)
+    wide = np.hypot(SIGMAS[:3], 0.4e-3 * np.sqrt(variance))
+    place, over = moments(found)
+    assert (place[:3] - CENTRE[:3] - 0.4e-3 * shared[:3]) / wide == pytest.approx(0.0, abs=error)
+    assert over[:3] / wide == pytest.approx(1.0, abs=error)
 
 
 def test_no_rounds_leave_the_grid_as_it_is() -> None:

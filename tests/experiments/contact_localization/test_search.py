@@ -13,8 +13,9 @@ from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.nearest import nearest_point
 from experiments.contact_localization.search import Search
+from experiments.contact_localization.shared_errors import SharedNoise
 from harness.arrays import FloatArray
-from harness.geometry import rotation_about, translation
+from harness.geometry import rotation_about, rotation_from_vector, translation
 
 QUICK = Levels(spacing=3e-3, rounds=2, samples=300)
 UP = np.array([0.0, 0.0, 1.0])
@@ -121,6 +122,38 @@ def test_translations_carry_the_gel_from_contact_to_contact(search: Search) -> N
     for k, press in enumerate(PRESSES):
         at = search.gel_centres(k, true_gel(search)[None], np.zeros(1))
         assert at[0] == pytest.approx(press.object_from_gel[:3, 3], abs=1e-12)
+
+
+def test_named_errors_put_contacts_where_a_crooked_bench_has_them(
+    contacts: tuple[Contact, ...], block: Model, prior: Prior
+) -> None:
+    """A tilted, larger object and a gel off its place, told in sigmas, are the true places again."""
+    noise, shared = SharedNoise(), np.array([[0.7, -0.4, 1.1, 0.5, -0.8, 0.3]])
+    tilt = rotation_from_vector(np.array([*noise.tilt * shared[0, :2], 0.0]))
+    size, off = 1.0 + noise.scale * shared[0, 2], noise.gel_centre * shared[0, 3:]
+
+    def reported(contact: Contact) -> Contact:
+        """The pose that the arm reports where the true one, of the crooked object, is ``contact``'s."""
+        pose = contact.base_from_gel.copy()
+        pose[:3, 3] = tilt.T @ (pose[:3, 3] - contacts[0].base_from_gel[:3, 3]) / size - pose[:3, :3] @ off
+        return replace(contact, base_from_gel=pose)
+
+    crooked = Search([reported(c) for c in contacts], block, prior, 3e-3, Noise())
+    true = np.array([press.object_from_gel[:3, 3] for press in PRESSES])
+    gel, none = true_gel(crooked)[None], np.zeros(1)
+    told = np.vstack([crooked.gel_centres(k, gel, none, shared) for k in range(len(true))])
+    plain = np.vstack([crooked.gel_centres(k, gel, none) for k in range(len(true))])
+    off_told, off_plain = (at - at.mean(axis=0) - true + true.mean(axis=0) for at in (told, plain))
+    # First order in half a degree and half a percent, over a block of 60 mm.
+    assert np.linalg.norm(off_told, axis=1).max() < 10e-6
+    assert np.linalg.norm(off_plain, axis=1).max() > 0.3e-3
+
+
+def test_errors_of_size_zero_are_none(search: Search) -> None:
+    gels, nothing = true_gel(search)[None], np.zeros((1, 6))
+    for k in range(len(PRESSES)):
+        at = search.gel_centres(k, gels, np.zeros(1), nothing)
+        np.testing.assert_array_equal(at, search.gel_centres(k, gels, np.zeros(1)))
 
 
 def test_the_contact_is_where_the_tools_line_first_meets_the_object(search: Search) -> None:
