@@ -1,8 +1,8 @@
 """What a network of sound costs and is worth, beside what needs no training.
 
-``python tests/benchmarks/bench_audionet.py [object ...]`` prints, for each profile, process seconds on
-one core, size, microseconds for a point, and errors on vertices that were held out. The profiles
-``small`` and ``paper`` train for minutes; name them with ``--profile``.
+``PYTHONPATH=tests python tests/benchmarks/bench_audionet.py [object ...]`` prints, for each profile,
+process seconds on one core, size, microseconds for a point, and errors on vertices that were held out.
+The profiles ``small`` and ``paper`` train for minutes; name them with ``--profile``.
 """
 
 import argparse
@@ -10,6 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from network_worth import HEADINGS, said, worth
 from rich.console import Console
 from rich.table import Table
 
@@ -22,17 +23,6 @@ from harness.sim.modal import HEARING, modes_of
 from harness.sim.modes import dampings
 from harness.store import Store, default_folder
 
-HEADINGS = ("object", "shapes from", "s", "MB", "us", "gain %", "95th", "STFT e-5", "envelope e-4", "dB")
-COLUMNS = (
-    ("bytes", 1e-6),
-    ("seconds_per_vertex", 1e6),
-    ("gain_error_median", 1e2),
-    ("gain_error_p95", 1e2),
-    ("stft_distance", 1e5),
-    ("envelope_distance", 1e4),
-    ("spectral_error_db", 1.0),
-)
-
 
 def main() -> None:
     """Print one table."""
@@ -41,7 +31,13 @@ def main() -> None:
     parser.add_argument("--profile", action="append")
     parser.add_argument("--modes", type=int, default=128)
     asked = parser.parse_args()
-    table = Table(*HEADINGS, title=f"up to {asked.modes} modes below {HEARING / 1e3:g} kHz, one thread")
+    table = Table(
+        "object",
+        "shapes from",
+        "s",
+        *HEADINGS,
+        title=f"up to {asked.modes} modes below {HEARING / 1e3:g} kHz, one thread",
+    )
     for name in asked.objects:
         _measure(table, name, asked.profile or ["smoke", "standard"], asked.modes)
     Console(width=140).print(table)
@@ -60,8 +56,8 @@ def _measure(table: Table, name: str, profiles: list[str], most: int) -> None:
         if number == 0:
             rows |= {row: errors for row, errors in made.errors.items() if row != "network"}
         for row, errors in rows.items():
-            said = [f"{errors[key] * scale:.3g}" if key in errors else "" for key, scale in COLUMNS]
-            table.add_row(f"{name}, {len(modes.frequencies)}", row, f"{took:.1f}" * (row == wanted), *said)
+            spent = f"{took:.1f}" * (row == wanted)
+            table.add_row(f"{name}, {len(modes.frequencies)}", row, spent, *said(worth(errors)))
 
 
 if __name__ == "__main__":

@@ -14,18 +14,33 @@ import numpy as np
 from exact_bars import astm_bending, astm_torsion
 from exact_plate import guided_plate, on_lower_edges, sliding_sides
 from exact_solids import exact_ball, exact_box, octant_shell, on_planes, radial_frequencies
+from manifold3d import Manifold
 from rich.console import Console
 from rich.table import Table
 from ritz_box import ritz_frequencies
 
 from harness.arrays import BoolArray, FloatArray
 from harness.materials import MATERIALS, Material
+from harness.mesh import Mesh
+from harness.objects.solid import from_manifold
+from harness.sim.element_edge import fine_edge
+from harness.sim.filled import filled
+from harness.sim.modal import curved
 from harness.sim.modal_mesh import QuadraticMesh
 from harness.sim.modal_solve import Solution, solve_mesh
 
 STEEL = MATERIALS["steel"]
 NAFEMS = Material("", 8000.0, 2e11, 0.3, 0.0, 0.0)
-CASES = ("balls", "boxes", "bars", "hollow", "plates", "supported")
+CASES = ("balls", "boxes", "bars", "hollow", "plates", "supported", "counted")
+BRICKS = (
+    ((60.0, 60.0, 60.0), 0.29),
+    ((60.0, 45.0, 30.0), 0.4),
+    ((60.0, 50.0, 20.0), 0.1),
+    ((100.0, 80.0, 10.0), 0.29),
+    ((200.0, 20.0, 10.0), 0.29),
+)
+"""mm, and Poisson's ratio."""
+
 Row = tuple[str, int, list[float], float]
 
 
@@ -143,6 +158,32 @@ def supported(sizes: tuple[tuple[int, int], ...]) -> Iterator[Row]:
         yield "plate on its sides, 3 modes, Rayleigh and Lamb", solved.unknowns, took, _worst(found, exact)
 
 
+def counted(numbers: tuple[int, ...]) -> Iterator[Row]:
+    """Surfaces of which so many modes are asked and no edge, filled as ``touchstone sim modes`` does."""
+    ball = replace(STEEL, poisson=0.25)
+    eta = np.repeat([2.501133, 2.639869, 3.424530, 3.864700], [5, 5, 3, 7])
+    lamb = eta * np.sqrt(ball.young / (2.5 * ball.density)) / (2.0 * np.pi * 0.03)
+    cases = [
+        (f"box {sides} mm", Manifold.cube(sides), replace(STEEL, poisson=nu), sides) for sides, nu in BRICKS
+    ]
+    for name, shape, material, sides in [
+        *cases,
+        ("Lamb's sphere, 30 mm", Manifold.sphere(30.0, 160), ball, None),
+    ]:
+        solid = from_manifold(shape)
+        surface = Mesh(solid.vertices * 1e-3, solid.faces)
+        for number in numbers:
+            exact = lamb if sides is None else ritz_frequencies(_metres(sides), material, 20)
+            inside, _ = filled(surface, fine_edge(surface, material, np.inf, number), None)
+            solved, took = timed(curved(inside, surface, inside), material, number)
+            shown = f"{name}, ratio {material.poisson:g}, {number} modes asked of its surface"
+            yield shown, solved.unknowns, took, error(solved, exact[:number])
+
+
+def _metres(sides: tuple[float, float, float]) -> tuple[float, float, float]:
+    return (1e-3 * sides[0], 1e-3 * sides[1], 1e-3 * sides[2])
+
+
 def _worst(found: FloatArray, expected: FloatArray) -> float:
     return float(np.abs(found / expected - 1.0).max())
 
@@ -162,6 +203,7 @@ def main() -> None:
         "hollow": lambda: hollow((4, 6, 9) if fine else (4,)),
         "plates": lambda: plates((16, 24, 36) if fine else (8,)),
         "supported": lambda: supported(((8, 1), (16, 2), (32, 4)) if fine else ((4, 1), (8, 1))),
+        "counted": lambda: counted((10, 20) if fine else (10,)),
     }
     table = Table(title="process seconds of assembly and solve on one thread: median (extremes)")
     for heading in ("case", "unknowns", "s", "worst error"):
