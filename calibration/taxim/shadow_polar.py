@@ -12,6 +12,7 @@ from scipy.ndimage import map_coordinates
 from calibration.taxim.light_fit import REACH, Light, light_shades
 from calibration.taxim.pack import PressPack
 from harness.arrays import FloatArray, read_only
+from harness.sim.shadow import RIM
 
 DIRECTIONS = 64
 SAMPLE_STEP = 1.25
@@ -19,9 +20,6 @@ SAMPLE_STEP = 1.25
 
 WITHIN = 0.7
 """Of the contact's radius: where its slopes show which way the light comes."""
-
-_RIM = 4
-"""Pixels to each side by which ``harness.sim.shadow.rim`` widens a contact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +85,7 @@ def rim_reach(edge: float, directions: FloatArray) -> FloatArray:
         edge: pixels, radius of the contact.
         directions: ``(d,)`` rad.
     """
-    side = np.arange(-_RIM, _RIM + 1)
+    side = np.arange(-RIM, RIM + 1)
     corner = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     along = np.stack([np.cos(directions), np.sin(directions)], axis=1) @ corner.T
     left = edge**2 - (corner**2).sum(axis=1) + along**2

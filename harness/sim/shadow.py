@@ -15,6 +15,9 @@ from harness.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused, OutOfDomain
 from harness.sim.compiled import compiled
 
+RIM = 4
+"""Pixels to each side by which the rim of a contact reaches past it."""
+
 Beyond = Literal["hold", "skip"]
 
 
@@ -62,8 +65,9 @@ class ShadowTable:
 
 def rim(core: BoolArray) -> BoolArray:
     """``(rows, columns)`` the ring of four pixels around a contact, from which shadows are thrown."""
-    wide: BoolArray = ndimage.binary_dilation(core, np.ones((5, 5), np.bool_), iterations=2)
-    return wide & ~core
+    wide = ndimage.maximum_filter(core.view(np.uint8), 2 * RIM + 1, mode="constant") > 0
+    ring: BoolArray = wide & ~core
+    return ring
 
 
 def cast_shadows(
@@ -101,36 +105,48 @@ def cast_shadows(
             f"colours {change.shape}, heights {indentation.shape} and core {core.shape} disagree"
         )
     starts = np.concatenate([[0], np.cumsum(table.lengths.ravel())]).astype(np.int64)
-    fans = [_fan(direction, table) for direction in table.directions]
-    rays = np.full((len(fans), max(len(fan) for fan in fans)), np.nan)
-    for k, fan in enumerate(fans):
-        rays[k, : len(fan)] = fan
+    lists = (table.lengths, starts, table.values)
+    rays = _rays(table)
     shaded, outside = change.copy(), np.zeros(len(change))
     for n in range(len(change)):
-        ring = rim(core[n])
-        if not ring.any():
+        ring = np.argwhere(rim(core[n]))
+        if not len(ring):
             continue
-        row = np.floor((indentation[n] - table.shallowest) / table.depth_step + 1e-9).astype(np.int64)
+        deep = indentation[n][ring[:, 0], ring[:, 1]]
+        row = np.floor((deep - table.shallowest) / table.depth_step + 1e-9).astype(np.int64)
         held = np.clip(row, 0, table.lengths.shape[2] - 1)
-        missing = ring & (row != held)
-        outside[n] = missing.sum() / ring.sum()
-        throws = ring & ~missing if beyond == "skip" else ring
-        direction = _direction_rows(surface[n], table)
-        lists = (table.lengths, starts, table.values)
-        _throw(shaded[n], surface[n], throws, held, direction, rays, lists, table.sample_step)
+        missing = row != held
+        outside[n] = missing.sum() / len(ring)
+        throws = ~missing if beyond == "skip" else np.ones(len(ring), np.bool_)
+        direction = _direction_rows(surface[n], ring[throws], table)
+        _throw(shaded[n], surface[n], ring[throws], held[throws], direction, rays, lists, table.sample_step)
     return read_only(shaded), read_only(outside)
 
 
-def _fan(direction: float, table: ShadowTable) -> FloatArray:
-    return np.arange(direction - table.fan, direction + table.fan, table.fan_step)
+def _rays(table: ShadowTable) -> FloatArray:
+    """``(d, rays)`` rad, NaN where a fan has fewer."""
+    fans = [
+        np.arange(direction - table.fan, direction + table.fan, table.fan_step)
+        for direction in table.directions
+    ]
+    rays = np.full((len(fans), max(len(fan) for fan in fans)), np.nan)
+    for k, fan in enumerate(fans):
+        rays[k, : len(fan)] = fan
+    return rays
 
 
-def _direction_rows(surface: FloatArray, table: ShadowTable) -> IntArray:
-    down, right = np.zeros_like(surface), np.zeros_like(surface)
-    down[1:-1, 1:-1] = (surface[2:, 1:-1] - surface[:-2, 1:-1]) / 2.0
-    right[1:-1, 1:-1] = (surface[1:-1, 2:] - surface[1:-1, :-2]) / 2.0
+def _direction_rows(surface: FloatArray, at: IntArray, table: ShadowTable) -> IntArray:
+    """``(n,)`` which lists pixels ``(n, 2)`` throw; at the picture's border slopes count as none."""
+    i, j = at.T
+    rows, columns = surface.shape
+    within_rows, within_columns = (i > 0) & (i < rows - 1), (j > 0) & (j < columns - 1)
+    inside = within_rows & within_columns
+    above, below = np.maximum(i - 1, 0), np.minimum(i + 1, rows - 1)
+    left, right = np.maximum(j - 1, 0), np.minimum(j + 1, columns - 1)
+    down = np.where(inside, (surface[below, j] - surface[above, j]) / 2.0, 0.0)
+    along = np.where(inside, (surface[i, right] - surface[i, left]) / 2.0, 0.0)
     # The slope climbs towards the contact; the shadow falls the other way, half a turn on.
-    outwards = np.arctan2(down, right) + np.pi
+    outwards = np.arctan2(down, along) + np.pi
     step = float(table.directions[1] - table.directions[0])
     return np.minimum(np.floor_divide(outwards, step).astype(np.int64), len(table.directions) - 1)
 
@@ -139,7 +155,7 @@ def _direction_rows(surface: FloatArray, table: ShadowTable) -> IntArray:
 def _throw(
     shaded: FloatArray,
     surface: FloatArray,
-    throws: BoolArray,
+    at: IntArray,
     depth_row: IntArray,
     direction_row: IntArray,
     rays: FloatArray,
@@ -148,20 +164,23 @@ def _throw(
 ) -> None:
     lengths, starts, values = lists
     rows, columns = surface.shape
-    for i in range(rows):
-        for j in range(columns):
-            if not throws[i, j]:
+    for p in range(len(at)):
+        i, j = at[p, 0], at[p, 1]
+        d, k = direction_row[p], depth_row[p]
+        for ray in range(rays.shape[1]):
+            turn = rays[d, ray]
+            if np.isnan(turn):
                 continue
-            d, k = direction_row[i, j], depth_row[i, j]
-            for ray in range(rays.shape[1]):
-                turn = rays[d, ray]
-                if np.isnan(turn):
+            across, along = step * np.cos(turn), step * np.sin(turn)
+            longest = max(lengths[0, d, k], lengths[1, d, k], lengths[2, d, k])
+            for s in range(1, longest):
+                x, y = int(j + s * across), int(i + s * along)
+                if x < 0 or x >= columns or y < 0 or y >= rows:
+                    # Rays are straight: what has left the picture does not come back.
+                    break
+                if surface[i, j] <= surface[y, x]:
                     continue
-                across, along = step * np.cos(turn), step * np.sin(turn)
                 for c in range(3):
-                    first = starts[(c * lengths.shape[1] + d) * lengths.shape[2] + k]
-                    for s in range(1, lengths[c, d, k]):
-                        x, y = int(j + s * across), int(i + s * along)
-                        if x < 0 or x >= columns or y < 0 or y >= rows or surface[i, j] <= surface[y, x]:
-                            continue
-                        shaded[y, x, c] = min(shaded[y, x, c], values[first + s])
+                    if s < lengths[c, d, k]:
+                        level = values[starts[(c * lengths.shape[1] + d) * lengths.shape[2] + k] + s]
+                        shaded[y, x, c] = min(shaded[y, x, c], level)

@@ -1,13 +1,13 @@
 """Shadows of a contact laid over the pictures that the optics drew."""
 
+import cv2
 import numpy as np
-from scipy import ndimage
 
 from harness.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.sensor import TactileSensor
 from harness.sim.gel import over_range
 from harness.sim.height_map import rest_surface
-from harness.sim.shadow import ShadowTable, cast_shadows
+from harness.sim.shadow import RIM, ShadowTable, cast_shadows
 from harness.sim.tactile_calibration import TactileCalibration
 
 SOFTNESS = 59e-6
@@ -42,11 +42,33 @@ def darkening(
         whose depth was not in the table.
     """
     held, _ = over_range(penetration, sensor)
-    core = (held > calibration.header.skirt.core * held.max(axis=(1, 2), keepdims=True)) & (held > 0.0)
+    deepest = held.max(axis=(1, 2), keepdims=True)
+    core = (held > calibration.header.skirt.core * deepest) & (held > 0.0)
     untouched = -rest_surface(sensor) if rest is None else rest
-    surface = (indentation + untouched) / calibration.header.pitch
-    change = pictures.astype(np.float64) - calibration.background
-    return soft_shadows(change, indentation, surface, core, table, calibration.header.pitch)
+    pitch = calibration.header.pitch
+    soft, outside = np.zeros(pictures.shape), np.zeros(len(pictures))
+    for n in range(len(pictures)):
+        box = _reached(core[n], table, pitch)
+        if box is None:
+            continue
+        change = pictures[n][box].astype(np.float64) - calibration.background[box]
+        surface = (indentation[n][box] + untouched[box]) / pitch
+        parts = (change[None], indentation[n][box][None], surface[None], core[n][box][None])
+        taken, share = soft_shadows(*parts, table, pitch)
+        soft[n][box], outside[n] = taken[0], share[0]
+    return read_only(soft), read_only(outside)
+
+
+def _reached(core: BoolArray, table: ShadowTable, pitch: float) -> tuple[slice, slice] | None:
+    """The part of a picture that shadows of a contact may reach, blur included; None without a contact."""
+    rows, columns = np.flatnonzero(core.any(axis=1)), np.flatnonzero(core.any(axis=0))
+    if not len(rows):
+        return None
+    longest = table.sample_step * float(table.lengths.max(initial=0))
+    margin = RIM + int(np.ceil(longest)) + _radius(SOFTNESS / pitch) + 2
+    return tuple(  # type: ignore[return-value]  # two of them
+        slice(max(0, int(one[0]) - margin), int(one[-1]) + margin + 1) for one in (rows, columns)
+    )
 
 
 def soft_shadows(
@@ -63,10 +85,26 @@ def soft_shadows(
     """
     shaded, outside = cast_shadows(change, indentation, surface, core, table)
     sigma = SOFTNESS / pitch
-    soft: FloatArray = ndimage.gaussian_filter(change - shaded, (0.0, sigma, sigma, 0.0))
-    return read_only(soft), outside
+    size = 2 * _radius(sigma) + 1
+    soft = np.subtract(change, shaded, dtype=np.float32, casting="same_kind")
+    for one in soft:
+        cv2.GaussianBlur(one, (size, size), sigma, dst=one, borderType=cv2.BORDER_REFLECT)
+    return read_only(soft.astype(np.float64)), outside
+
+
+def _radius(sigma: float) -> int:
+    """Pixels to a side beyond which a blur has nothing: four sigma."""
+    return max(1, int(4.0 * sigma + 0.5))
 
 
 def darkened(pictures: ByteArray, by: FloatArray) -> ByteArray:
     """The pictures, darker by grey levels; the same to the bit where that is zero."""
-    return read_only(np.clip(np.rint(pictures - by), 0.0, 255.0).astype(np.uint8))
+    drawn = pictures.copy()
+    for n in range(len(by)):
+        rows = np.flatnonzero(by[n].any(axis=(1, 2)))
+        if len(rows):
+            part = slice(int(rows[0]), int(rows[-1]) + 1)
+            columns = np.flatnonzero(by[n, part].any(axis=(0, 2)))
+            box = (part, slice(int(columns[0]), int(columns[-1]) + 1))
+            drawn[n][box] = np.clip(np.rint(pictures[n][box] - by[n][box]), 0.0, 255.0)
+    return read_only(drawn)

@@ -2,14 +2,21 @@
 
 ``PYTHONPATH=tests python tests/benchmarks/real_shadows.py`` needs the real data. The last rows are what
 nobody can beat: the published pictures are JPEGs, and their compression is noise on exactly these pixels.
-With ``law``: how well the nine published depths follow from the deepest, by the law that calibrations take.
+With ``speed``: what shadows take. With ``law``: how well the nine published depths follow from the deepest
+one, by the law that calibrations take.
 """
 
 import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from time import process_time
 
+import cv2
 import numpy as np
 from published_shadow import (
     OTHER,
+    PITCH,
     TOPS,
     PublishedPress,
     from_both,
@@ -22,10 +29,16 @@ from real_data import WHY_NOT, find_shared_data
 from rich.console import Console
 from rich.table import Table
 
+from harness.arrays import ByteArray
 from harness.image_metrics import psnr
+from harness.sensor import TactileSensor
+from harness.sim.optics import Optics
+from harness.sim.published_pack import read_published
 from harness.sim.shadow import ShadowTable, cast_shadows
+from harness.sim.shadow_image import darkened, darkening
 
 CONSOLE = Console(width=118, highlight=False)
+_TIMES = 15
 _LEAST = 7
 """Samples of a direction's deepest list, for it to say anything."""
 
@@ -35,6 +48,9 @@ def main() -> None:
     data = find_shared_data()
     if data is None:
         raise SystemExit(WHY_NOT)
+    if "speed" in sys.argv[1:]:
+        CONSOLE.print(speed(data / "tactile/taxim"))
+        return
     if "law" in sys.argv[1:]:
         CONSOLE.print(law_of_depths(shadow_table(data / "tactile/taxim/gelsight_lab")))
         return
@@ -55,6 +71,40 @@ def main() -> None:
     for words, cells in rows.items():
         table.add_row(words, *cells)
     CONSOLE.print(table)
+
+
+def speed(taxim: Path) -> str:
+    """Milliseconds of the processor, 640 x 480: colours of the fast level, and what shadows take besides."""
+    cv2.setNumThreads(1)
+    said = []
+    for name in TOPS:
+        press = published_press(taxim, name)
+        background: ByteArray = np.clip(press.background, 0.0, 255.0).astype(np.uint8)
+        pack = read_published(taxim / "gelsight_lab", PITCH, background)
+        assert pack.shadow is not None
+        rows, columns = press.surface.shape
+        sensor = TactileSensor("GelSight of Taxim", rows, columns, PITCH, 5e-3, casts_shadow=True)
+        optics, deep = Optics(pack.calibration, "fast", pack.rest), np.maximum(press.penetration, 0.0)[None]
+        plain: ByteArray = press.plain.astype(np.uint8)[None]
+        shadows = partial(darkening, plain, deep, deep, sensor, pack.calibration, pack.shadow, pack.rest)
+        taken = shadows()[0]
+        ways = (partial(optics.render, deep), shadows, partial(darkened, plain, taken))
+        colour, thrown, laid = (_milliseconds(way) for way in ways)
+        said.append(
+            f"{name}: colours {colour:.1f} ms, shadows thrown {thrown:.1f} and laid over {laid:.1f}: "
+            f"{colour + thrown + laid:.1f} together"
+        )
+    return "\n".join(said)
+
+
+def _milliseconds(way: Callable[[], object]) -> float:
+    way()
+    took = []
+    for _ in range(_TIMES):
+        began = process_time()
+        way()
+        took.append(process_time() - began)
+    return 1e3 * float(np.median(took))
 
 
 def law_of_depths(published: ShadowTable) -> Table:

@@ -9,8 +9,11 @@ from scipy import ndimage
 
 from harness.arrays import FloatArray
 from harness.errors import CalibrationRefused, OutOfDomain
+from harness.sensor import GELSIGHT_R15
 from harness.sim.optics_kernels import change_exactly
 from harness.sim.shadow import Beyond, ShadowTable, cast_shadows, rim
+from harness.sim.shadow_image import SOFTNESS, darkened, darkening
+from harness.sim.tactile_calibration import shipped_calibration
 
 PITCH = 0.0295e-3
 
@@ -125,3 +128,26 @@ def test_tables_that_do_not_hold_together_are_refused() -> None:
     nothing = np.zeros((1, 6, 7))
     with pytest.raises(OutOfDomain, match="disagree"):
         cast_shadows(np.zeros((1, 6, 8, 3)), nothing, nothing, nothing > 0, good)
+
+
+@pytest.mark.parametrize("place", [(60, 80), (4, 6), (110, 150)])
+def test_a_shadow_is_the_same_whether_a_part_or_all_of_the_picture_is_looked_at(
+    place: tuple[int, int],
+) -> None:
+    calibration = shipped_calibration("gelsight_r15_bench")
+    y, x = np.mgrid[:120, :160]
+    deep = np.maximum(0.0, 1e-3 - 4e-6 * ((y - place[0]) ** 2 + (x - place[1]) ** 2))[None]
+    gel = ndimage.gaussian_filter(deep, (0, 2.0, 2.0))
+    plain = calibration.background[None]
+    taken, outside = darkening(plain, deep, gel, GELSIGHT_R15, calibration, _made_up())
+    core = (deep > calibration.header.skirt.core * deep.max()) & (deep > 0.0)
+    change = np.zeros((*deep.shape, 3))
+    whole, share = cast_shadows(change, gel, gel / calibration.header.pitch, core, _made_up())
+    sigma = SOFTNESS / calibration.header.pitch
+    soft = ndimage.gaussian_filter(-whole, (0.0, sigma, sigma, 0.0))
+    assert soft.max() > 10.0
+    assert np.abs(taken - soft).max() < 1e-4
+    assert outside[0] == share[0]
+    drawn = darkened(plain, taken)
+    assert np.array_equal(drawn[0][taken[0] == 0.0], plain[0][taken[0] == 0.0])
+    assert np.array_equal(drawn, np.clip(np.rint(plain - taken), 0.0, 255.0).astype(np.uint8))
