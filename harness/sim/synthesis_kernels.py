@@ -60,15 +60,15 @@ def fill(
         floor: what is smaller is zero, so that no product of two tables loses its leading bit.
         swapped: the imaginary parts come before the real ones in each tile.
     """
-    kernel = _fill_single if table.dtype == np.float32 else _fill_double
-    kernel(table, rows, first, step, floor * floor, swapped)
+    _fill(table, rows, first, step, floor * floor, swapped)
 
 
 @compiled
-def _fill_single(
+def _fill(
     table: AnyArray, rows: IntArray, first: FloatArray, step: FloatArray, least: float, swapped: bool
 ) -> None:
-    size, wide = np.int64(4), table.shape[1]
+    # Known when this is compiled for a type, so that only one of both turns is in its code.
+    size, wide = np.int64(table.itemsize), table.shape[1]
     out: Any = np.int64(table.ctypes.data)
     ahead: Any = np.int64(first.ctypes.data)
     on: Any = np.int64(step.ctypes.data)
@@ -77,29 +77,11 @@ def _fill_single(
         at = out + size * 2 * TILE * tile
         real, imag = (at + size * TILE, at) if swapped else (at, at + size * TILE)
         lane = 8 * TILE * tile
-        turn_single(
-            real, imag, size * wide, rows[tile], ahead + lane, ahead + below + lane, on + lane,
-            on + below + lane, least,
-        )  # fmt: skip
-
-
-@compiled
-def _fill_double(
-    table: AnyArray, rows: IntArray, first: FloatArray, step: FloatArray, least: float, swapped: bool
-) -> None:
-    size, wide = np.int64(8), table.shape[1]
-    out: Any = np.int64(table.ctypes.data)
-    ahead: Any = np.int64(first.ctypes.data)
-    on: Any = np.int64(step.ctypes.data)
-    below = 8 * first.shape[1]
-    for tile in range(len(rows)):
-        at = out + size * 2 * TILE * tile
-        real, imag = (at + size * TILE, at) if swapped else (at, at + size * TILE)
-        lane = 8 * TILE * tile
-        turn_double(
-            real, imag, size * wide, rows[tile], ahead + lane, ahead + below + lane, on + lane,
-            on + below + lane, least,
-        )  # fmt: skip
+        place, step_at, apart = ahead + lane, on + lane, size * wide
+        if size == 4:
+            turn_single(real, imag, apart, rows[tile], place, place + below, step_at, step_at + below, least)
+        else:
+            turn_double(real, imag, apart, rows[tile], place, place + below, step_at, step_at + below, least)
 
 
 @compiled
