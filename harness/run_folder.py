@@ -20,7 +20,7 @@ from harness.objectfile.entries import DESCRIPTION
 from harness.objectfile.file import ObjectFile, copied
 from harness.recording import Recording, RunHeader, require_unused
 from harness.scene import SceneFile, scene_from_json
-from harness.sim.lit_calibration import read_calibration
+from harness.sim.lit_calibration import read_calibration, shadow_of
 from harness.sim.scene_object import known_file
 from harness.sim.tactile_calibration import (
     TactileCalibration,
@@ -39,9 +39,21 @@ _NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-python-headless", "mujo
 
 
 def station_calibration(station: Station) -> TactileCalibration:
-    """The calibration of a station's gel: a file, or one that comes with the package."""
+    """The calibration of a station's gel: a file, or one that comes with the package.
+
+    Raises:
+        CalibrationRefused: it is missing or damaged.
+        WrongUse: the station's light casts shadows, and the calibration has none.
+    """
     named = station.gel.calibration
-    return read_calibration(Path(named)) if named.endswith(".npz") else shipped_calibration(named)
+    found = read_calibration(Path(named)) if named.endswith(".npz") else shipped_calibration(named)
+    if station.gel.casts_shadow and shadow_of(found) is None:
+        raise WrongUse(
+            f"the station {station.title!r} has gel.casts_shadow = true, and the presses of its calibration "
+            f"({named}) showed no shadow; set it to false, or calibrate with `touchstone calibrate taxim` by "
+            "presses that show one"
+        )
+    return found
 
 
 def station_acquisition(scene: SceneFile, station: Station) -> AcquisitionCalibration | None:

@@ -15,6 +15,7 @@ from harness.materials import MATERIALS
 from harness.plan import Plan
 from harness.run_folder import RunFiles
 from harness.sim.inverse import invert
+from harness.sim.lit_calibration import shadow_of
 from harness.store import Store, default_folder
 
 
@@ -56,6 +57,9 @@ def compare(found: Answer, run: RunFiles, accuracy: Accuracy) -> Comparison:
         "sensor.calibration": run.calibration,
         "seed": run.recording.header.seed,
     }
+    shadow = shadow_of(run.calibration)
+    if shadow is not None:
+        sources["sensor.shadow_table"] = shadow
     if "object.file" in plan.sources:
         sources["object.file"] = run.objectfile
     evaluation = evaluate(plan, sources, Store(default_folder()))

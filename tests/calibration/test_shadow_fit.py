@@ -17,11 +17,13 @@ from calibration.taxim.shadow_fit import fit_shadow
 from calibration.taxim.shadow_polar import DIRECTIONS, rim_reach
 from calibration.taxim.smooth_fit import changes
 from harness.arrays import BoolArray, FloatArray
-from harness.errors import CalibrationRefused
-from harness.sim.lit_calibration import ShadowedCalibration, read_calibration, with_shadow
+from harness.errors import CalibrationRefused, WrongUse
+from harness.run_folder import station_calibration
+from harness.sim.lit_calibration import ShadowedCalibration, read_calibration, shadow_of, with_shadow
 from harness.sim.shadow import rim
 from harness.sim.shadow_file import read_shadow_table, write_shadow_table
 from harness.sim.tactile_calibration import save_calibration
+from harness.station_file import load_station, station_path
 
 WHO = Identity("drawn", "0", "none", "2026-01-01", pitch=1e-4, ball_radius=BALL * 1e-4)
 GREEN = 1
@@ -167,6 +169,19 @@ def test_a_calibration_keeps_its_shadows_on_the_disk(tmp_path_factory: pytest.Te
     assert back.sha256 == made.sha256
     assert np.array_equal(back.shadow.values, made.shadow.values)
     assert back.shadow_depth == pytest.approx(_made().shadow.rim * WHO.pitch)
+
+
+def test_a_station_whose_light_casts_shadows_needs_a_calibration_that_has_some(tmp_path: Path) -> None:
+    made = _made().calibration
+    assert isinstance(made, ShadowedCalibration)
+    save_calibration(made, tmp_path / "shadowed.npz")
+    station = load_station(station_path("mock"))
+    grazed = station.gel.model_copy(update={"casts_shadow": True})
+    with pytest.raises(WrongUse, match="showed no shadow"):
+        station_calibration(station.model_copy(update={"gel": grazed}))
+    measured = grazed.model_copy(update={"calibration": str(tmp_path / "shadowed.npz")})
+    found = station_calibration(station.model_copy(update={"gel": measured}))
+    assert shadow_of(found) is not None
 
 
 def test_tables_that_do_not_hold_together_are_refused() -> None:
