@@ -23,12 +23,16 @@ from harness.image_file import write_png
 from harness.linear_image import LinearImage
 from harness.objectfile.vision_graph import vision_graph
 from harness.objectfile.vision_network import VisionModel
+from harness.objectfile.vision_outline import is_closed, mesh_outline
 from harness.objectfile.vision_plain import Asked, evaluate
 from harness.objectfile.vision_render import VisionRenderer
 from harness.objectfile.vision_settings import RenderSettings
+from harness.objectfile.vision_work import Crew, Room
+from harness.pinhole import DirectionalLight, Pinhole
 from harness.sim.appearance import Appearance
 from harness.sim.appearance_source import appearance_of
 from harness.sim.direct_image import LitObject
+from harness.sim.lambert import irradiance, places_seen, radiance, sees_light
 from harness.srgb import bytes_from_linear
 
 CONSOLE = Console(width=140, highlight=False, emoji=False)
@@ -48,6 +52,8 @@ def main() -> None:
     parser.add_argument("--units", default="m")
     parser.add_argument("--profile", default="smoke")
     parser.add_argument("--steps", type=int, nargs="*", default=[])
+    parser.add_argument("--batch", type=int)
+    parser.add_argument("--rate", type=float)
     parser.add_argument("--pictures", type=int)
     parser.add_argument("--threads", type=int)
     parser.add_argument("--seed", type=int, default=0)
@@ -67,7 +73,8 @@ def measure(name: str, steps: int | None, given: argparse.Namespace) -> ByteArra
         made = author_vision(look, profile, given.seed, Path(folder), unsaid, given.threads)
     on_core = time.process_time() - on_core
     CONSOLE.print(
-        f"{Path(name).stem}: {len(made.model.grid)} networks, {profile.networks.steps} steps, "
+        f"{Path(name).stem}: {len(made.model.grid)} networks, {profile.networks.steps} steps of "
+        f"{profile.networks.batch}, "
         f"{on_core:.0f} s of one core; on the clock "
         + ", ".join(f"{part} {seconds:.0f} s" for part, seconds in made.seconds.items())
     )
@@ -90,7 +97,9 @@ def chosen(steps: int | None, given: argparse.Namespace) -> VisionProfile:
         profile = replace(profile, strict=replace(profile.networks, size=size))
     if given.pictures:
         profile = replace(profile, pictures=given.pictures)
-    return replace(profile, networks=replace(profile.networks, steps=steps)) if steps else profile
+    asked = {"steps": steps, "batch": given.batch, "rate": given.rate}
+    others = {name: value for name, value in asked.items() if value}
+    return replace(profile, networks=replace(profile.networks, **others))
 
 
 def line(errors: Mapping[str, float], before: str = "") -> str:
@@ -116,8 +125,36 @@ def by_ways(
         apart = 255.0 * np.sqrt(np.mean(each))
         errors = picture_errors(exact, drawn[way])
         CONSOLE.print(f"  {way:12} {line(errors)}, from the default {apart:.2f}/255")
+    for side in (3, 5):
+        limit = [one_ray(lit, camera, light, side) for camera, light in _pairs(held_out)]
+        CONSOLE.print(
+            f"  exact colours, one ray a pixel, coverage {side}: {line(picture_errors(exact, limit))}"
+        )
     CONSOLE.print(f"  across borders between cells {across_borders(made.model, lit):.2f}/255")
     return np.hstack([beside(exact[0], drawn["default"][0]), beside(exact[-1], drawn["default"][-1])])
+
+
+def one_ray(lit: LitObject, camera: Pinhole, light: DirectionalLight, side: int) -> LinearImage:
+    """What networks without error would give: exact light where the renderer's outline asks for it."""
+    mesh, (x, y) = lit.appearance.mesh, camera.centre_px
+    outline = mesh_outline(mesh, is_closed(mesh), camera, side, Crew(1), Room())
+    across, down = (outline.places[:, k] - centre for k, centre in enumerate((x, y)))
+    ways = np.stack([across, down, np.full(len(down), camera.focal_px)], axis=1).astype(np.float64)
+    ways = ways / np.linalg.norm(ways, axis=1, keepdims=True) @ camera.object_from_camera[:3, :3].T
+    hits = lit.rays.first_hits(camera.eye, ways)
+    met = np.flatnonzero(hits.face >= 0)
+    places = places_seen(lit.appearance, hits.face[met], hits.weights[met], ways[met])
+    falling = irradiance(places, light, mesh.diagonal)
+    falling = falling * sees_light(lit.rays, places, light, falling > 0.0)
+    colour, alpha = np.zeros((camera.pixels, 3)), np.zeros(camera.pixels)
+    colour[outline.pixels[met]] = radiance(places, falling) * outline.cover[met, None]
+    alpha[outline.pixels] = outline.cover
+    shape = (camera.height, camera.width)
+    return LinearImage(colour.reshape(*shape, 3), alpha.reshape(shape), np.full(shape, np.inf))
+
+
+def _pairs(held_out: HeldOut) -> list[tuple[Pinhole, DirectionalLight]]:
+    return list(zip(held_out.cameras, held_out.lights, strict=True))
 
 
 def difference(one: LinearImage, other: LinearImage) -> float:
