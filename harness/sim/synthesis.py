@@ -17,7 +17,7 @@ from threadpoolctl import ThreadpoolController
 from harness.arrays import AnyArray, BoolArray, FloatArray, read_only
 from harness.errors import WrongUse
 from harness.sim.modal_sound import audible, check_modes, check_rate, impulse_response, is_heavy
-from harness.sim.synthesis_tables import Steps, fill_sound
+from harness.sim.synthesis_tables import Steps, fill_sound, longest_sum
 
 SynthesisLevel = Literal["fast", "double", "exact"]
 """``"fast"``: tables in single precision from phases in double; ``"double"``: tables in double
@@ -174,8 +174,9 @@ def _phase_errors(
 def _rounding(amplitudes: AnyArray, peaks: FloatArray, samples: int, level: SynthesisLevel) -> FloatArray:
     """``(k,)``: what roundings add up to.
 
-    Those of the tables and of the sum are a random walk along two terms a mode, its partial sums as
-    large as independent phases make them, or as the sound itself where they agree (Higham and Mary,
+    Those of the tables and of the sum are a random walk along two terms a mode of each group and then
+    along the groups (``synthesis_tables.longest_sum``), its partial sums as large as independent
+    phases make them, or as the sound itself where they agree (Higham and Mary,
     A New Approach to Probabilistic Rounding Error Analysis, SIAM J. Sci. Comput. 41(5), 2019, for why
     a walk and not the sum of all roundings). Those of the powers in the tables are bounded: each
     complex product is off by the square root of five units (Brent, Percival and Zimmermann, Error
@@ -185,7 +186,8 @@ def _rounding(amplitudes: AnyArray, peaks: FloatArray, samples: int, level: Synt
     unit = float(np.finfo(np.float32).eps) / 2.0 if level == "fast" else double
     sizes = np.abs(amplitudes)
     whole = np.sqrt(np.sum(sizes**2, axis=1))
-    walk = np.sqrt((2.0 + amplitudes.shape[1]) / 3.0) * np.maximum(_SIGMAS * np.sqrt(0.5) * whole, peaks)
+    terms = amplitudes.shape[1] if level == "exact" else longest_sum(amplitudes.shape[1])
+    walk = np.sqrt((2.0 + terms) / 3.0) * np.maximum(_SIGMAS * np.sqrt(0.5) * whole, peaks)
     block = _block_length(samples)
     powers = np.sqrt(5.0) * (block + samples / block) * sizes.sum(axis=1)
     return np.asarray(unit * (walk + 6.0 * whole) + double * powers)

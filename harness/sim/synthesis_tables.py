@@ -35,6 +35,13 @@ _SEGMENT = 2048
 _LIKE = 0.75
 """Modes are multiplied together that sound for at least this share of the longest among them."""
 
+TOGETHER = 128
+"""Modes multiplied together at most: their sum is rounded at its own size, not at that of all, so that
+roundings of 2048 modes add up to a third."""
+
+_SPLITS = 24
+"""Groups more than that that ``_LIKE`` can make of a sound of ``_SEGMENT`` blocks, nearly: each sounds
+for less than three quarters of the one before."""
 
 _KEPT = 1 << 24
 """Bytes of working memory that a thread keeps from one sound to the next."""
@@ -193,13 +200,18 @@ class _Tables:
 
 
 def _together(counts: IntArray) -> list[slice]:
-    """Runs of whole tiles whose counts are like, of descending counts."""
+    """Runs of whole tiles whose counts are like, of descending counts, ``TOGETHER`` modes at most."""
     groups, first = [], 0
     for tile in range(TILE, len(counts), TILE):
-        if counts[tile] < _LIKE * counts[first]:
+        if counts[tile] < _LIKE * counts[first] or tile - first >= TOGETHER:
             groups.append(slice(first, tile))
             first = tile
     return [*groups, slice(first, len(counts))]
+
+
+def longest_sum(modes: int) -> float:
+    """How many modes' parts, at most, are added up in one run: those of a group, and then the groups."""
+    return min(modes, TOGETHER) + modes / TOGETHER + min(modes / TILE, _SPLITS)
 
 
 def _width(modes: int) -> int:
