@@ -26,10 +26,11 @@ def build_vision_part(
     json: bool,
 ) -> int:
     """Build, measure and say; the options are those of ``object_build.build``, lengths in metres."""
-    from harness.authoring.object_vision import VisionRequest, build_vision
+    from harness.authoring.object_source import PartRequest
+    from harness.authoring.object_vision import build_vision
     from harness.materials import material as named
 
-    wanted = VisionRequest(mesh, named(material), profile, units, wall, licence, seed)
+    wanted = PartRequest(mesh, named(material), profile, units, wall, licence, seed)
     with share_progress() as report:
         built = build_vision(wanted, out, report, threads)
     for sentence in built.said:

@@ -16,6 +16,29 @@ from harness.sim.intake import take_in
 from harness.sim.walls import walled
 
 
+@dataclass(frozen=True, eq=False)
+class PartRequest:
+    """What is to be built of an object.
+
+    Attributes:
+        mesh: a file of a surface, with its colours for a look, or ``builtin:`` and a name.
+        material: it is of; only sound asks, an ObjectFile says.
+        profile: of the part's profiles.
+        units: of the file's numbers; None to take the only ones that make sense.
+        wall: m, of a hollow thing of which the file has the outside; a picture is of the file's faces.
+        licence: of the mesh, and so of the ObjectFile.
+        seed: of everything random.
+    """
+
+    mesh: str
+    material: Material
+    profile: str = "standard"
+    units: str | None = None
+    wall: float | None = None
+    licence: str = "unknown"
+    seed: int = 0
+
+
 def source_of(mesh: str, licence: str) -> Source:
     """Where a mesh comes from; with a hash where it is a file.
 

@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from harness.authoring.object_source import created_object, source_of, surface_of
+from harness.authoring.object_source import PartRequest, created_object, source_of, surface_of
 from harness.authoring.touch import CHECKPOINT, AuthoredTouch, author_touch
 from harness.authoring.touch_data import DEPTHS, MOST_TILT
 from harness.authoring.touch_profiles import touch_profile
 from harness.authoring.training import Report
 from harness.code_version import content_hash
-from harness.materials import Material
 from harness.objectfile.entries import Provenance
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch_part import TouchPart, with_touch
@@ -21,27 +20,13 @@ from harness.sim.press_pose import MOST_MOVED
 
 
 @dataclass(frozen=True, eq=False)
-class TouchRequest:
-    """What is to be built.
+class TouchRequest(PartRequest):
+    """What is to be built, by a profile of ``touch_profiles.TOUCH_PROFILES``.
 
     Attributes:
-        mesh: a file of a surface, or ``builtin:`` and a name.
-        material: it is of; touch does not ask, an ObjectFile says.
-        profile: of ``touch_profiles.TOUCH_PROFILES``.
-        units: of the file's numbers; None to take the only ones that make sense.
-        wall: m, of a hollow thing of which the file has the outside.
-        licence: of the mesh, and so of the ObjectFile.
-        seed: of everything random.
         sensor: a flat gel.
     """
 
-    mesh: str
-    material: Material
-    profile: str = "standard"
-    units: str | None = None
-    wall: float | None = None
-    licence: str = "unknown"
-    seed: int = 0
     sensor: TactileSensor = GELSIGHT_R15
 
 

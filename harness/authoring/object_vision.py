@@ -9,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.authoring.object_source import created_object, source_of, surface_of
+from harness.authoring.object_source import PartRequest, created_object, source_of, surface_of
 from harness.authoring.training import Report
 from harness.authoring.vision import CHECKPOINT, STRICT_CHECKPOINT, AuthoredVision, author_vision
 from harness.authoring.vision_profiles import vision_profile
 from harness.code_version import content_hash
-from harness.materials import Material
 from harness.mesh import Mesh
 from harness.objectfile.entries import Provenance, Source
 from harness.objectfile.file import ObjectFile
@@ -23,29 +22,6 @@ from harness.objectfile.vision_part import VisionPart, with_vision
 from harness.scene import BUILTIN
 from harness.sim.appearance import Appearance
 from harness.sim.appearance_source import appearance_of
-
-
-@dataclass(frozen=True, eq=False)
-class VisionRequest:
-    """What is to be built.
-
-    Attributes:
-        mesh: a file of a surface with its colours, or ``builtin:`` and a name.
-        material: it is of; a look does not ask, an ObjectFile says.
-        profile: of ``vision_profiles.VISION_PROFILES``.
-        units: of the file's numbers; None to take the only ones that make sense.
-        wall: m, of a hollow thing of which the file has the outside; a picture is of the file's faces.
-        licence: of the mesh, and so of the ObjectFile.
-        seed: of everything random.
-    """
-
-    mesh: str
-    material: Material
-    profile: str = "standard"
-    units: str | None = None
-    wall: float | None = None
-    licence: str = "unknown"
-    seed: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +41,11 @@ class BuiltVision:
     seconds: Mapping[str, float]
 
 
-def build_vision(wanted: VisionRequest, out: Path, report: Report, threads: int | None = None) -> BuiltVision:
+def build_vision(wanted: PartRequest, out: Path, report: Report, threads: int | None = None) -> BuiltVision:
     """Build an object's look, or go on with a training that was stopped.
 
     Args:
-        wanted: what.
+        wanted: what, by a profile of ``vision_profiles.VISION_PROFILES``.
         out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
         report: told of progress.
         threads: of a training; None for as many as the process has cores.
@@ -132,7 +108,7 @@ def without_seams(mesh: Mesh) -> Mesh:
     return Mesh(vertices, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
 
 
-def _textures(wanted: VisionRequest, look: Appearance) -> tuple[Source, ...]:
+def _textures(wanted: PartRequest, look: Appearance) -> tuple[Source, ...]:
     """Of a file's textures, which lie beside it or within it, their pixels' hashes."""
     if wanted.mesh.startswith(BUILTIN):
         return ()
