@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
+from experiments.commands.object_build_answer import build_and_say
 from harness import options
-from harness.output import ANSWERS, emit, share_progress, warn
+from harness.output import ANSWERS
 
 if TYPE_CHECKING:
-    from harness.authoring.object_audio import BuiltAudio
+    from harness.authoring.object_audio import AudioRequest, BuiltAudio
 
 _ROWS = {
     "network": "network",
@@ -69,45 +70,39 @@ def build(
 
     Try: touchstone object build builtin:bowl --material ceramic --profile smoke --out objects/bowl
     """
-    from harness.authoring.object_audio import ObjectRequest, build_audio
+    from harness.authoring.object_source import PartRequest
     from harness.errors import WrongUse
     from harness.materials import material as named
     from harness.quantities import FREQUENCY, LENGTH
-    from harness.store import Store, default_folder
 
+    if only not in ("audio", "touch", "vision"):
+        raise WrongUse(f"--only {only} cannot be built; there is audio, touch and vision")
+    thick = options.quantity("--wall", wall, LENGTH)
+    wanted = PartRequest(mesh, named(material), profile, units, thick, licence, seed)
     if only == "touch":
         from experiments.commands.object_build_touch import build_touch_part
 
-        thick = options.quantity("--wall", wall, LENGTH)
-        return build_touch_part(mesh, material, profile, units, thick, licence, seed, out, threads or 1, json)
+        return build_touch_part(wanted, out, threads or 1, json)
     if only == "vision":
         from experiments.commands.object_build_vision import build_vision_part
 
-        thick = options.quantity("--wall", wall, LENGTH)
-        return build_vision_part(mesh, material, profile, units, thick, licence, seed, out, threads, json)
-    if only != "audio":
-        raise WrongUse(f"--only {only} cannot be built; there is audio, touch and vision")
-    wanted = ObjectRequest(
-        mesh=mesh,
-        material=named(material),
-        profile=profile,
-        units=units,
-        wall=options.quantity("--wall", wall, LENGTH),
-        limit=options.quantity("--up-to", up_to, FREQUENCY),
-        most=modes,
-        edge=options.quantity("--edge", edge, LENGTH),
-        licence=licence,
-        seed=seed,
+        return build_vision_part(wanted, out, threads, json)
+    from harness.authoring.object_audio import AudioRequest
+
+    limit, longest = options.quantity("--up-to", up_to, FREQUENCY), options.quantity("--edge", edge, LENGTH)
+    return _build_audio_part(
+        AudioRequest(**vars(wanted), limit=limit, most=modes, edge=longest), out, threads or 1, json
     )
-    with share_progress() as report:
-        built = build_audio(wanted, out, Store(default_folder()), report, threads or 1)
-    for sentence in built.said:
-        warn(sentence)
-    if json:
-        emit(_as_json(built))
-    else:
-        _print(built)
-    return 0
+
+
+def _build_audio_part(wanted: "AudioRequest", out: Path, threads: int, json: bool) -> int:
+    from harness.authoring.object_audio import build_audio
+    from harness.store import Store, default_folder
+
+    store = Store(default_folder())
+    return build_and_say(
+        lambda report: build_audio(wanted, out, store, report, threads), _as_json, _print, json
+    )
 
 
 def _as_json(built: "BuiltAudio") -> dict[str, Any]:

@@ -5,41 +5,23 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from harness.output import ANSWERS, emit, share_progress, warn
+from experiments.commands.object_build_answer import build_and_say
+from harness.output import ANSWERS
 
 if TYPE_CHECKING:
+    from harness.authoring.object_source import PartRequest
     from harness.authoring.object_touch import BuiltTouch
 
 _KINDS = {"trained_places": "trained places", "unseen_places": "unseen places"}
 _ROWS = {"level": "codes", "nearest_trained": "nearest trained place", "background": "untouched gel"}
 
 
-def build_touch_part(
-    mesh: str,
-    material: str,
-    profile: str,
-    units: str | None,
-    wall: float | None,
-    licence: str,
-    seed: int,
-    out: Path,
-    threads: int,
-    json: bool,
-) -> int:
-    """Build, measure and say; the options are those of ``object_build.build``, lengths in metres."""
+def build_touch_part(wanted: "PartRequest", out: Path, threads: int, json: bool) -> int:
+    """Build, measure and say."""
     from harness.authoring.object_touch import TouchRequest, build_touch
-    from harness.materials import material as named
 
-    wanted = TouchRequest(mesh, named(material), profile, units, wall, licence, seed)
-    with share_progress() as report:
-        built = build_touch(wanted, out, report, threads)
-    for sentence in built.said:
-        warn(sentence)
-    if json:
-        emit(_as_json(built))
-    else:
-        _print(built)
-    return 0
+    asked = TouchRequest(**vars(wanted))
+    return build_and_say(lambda report: build_touch(asked, out, report, threads), _as_json, _print, json)
 
 
 def _as_json(built: "BuiltTouch") -> dict[str, Any]:

@@ -6,40 +6,22 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from harness.output import ANSWERS, emit, share_progress, warn
+from experiments.commands.object_build_answer import build_and_say
+from harness.output import ANSWERS
 
 if TYPE_CHECKING:
+    from harness.authoring.object_source import PartRequest
     from harness.authoring.object_vision import BuiltVision
     from harness.objectfile.vision_entry import VisionEntry
 
 
-def build_vision_part(
-    mesh: str,
-    material: str,
-    profile: str,
-    units: str | None,
-    wall: float | None,
-    licence: str,
-    seed: int,
-    out: Path,
-    threads: int | None,
-    json: bool,
-) -> int:
-    """Build, measure and say; the options are those of ``object_build.build``, lengths in metres."""
-    from harness.authoring.object_source import PartRequest
+def build_vision_part(wanted: "PartRequest", out: Path, threads: int | None, json: bool) -> int:
+    """Build, measure and say."""
     from harness.authoring.object_vision import build_vision
-    from harness.materials import material as named
 
-    wanted = PartRequest(mesh, named(material), profile, units, wall, licence, seed)
-    with share_progress() as report:
-        built = build_vision(wanted, out, report, threads)
-    for sentence in built.said:
-        warn(sentence)
-    if json:
-        emit(as_json(built))
-    else:
-        print_built(built)
-    return 0
+    return build_and_say(
+        lambda report: build_vision(wanted, out, report, threads), as_json, print_built, json
+    )
 
 
 def as_json(built: "BuiltVision") -> dict[str, Any]:

@@ -9,14 +9,18 @@ import numpy as np
 from harness.authoring.audio import CHECKPOINT, AuthoredAudio, author_audio
 from harness.authoring.audio_data import canonical
 from harness.authoring.audio_profiles import profile
-from harness.authoring.object_source import created_object, source_of, surface_of
+from harness.authoring.object_source import (
+    PartRequest,
+    created_object,
+    provenance_of,
+    source_of,
+    surface_of,
+)
 from harness.authoring.training import Report
-from harness.code_version import content_hash
 from harness.errors import DataRefused, MeshRefused
-from harness.materials import Material
 from harness.mesh import Mesh
 from harness.objectfile.audio_part import AudioPart, with_audio
-from harness.objectfile.entries import Provenance, Source
+from harness.objectfile.entries import Source
 from harness.objectfile.file import ObjectFile, with_part
 from harness.objectfile.verify import verify
 from harness.sim.modal import HEARING, default_edge, solved_once
@@ -42,32 +46,18 @@ _NEAR = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class ObjectRequest:
-    """What is to be built.
+class AudioRequest(PartRequest):
+    """What is to be built, by a profile of ``audio_profiles.PROFILES``.
 
     Attributes:
-        mesh: a file of a surface or of tetrahedra, or ``builtin:`` and a name.
-        material: of all of it.
-        profile: of ``audio_profiles.PROFILES``.
-        units: of the file's numbers; None to take the only ones that make sense.
-        wall: m, of a hollow thing of which the file has the outside.
         limit: Hz, modes up to there.
         most: modes at most, the lowest.
         edge: m, longest edge of an element; None for a share of the shortest wave.
-        licence: of the mesh, and so of the ObjectFile.
-        seed: of everything random.
     """
 
-    mesh: str
-    material: Material
-    profile: str = "standard"
-    units: str | None = None
-    wall: float | None = None
     limit: float = HEARING
     most: int = MODES
     edge: float | None = None
-    licence: str = "unknown"
-    seed: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +81,7 @@ class BuiltAudio:
 
 
 def build_audio(
-    wanted: ObjectRequest, out: Path, store: Store | None, report: Report, threads: int = 1
+    wanted: AudioRequest, out: Path, store: Store | None, report: Report, threads: int = 1
 ) -> BuiltAudio:
     """Build an object's sound, or go on with a build that was stopped.
 
@@ -120,18 +110,11 @@ def build_audio(
     audio = author_audio(modes, rates, chosen, wanted.seed, out, report, threads)
     seconds |= audio.seconds
     report("writing", 0.0)
-    provenance = Provenance(
-        code={"harness.authoring.object_audio": content_hash("harness.authoring.object_audio")},
-        seeds={"audio": wanted.seed},
-        settings={"profile": wanted.profile, **audio.settings},
-        sources=(source,),
-        licence=wanted.licence,
-    )
     part = AudioPart(
         modes=modes,
         dampings=rates,
         near_surface=_NEAR * mesh.diagonal,
-        provenance=provenance,
+        provenance=provenance_of(wanted, "audio", audio.settings, (source,)),
         graph=audio.graph,
         measured={"network": audio.errors["network"], "table": audio.errors["table_float16"]},
     )
@@ -167,7 +150,7 @@ def _with_seconds(made: ObjectFile, seconds: Mapping[str, float]) -> ObjectFile:
 
 
 def _modes(
-    wanted: ObjectRequest, store: Store | None, seconds: dict[str, float]
+    wanted: AudioRequest, store: Store | None, seconds: dict[str, float]
 ) -> tuple[Mesh, Modes, Source, tuple[str, ...]]:
     whole: dict[str, float] = {}
     with timed(whole, "intake"):
@@ -185,14 +168,14 @@ def _modes(
     return mesh, modes, source, said
 
 
-def _of_volume(wanted: ObjectRequest) -> tuple[Mesh, Modes, tuple[str, ...]]:
+def _of_volume(wanted: AudioRequest) -> tuple[Mesh, Modes, tuple[str, ...]]:
     path = Path(wanted.mesh)
     solved = modes_of_file(path, wanted.material, wanted.units, wanted.wall, wanted.limit, edge=wanted.edge)
     modes = solved.solution.modes
     return Mesh(modes.points, modes.faces), modes, solved.said
 
 
-def _solved(wanted: ObjectRequest, mesh: Mesh, store: Store | None) -> tuple[Modes, bool]:
+def _solved(wanted: AudioRequest, mesh: Mesh, store: Store | None) -> tuple[Modes, bool]:
     edge = wanted.edge
     if edge is None:
         edge = default_edge(mesh, wanted.material, wanted.limit, wanted.most)

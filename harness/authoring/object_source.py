@@ -1,9 +1,12 @@
 """What an ObjectFile is built from: a mesh's origin, its surface, and the folder's object."""
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
+from harness.code_version import content_hash
 from harness.errors import MeshRefused, WrongUse
 from harness.materials import Material
 from harness.mesh import Mesh
@@ -21,8 +24,9 @@ class PartRequest:
     """What is to be built of an object.
 
     Attributes:
-        mesh: a file of a surface, with its colours for a look, or ``builtin:`` and a name.
-        material: it is of; only sound asks, an ObjectFile says.
+        mesh: a file of a surface, with its colours for a look, or of tetrahedra for a sound; or
+            ``builtin:`` and a name.
+        material: of all of it; only sound asks, an ObjectFile says.
         profile: of the part's profiles.
         units: of the file's numbers; None to take the only ones that make sense.
         wall: m, of a hollow thing of which the file has the outside; a picture is of the file's faces.
@@ -37,6 +41,30 @@ class PartRequest:
     wall: float | None = None
     licence: str = "unknown"
     seed: int = 0
+
+
+def provenance_of(
+    wanted: PartRequest,
+    part: Literal["audio", "touch", "vision"],
+    settings: Mapping[str, str | float | int | bool | None],
+    sources: tuple[Source, ...],
+) -> Provenance:
+    """How a part came to be: by which code, from what, with which seed and settings.
+
+    Args:
+        wanted: what was asked for.
+        part: whose builder is ``harness.authoring.object_audio`` and so on.
+        settings: with which it was trained.
+        sources: of the mesh, and of whatever else went into the part.
+    """
+    builder = f"harness.authoring.object_{part}"
+    return Provenance(
+        code={builder: content_hash(builder)},
+        seeds={part: wanted.seed},
+        settings={"profile": wanted.profile, **settings},
+        sources=sources,
+        licence=wanted.licence,
+    )
 
 
 def source_of(mesh: str, licence: str) -> Source:

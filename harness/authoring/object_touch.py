@@ -5,13 +5,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from harness.authoring.object_source import PartRequest, created_object, source_of, surface_of
+from harness.authoring.object_source import (
+    PartRequest,
+    created_object,
+    provenance_of,
+    source_of,
+    surface_of,
+)
 from harness.authoring.touch import CHECKPOINT, AuthoredTouch, author_touch
 from harness.authoring.touch_data import DEPTHS, MOST_TILT
 from harness.authoring.touch_profiles import touch_profile
 from harness.authoring.training import Report
-from harness.code_version import content_hash
-from harness.objectfile.entries import Provenance
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch_part import TouchPart, with_touch
 from harness.sensor import GELSIGHT_R15, TactileSensor
@@ -78,13 +82,7 @@ def build_touch(wanted: TouchRequest, out: Path, report: Report, threads: int = 
         depths=DEPTHS,
         most_tilt=MOST_TILT,
         near_surface=MOST_MOVED,
-        provenance=Provenance(
-            code={"harness.authoring.object_touch": content_hash("harness.authoring.object_touch")},
-            seeds={"touch": wanted.seed},
-            settings={"profile": wanted.profile, **touch.settings},
-            sources=(source,),
-            licence=wanted.licence,
-        ),
+        provenance=provenance_of(wanted, "touch", touch.settings, (source,)),
         codes=touch.codes,
         perceptron=touch.perceptron,
     )

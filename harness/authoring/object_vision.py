@@ -9,13 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.authoring.object_source import PartRequest, created_object, source_of, surface_of
+from harness.authoring.object_source import (
+    PartRequest,
+    created_object,
+    provenance_of,
+    source_of,
+    surface_of,
+)
 from harness.authoring.training import Report
 from harness.authoring.vision import CHECKPOINT, STRICT_CHECKPOINT, AuthoredVision, author_vision
 from harness.authoring.vision_profiles import vision_profile
-from harness.code_version import content_hash
 from harness.mesh import Mesh
-from harness.objectfile.entries import Provenance, Source
+from harness.objectfile.entries import Source
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import is_same_surface
 from harness.objectfile.vision_part import VisionPart, with_vision
@@ -68,13 +73,7 @@ def build_vision(wanted: PartRequest, out: Path, report: Report, threads: int | 
     report("writing", 1.0)
     part = VisionPart(
         model=vision.model,
-        provenance=Provenance(
-            code={"harness.authoring.object_vision": content_hash("harness.authoring.object_vision")},
-            seeds={"vision": wanted.seed},
-            settings={"profile": wanted.profile, **vision.settings},
-            sources=(source, *_textures(wanted, look)),
-            licence=wanted.licence,
-        ),
+        provenance=provenance_of(wanted, "vision", vision.settings, (source, *_textures(wanted, look))),
         # JSON holds no infinity, which is what equal pictures have for decibels.
         measured={name: value for name, value in vision.errors.items() if math.isfinite(value)},
         surface=drawn_surface(taken.mesh, look.mesh),

@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 
 from harness.accuracy import Accuracy
 from harness.arrays import FloatArray
-from harness.authoring.object_audio import ObjectRequest, build_audio
+from harness.authoring.object_audio import AudioRequest, build_audio
 from harness.effects import Facts, knobs_of
 from harness.evaluate import evaluate
 from harness.materials import MATERIALS, material
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def _built(name: str, out: Path) -> Path:
-    wanted = ObjectRequest(f"builtin:{name}", material(MADE_OF[name]))
+    wanted = AudioRequest(f"builtin:{name}", material(MADE_OF[name]))
     begun = time.process_time()
     build_audio(wanted, out, None, lambda _doing, _share: None)
     Console().print(f"built once: {time.process_time() - begun:.1f} s of CPU")

@@ -27,7 +27,7 @@ from rich.table import Table
 
 from experiments.contact_localization.table import REAL
 from harness.authoring.audio_profiles import PROFILES
-from harness.authoring.object_audio import MODES, STAGES, ObjectRequest, build_audio
+from harness.authoring.object_audio import MODES, STAGES, AudioRequest, build_audio
 from harness.authoring.object_source import surface_of
 from harness.materials import material
 from harness.objects.household import MATERIALS
@@ -39,18 +39,18 @@ from harness.store import Store
 WAYS = ("network", "nearest_trained", "linear", "table_float16")
 
 
-def requests(data: Path | None, profile: str, modes: int) -> dict[str, ObjectRequest]:
+def requests(data: Path | None, profile: str, modes: int) -> dict[str, AudioRequest]:
     """What can be built, by name."""
     asked = {
-        name: ObjectRequest(f"{BUILTIN}{name}", material(of), profile, most=modes)
+        name: AudioRequest(f"{BUILTIN}{name}", material(of), profile, most=modes)
         for name, of in MATERIALS.items()
     }
     for name, (file, units, of) in REAL.items() if data is not None else ():
-        asked[name] = ObjectRequest(str(Path(data or "") / file), material(of), profile, units, most=modes)
+        asked[name] = AudioRequest(str(Path(data or "") / file), material(of), profile, units, most=modes)
     return asked
 
 
-def built(name: str, asked: ObjectRequest, finer: float) -> dict[str, Any]:
+def built(name: str, asked: AudioRequest, finer: float) -> dict[str, Any]:
     """Build one, and say all that is known of it."""
     if finer != 1.0:
         surface = surface_of(asked.mesh, asked.units, asked.wall).mesh
