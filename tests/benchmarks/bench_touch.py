@@ -11,6 +11,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 import pytest
+from mujoco_depth import CannotDraw, gaps_drawn
 
 from harness import geometry
 from harness.arrays import FloatArray
@@ -123,6 +124,7 @@ def _size(
         f"median contact area {area:.0%} of the window"
     )
     _line("height map", _timed(lambda k: height_maps(*contacts[k], sensor), len(contacts)))
+    _beside_mujoco(sensor, contacts, gaps)
     few = 12
     _line("gel, exact", _timed(lambda k: deform(pressed[k : k + 1], skirt), few))
     _line("gel, fast", _timed(lambda k: deform(pressed[k : k + 1], skirt, "fast"), few))
@@ -136,6 +138,27 @@ def _size(
     _line(
         "colour, original arithmetic (numpy)",
         _timed(lambda k: _original_optics(gel[k] / sensor.pitch, table, background), few),
+    )
+
+
+def _beside_mujoco(
+    sensor: TactileSensor, contacts: list[tuple[RasterMesh, FloatArray]], ours: FloatArray
+) -> None:
+    scenes = [(raster.mesh, pose) for raster, pose in contacts]
+    try:
+        drawn, seconds = gaps_drawn(scenes, sensor)
+    except CannotDraw as why:
+        print(f"  MuJoCo draws nothing here: {why}")  # noqa: T201
+        return
+    theirs = np.concatenate(drawn)
+    both = np.isfinite(ours) & np.isfinite(theirs)
+    apart = np.abs(ours[both] - theirs[both]) * 1e6
+    one_alone = (np.isfinite(ours) != np.isfinite(theirs)).mean()
+    middle, most = np.percentile(apart, [50.0, 99.0])
+    print(  # noqa: T201
+        f"  {'MuJoCo renderer':<44} {seconds * 1e3:9.3f} ms; ours is {middle:.4f} um from it in the median,\n"
+        f"    {most:.4f} at p99, {apart.max():.2f} at most; {(apart > 10.0).mean():.1e} of the pixels beyond "
+        f"10 um, {one_alone:.1e} met by one alone"
     )
 
 
