@@ -41,7 +41,7 @@ def mean_square(a: AnyArray, b: AnyArray, where: BoolArray | None = None) -> flo
     return float(counted.mean())
 
 
-def ssim(a: AnyArray, b: AnyArray) -> float:
+def ssim(a: AnyArray, b: AnyArray, where: BoolArray | None = None) -> float:
     """Structural similarity, mean over pixels and channels; 1 where the pictures are the same.
 
     Wang, Bovik, Sheikh and Simoncelli (2004), equation 13, with their Gaussian window and constants.
@@ -49,11 +49,12 @@ def ssim(a: AnyArray, b: AnyArray) -> float:
     Args:
         a: ``(rows, columns, 3)`` grey levels of 0 to 255.
         b: the same shape.
+        where: ``(rows, columns)`` the pixels whose windows count; all if None.
 
     Raises:
-        OutOfDomain: shapes that disagree.
+        OutOfDomain: shapes that disagree, or no pixel that counts.
     """
-    if a.shape != b.shape or a.ndim != 3:
+    if a.shape != b.shape or a.ndim != 3 or (where is not None and where.shape != a.shape[:-1]):
         raise OutOfDomain(f"pictures of {a.shape} and {b.shape} pixels cannot be compared")
     x, y = a.astype(np.float64), b.astype(np.float64)
     mean_x, mean_y = _blurred(x), _blurred(y)
@@ -61,7 +62,10 @@ def ssim(a: AnyArray, b: AnyArray) -> float:
     both = _blurred(x * y) - mean_x * mean_y
     alike = (2.0 * mean_x * mean_y + _STABLE[0]) * (2.0 * both + _STABLE[1])
     of = (mean_x**2 + mean_y**2 + _STABLE[0]) * (var_x + var_y + _STABLE[1])
-    return float((alike / of).mean())
+    counted = alike / of if where is None else (alike / of)[where]
+    if counted.size == 0:
+        raise OutOfDomain("no pixel was chosen to compare two pictures by; choose one or more")
+    return float(counted.mean())
 
 
 def _blurred(picture: FloatArray) -> FloatArray:

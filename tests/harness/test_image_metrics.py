@@ -40,3 +40,17 @@ def test_flat_pictures_differ_by_their_levels_alone() -> None:
 def test_pictures_of_two_sizes_are_refused() -> None:
     with pytest.raises(OutOfDomain, match="cannot be compared"):
         ssim(PICTURE, PICTURE[1:])
+
+
+def test_likeness_of_a_part_is_of_that_part() -> None:
+    """And parts make up the whole."""
+    other, left = _noisy(20.0), np.zeros(PICTURE.shape[:2], bool)
+    left[:, :20] = True
+    other[:, 30:] = PICTURE[:, 30:]
+    parts = [ssim(PICTURE, other, where) for where in (left, ~left)]
+    assert parts[0] < parts[1]
+    assert 0.4 * parts[0] + 0.6 * parts[1] == pytest.approx(ssim(PICTURE, other))
+    with pytest.raises(OutOfDomain, match="no pixel was chosen"):
+        ssim(PICTURE, other, left & ~left)
+    with pytest.raises(OutOfDomain, match="cannot be compared"):
+        ssim(PICTURE, other, left[1:])
