@@ -206,4 +206,5 @@ def _checked_files(out: Path | None, picture: Path | None, height_out: Path | No
 def _write_heights(path: Path, touched: Touched) -> None:
     import numpy as np
 
-    np.save(path, touched.press.heights)
+    heights, missing = touched.press.heights, touched.press.missing
+    np.save(path, heights if missing is None else np.where(missing, np.nan, heights))

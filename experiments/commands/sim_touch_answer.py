@@ -55,11 +55,29 @@ class Touched:
         return replace(self, live=live, seconds={**before, **self.seconds})
 
     @property
+    def missing(self) -> int:
+        """Pixels for which the map had no height."""
+        return 0 if self.press.missing is None else int(self.press.missing.sum())
+
+    @property
+    def fills_window(self) -> bool:
+        """Whether the object touches all that the camera sees and has a height for."""
+        touched = int(self.press.contact.sum())
+        return 0 < touched == self.press.contact.size - self.missing
+
+    @property
     def notes(self) -> list[str]:
         """What the operator should know."""
         press, said = self.press, list(self.said)
         if not press.contact.any():
             said.append("no contact: the picture is the untouched gel's")
+        if self.missing:
+            said.append(
+                f"{self.missing} of {press.contact.size} heights are missing (not finite, or no height): the "
+                "gel was hung over them, and neither picture nor contact is known there"
+            )
+        if self.fills_window:
+            said.append("the contact fills the window: a flat face then looks like the untouched gel")
         over_range = press.over_range or 0.0
         if over_range > 0.0:
             said.append(
@@ -81,6 +99,7 @@ class Touched:
 def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path | None) -> dict[str, Any]:
     """The one JSON object."""
     from harness.explain import as_json as plan_json
+    from harness.sim.supported import filled_share
 
     press, place = touched.press, touched.place
     sensor, calibration = press.gel.sensor, press.gel.calibration
@@ -109,8 +128,11 @@ def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path 
             "no_contact": not press.contact.any(),
             "over_range_m": press.over_range,
             "touches_border": press.touches_border,
+            "fills_window": touched.fills_window,
+            "missing_heights": touched.missing,
             "saturated_values": press.saturated,
             "out_of_domain_share": press.out_of_domain,
+            "filled_bins_share": filled_share(_towards_camera(press), calibration),
             "shadow_out_of_table_share": press.shadow_out_of_table,
         },
         "error_estimate": {
@@ -164,6 +186,13 @@ def print_answer(touched: Touched, out: Path, picture: Path | None) -> None:
         ANSWERS.print(f"{picture}", markup=False)
     seconds = {**touched.seconds, **press.evaluation.seconds}
     ANSWERS.print(", ".join(f"{stage} {1e3 * took:.1f} ms" for stage, took in seconds.items()), markup=False)
+
+
+def _towards_camera(press: "Press") -> "FloatArray":
+    from harness.sim.height_map import rest_surface
+
+    rest = press.gel.rest
+    return press.surface + (-rest_surface(press.gel.sensor) if rest is None else rest)
 
 
 def _compared(touched: Touched) -> dict[str, Any]:

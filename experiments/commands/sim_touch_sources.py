@@ -69,12 +69,15 @@ def of_heights(path: Path, of: str, under: Path | None, gel: "Gel", levels: list
 
     kind = _heights_of(of)
     begun = time.perf_counter()
-    heights = read_heights(path, gel.sensor, kind)
+    given = read_heights(path, gel.sensor, kind)
     if under is not None and kind == "object":
         refuse("--reached stands beside the surface of a gel; an object's --height says it already")
     reached = None if under is None else read_heights(under, gel.sensor)
     read = time.perf_counter() - begun
-    press = press_heights(heights, kind, gel, _scene(str(path), None, gel), levels, reached)
+    missing = given.missing if reached is None else given.missing | reached.missing
+    touched = None if reached is None else reached.heights
+    scene = _scene(str(path), None, gel)
+    press = press_heights(given.heights, kind, gel, scene, levels, touched, missing)
     return Touched(press, str(path), seconds={"read": read})
 
 

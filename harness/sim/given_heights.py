@@ -1,11 +1,14 @@
 """A height map out of a file: checked for what it could not be before anything is drawn from it."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
-from harness.arrays import AnyArray, FloatArray, read_only
+from harness.arrays import AnyArray, BoolArray, FloatArray, read_only
 from harness.errors import DataRefused, OutOfDomain
 from harness.sensor import TactileSensor
 
@@ -17,24 +20,39 @@ MOST_BEYOND = 4.0
 
 _UNITS = (("millimetres", 1e-3), ("micrometres", 1e-6))
 
+_NO_HEIGHT = 1e6
+"""As large as no height in any unit is: what some programs write where a ray met nothing."""
 
-def read_heights(path: Path, sensor: TactileSensor, of: Heights = "object") -> FloatArray:
+
+@dataclass(frozen=True, eq=False)
+class GivenHeights:
+    """A height map, and where there was none.
+
+    Attributes:
+        heights: ``(rows, columns)`` metres, finite.
+        missing: ``(rows, columns)`` where no height came: of an object 0 stands there, and the gel's skirt
+            hangs over it as over anything that does not reach it; a gel is spanned from its edge inwards.
+    """
+
+    heights: FloatArray
+    missing: BoolArray
+
+
+def read_heights(path: Path, sensor: TactileSensor, of: Heights = "object") -> GivenHeights:
     """Read a height map of metres of indentation, positive into the gel.
 
     Of an ``"object"`` map zero and less is where nothing reaches the gel. A ``"gel"`` map may be
-    a little below zero where the gel bulges.
+    a little below zero where the gel bulges. NaN, infinities and numbers that no height can be (a million
+    and more; of an object only upwards) are where no height came.
 
     Args:
         path: a ``.npy`` file.
         sensor: gives shape, pitch and thickness.
         of: what the map is of.
 
-    Returns:
-        ``(rows, columns)`` metres, float64.
-
     Raises:
         DataRefused: the file does not read, or holds something else than numbers.
-        OutOfDomain: another shape, heights that are not finite, in another unit or of another sign.
+        OutOfDomain: another shape, no height at all, or heights in another unit or of another sign.
     """
     if path.suffix != ".npy":
         raise DataRefused(f"{path}: a height map is read from a .npy file; write it with numpy.save")
@@ -46,31 +64,55 @@ def read_heights(path: Path, sensor: TactileSensor, of: Heights = "object") -> F
         raise DataRefused(
             f"{path} holds {found.dtype}; a height map holds floating-point metres. Is it a picture of one?"
         )
-    heights = np.ascontiguousarray(found, dtype=np.float64)
-    check_heights(heights, sensor, of, path.name)
-    return read_only(heights)
+    return given_heights(np.ascontiguousarray(found, dtype=np.float64), sensor, of, path.name)
 
 
-def check_heights(heights: FloatArray, sensor: TactileSensor, of: Heights, name: str) -> None:
-    """Refuse a height map that cannot be one of this sensor.
+def given_heights(heights: FloatArray, sensor: TactileSensor, of: Heights, name: str) -> GivenHeights:
+    """A height map with what is missing in it masked and filled; ``name`` is what errors call it.
 
     Raises:
         OutOfDomain: as ``read_heights``.
     """
     _check_shape(heights, sensor, name)
-    bad = np.argwhere(~np.isfinite(heights))
-    if len(bad):
-        i, j = bad[0]
+    missing = ~np.isfinite(heights) | (heights >= _NO_HEIGHT)
+    if of == "gel":
+        missing |= heights <= -_NO_HEIGHT
+    if missing.all():
         raise OutOfDomain(
-            f"{name}: {len(bad)} of {heights.size} heights are not finite, the first {heights[i, j]} at row "
-            f"{i}, column {j}; write 0 where the gel is not reached"
+            f"{name}: none of its {heights.size} heights is a number of metres, the first is "
+            f"{heights[0, 0]}; is it the map of a press at all? Write 0 where the gel is not reached"
         )
-    _check_unit(heights, sensor, of, name)
-    if of == "gel" and heights.any() and heights.max() <= 0.0:
+    _check_unit(heights[~missing], sensor, of, name)
+    if of == "gel" and heights[~missing].any() and heights[~missing].max() <= 0.0:
         raise OutOfDomain(
-            f"{name}: no height is above zero and the least is {heights.min() * 1e3:.3g} mm; indentation is "
-            "positive into the gel: turn the sign, and subtract the untouched gel's own height"
+            f"{name}: no height is above zero and the least is {heights[~missing].min() * 1e3:.3g} mm; "
+            "indentation is positive into the gel: turn the sign, and subtract the untouched gel's own height"
         )
+    known = np.where(missing, 0.0, heights)
+    filled = spanned(known, missing) if of == "gel" and missing.any() else known
+    return GivenHeights(read_only(filled), read_only(missing))
+
+
+def spanned(heights: FloatArray, missing: BoolArray) -> FloatArray:
+    """A surface with its holes spanned as by a membrane: Laplace's equation, the picture's border free.
+
+    No height between those known at a hole's edge is left, and no wall stands there.
+
+    Args:
+        heights: ``(rows, columns)``; what stands where they are missing does not matter.
+        missing: ``(rows, columns)``, not everywhere.
+    """
+    size, which = heights.size, np.flatnonzero(missing)
+    place = np.arange(size).reshape(heights.shape)
+    pairs = [(place[1:], place[:-1]), (place[:, 1:], place[:, :-1])]
+    one, other = (np.concatenate([pair[k].ravel() for pair in pairs]) for k in (0, 1))
+    beside = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(size, size)).tocsr()
+    beside = (beside + beside.T)[which]
+    known = np.where(missing, 0.0, heights).ravel()
+    pull = sparse.diags_array(np.asarray(beside.sum(axis=1)).ravel()) - beside[:, which]
+    filled = known.copy()
+    filled[which] = spsolve(pull.tocsc(), beside @ known)
+    return filled.reshape(heights.shape)
 
 
 def _check_shape(heights: FloatArray, sensor: TactileSensor, name: str) -> None:

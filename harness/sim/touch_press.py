@@ -83,6 +83,7 @@ class Press:
         evaluation: every quantity on the way.
         contact: ``(rows, columns)`` where the object touches.
         of: whether the heights are of the object or, given or of an ObjectFile's network, of the gel.
+        missing: ``(rows, columns)`` where a given map had no height; None where every pixel has one.
     """
 
     gel: Gel
@@ -90,6 +91,7 @@ class Press:
     evaluation: Evaluation
     contact: BoolArray
     of: Heights
+    missing: BoolArray | None = None
 
     @property
     def image(self) -> ByteArray:
@@ -174,6 +176,7 @@ def press_heights(
     scene: SceneFile,
     levels: Sequence[str] = (),
     reached: FloatArray | None = None,
+    missing: BoolArray | None = None,
 ) -> Press:
     """Draw the press of a height map.
 
@@ -185,13 +188,15 @@ def press_heights(
         levels: as an operator writes them, ``"touch.optics=exact"``.
         reached: beside a gel, ``(rows, columns)`` metres, how deep the object reaches: shadows and printed
             dots go by it. Without it the contact is taken as what the object surely shapes.
+        missing: ``(rows, columns)`` where no height was given: drawn as filled, and counted as no contact.
 
     Raises:
         WrongUse: an unknown knob or level; shadows or dots of a gel of which nobody says what pressed it.
         CalibrationRefused: a level that the calibration does not have.
     """
     if of == "object":
-        return _pressed({"touch.height_map": np.maximum(heights, 0.0)[None]}, of, gel, scene, levels)
+        sources = {"touch.height_map": np.maximum(heights, 0.0)[None]}
+        return _masked(_pressed(sources, of, gel, scene, levels), missing)
     if reached is None and (gel.sensor.casts_shadow or gel.sensor.markers is not None):
         raise WrongUse(
             "the surface of a gel does not say where the object touches, and shadows and dots go by that; "
@@ -200,9 +205,15 @@ def press_heights(
     touched = heights if reached is None else reached
     sources = {"touch.height_map": np.maximum(touched, 0.0)[None], "touch.gel": heights[None]}
     press = _pressed(sources, of, gel, scene, levels)
-    return (
-        press if reached is None else replace(press, contact=contact_of(reached, gel.calibration, "object"))
-    )
+    if reached is not None:
+        press = replace(press, contact=contact_of(reached, gel.calibration, "object"))
+    return _masked(press, missing)
+
+
+def _masked(press: Press, missing: BoolArray | None) -> Press:
+    if missing is None or not missing.any():
+        return press
+    return replace(press, contact=press.contact & ~missing, missing=missing)
 
 
 def press_mesh(sources: Mapping[str, Any], gel: Gel, scene: SceneFile, levels: Sequence[str] = ()) -> Press:
@@ -259,7 +270,7 @@ def _pressed(
     }
     sources |= {"object.wall": scene.object.wall, **_file(made, scene)}
     done = evaluate(made, {**sources, **given})
-    values = Evaluation({**given, **done.values}, done.seconds, done.calls, done.from_store)
+    values = replace(done, values={**given, **done.values})
     seen: Heights = of if "touch.height_map" in values.values else "gel"
     heights = values["touch.gel" if seen == "gel" else "touch.height_map"][0]
     return Press(gel, made, values, contact_of(heights, gel.calibration, seen), seen)

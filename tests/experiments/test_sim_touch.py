@@ -151,6 +151,50 @@ def test_noise_is_the_seeds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert seen[0] == seen[1] != seen[2]
 
 
+@pytest.mark.parametrize("of", ["object", "gel"])
+def test_heights_that_are_missing_are_masked_counted_and_handed_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], of: str
+) -> None:
+    holed = bump(1e-3)
+    holed[58:61, 78:80], holed[0, 0] = np.nan, np.inf
+    words = ("--heights-of", of, "--height-out", tmp_path / "out.npy", "--picture", tmp_path / "p.png")
+    answer = answered(capsys, tmp_path, "--height", saved(tmp_path, holed), *words)
+    whole = answered(capsys, tmp_path, "--height", saved(tmp_path, bump(1e-3), "w.npy"), *words[:2])
+    assert (answer["flags"]["missing_heights"], whole["flags"]["missing_heights"]) == (7, 0)
+    assert answer["contact_pixels"] == whole["contact_pixels"] - 6
+    assert any("7 of 19200 heights are missing" in note for note in answer["notes"])
+    assert np.array_equal(np.isnan(np.load(tmp_path / "out.npy")), ~np.isfinite(holed))
+    first = answered(capsys, tmp_path, "--height", tmp_path / "h.npy", "--heights-of", of)
+    seen = read_image(tmp_path / "a.png")
+    again = answered(capsys, tmp_path, "--height", tmp_path / "out.npy", "--heights-of", of)
+    assert np.array_equal(read_image(tmp_path / "a.png"), seen)
+    assert again["flags"] == first["flags"] == answer["flags"]
+
+
+def test_how_deep_an_object_reaches_below_a_gel_may_be_missing_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    holed = bump(1e-3)
+    holed[58:61, 78:80] = np.nan
+    reached = saved(tmp_path, holed, "r.npy")
+    words = ("--height", saved(tmp_path, bump(1e-3)), "--heights-of", "gel", "--reached")
+    answer = answered(capsys, tmp_path, *words, reached)
+    whole = answered(capsys, tmp_path, *words, saved(tmp_path, bump(1e-3), "w.npy"))
+    assert answer["flags"]["missing_heights"] == 6
+    assert answer["contact_pixels"] == whole["contact_pixels"] - 6
+
+
+def test_a_contact_that_fills_the_window_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    level = np.full((120, 160), 1e-3)
+    for patch in (1e-3, np.nan):
+        level[40:50, 40:50] = patch
+        answer = answered(capsys, tmp_path, "--height", saved(tmp_path, level))
+        assert answer["flags"]["fills_window"] is True
+        assert answer["flags"]["touches_border"] is True
+        assert any("fills the window" in note for note in answer["notes"])
+    assert not answered(capsys, tmp_path, "--height", saved(tmp_path, bump(1e-3)))["flags"]["fills_window"]
+
+
 @pytest.mark.parametrize(
     ("words", "reason", "code"),
     [
@@ -189,7 +233,7 @@ def test_noise_is_the_seeds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         (("--height", "h.npy", "--height-out", "h.txt"), "let its name end in .npy", 2),
         (("--height", "mm.npy"), "look like millimetres", 1),
         (("--height", "pixels.npy"), "look like pixels of 0.1245 mm", 1),
-        (("--height", "nan.npy"), "not finite", 1),
+        (("--height", "nan.npy"), "none of its 19200 heights", 1),
         (("--height", "turned.npy"), "transpose it", 1),
     ],
 )
@@ -203,7 +247,7 @@ def test_errors_say_what_to_do(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     maps = {"h": bump(1e-3), "mm": bump(1.0), "pixels": bump(8.0), "turned": bump(1e-3).T}
-    for name, heights in {**maps, "nan": np.where(bump(1e-3) > 9e-4, np.nan, 0.0)}.items():
+    for name, heights in {**maps, "nan": np.full((120, 160), np.nan)}.items():
         saved(tmp_path, heights, f"{name}.npy")
     write_png(tmp_path / "small.png", np.zeros((60, 80, 3), np.uint8))
     answer = answered(capsys, tmp_path, *words, code=code)

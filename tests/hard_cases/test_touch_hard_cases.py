@@ -173,6 +173,25 @@ def test_texture_finer_than_four_pixels_is_drawn_too_shallow_and_finer_pixels_cu
     assert slopes[1] > 0.85
 
 
+@pytest.mark.parametrize("level", LEVELS)
+def test_the_seam_of_directions_is_a_border_as_any_other(
+    level: OpticsLevel, world: TactileCalibration
+) -> None:
+    """A table steps from bin to bin, across the seam no more than elsewhere; without bins nothing steps."""
+    y, x = np.mgrid[:120, :160] * SENSOR.pitch
+    optics = Optics(world, level)
+
+    def seen(direction: float) -> FloatArray:
+        plane = 0.3 * (x * np.cos(direction) + y * np.sin(direction))
+        return optics.render(plane[None]).images.astype(np.float64)
+
+    borders = 2.0 * np.pi / 119 * np.arange(1, 120) - np.pi
+    steps = np.array([np.abs(seen(d + 1e-4) - seen(d - 1e-4)).mean() for d in borders])
+    assert steps[-1] <= steps[:-1].max()
+    if level == "smooth":
+        assert steps.max() < 0.05
+
+
 def test_deeper_presses_never_raise_the_gel() -> None:
     ball = trimesh.creation.icosphere(subdivisions=3, radius=5e-3)
     mesh = Mesh(np.asarray(ball.vertices) + np.array([0, 0, 5e-3]), np.asarray(ball.faces))
