@@ -87,6 +87,10 @@ COMMANDS = {
         "experiments.commands.object_render_vision:render",
         "Render a picture from any side in any light, or a turntable of them, by the networks.",
     ),
+    "object compare vision": Command(
+        "experiments.commands.object_compare_vision:compare",
+        "A camera's picture beside the networks': exposure and white balance fitted, what is left.",
+    ),
     "object verify": Command(
         "experiments.commands.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
     ),
@@ -113,6 +117,7 @@ GROUPS = {
     "cost": "What accuracy costs in seconds, measured on this machine.",
     "object": "ObjectFiles: what is known of one object, in a folder of open files.",
     "object render": "What an ObjectFile's networks say, for ears and eyes: audio, touch, vision.",
+    "object compare": "What instruments read of an object beside what its ObjectFile says: vision.",
     "calibrate": "Instruments' own calibrations, each an artefact with its residual and its reasons.",
     "sim": "What the simulators compute, one at a time.",
 }

@@ -91,3 +91,11 @@ def looking(
     way = np.array(along) / np.linalg.norm(along)
     eye = centre + away * longest * way
     return Pinhole.looking_at(eye, centre, (0.0, 0.0, 1.0), width, height or width, np.radians(39.6))
+
+
+def patchy_look(grid: VisionGrid, density: float, seed: int = 0, size: NetworkSize = SMALL) -> VisionModel:
+    """A density in 1/m, and a colour of its own for each cell."""
+    arrays = no_weights(size, len(grid))
+    arrays["density_bias"][:] = 1.0
+    arrays["colour_bias"][:] = np.random.default_rng(seed).uniform(-2.0, 2.0, (len(grid), 3))
+    return VisionModel(grid, VisionWeights(size, density, **arrays).rounded())

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from experiments.commands import vision_options
 from experiments.commands.object_render_vision_answer import (
     RenderedLook,
     View,
@@ -15,6 +16,7 @@ from experiments.commands.object_render_vision_answer import (
     sheet,
     write_arrays,
 )
+from experiments.commands.vision_options import Three
 from harness import options
 from harness.output import emit
 
@@ -22,8 +24,6 @@ if TYPE_CHECKING:
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.vision import ObjectVision
     from harness.objectfile.vision_settings import VisionLevel
-
-Three = tuple[float, float, float]
 
 _MOST_SHEET = 2**24
 """Pixels of all pictures of a turntable."""
@@ -33,32 +33,15 @@ _FIRST = 256
 
 
 def render(
-    folder: Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")],
+    folder: vision_options.Folder,
     out: Annotated[Path, typer.Option(help="The picture, before white, 8 bits sRGB.", metavar="FILE.png")],
-    camera: Annotated[
-        Three | None,
-        typer.Option(
-            help="Where the camera is, metres in the object's frame; else where all of it is seen.",
-            metavar="X Y Z",
-        ),
-    ] = None,
-    look_at: Annotated[
-        Three | None,
-        typer.Option(help="What is in the middle, metres; else the middle of the object.", metavar="X Y Z"),
-    ] = None,
-    up: Annotated[
-        Three | None, typer.Option(help="What is up in the picture; else the object's z.", metavar="X Y Z")
-    ] = None,
+    camera: vision_options.Camera = None,
+    look_at: vision_options.LookAt = None,
+    up: vision_options.Up = None,
     field_of_view: Annotated[str, typer.Option(help="Across the picture's width.", metavar="A")] = "40deg",
-    light: Annotated[
-        Three | None,
-        typer.Option(help="Towards the lamp, object's frame; else over the left shoulder.", metavar="X Y Z"),
-    ] = None,
+    light: vision_options.Light = None,
     size: Annotated[str, typer.Option(help="Pixels: a side, or columns x rows.", metavar="WxH")] = "256",
-    level: Annotated[
-        str,
-        typer.Option(help="fused (a kernel), onnx (the graph alone), or one_sample a pixel, at the mesh."),
-    ] = "fused",
+    level: vision_options.Level = "fused",
     turntable: Annotated[
         int | None,
         typer.Option(help="So many pictures of the object turned about its z, on one sheet.", metavar="N"),
@@ -72,9 +55,7 @@ def render(
     compare: Annotated[
         bool, typer.Option("--compare", help="Say how far it is from all samples of the same networks.")
     ] = False,
-    threads: Annotated[
-        int | None, typer.Option(help="That share the work; as many as cores if left out.", min=1)
-    ] = None,
+    threads: vision_options.Threads = None,
     json: options.Json = False,
 ) -> int:
     """A picture of an object from any side in any light, by the networks of its ObjectFile.
@@ -94,7 +75,7 @@ def render(
     angle = options.quantity("--field-of-view", field_of_view, ANGLE)
     chosen, pixels = vision_level(level), _pixels(size, turntable)
     begun = time.perf_counter()
-    of, vision = _opened(folder, threads)
+    of, vision = vision_options.opened(folder, threads)
     views = _views(vision, pixels, camera, look_at, up, light, angle, turntable)
     found = _rendered(of, vision, views, chosen, compare, begun)
     write_png(out, sheet(found))
@@ -107,14 +88,6 @@ def render(
     else:
         print_answer(found, out, depth_out, alpha_out)
     return 0
-
-
-def _opened(folder: Path, threads: int | None) -> "tuple[ObjectFile, ObjectVision]":
-    from harness.objectfile.file import ObjectFile
-    from harness.objectfile.vision import open_vision
-
-    of = ObjectFile.open(folder)
-    return of, open_vision(of, threads)
 
 
 def _pixels(text: str, turntable: int | None) -> tuple[int, int]:

@@ -107,14 +107,7 @@ def as_json(found: RenderedLook, out: Path, depth_out: Path | None, alpha_out: P
         "alpha_out": None if alpha_out is None else str(alpha_out),
         "rows": camera.height,
         "columns": camera.width,
-        "camera": {
-            "position_m": camera.eye.tolist(),
-            "forward": camera.forward.tolist(),
-            "object_from_camera": camera.object_from_camera.tolist(),
-            "focal_px": camera.focal_px,
-            "centre_px": list(camera.centre_px),
-            "field_of_view_rad": camera.field_of_view,
-        },
+        "camera": camera_as_json(camera),
         "light": {"direction": light.direction.tolist(), "irradiance": light.irradiance},
         "samples": sum(picture.samples for picture in found.pictures),
         "rays": sum(picture.rays for picture in found.pictures),
@@ -126,6 +119,18 @@ def as_json(found: RenderedLook, out: Path, depth_out: Path | None, alpha_out: P
         },
         "seconds": found.seconds,
         "seconds_by_part": dict(found.pictures[0].seconds),
+    }
+
+
+def camera_as_json(camera: "Pinhole") -> dict[str, Any]:
+    """Where a camera is in the object's frame, and what it shows."""
+    return {
+        "position_m": camera.eye.tolist(),
+        "forward": camera.forward.tolist(),
+        "object_from_camera": camera.object_from_camera.tolist(),
+        "focal_px": camera.focal_px,
+        "centre_px": list(camera.centre_px),
+        "field_of_view_rad": camera.field_of_view,
     }
 
 

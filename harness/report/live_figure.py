@@ -1,0 +1,89 @@
+"""A camera's picture, the simulated one exposed alike, and their difference, side by side."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from harness.arrays import AnyArray, BoolArray, ByteArray
+from harness.report.style import ANSWER, TOOL, blank, styled
+from harness.report.tiles import DIFFERENCE_GAIN, difference
+
+_WIDTH, _WORDS = 4.0, 0.95
+
+_MARGIN = 0.35
+"""Of the object's box, shown on each side of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class LivePictures:
+    """What is shown of a comparison.
+
+    Attributes:
+        live: ``(rows, columns, 3)`` RGB.
+        simulated: the same.
+        silhouette: ``(rows, columns)`` the object's pixels in the simulation.
+        mask: the same in the live picture.
+        words: under each of the three pictures.
+    """
+
+    live: ByteArray
+    simulated: ByteArray
+    silhouette: BoolArray
+    mask: BoolArray
+    words: tuple[str, str, str]
+
+
+def live_figure(shown: LivePictures) -> Figure:
+    """Live with both outlines, simulated, and live less simulated: the part of the pictures about the object.
+
+    Raises:
+        ValueError: pictures of other shapes.
+    """
+    shapes = {shown.live.shape, shown.simulated.shape}
+    if len(shapes) != 1 or {shown.silhouette.shape, shown.mask.shape} != {shown.live.shape[:2]}:
+        raise ValueError(f"pictures of {shapes} with masks of {shown.silhouette.shape}, {shown.mask.shape}")
+    near = _about(shown.mask | shown.silhouette)
+    live_part, simulated_part = shown.live[near], shown.simulated[near]
+    rows, columns = live_part.shape[:2]
+    with styled():
+        figure = blank(3 * _WIDTH, _WIDTH * rows / columns + _WORDS)
+        figure.set_layout_engine("constrained")
+        live, simulated, left = np.asarray(figure.subplots(1, 3)).tolist()
+        _picture(live, live_part, "live", shown.words[0])
+        _outline(live, shown.silhouette[near], ANSWER)
+        _outline(live, shown.mask[near], TOOL)
+        _picture(simulated, simulated_part, "simulated, as exposed", shown.words[1])
+        _picture(
+            left,
+            difference(live_part, simulated_part),
+            f"live - simulated, x {DIFFERENCE_GAIN:g}",
+            shown.words[2],
+        )
+    return figure
+
+
+def _about(mask: BoolArray) -> tuple[slice, slice]:
+    """The rows and columns that show a mask and what is around it; all where it is empty."""
+    if not mask.any():
+        return slice(None), slice(None)
+    shown = []
+    for axis in (1, 0):
+        places = np.flatnonzero(mask.any(axis=axis))
+        margin = 1 + int(_MARGIN * (places[-1] - places[0] + 1))
+        shown.append(slice(max(0, int(places[0]) - margin), int(places[-1]) + 1 + margin))
+    return shown[0], shown[1]
+
+
+def _picture(axes: Axes, picture: AnyArray, title: str, words: str) -> None:
+    axes.imshow(picture, interpolation="nearest")
+    axes.set_title(title, fontsize=10)
+    axes.set_xlabel(words, fontsize=8)
+    axes.set_xticks([])
+    axes.set_yticks([])
+
+
+def _outline(axes: Axes, mask: BoolArray, colour: str) -> None:
+    if mask.any() and not mask.all():
+        axes.contour(mask, levels=[0.5], colors=[colour], linewidths=0.8)

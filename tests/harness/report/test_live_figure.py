@@ -1,0 +1,36 @@
+"""The sheet of a comparison: all of the object is on it, and pictures that do not match are refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from exposed_pictures import pictured, taken
+
+from harness.report.live_figure import LivePictures, live_figure
+
+IMAGE = pictured(radius=12.0)
+MASK = IMAGE.alpha >= 0.5
+SHOWN = LivePictures(taken(IMAGE), taken(IMAGE, seed=2), MASK, np.roll(MASK, 3, axis=1), ("a", "b", "c"))
+
+
+def test_the_sheet_shows_the_object_three_times_and_what_is_around_it() -> None:
+    panels = live_figure(SHOWN).axes
+    assert [axes.get_title() for axes in panels] == ["live", "simulated, as exposed", "live - simulated, x 3"]
+    shapes = [np.asarray(axes.images[0].get_array()).shape for axes in panels]
+    # 24 pixels and 3 more to the right, and a third of that on each side.
+    assert shapes == [(24 + 2 * 9, 27 + 2 * 10, 3)] * 3
+    assert [axes.get_xlabel() for axes in panels] == ["a", "b", "c"]
+    assert len(panels[0].collections) == 2
+
+
+def test_an_object_at_the_edge_or_not_there_is_shown_all_the_same() -> None:
+    whole = replace(SHOWN, silhouette=~MASK, mask=MASK)
+    none = replace(SHOWN, silhouette=MASK & ~MASK, mask=MASK & ~MASK)
+    for shown in (whole, none):
+        assert np.asarray(live_figure(shown).axes[0].images[0].get_array()).shape == (96, 96, 3)
+
+
+def test_pictures_of_two_sizes_are_refused() -> None:
+    for wrong in ({"live": SHOWN.live[1:]}, {"mask": MASK[1:]}):
+        with pytest.raises(ValueError, match="pictures of"):
+            live_figure(replace(SHOWN, **wrong))
