@@ -3,11 +3,11 @@
 import importlib.metadata
 import os
 import platform
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 
 from harness.code_version import content_hash
+from harness.cores import own_cores
 from harness.cost import Curve
 from harness.run_folder import git_commit
 from harness.store import digest
@@ -21,7 +21,7 @@ def machine() -> dict[str, str]:
     limits = ", ".join(f"{name}={os.environ[name]}" for name in _THREADS if name in os.environ)
     found = {
         "cpu": _cpu_model(),
-        "cores": str(len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1),
+        "cores": str(own_cores()),
         "threads": limits or "not limited",
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),

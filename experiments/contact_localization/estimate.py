@@ -236,8 +236,7 @@ def _everywhere(search: Search, count: int, found: Solution) -> tuple[Hypotheses
 
 def _points(search: Search, contact: int, found: Solution) -> FloatArray:
     if found.pictured:
-        one = found.hypotheses
-        return search.surface_points(contact, one.gels, one.yaws, one.shared)
+        return search.surface_points(contact, found.hypotheses)
     places = search.contact_places(contact, found.hypotheses)
     return search.surface.points[search.surface.tree.query(places)[1]]
 

@@ -144,7 +144,7 @@ def refuse_inside_out(search: Search, one: Hypotheses, members: IntArray) -> Non
 
 def _facing(search: Search, contact: int, one: Hypotheses) -> float:
     """Cosine between the tool's axis and the outward normal at a contact; -1 for a square press."""
-    point = search.surface_points(contact, one.gels, one.yaws, one.shared)[0]
+    point = search.surface_points(contact, one)[0]
     normal = search.surface.normals[search.surface.tree.query(point)[1]]
     axis = search.prior.object_from_base(one.yaws)[0] @ search.contacts[contact].axis
     return float(normal @ axis)

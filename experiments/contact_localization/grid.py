@@ -15,7 +15,10 @@ from harness.sim.compiled import compiled
 _DROPPED_AT = 18.0
 _WORTH_A_LOOK = 12.0
 _MOST_LOOKS = 3000
-_DRAWS_EACH = 8.0
+_DRAWS_EACH = 4.0
+_WORTH_HEARING = 15.0
+"""Nats behind the best by touch at which a draw is dropped unheard: by sound, draws differ by 2 to 7."""
+
 _FILLED = 0.15
 _WIDTH = np.array([0.8e-3, 0.8e-3, 0.6e-3])
 _NARROW = 0.65
@@ -35,19 +38,16 @@ def on_samples(search: Search, members: IntArray, anchor: int, heard: Heard | No
         heard: what the strikes said; None without.
     """
     start = search.grid(members, anchor)
-    if heard is None:
-        looked = search.look(start, members, _DROPPED_AT)
-    else:
+    told = np.zeros(len(start.yaws))
+    if heard is not None:
         # Sound costs no picture: what it rules out is never looked at.
-        told = heard.nats(search, start.gels, start.yaws)
-        total = start.log_weights + told
-        kept = best_of(total, _DROPPED_AT, len(total))
-        start = Hypotheses(start.gels[kept], start.yaws[kept], start.log_weights[kept])
-        looked = search.look(start, members, _DROPPED_AT, told[kept])
+        told = heard.nats(search, start)
+        kept = best_of(start.log_weights + told, _DROPPED_AT, len(told))
+        start, told = start.taken(kept, start.log_weights[kept]), told[kept]
+    looked = search.look(replace(start, log_weights=told), members, _DROPPED_AT)
     closer = looked.best(_WORTH_A_LOOK, _MOST_LOOKS)
     search.settle(closer.yaws)
-    log_weights = _weighed(search, closer, members, 2, 1, heard)
-    return replace(closer, log_weights=log_weights - log_weights.max())
+    return _weighed(search, replace(closer, log_weights=np.zeros(len(closer.yaws))), members, 2, 1, heard)
 
 
 def refine(
@@ -80,10 +80,9 @@ def refine(
     current = start
     for attempt in range(rounds):
         draws = int(np.clip(_DRAWS_EACH * _perplexity(current.weights), samples, 5 * samples))
-        drawn, log_density = _Kernel.of_round(search, members, attempt).draw(current, draws, rng)
+        drawn = _Kernel.of_round(search, members, attempt).draw(current, draws, rng)
         step = 1 if attempt == rounds - 1 else 2
-        log_weights = _weighed(search, drawn, members, step, 2, heard) - log_density
-        current = replace(drawn, log_weights=log_weights - log_weights.max())
+        current = _weighed(search, drawn, members, step, 2, heard)
         if 1.0 / np.sum(current.weights**2) > _FILLED * draws:
             break
     return current
@@ -111,10 +110,8 @@ class _Kernel:
         """Places of the contacts' middle from those of the first gel, or with -1 back."""
         return np.asarray(gels + way * (self.prior.object_from_base(yaws) @ self.middle))
 
-    def draw(
-        self, current: Hypotheses, draws: int, rng: np.random.Generator
-    ) -> tuple[Hypotheses, FloatArray]:
-        """Hypotheses, all of one weight, and the ``(draws,)`` logarithm of the density they are drawn from.
+    def draw(self, current: Hypotheses, draws: int, rng: np.random.Generator) -> Hypotheses:
+        """Hypotheses, each weighed by one over the density it is drawn from.
 
         Shared errors that were not named before are drawn from their prior, and what is drawn from the prior
         has the prior's density.
@@ -137,18 +134,20 @@ class _Kernel:
             centres.append(around(current.shared[unique], _STEP) / _STEP)
         log_density = _mixture(np.hstack(points), np.hstack(centres), repeats / draws) + named
         gels = self._middles(drawn, yaws, -1.0)
-        return Hypotheses(gels, yaws, np.zeros(draws), shared), log_density
+        return Hypotheses(gels, yaws, -log_density, shared)
 
 
 def _weighed(
     search: Search, at: Hypotheses, members: IntArray, step: int, rings: int, heard: Heard | None
-) -> FloatArray:
-    total = search.weigh(at.gels, at.yaws, members, step, rings, at.shared)
+) -> Hypotheses:
+    """Those worth a weight, with what images and sound say added to theirs."""
+    touched = search.weigh(at, members, step, rings, _DROPPED_AT)
     if heard is None:
-        return total
-    # A hammer strikes within a millimetre of where it is aimed: shared errors, less than that, do not show in
-    # sound, and what its modes are wrong by would only be taken for them.
-    return np.asarray(total + heard.nats(search, at.gels, at.yaws, between=True))
+        return touched
+    likely = touched.best(_WORTH_HEARING, len(touched.yaws))
+    # A hammer strikes within a millimetre of where it is aimed: shared errors, less than that, do not show
+    # in sound, and what its modes are wrong by would only be taken for them.
+    return likely.told(heard.nats(search, likely, between=True))
 
 
 def _turn(search: Search) -> float:

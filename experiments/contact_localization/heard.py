@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.contact_localization.hypotheses import Hypotheses
 from experiments.contact_localization.model import Model
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.sound_analysis import analyse
@@ -27,9 +28,9 @@ class Heard:
     term: SoundTerm
     struck: IntArray
 
-    def nats(self, search: Search, gels: FloatArray, yaws: FloatArray, between: bool = False) -> FloatArray:
-        """``(n,)`` nats of hypotheses, see ``Hypotheses`` and ``sound_nats``; 0 where sound says nothing."""
-        return sound_nats(search, self.term, self.struck, gels, yaws, between)
+    def nats(self, search: Search, at: Hypotheses, between: bool = False) -> FloatArray:
+        """``(n,)`` nats of hypotheses, see ``sound_nats``; 0 where sound says nothing."""
+        return sound_nats(search, self.term, self.struck, at, between)
 
 
 def hear(strikes: Sequence[Strike | None], model: Model, spacing: float) -> Heard | None:

@@ -1,6 +1,6 @@
 """What the search is about: contacts, places they may have been, and how noisy everything is."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -71,9 +71,16 @@ class Hypotheses:
         """``(n,)``, summing to 1."""
         return normalised(self.log_weights)
 
+    def told(self, nats: FloatArray) -> "Hypotheses":
+        """With ``(n,)`` nats more, up to a constant."""
+        total = self.log_weights + nats
+        return replace(self, log_weights=total - total.max(initial=-np.inf))
+
     def best(self, within: float, most: int) -> "Hypotheses":
         """Those within so many nats of the best, evenly thinned where they are more than ``most``."""
         kept = best_of(self.log_weights, within, most)
+        if len(kept) == len(self.log_weights):
+            return self
         return self.taken(kept, self.log_weights[kept])
 
     def taken(self, chosen: IntArray, log_weights: FloatArray) -> "Hypotheses":
@@ -104,7 +111,7 @@ class Noise:
     geometry: GeometryNoise = field(default_factory=GeometryNoise)
     unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3, angle=np.radians(4.0)))
     touch: TouchNoise = field(default_factory=TouchNoise)
-    temperature: float = 0.3
+    temperature: float = 0.45
     shared: SharedNoise = field(default_factory=SharedNoise)
 
 

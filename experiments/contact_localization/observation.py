@@ -1,6 +1,7 @@
 """From what was recorded at each contact to what the estimator compares."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from experiments.contact_localization.model import Model
 from experiments.contact_localization.touch import TouchNoise, touch_map
 from harness.acquisition import Strike
 from harness.arrays import ByteArray, FloatArray, read_only
+from harness.cores import own_cores
 from harness.errors import DataRefused
 from harness.sim.inverse import invert
 
@@ -48,7 +50,7 @@ class Observation:
 def read_contacts(
     observations: Sequence[Observation], model: Model, block: int, noise: TouchNoise
 ) -> tuple[Contact, ...]:
-    """Recover each contact's height map and average it into the map that is compared.
+    """Recover each contact's height map, on all cores, and average it into the map that is compared.
 
     Args:
         observations: the contacts.
@@ -56,12 +58,13 @@ def read_contacts(
         block: tactile pixels a side of one compared pixel.
         noise: gives the gel's blurs.
     """
-    return tuple(
-        contact_of(
-            observation.base_from_gel, height_map(observation, model), model.sensor.pitch, block, noise
-        )
-        for observation in observations
-    )
+
+    def read(observation: Observation) -> Contact:
+        heights = height_map(observation, model)
+        return contact_of(observation.base_from_gel, heights, model.sensor.pitch, block, noise)
+
+    with ThreadPoolExecutor(own_cores(), "images") as pool:
+        return tuple(pool.map(read, observations))
 
 
 def contact_of(

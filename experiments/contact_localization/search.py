@@ -16,7 +16,7 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.shared_errors import log_prior, moves
 from experiments.contact_localization.surface import Surface
 from experiments.contact_localization.touch import TouchMap, View, best_fit, touch_terms
-from experiments.contact_localization.view import view_along
+from experiments.contact_localization.view import half_as_fine, view_along
 from harness.arrays import FloatArray, IntArray
 
 _KNOWN_YAWS = np.radians(np.arange(-5.0, 5.5, 1.0))
@@ -62,14 +62,19 @@ class Search:
         """The object along the tool at a contact, under the yaw of a numbered picture."""
         key = (contact, picture, coarse)
         if key not in self._views:
-            nominal = np.radians(_YAW_STEP * picture)
-            object_from_base = self.prior.object_from_base(np.array([nominal]))[0]
-            object_from_gel = object_from_base @ self.contacts[contact].base_from_gel[:3, :3]
-            pitch = self._pitch if coarse else 0.5 * self._pitch
-            self._views[key] = view_along(
-                self.model.raster, self.surface.points, object_from_gel, pitch, self.model.sensor
-            )
+            self._views[key] = self._seen(contact, picture, coarse)
         return self._views[key]
+
+    def _seen(self, contact: int, picture: int, coarse: bool) -> View:
+        sensor = self.model.sensor
+        if coarse and self.prior.yaw == "known":
+            # The fine picture will be asked for as well.
+            return half_as_fine(self.view(contact, picture), sensor)
+        nominal = np.radians(_YAW_STEP * picture)
+        object_from_base = self.prior.object_from_base(np.array([nominal]))[0]
+        object_from_gel = object_from_base @ self.contacts[contact].base_from_gel[:3, :3]
+        pitch = self._pitch if coarse else 0.5 * self._pitch
+        return view_along(self.model.raster, self.surface.points, object_from_gel, pitch, sensor)
 
     def grid(self, members: IntArray, anchor: int, use_axis: bool = True) -> Hypotheses:
         """Hypotheses on the surface's samples, weighed by the places and tool axes of some contacts.
@@ -95,68 +100,55 @@ class Search:
         gels = gels_at_anchor - (rotations @ self.positions[anchor])[yaws]
         return gels, self.yaws[yaws], log_weights[kept]
 
-    def look(
-        self, start: Hypotheses, members: IntArray, within: float, told: FloatArray | None = None
-    ) -> Hypotheses:
-        """Weigh samples' hypotheses by coarse images, dropping what falls behind as contacts come in.
+    def look(self, at: Hypotheses, members: IntArray, within: float) -> Hypotheses:
+        """Samples' hypotheses with what coarse images say added to their weights.
 
         Args:
-            start: on the surface's samples; their weights are not used.
+            at: on the surface's samples, weighed by what is not an image.
             members: ``(m,)`` indices of contacts whose image shows a contact.
-            within: nats behind the best at which a hypothesis is dropped.
-            told: ``(n,)`` nats that something else already says; None for nothing.
+            within: nats behind the best at which a hypothesis is dropped as contacts come in.
         """
         # Between samples the best place is up to half their spacing away.
         off, pitch = 0.4 * self.surface.spacing, self._pitch
         step = max(1, round(self.surface.spacing / pitch))
-        total = self.log_yaw_prior(start.yaws) + (0.0 if told is None else told)
-        gels, yaws = start.gels, start.yaws
+        at = at.told(self.log_yaw_prior(at.yaws))
         for k, sigma, temperature in self._scales(members):
-            total = total + self._term(k, gels, yaws, step, 1, float(np.hypot(sigma, off)), temperature, True)
-            kept = best_of(total, within, len(total))
-            gels, yaws, total = gels[kept], yaws[kept], total[kept]
-        return Hypotheses(gels, yaws, total - total.max())
+            term = self._term(k, at, step, 1, float(np.hypot(sigma, off)), temperature, True)
+            at = at.told(term).best(within, len(term))
+        return at
 
     def weigh(
-        self,
-        gels: FloatArray,
-        yaws: FloatArray,
-        members: IntArray,
-        step: int,
-        rings: int,
-        shared: FloatArray | None = None,
-    ) -> FloatArray:
-        """``(n,)`` nats: the posterior of hypotheses, up to a constant.
+        self, at: Hypotheses, members: IntArray, step: int, rings: int, within: float = np.inf
+    ) -> Hypotheses:
+        """Hypotheses with what yaw, shared errors and images say added to their weights.
 
         Args:
-            gels: ``(n, 3)`` metres, see ``Hypotheses``.
-            yaws: ``(n,)`` rad.
+            at: weighed by all else. Shared errors that they do not name count to each contact's own.
             members: ``(m,)`` indices of contacts whose image shows a contact.
             step: fine view pixels between the cells over which the arm's error is integrated.
             rings: cells on each side.
-            shared: ``(n, 6)`` errors that all contacts share; None counts them to each contact's own.
+            within: nats behind the best at which a hypothesis is dropped as contacts come in.
         """
-        total = self.log_yaw_prior(yaws) + log_prior(shared)
+        at = at.told(self.log_yaw_prior(at.yaws) + log_prior(at.shared))
         cells = max(1, step // 2) if self._rough else step
-        for k, sigma, temperature in self._scales(members, shared is not None):
-            total += self._term(k, gels, yaws, cells, rings, sigma, temperature, self._rough, shared)
-        return total
+        for k, sigma, temperature in self._scales(members, at.shared is not None):
+            term = self._term(k, at, cells, rings, sigma, temperature, self._rough)
+            at = at.told(term).best(within, len(term))
+        return at
 
     def _term(
         self,
         contact: int,
-        gels: FloatArray,
-        yaws: FloatArray,
+        at: Hypotheses,
         step: int,
         rings: int,
         sigma: float,
         temperature: float,
         coarse: bool,
-        shared: FloatArray | None = None,
     ) -> FloatArray:
-        term = np.empty(len(gels))
-        touch, noise = self.touch(contact, coarse), place_noise(self.noise, shared is not None)
-        for chosen, view, places in self.placed(contact, gels, yaws, coarse, shared):
+        term = np.empty(len(at.yaws))
+        touch, noise = self.touch(contact, coarse), place_noise(self.noise, at.shared is not None)
+        for chosen, view, places in self.placed(contact, at, coarse):
             term[chosen] = touch_terms(view, touch, noise, places, step, rings, sigma, temperature)
         return term
 
@@ -172,31 +164,28 @@ class Search:
         """
         values = np.empty(len(members))
         for column, (k, sigma, _) in enumerate(self._scales(members)):
-            ((_, view, places),) = self.placed(k, one.gels, one.yaws, shared=one.shared)
+            ((_, view, places),) = self.placed(k, one)
             values[column] = best_fit(view, self.touch(k), self.noise.touch, places[0], sigma)
         return values
 
     def placed(
-        self,
-        contact: int,
-        gels: FloatArray,
-        yaws: FloatArray,
-        coarse: bool = False,
-        shared: FloatArray | None = None,
+        self, contact: int, at: Hypotheses, coarse: bool = False
     ) -> Iterator[tuple[IntArray, View, FloatArray]]:
         """Hypotheses by the picture that serves them, with the gel's centre in view coordinates."""
-        places_in_object = self.gel_centres(contact, gels, yaws, shared)
-        pictures = self.pictures(yaws, coarse)
+        places_in_object = self.gel_centres(contact, at)
+        pictures = self.pictures(at.yaws, coarse)
         for picture in (0,) if self.prior.yaw == "known" else np.unique(pictures):
             chosen = np.nonzero(pictures == picture)[0].astype(np.int64)
             view = self.view(contact, int(picture), coarse)
             yield chosen, view, places_in_object[chosen] @ view.object_from_view
 
-    def gel_centres(
-        self, contact: int, gels: FloatArray, yaws: FloatArray, shared: FloatArray | None = None
-    ) -> FloatArray:
+    def gel_centres(self, contact: int, at: Hypotheses) -> FloatArray:
         """``(n, 3)`` metres, in the object's frame, at one contact."""
-        return np.asarray(gels + self.moved(contact, self._rotations(yaws), shared))
+        moved = self.positions[contact]
+        if at.shared is not None:
+            moved = (moved + at.shared @ self._shared_moves[contact])[:, :, None]
+            return np.asarray(at.gels + np.matmul(self._rotations(at.yaws), moved)[:, :, 0])
+        return np.asarray(at.gels + self._rotations(at.yaws) @ moved)
 
     def _rotations(self, yaws: FloatArray) -> FloatArray:
         """``(n, 3, 3)``, object from base; all contacts of one set of hypotheses ask for the same in turn."""
@@ -204,24 +193,14 @@ class Search:
             self._turned = yaws, self.prior.object_from_base(yaws)
         return self._turned[1]
 
-    def moved(self, contact: int, rotations: FloatArray, shared: FloatArray | None) -> FloatArray:
-        """``(n, 3)`` metres, in the object's frame, from the first contact's gel to this one's."""
-        moved = self.positions[contact]
-        if shared is None:
-            return np.asarray(rotations @ moved)
-        off = shared @ self._shared_moves[contact]
-        return np.asarray(np.matmul(rotations, (moved + off)[:, :, None])[:, :, 0])
-
-    def surface_points(
-        self, contact: int, gels: FloatArray, yaws: FloatArray, shared: FloatArray | None = None
-    ) -> FloatArray:
+    def surface_points(self, contact: int, at: Hypotheses) -> FloatArray:
         """``(n, 3)`` metres: where the tool's line first meets the object, to a view's pixel.
 
         Where it meets nothing within the gel's thickness, the sample nearest to the gel's centre:
         what lies behind an edge that was just missed was not touched.
         """
-        points = self.gel_centres(contact, gels, yaws, shared)
-        for chosen, view, places in self.placed(contact, gels, yaws, self._rough, shared):
+        points = self.gel_centres(contact, at)
+        for chosen, view, places in self.placed(contact, at, self._rough):
             row, column = np.round((places[:, :2] - view.origin) / view.pitch).astype(np.int64).T[::-1]
             rows, columns = view.depth.shape
             inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
@@ -234,12 +213,10 @@ class Search:
             points[lost] = self.surface.points[self.surface.tree.query(points[lost])[1]]
         return points
 
-    def contact_places(self, contact: int, hypotheses: Hypotheses) -> FloatArray:
+    def contact_places(self, contact: int, at: Hypotheses) -> FloatArray:
         """``(n, 3)`` metres: where a contact lies if the gel's centre was pressed in as it seems."""
-        rotations = self.prior.object_from_base(hypotheses.yaws)
-        inward = rotations @ self.axes[contact]
-        gels = hypotheses.gels + self.moved(contact, rotations, hypotheses.shared)
-        return np.asarray(gels - self.contacts[contact].indentation * inward)
+        inward = self._rotations(at.yaws) @ self.axes[contact]
+        return np.asarray(self.gel_centres(contact, at) - self.contacts[contact].indentation * inward)
 
     def touch(self, contact: int, coarse: bool = False) -> TouchMap:
         """What the gel read at a contact whose image counts."""

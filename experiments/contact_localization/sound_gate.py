@@ -88,12 +88,12 @@ def fit_by_sound(search: Search, hypotheses: Hypotheses, heard: Heard, count: in
         count: contacts that count.
     """
     best = hypotheses.top
-    points, directions = strike_places(search, heard.struck, best.gels, best.yaws)
+    points, directions = strike_places(search, heard.struck, best)
     rows = heard.term.mode_table(points[0], directions[0])
     return SoundFit(
         places=_places(search, best, count),
         yaw=float(search.log_yaw_prior(best.yaws)[0]),
-        sound=float(heard.nats(search, best.gels, best.yaws)[0]),
+        sound=float(heard.nats(search, best)[0]),
         resonances=len(rows),
         unexplained=sum(not row.modes for row in rows),
     )

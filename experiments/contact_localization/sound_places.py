@@ -8,26 +8,23 @@ from experiments.contact_localization.sound_likelihood import SoundTerm
 from harness.arrays import FloatArray, IntArray
 
 
-def strike_places(
-    search: Search, struck: IntArray, gels: FloatArray, yaws: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def strike_places(search: Search, struck: IntArray, at: Hypotheses) -> tuple[FloatArray, FloatArray]:
     """Where strikes fell and which way they went: the press's place, along the tool.
 
     Args:
         search: the run.
         struck: ``(K,)`` indices of the contacts that were struck.
-        gels: ``(h, 3)`` metres, see ``Hypotheses``.
-        yaws: ``(h,)`` rad.
+        at: ``h`` hypotheses; errors that contacts share do not move a strike.
 
     Returns:
         ``(h, K, 3)`` metres and ``(h, K, 3)`` unit, in the object's frame. The places are as far off
         the surface as the indentation is misread; a table of modes takes the nearest sample.
     """
-    rotations = search.prior.object_from_base(yaws)
+    rotations = search.prior.object_from_base(at.yaws)
     directions = np.einsum("hij,kj->hki", rotations, search.axes[struck])
     indentations = np.array([search.contacts[k].indentation for k in struck])
     moved = np.einsum("hij,kj->hki", rotations, search.positions[struck])
-    points: FloatArray = gels[:, None] + moved - indentations[:, None] * directions
+    points: FloatArray = at.gels[:, None] + moved - indentations[:, None] * directions
     return points, np.ascontiguousarray(directions)
 
 
@@ -35,8 +32,7 @@ def sound_nats(
     search: Search,
     term: SoundTerm,
     struck: IntArray,
-    gels: FloatArray,
-    yaws: FloatArray,
+    at: Hypotheses,
     between: bool = False,
 ) -> FloatArray:
     """``(h,)`` nats of hypotheses by a run's sounds, 0 for sounds that say nothing.
@@ -45,13 +41,12 @@ def sound_nats(
         search: the run.
         term: of its strikes, in the order of ``struck``.
         struck: ``(K,)`` indices of the contacts that were struck.
-        gels: ``(h, 3)`` metres, see ``Hypotheses``.
-        yaws: ``(h,)`` rad.
+        at: ``h`` hypotheses.
         between: whether the places lie between samples, see ``SoundTerm.log_likelihood``.
     """
     if not term.says_something:
-        return np.zeros(len(gels))
-    return term.log_likelihood(*strike_places(search, struck, gels, yaws), between)
+        return np.zeros(len(at.yaws))
+    return term.log_likelihood(*strike_places(search, struck, at), between)
 
 
 _WORTH_KEEPING = 18.0
@@ -80,5 +75,5 @@ def by_sound(
     most = MOST_HYPOTHESES // len(carriers)
     parts = [search.places(members, int(anchor), use_axis, most) for anchor in carriers]
     gels, yaws, places = (np.concatenate(column) for column in zip(*parts, strict=True))
-    total = places + sound_nats(search, term, struck, gels, yaws)
-    return Hypotheses(gels, yaws, total - total.max()).best(_WORTH_KEEPING, len(total))
+    at = Hypotheses(gels, yaws, places)
+    return at.told(sound_nats(search, term, struck, at)).best(_WORTH_KEEPING, len(places))

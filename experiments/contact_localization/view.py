@@ -8,7 +8,7 @@ from experiments.contact_localization.touch_kernels import POOL
 from harness.arrays import FloatArray, read_only
 from harness.geometry import transform
 from harness.sensor import TactileSensor
-from harness.sim.height_map import RasterMesh, depth_image
+from harness.sim.height_map import RasterMesh, first_surface
 
 _SLACK = 3.0e-3
 """Metres by which place and picture may disagree: arm, shape, attitude over the window's width."""
@@ -29,13 +29,24 @@ def view_along(
         pitch: metres a pixel.
         sensor: gives the gel's window and thickness.
     """
-    in_view = samples @ object_from_gel
-    low, high = in_view.min(axis=0)[:2], in_view.max(axis=0)[:2]
+    across = object_from_gel[:, :2].T @ samples.T
+    low, high = across.min(axis=1), across.max(axis=1)
     columns, rows = np.ceil((high - low) / pitch).astype(np.int64) + 2 * round(_MARGIN / pitch)
     centre = 0.5 * (low + high)
     view_from_object = transform(object_from_gel.T, np.array([-centre[0], -centre[1], 0.0]))
-    depth = depth_image(raster, view_from_object, pitch, int(rows), int(columns)).depth
+    depth = first_surface(raster, view_from_object, pitch, int(rows), int(columns))
     origin = centre - 0.5 * pitch * np.array([columns - 1.0, rows - 1.0])
+    return _view_of(depth, object_from_gel, origin, pitch, sensor)
+
+
+def half_as_fine(view: View, sensor: TactileSensor) -> View:
+    """Every second pixel each way of a view."""
+    return _view_of(view.depth[::2, ::2], view.object_from_view, view.origin, 2.0 * view.pitch, sensor)
+
+
+def _view_of(
+    depth: FloatArray, object_from_gel: FloatArray, origin: FloatArray, pitch: float, sensor: TactileSensor
+) -> View:
     pooled = _pooled(depth)
     nearest = _front(pooled, pitch, sensor.window, _SLACK) - _SLACK
     farthest = _front(pooled, pitch, sensor.window, -_SLACK) + sensor.gel_thickness + _SLACK
@@ -44,7 +55,7 @@ def view_along(
         read_only(object_from_gel.copy()),
         read_only(origin),
         pitch,
-        depth,
+        read_only(np.ascontiguousarray(depth)),
         nearest,
         farthest,
         missing,
@@ -54,10 +65,9 @@ def view_along(
 
 def _pooled(depth: FloatArray) -> FloatArray:
     """The first surface in blocks of pixels: as fine as the limits on the gel's place need be."""
-    rows, columns = (-(-side // POOL) for side in depth.shape)
-    padded = np.full((rows * POOL, columns * POOL), np.inf)
-    padded[: depth.shape[0], : depth.shape[1]] = depth
-    return np.asarray(padded.reshape(rows, POOL, columns, POOL).min(axis=(1, 3)))
+    # The rows first, by whole rows at a time: several times as fast as blocks.
+    by_rows = np.minimum.reduceat(depth, np.arange(0, depth.shape[0], POOL), axis=0)
+    return np.asarray(np.minimum.reduceat(by_rows, np.arange(0, depth.shape[1], POOL), axis=1))
 
 
 def _front(pooled: FloatArray, pitch: float, window: tuple[float, float], wider: float) -> FloatArray:
@@ -84,4 +94,4 @@ def window_depth(
     """
     columns, rows = (2 * round(0.5 * side / pitch) + 1 for side in size)
     view_from_object = transform(object_from_gel.T, -object_from_gel.T @ centre_in_object)
-    return depth_image(raster, view_from_object, pitch, rows, columns).depth
+    return first_surface(raster, view_from_object, pitch, rows, columns)

@@ -23,9 +23,9 @@ from harness.authoring.vision_layers import (
 )
 from harness.authoring.vision_lessons import Lessons
 from harness.authoring.vision_profiles import CellsSpec
+from harness.cores import own_cores
 from harness.errors import DataRefused
 from harness.objectfile.vision_network import VisionGrid, VisionModel
-from harness.objectfile.vision_work import own_cores
 from harness.store import digest
 
 VERSION = 1

@@ -1,7 +1,5 @@
 """Threads that share loops, and arrays that are used again."""
 
-import os
-import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -10,12 +8,8 @@ from typing import Any
 import numpy as np
 
 from harness.arrays import AnyArray
+from harness.cores import own_cores
 from harness.errors import WrongUse
-
-
-def own_cores() -> int:
-    """Cores that this process may run on."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 class Crew:

@@ -179,7 +179,7 @@ def score_of(thing: Thing, run: Run, settings: Analysis, noise: SoundNoise, seed
         answers[use_axis] = off(best_point(search.contact_places(last, found), found.weights))
     places = search.grid(everyone, last)
     before = time.thread_time()
-    nats = sound_nats(search, term, everyone, places.gels, places.yaws)
+    nats = sound_nats(search, term, everyone, places)
     weighed = time.thread_time() - before
     points = search.contact_places(last, places)
     near = np.linalg.norm(points - run.true, axis=1) < 4e-3

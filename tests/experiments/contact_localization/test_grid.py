@@ -38,26 +38,20 @@ class Known:
         self.carries, self.told = carries, told
 
     def weigh(
-        self,
-        gels: FloatArray,
-        yaws: FloatArray,
-        members: IntArray,
-        step: int,
-        rings: int,
-        shared: FloatArray | None = None,
-    ) -> FloatArray:
-        """Nats, up to a constant that is not zero."""
-        known = 0.0
-        if shared is not None:
-            gels = gels - self.carries * shared[:, :3]
-            known = -0.5 * np.sum(shared**2, axis=1)
-            known = known - 0.5 * np.sum(((shared[:, :3] - READ) / self.told) ** 2, axis=1)
-        at = np.column_stack([gels, yaws])
+        self, at: Hypotheses, members: IntArray, step: int, rings: int, within: float = np.inf
+    ) -> Hypotheses:
+        gels, known = at.gels, 0.0
+        if at.shared is not None:
+            gels = gels - self.carries * at.shared[:, :3]
+            known = -0.5 * np.sum(at.shared**2, axis=1)
+            known = known - 0.5 * np.sum(((at.shared[:, :3] - READ) / self.told) ** 2, axis=1)
+        places = np.column_stack([gels, at.yaws])
         parts = [
-            np.log(share) - 0.5 * np.sum(((at - CENTRE - k * APART) / SIGMAS) ** 2, axis=1)
+            np.log(share) - 0.5 * np.sum(((places - CENTRE - k * APART) / SIGMAS) ** 2, axis=1)
             for k, share in enumerate(self.shares)
         ]
-        return np.asarray(np.logaddexp.reduce(parts)) + known - 123.4
+        told = at.told(np.asarray(np.logaddexp.reduce(parts)) + known)
+        return told.best(within, len(at.yaws))
 
 
 def start_of(known: Known, seed: int = 0) -> Hypotheses:
@@ -67,8 +61,7 @@ def start_of(known: Known, seed: int = 0) -> Hypotheses:
     places = np.vstack([rng.uniform(-4e-3, 4e-3, (300, 3)) + k * APART[:3] for k in bumps])
     gels = np.repeat(places, 7, axis=0)
     yaws = np.tile(np.radians(np.arange(-3.0, 4.0)), len(places))
-    log_weights = known.weigh(gels, yaws, MEMBERS, 2, 1)
-    return Hypotheses(gels, yaws, log_weights - log_weights.max())
+    return known.weigh(Hypotheses(gels, yaws, np.zeros(len(yaws))), MEMBERS, 2, 1)
 
 
 def refined(known: Known, samples: int = 1200, rounds: int = 3, seed: int = 0) -> Hypotheses:
@@ -194,8 +187,9 @@ def test_one_sure_hypothesis_is_a_start_as_well() -> None:
 
 def test_a_wide_posterior_gets_more_draws() -> None:
     sure, wide = Known(), Known((0.25, 0.25, 0.25, 0.25))
-    sure_draws, wide_draws = (len(refined(known, 300, rounds=1).gels) for known in (sure, wide))
-    assert 300 <= sure_draws <= wide_draws <= 5 * 300
+    sure_draws, wide_draws = (len(refined(known, 60, rounds=1).gels) for known in (sure, wide))
+    # What falls behind on the way is not handed back.
+    assert 30 < sure_draws < 1.5 * sure_draws < wide_draws <= 5 * 60
 
 
 def test_a_yaw_that_nothing_shows_is_left_alone() -> None:

@@ -37,6 +37,16 @@ def true_gel(search: Search) -> FloatArray:
     return np.asarray(PRESSES[0].object_from_gel[:3, 3])
 
 
+def at(gels: FloatArray, yaws: FloatArray) -> Hypotheses:
+    """Hypotheses, all of one weight."""
+    return Hypotheses(gels, yaws, np.zeros(len(yaws)))
+
+
+def truth(search: Search) -> Hypotheses:
+    """The true one alone."""
+    return at(true_gel(search)[None], np.zeros(1))
+
+
 def test_exact_presses_are_found(found: Estimate) -> None:
     # Contacts tell a place to 0.6 mm each; six of them, and a sample of the draws.
     assert np.linalg.norm(found.position_in_object - TRUE[-1]) < 0.6e-3
@@ -109,19 +119,19 @@ def test_a_wrong_yaw_within_its_sigma_is_made_good(contacts: tuple[Contact, ...]
 def test_the_true_hypothesis_outweighs_others(search: Search) -> None:
     """Against two thousand around it."""
     rng = np.random.default_rng(0)
-    gels = true_gel(search) + rng.normal(size=(2000, 3)) * 4e-3
-    yaws = rng.normal(size=2000) * np.radians(1.5)
-    others = search.weigh(gels, yaws, ALL, 1, 2)
-    truth = search.weigh(true_gel(search)[None], np.zeros(1), ALL, 1, 2)
+    gels = true_gel(search) + rng.normal(size=(2000, 3)) * np.where(np.arange(2000) > 0, 4e-3, 0.0)[:, None]
+    yaws = rng.normal(size=2000) * np.where(np.arange(2000) > 0, np.radians(1.5), 0.0)
+    weights = search.weigh(at(gels, yaws), ALL, 1, 2).log_weights
     # Within half a millimetre others may fit as well.
     far = np.linalg.norm(gels - true_gel(search), axis=1) > 1.5e-3
-    assert truth[0] > others[far].max()
+    assert weights[0] > weights[far].max()
 
 
 def test_translations_carry_the_gel_from_contact_to_contact(search: Search) -> None:
     for k, press in enumerate(PRESSES):
-        at = search.gel_centres(k, true_gel(search)[None], np.zeros(1))
-        assert at[0] == pytest.approx(press.object_from_gel[:3, 3], abs=1e-12)
+        assert search.gel_centres(k, truth(search))[0] == pytest.approx(
+            press.object_from_gel[:3, 3], abs=1e-12
+        )
 
 
 def test_named_errors_put_contacts_where_a_crooked_bench_has_them(
@@ -140,32 +150,35 @@ def test_named_errors_put_contacts_where_a_crooked_bench_has_them(
 
     crooked = Search([reported(c) for c in contacts], block, prior, 3e-3, Noise())
     true = np.array([press.object_from_gel[:3, 3] for press in PRESSES])
-    gel, none = true_gel(crooked)[None], np.zeros(1)
-    told = np.vstack([crooked.gel_centres(k, gel, none, shared) for k in range(len(true))])
-    plain = np.vstack([crooked.gel_centres(k, gel, none) for k in range(len(true))])
-    off_told, off_plain = (at - at.mean(axis=0) - true + true.mean(axis=0) for at in (told, plain))
+    told, plain = (
+        np.vstack([crooked.gel_centres(k, replace(truth(crooked), shared=named)) for k in range(len(true))])
+        for named in (shared, None)
+    )
+    off_told, off_plain = (
+        places - places.mean(axis=0) - true + true.mean(axis=0) for places in (told, plain)
+    )
     # First order in half a degree and half a percent, over a block of 60 mm.
     assert np.linalg.norm(off_told, axis=1).max() < 10e-6
     assert np.linalg.norm(off_plain, axis=1).max() > 0.3e-3
 
 
 def test_errors_of_size_zero_are_none(search: Search) -> None:
-    gels, nothing = true_gel(search)[None], np.zeros((1, 6))
+    unnamed = truth(search)
+    named = replace(unnamed, shared=np.zeros((1, 6)))
     for k in range(len(PRESSES)):
-        at = search.gel_centres(k, gels, np.zeros(1), nothing)
-        np.testing.assert_array_equal(at, search.gel_centres(k, gels, np.zeros(1)))
+        np.testing.assert_array_equal(search.gel_centres(k, named), search.gel_centres(k, unnamed))
 
 
 def test_the_contact_is_where_the_tools_line_first_meets_the_object(search: Search) -> None:
     for k, press in enumerate(PRESSES):
-        point = search.surface_points(k, true_gel(search)[None], np.zeros(1))[0]
+        point = search.surface_points(k, truth(search))[0]
         # To a pixel of the view, half a millimetre; on a slope that much again in depth.
         assert np.linalg.norm(point - press.point) < 0.5e-3
 
 
 def test_a_line_that_misses_the_object_ends_on_the_surface_all_the_same(search: Search) -> None:
-    away = true_gel(search)[None] + np.array([0.2, 0.0, 0.0])
-    point = search.surface_points(0, away, np.zeros(1))[0]
+    away = at(true_gel(search)[None] + np.array([0.2, 0.0, 0.0]), np.zeros(1))
+    point = search.surface_points(0, away)[0]
     assert np.linalg.norm(search.surface.points - point, axis=1).min() < 1e-12
 
 
@@ -181,11 +194,22 @@ def test_the_grid_starts_everywhere_the_tool_may_have_stood(search: Search) -> N
 def test_weights_of_hypotheses_do_not_hang_on_their_company(search: Search) -> None:
     rng = np.random.default_rng(1)
     gels, yaws = true_gel(search) + rng.normal(size=(60, 3)) * 2e-3, rng.normal(size=60) * 0.02
-    whole = search.weigh(gels, yaws, ALL, 2, 2)
-    halves = np.concatenate(
-        [search.weigh(g, y, ALL, 2, 2) for g, y in zip(np.split(gels, 2), np.split(yaws, 2), strict=True)]
-    )
-    assert halves == pytest.approx(whole, abs=1e-9)
+    whole = search.weigh(at(gels, yaws), ALL, 2, 2).log_weights
+    for half in (slice(30), slice(30, 60)):
+        alone = search.weigh(at(gels[half], yaws[half]), ALL, 2, 2).log_weights
+        assert alone == pytest.approx(whole[half] - whole[half].max(), abs=1e-9)
+
+
+def test_hypotheses_that_fall_behind_are_dropped_and_no_other_is_weighed_anew(search: Search) -> None:
+    """Dropped as contacts come in, so a few that were to recover may be missing; none that leads."""
+    rng = np.random.default_rng(3)
+    gels, yaws = true_gel(search) + rng.normal(size=(400, 3)) * 3e-3, rng.normal(size=400) * 0.02
+    whole, few = (search.weigh(at(gels, yaws), ALL, 2, 2, within) for within in (np.inf, 18.0))
+    leading = whole.best(6.0, 400)
+    assert len(leading.yaws) <= len(few.yaws) < len(whole.yaws)
+    assert set(leading.yaws) <= set(few.yaws)
+    order = dict(zip(whole.yaws, whole.log_weights, strict=True))
+    assert few.log_weights == pytest.approx([order[yaw] for yaw in few.yaws], abs=1e-9)
 
 
 def test_repeating_a_press_makes_no_one_surer(
@@ -234,8 +258,8 @@ def test_geometry_alone_does_not_know_a_single_contact(
 
 
 def test_hypotheses_of_one_contact_are_where_its_gel_was_pressed_in(search: Search) -> None:
-    truth = Hypotheses(true_gel(search)[None], np.zeros(1), np.zeros(1))
+    here = truth(search)
     for k, press in enumerate(PRESSES):
-        place = search.contact_places(k, truth)[0]
+        place = search.contact_places(k, here)[0]
         # The image's own depth at the centre is a little less than the press over edges.
         assert np.linalg.norm(place - press.point) < 0.4e-3

@@ -5,7 +5,7 @@ import pytest
 import sounding_plate as plate
 from scipy.signal import find_peaks
 
-from experiments.contact_localization.hypotheses import Contact, Noise, anchors
+from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise, anchors
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior import best_point
 from experiments.contact_localization.search import MOST_HYPOTHESES, Search
@@ -43,13 +43,17 @@ def _search(points: FloatArray, prior: Prior) -> Search:
     return Search(contacts, MODEL, prior, SPACING, Noise())
 
 
+def at(gels: FloatArray, yaws: FloatArray) -> Hypotheses:
+    return Hypotheses(gels, yaws, np.zeros(len(yaws)))
+
+
 def test_strikes_fall_where_the_gel_was_less_its_indentation() -> None:
     points = plate.places(K, np.random.default_rng(0))
     turned = rotation_about(np.array([0.0, 0.0, 1.0]), 0.7)
     search = _search(points, Prior(turned))
     aside = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 2e-3, 0.0]])
     gels = points[0] - np.array([0.0, 0.0, INDENTATION]) + aside
-    found, directions = strike_places(search, np.arange(K), gels, np.zeros(3))
+    found, directions = strike_places(search, np.arange(K), at(gels, np.zeros(3)))
     assert found[0] == pytest.approx(points, abs=1e-12)
     assert found[1] == pytest.approx(points + aside[1], abs=1e-12)
     assert directions == pytest.approx(np.tile([0.0, 0.0, -1.0], (3, K, 1)), abs=1e-12)
@@ -59,7 +63,7 @@ def test_only_the_struck_contacts_are_asked_for_in_their_order() -> None:
     points = plate.places(K, np.random.default_rng(1))
     search = _search(points, Prior(np.eye(3)))
     gels = points[:1] - [0.0, 0.0, INDENTATION]
-    found, _ = strike_places(search, np.array([3, 1]), gels, np.zeros(1))
+    found, _ = strike_places(search, np.array([3, 1]), at(gels, np.zeros(1)))
     assert found[0] == pytest.approx(points[[3, 1]], abs=1e-12)
 
 
@@ -67,8 +71,8 @@ def test_a_yaw_turns_places_and_directions_together() -> None:
     points = plate.places(K, np.random.default_rng(2))
     nominal, off = _search(points, Prior(np.eye(3))), np.array([0.4])
     gels = points[:1] - [0.0, 0.0, INDENTATION]
-    straight, _ = strike_places(nominal, np.arange(K), gels, np.zeros(1))
-    turned, directions = strike_places(nominal, np.arange(K), gels, off)
+    straight, _ = strike_places(nominal, np.arange(K), at(gels, np.zeros(1)))
+    turned, directions = strike_places(nominal, np.arange(K), at(gels, off))
     back = rotation_about(np.array([0.0, 0.0, 1.0]), 0.4)
     assert (turned[0] - turned[0, 0]) @ back.T == pytest.approx(straight[0] - straight[0, 0], abs=1e-12)
     assert np.linalg.norm(directions, axis=2) == pytest.approx(1.0)
@@ -98,7 +102,7 @@ def test_sounds_that_say_nothing_leave_the_posterior_of_the_places() -> None:
     assert len(parts) == 2
     nats = np.concatenate([weights for _, _, weights in parts])
     gels, yaws = np.concatenate([g for g, _, _ in parts]), np.concatenate([y for _, y, _ in parts])
-    assert np.all(sound_nats(search, term, np.arange(K), gels, yaws) == 0.0)
+    assert np.all(sound_nats(search, term, np.arange(K), at(gels, yaws)) == 0.0)
     found = by_sound(search, term, np.arange(K), np.arange(K))
     kept = nats > nats.max() - 18.0
     assert np.exp(nats[~kept] - nats.max()).sum() < 1e-3 * np.exp(nats - nats.max()).sum()
