@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from PIL import Image
 from scipy import ndimage
+from scipy.optimize import minimize_scalar
 
 from harness.arrays import BoolArray, ByteArray, FloatArray
 from harness.sim.optics_kernels import change_exactly
@@ -29,6 +30,11 @@ DEPTH = 1e-3
 _FLAT = 1e-7
 _SOFT = 2.0
 _LAST = (5, 5)
+_FIRST = 1.5
+"""Pixels, sigma, by which the first estimate of the gel is smoothed; only its noise is looked at."""
+
+_NEAR = 4.0
+"""Pixels, sigma, within which compression makes alike noise: half a block."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +121,59 @@ def soft(change: FloatArray, background: FloatArray) -> FloatArray:
 
 def from_both(other: PublishedPress) -> FloatArray:
     """The untouched gel, blurred as pictures are, as an object's two pictures give it together."""
-    plain = np.asarray(cv2.GaussianBlur((other.plain - other.change).astype(np.float32), _LAST, 0))
-    thrown = ndimage.gaussian_filter(other.shaded, (_SOFT, _SOFT, 0.0)).astype(np.float32)
-    shadowed = other.live - np.asarray(cv2.GaussianBlur(thrown, _LAST, 0))
-    both: FloatArray = 0.5 * (plain.astype(np.float64) + shadowed)
-    return both
+    plain, shadowed = _each(other)
+    return 0.5 * (plain + shadowed)
+
+
+def untouched(other: PublishedPress, where: BoolArray) -> tuple[FloatArray, float]:
+    """As ``from_both``, without most of what compression left in it.
+
+    The two pictures show one gel under colours that are known; where they differ is noise. How much of
+    it is near a pixel is seen by compressing a first estimate as they were compressed: that gives weights. A
+    Gaussian takes it out, of the width with which either picture predicts the other best over ``where``. Of
+    another object nothing enters but ``where``, ``(rows, columns)``, which its shape alone gives.
+
+    Returns:
+        ``(rows, columns, 3)`` grey levels, and the width in pixels, sigma.
+    """
+    plain, shadowed = _each(other)
+    weights = _weights(other, gaussian(0.5 * (plain + shadowed), _FIRST))
+
+    def missed(width: float) -> float:
+        left = (
+            _weighted([plain], weights[:1], width) - shadowed,
+            _weighted([shadowed], weights[1:], width) - plain,
+        )
+        return float(np.mean([(one[where] ** 2).mean() for one in left]))
+
+    found = minimize_scalar(missed, bounds=(0.3, 5.0), method="bounded", options={"xatol": 0.05})
+    return _weighted([plain, shadowed], weights, float(found.x)), float(found.x)
+
+
+def _each(other: PublishedPress) -> tuple[FloatArray, FloatArray]:
+    thrown = ndimage.gaussian_filter(other.shaded, (_SOFT, _SOFT, 0.0))
+    return _last_blur(other.plain - other.change), other.live - _last_blur(thrown)
+
+
+def _weights(other: PublishedPress, first: FloatArray) -> list[FloatArray]:
+    """One over the squared noise of each of ``_each``, ``(rows, columns, 1)``."""
+    plain, shadowed = np.clip(np.rint(first + other.change), 0.0, 255.0), over(first, other.shaded)
+    noise = _last_blur(other.through_jpeg(plain) - plain), other.through_jpeg(shadowed) - shadowed
+    return [1.0 / gaussian((each**2).mean(axis=-1, keepdims=True), _NEAR) for each in noise]
+
+
+def _weighted(estimates: list[FloatArray], weights: list[FloatArray], width: float) -> FloatArray:
+    known = [gaussian(one * weight, width) for one, weight in zip(estimates, weights, strict=True)]
+    return np.asarray(sum(known) / sum(gaussian(weight, width) for weight in weights))
+
+
+def gaussian(picture: FloatArray, width: float) -> FloatArray:
+    """Blurred by ``width`` pixels, sigma, channel by channel."""
+    return np.asarray(ndimage.gaussian_filter(picture, (width, width, 0.0)))
+
+
+def _last_blur(picture: FloatArray) -> FloatArray:
+    return np.asarray(cv2.GaussianBlur(picture.astype(np.float32), _LAST, 0), dtype=np.float64)
 
 
 def over(blurred: FloatArray, change: FloatArray) -> FloatArray:

@@ -1,11 +1,13 @@
 """Taxim's published shadows, predicted from the other object's pictures, over the shadow's own pixels.
 
-``PYTHONPATH=tests python tests/benchmarks/real_shadows.py`` needs the real data. The last rows are what
-nobody can beat: the published pictures are JPEGs, and their compression is noise on exactly these pixels.
+``PYTHONPATH=tests python tests/benchmarks/real_shadows.py`` needs the real data. The last rows say what the
+published pictures' own compression costs on exactly these pixels: of our picture, by two encoders, and of
+the published pictures themselves, compressed once more on another grid of blocks.
 With ``speed``: what shadows take. With ``law``: how well the nine published depths follow from the deepest
 one, by the law that calibrations take.
 """
 
+import io
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -14,6 +16,7 @@ from time import process_time
 
 import cv2
 import numpy as np
+from PIL import Image
 from published_shadow import (
     OTHER,
     PITCH,
@@ -24,12 +27,13 @@ from published_shadow import (
     published_press,
     shadow_table,
     soft,
+    untouched,
 )
 from real_data import WHY_NOT, find_shared_data
 from rich.console import Console
 from rich.table import Table
 
-from harness.arrays import ByteArray
+from harness.arrays import ByteArray, FloatArray
 from harness.image_metrics import psnr
 from harness.sensor import TactileSensor
 from harness.sim.optics import Optics
@@ -155,22 +159,38 @@ def _follows(deepest: np.ndarray, share: float, longer: float, darker: float, sa
 
 def _ways(
     press: PublishedPress, other: PublishedPress, lists: ShadowTable
-) -> list[tuple[str, np.ndarray, np.ndarray]]:
+) -> list[tuple[str, FloatArray, FloatArray]]:
     background, both = other.background, from_both(other)
+    gel, width = untouched(other, press.own(background))
+    CONSOLE.print(f"width of the blur that takes compression's noise out of the gel: {width:.2f} px")
     ours, _ = cast_shadows(
         press.change[None], press.penetration[None], press.surface[None], press.core[None], lists
     )
-    best = soft(press.shaded, background)
+    noisy, best = soft(press.shaded, background), over(gel, press.shaded)
     sharp = np.clip(np.rint(background + press.change), 0.0, 255.0)
+    moved = np.roll(press.live, (4, 4), (0, 1))
+    again = np.roll(press.through_jpeg(moved), (-4, -4), (0, 1))
     return [
         ("no shadow", soft(press.change, background), press.live),
-        ("published arithmetic", best, press.live),
+        ("published arithmetic", noisy, press.live),
         ("the same, gel from both of the other's pictures", over(both, press.shaded), press.live),
-        ("the same, gel from its own picture", soft(press.shaded, press.background), press.live),
-        ("every rim pixel throws, depths outside the table held", soft(ours[0], background), press.live),
+        ("the same, compression's noise taken out of it", best, press.live),
+        ("every rim pixel throws, depths outside the table held", over(gel, ours[0]), press.live),
         ("without any shadow: the plain picture, predicted", sharp, press.plain),
-        ("JPEG alone: ours against ours compressed as the live one", press.through_jpeg(best), best),
+        ("JPEG alone: the best of ours, compressed as the live one", press.through_jpeg(best), best),
+        ("the same by OpenCV's encoder, quality 95", _through_opencv(best, press), best),
+        ("the same of the noisy one", press.through_jpeg(noisy), noisy),
+        ("the live one, compressed again half a block aside", again, press.live),
     ]
+
+
+def _through_opencv(picture: FloatArray, press: PublishedPress) -> FloatArray:
+    """As ``through_jpeg``, by the encoder that wrote the published files."""
+    blue_first: ByteArray = picture.astype(np.uint8)[..., ::-1]
+    _, code = cv2.imencode(".jpg", blue_first)
+    tables = Image.open(io.BytesIO(code.tobytes())).quantization  # type: ignore[attr-defined]
+    assert {k: list(v) for k, v in tables.items()} == press.quantised
+    return np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), dtype=np.float64)[..., ::-1]
 
 
 if __name__ == "__main__":
