@@ -119,8 +119,8 @@ def fit_exposure(
     """Fit gain and offset of each channel.
 
     Standard errors are by blocks of 16 x 16 pixels, which may disagree for any reason: noise, a highlight, a
-    network's patch. Errors of the simulation
-    itself make gains smaller, as errors of any abscissa do; no standard error tells that.
+    network's patch. They do not tell what is wrong everywhere: errors of the simulation make gains smaller,
+    as errors of any abscissa do, and cameras mix the colours of neighbours.
 
     Args:
         live: ``(rows, columns, 3)`` RGB in sRGB.

@@ -10,13 +10,11 @@ from harness.errors import DataRefused
 SILHOUETTE = 0.5
 """Share of a pixel that the object must cover to count among its own."""
 
-_DIFFERS = 12.0
-"""Grey levels of any channel by which an object's pixel differs from the bench behind it, at least."""
+_DIFFERS = 8.0
+"""Grey levels of any channel by which the object differs from the bench behind it, at least."""
 
-_DIFFERS_SIGMAS = 8.0
-"""The same in robust standard deviations of pixels of the bench, where its camera is noisier."""
-
-_NORMAL = 1.4826
+_DIFFERS_NOISES = 4.0
+"""The same in medians of what pixels of the bench differ by, where its camera is noisier."""
 
 _MARGIN = 0.5
 """Of the silhouette's box, added on each side, within which colours are told apart."""
@@ -27,9 +25,10 @@ _SMALL = 3
 
 
 def mask_by_background(live: ByteArray, background: ByteArray, silhouette: BoolArray) -> BoolArray:
-    """The object's pixels: those that differ from the bench without it.
+    """The object's pixels: those that differ from the bench without it, and those that these enclose.
 
-    A shadow that the object throws on the bench differs too, where it is deep.
+    A shadow that the object throws on the bench differs too, where it is deep; a hole through which the bench
+    is seen counts as the object.
 
     Args:
         live: ``(rows, columns, 3)`` RGB.
@@ -47,8 +46,8 @@ def mask_by_background(live: ByteArray, background: ByteArray, silhouette: BoolA
         )
     apart = np.abs(live.astype(np.int16) - background).max(axis=2)
     bench = apart[~silhouette]
-    noise = _NORMAL * float(np.median(bench)) if bench.size else 0.0
-    return _meeting(apart > max(_DIFFERS, _DIFFERS_SIGMAS * noise), silhouette)
+    noise = float(np.median(bench)) if bench.size else 0.0
+    return ndimage.binary_fill_holes(_meeting(apart > max(_DIFFERS, _DIFFERS_NOISES * noise), silhouette))
 
 
 def mask_by_colours(live: ByteArray, silhouette: BoolArray) -> BoolArray:
