@@ -16,9 +16,6 @@ _DROPPED_AT = 18.0
 _WORTH_A_LOOK = 12.0
 _MOST_LOOKS = 3000
 _DRAWS_EACH = 4.0
-_WORTH_HEARING = 15.0
-"""Nats behind the best by touch at which a draw is dropped unheard: by sound, draws differ by 2 to 7."""
-
 _FILLED = 0.15
 _WIDTH = np.array([0.8e-3, 0.8e-3, 0.6e-3])
 _NARROW = 0.65
@@ -144,10 +141,9 @@ def _weighed(
     touched = search.weigh(at, members, step, rings, _DROPPED_AT)
     if heard is None:
         return touched
-    likely = touched.best(_WORTH_HEARING, len(touched.yaws))
     # A hammer strikes within a millimetre of where it is aimed: shared errors, less than that, do not show
     # in sound, and what its modes are wrong by would only be taken for them.
-    return likely.told(heard.nats(search, likely, between=True))
+    return touched.told(heard.nats(search, touched, between=True))
 
 
 def _turn(search: Search) -> float:
