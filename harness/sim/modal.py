@@ -10,6 +10,7 @@ from harness.arrays import AnyArray
 from harness.errors import MeshRefused
 from harness.materials import Material
 from harness.mesh import Mesh
+from harness.sim.filled import filled
 from harness.sim.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
 from harness.sim.modal_mesh import QuadraticMesh, least_determinant, middles_of, quadratic_mesh
 from harness.sim.modal_snap import snapped, straightened
@@ -17,7 +18,7 @@ from harness.sim.modal_solve import Elasticity, check_limit, solve_mesh
 from harness.sim.modes import Modes
 from harness.sim.stage_seconds import timed
 from harness.sim.surface_measure import enclosed_volume, thin_wall
-from harness.sim.tetrahedra import Tetrahedra, tetrahedralize
+from harness.sim.tetrahedra import Tetrahedra
 from harness.store import Store, digest
 
 VERSION = 3
@@ -69,8 +70,9 @@ def solved_once(
         return from_arrays(kept), True
     spent: dict[str, float] = {}
     with timed(spent, "tetrahedra"):
-        filled = tetrahedralize(mesh, edge)
-    solved = solve_modes(filled, material, limit, mesh, most=most, spent=spent)
+        # Not from the store: kept cells would have no seconds of their own to say.
+        inside, _ = filled(mesh, edge, None)
+    solved = solve_modes(inside, material, limit, mesh, most=most, spent=spent)
     if store is not None:
         store.put(key, to_arrays(solved))
     return solved, False

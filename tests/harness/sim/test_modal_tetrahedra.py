@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from manifold3d import Manifold
+from volume_meshes import box
 
 from harness.errors import MeshRefused, WrongUse
 from harness.materials import MATERIALS
@@ -146,8 +147,26 @@ def test_modes_are_computed_once_and_then_read(
     def never(*_: object) -> None:
         raise AssertionError("meshed again")
 
-    monkeypatch.setattr("harness.sim.modal.tetrahedralize", never)
+    monkeypatch.setattr("harness.sim.filled.tetrahedralize", never)
     again = modes_of(sphere(0.03), CERAMIC, 60e3, 0.03, store=store)
     assert (again.shapes == first.shapes).all()
     with pytest.raises(AssertionError):
         modes_of(sphere(0.03), CERAMIC, 61e3, 0.03, store=store)
+
+
+def test_modes_are_those_of_a_filling_made_again_where_edges_stayed_too_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sides, stops = (0.06, 0.05, 0.04), list[float | None]()
+    cuboid = box(sides, (1, 1, 1)).surface
+
+    def coarse_at_first(_mesh: Mesh, _edge: float, stop: float | None = None) -> Tetrahedra:
+        stops.append(stop)
+        return box(sides, (1, 1, 1) if stop is None else (4, 4, 3))
+
+    monkeypatch.setattr("harness.sim.filled.tetrahedralize", coarse_at_first)
+    found = modes_of(cuboid, CERAMIC, 60e3, 0.02)
+    assert len(stops) == 2
+    fine = solve_modes(box(sides, (4, 4, 3)), CERAMIC, 60e3)
+    assert found.frequencies == pytest.approx(fine.frequencies, rel=1e-9)
+    assert found.seconds["tetrahedra"] >= 0.0

@@ -149,7 +149,7 @@ def test_nothing_is_meshed_or_solved_but_for_the_elements(
         raise AssertionError("meshed or solved")
 
     monkeypatch.setattr(sound_effects, "modes_of", found)
-    monkeypatch.setattr(modal, "tetrahedralize", never)
+    monkeypatch.setattr(modal, "filled", never)
     monkeypatch.setattr(modal, "solve_mesh", never)
     modes_at(of, level)
     assert calls["modes_of"] == solutions
