@@ -12,7 +12,7 @@ from harness.arrays import BoolArray, IntArray
 from harness.errors import WrongUse
 from harness.materials import Material
 from harness.mesh import Mesh
-from harness.sim.element_edge import fine_edge
+from harness.sim.element_edge import finely_filled
 from harness.sim.filled import filled
 from harness.sim.intake import take_in
 from harness.sim.modal import HEARING, curved
@@ -158,9 +158,11 @@ def _surface(
         intake = take_in(path, units, wall=wall)
         surface: Mesh = walled(intake.mesh, wall)
         check_closed(surface)
-        edge = fine_edge(surface, material, limit, count) if edge is None else edge
     with _timed(seconds, "mesh"):
-        inside, kept = filled(surface, edge, store)
+        if edge is None:
+            inside, edge, kept = finely_filled(surface, material, limit, count, store)
+        else:
+            inside, kept = filled(surface, edge, store)
         mesh = curved(inside, surface, inside)
     said = (*intake.report.repairs, *intake.report.warnings, *((_KEPT,) if kept else ()))
     return _Taken(mesh, {}, intake.report.units, inside.bodies, edge, said)

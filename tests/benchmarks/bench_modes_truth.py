@@ -23,15 +23,14 @@ from harness.arrays import BoolArray, FloatArray
 from harness.materials import MATERIALS, Material
 from harness.mesh import Mesh
 from harness.objects.solid import from_manifold
-from harness.sim.element_edge import fine_edge
-from harness.sim.filled import filled
+from harness.sim.element_edge import finely_filled
 from harness.sim.modal import curved
 from harness.sim.modal_mesh import QuadraticMesh
 from harness.sim.modal_solve import Solution, solve_mesh
 
 STEEL = MATERIALS["steel"]
 NAFEMS = Material("", 8000.0, 2e11, 0.3, 0.0, 0.0)
-CASES = ("balls", "boxes", "bars", "hollow", "plates", "supported", "counted")
+CASES = ("balls", "boxes", "bars", "hollow", "plates", "supported", "counted", "thin")
 BRICKS = (
     ((60.0, 60.0, 60.0), 0.29),
     ((60.0, 45.0, 30.0), 0.4),
@@ -40,6 +39,7 @@ BRICKS = (
     ((200.0, 20.0, 10.0), 0.29),
 )
 """mm, and Poisson's ratio."""
+THIN = (((100.0, 80.0, 4.0), 0.29),)
 
 Row = tuple[str, int, list[float], float]
 
@@ -160,24 +160,33 @@ def supported(sizes: tuple[tuple[int, int], ...]) -> Iterator[Row]:
 
 def counted(numbers: tuple[int, ...]) -> Iterator[Row]:
     """Surfaces of which so many modes are asked and no edge, filled as ``touchstone sim modes`` does."""
+    yield from counted_boxes(numbers, BRICKS)
     ball = replace(STEEL, poisson=0.25)
     eta = np.repeat([2.501133, 2.639869, 3.424530, 3.864700], [5, 5, 3, 7])
     lamb = eta * np.sqrt(ball.young / (2.5 * ball.density)) / (2.0 * np.pi * 0.03)
-    cases = [
-        (f"box {sides} mm", Manifold.cube(sides), replace(STEEL, poisson=nu), sides) for sides, nu in BRICKS
-    ]
-    for name, shape, material, sides in [
-        *cases,
-        ("Lamb's sphere, 30 mm", Manifold.sphere(30.0, 160), ball, None),
-    ]:
-        solid = from_manifold(shape)
-        surface = Mesh(solid.vertices * 1e-3, solid.faces)
-        for number in numbers:
-            exact = lamb if sides is None else ritz_frequencies(_metres(sides), material, 20)
-            inside, _ = filled(surface, fine_edge(surface, material, np.inf, number), None)
-            solved, took = timed(curved(inside, surface, inside), material, number)
-            shown = f"{name}, ratio {material.poisson:g}, {number} modes asked of its surface"
-            yield shown, solved.unknowns, took, error(solved, exact[:number])
+    yield from _counted("Lamb's sphere, 30 mm", Manifold.sphere(30.0, 160), ball, lamb, numbers)
+
+
+def counted_boxes(
+    numbers: tuple[int, ...], boxes_of: tuple[tuple[tuple[float, float, float], float], ...]
+) -> Iterator[Row]:
+    """The same of boxes, by their sides in mm and Poisson's ratio."""
+    for sides, poisson in boxes_of:
+        material = replace(STEEL, poisson=poisson)
+        exact = ritz_frequencies(_metres(sides), material, 20)
+        yield from _counted(f"box {sides} mm", Manifold.cube(sides), material, exact, numbers)
+
+
+def _counted(
+    name: str, shape: Manifold, material: Material, exact: FloatArray, numbers: tuple[int, ...]
+) -> Iterator[Row]:
+    solid = from_manifold(shape)
+    surface = Mesh(solid.vertices * 1e-3, solid.faces)
+    for number in numbers:
+        inside, _, _ = finely_filled(surface, material, np.inf, number, None)
+        solved, took = timed(curved(inside, surface, inside), material, number)
+        shown = f"{name}, ratio {material.poisson:g}, {number} modes asked of its surface"
+        yield shown, solved.unknowns, took, error(solved, exact[:number])
 
 
 def _metres(sides: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -204,6 +213,7 @@ def main() -> None:
         "plates": lambda: plates((16, 24, 36) if fine else (8,)),
         "supported": lambda: supported(((8, 1), (16, 2), (32, 4)) if fine else ((4, 1), (8, 1))),
         "counted": lambda: counted((10, 20) if fine else (10,)),
+        "thin": lambda: counted_boxes((10, 20) if fine else (10,), THIN),
     }
     table = Table(title="process seconds of assembly and solve on one thread: median (extremes)")
     for heading in ("case", "unknowns", "s", "worst error"):

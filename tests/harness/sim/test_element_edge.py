@@ -11,8 +11,9 @@ from volume_meshes import box
 from harness.arrays import FloatArray
 from harness.materials import MATERIALS
 from harness.mesh import Mesh
+from harness.sim import element_edge
 from harness.sim import filled as filling
-from harness.sim.element_edge import FINE_SHARE, fine_edge, weyl_frequency
+from harness.sim.element_edge import FINE_SHARE, fine_edge, finely_filled, weyl_frequency
 from harness.sim.modal import curved
 from harness.sim.modal_solve import solve_mesh
 from harness.sim.tetrahedra import Tetrahedra
@@ -49,7 +50,7 @@ def test_weyls_law_finds_the_highest_of_the_modes_asked_for(
 
 def test_ten_modes_of_a_cube_are_within_a_thousandth_of_ritz_without_more_unknowns_than_that_takes() -> None:
     cube = brick(CUBE)
-    inside, _ = filling.filled(cube, fine_edge(cube, STEEL, UNLIMITED, 10), None)
+    inside, _, _ = finely_filled(cube, STEEL, UNLIMITED, 10, None)
     solved = solve_mesh(curved(inside, cube, inside), STEEL, np.inf, least=10)
     exact = ritz_frequencies(CUBE, STEEL, 14)[:10]
     assert np.abs(solved.modes.frequencies[:10] / exact - 1.0).max() < 1e-3
@@ -68,6 +69,38 @@ def test_a_limit_below_the_modes_asked_for_decides() -> None:
     limit = 0.8 * weyl_frequency(cube, STEEL, 40, float(np.prod(CUBE)))
     assert fine_edge(cube, STEEL, limit, 40) == pytest.approx(FINE_SHARE * shear_wave(limit), rel=1e-6)
     assert fine_edge(cube, STEEL, limit, None) >= fine_edge(cube, STEEL, limit, 40)
+
+
+def test_a_thin_plate_is_cut_by_the_waves_that_bend_it_in_the_modes_asked_for() -> None:
+    """As the square root of wall and wave: an element misses shear, its edge squared over both."""
+    of = {wall: brick((0.1, 0.08, wall)) for wall in (0.003, 0.004)}
+    edge = {wall: fine_edge(plate, STEEL, UNLIMITED, 6) for wall, plate in of.items()}
+    areas = {wall: plate.face_areas.sum() for wall, plate in of.items()}
+    thinner = 0.75**0.5 * (areas[0.003] / areas[0.004]) ** 0.25
+    assert edge[0.003] / edge[0.004] == pytest.approx(thinner, rel=1e-3)
+    half = fine_edge(of[0.004], STEEL, UNLIMITED, 2) / edge[0.004]
+    assert half == pytest.approx(2.0**0.25, rel=1e-3), "4 and 8 modes, two of them to spare"
+    assert fine_edge(of[0.004], STEEL, 1e3, 6) == pytest.approx(edge[0.004], rel=1e-3)
+
+
+def test_modes_of_a_thin_plate_are_within_a_thousandth_of_ritz_with_rims_cut(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On even cells of the edge asked for; those that fill a surface need not be even."""
+    sides = (0.05, 0.04, 0.003)
+
+    def evenly(mesh: Mesh, edge: float, store: Store | None) -> tuple[Tetrahedra, bool]:
+        counts = [int(np.ceil(side / edge)) for side in sides]
+        return box(sides, (counts[0], counts[1], 2)), False
+
+    monkeypatch.setattr(element_edge, "filled", evenly)
+    plate = brick(sides)
+    inside, edge, _ = finely_filled(plate, STEEL, UNLIMITED, 3, None)
+    assert edge > 0.4 * sides[2]
+    assert len(inside.cells) > len(evenly(plate, edge, None)[0].cells)
+    solved = solve_mesh(curved(inside, plate, inside), STEEL, np.inf, least=3)
+    exact = ritz_frequencies(sides, STEEL, 18)[:3]
+    assert np.abs(solved.modes.frequencies[:3] / exact - 1.0).max() < 1e-3
 
 
 def test_a_bar_of_any_length_is_cut_across_its_section() -> None:
