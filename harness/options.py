@@ -50,7 +50,9 @@ Seed = Annotated[
 GapOption = Annotated[
     str | None,
     typer.Option(
-        "--gap", help="Reality gap of a mocked bench: default, none, or a gap file.", metavar="NAME"
+        "--gap",
+        help="Reality gap of a mocked bench: a name under harness/gaps, as default or none, or a gap file.",
+        metavar="NAME",
     ),
 ]
 LevelOption = Annotated[
