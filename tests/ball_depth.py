@@ -15,6 +15,9 @@ from calibration.taxim.smooth_fit import changes
 from harness.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.sim.tactile_calibration import TactileCalibration
 
+R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
+FOTS = Identity("GelSight", "FOTS", "MIT", "2026-01-01", 1e-3 / 19.58, 2.35e-3)
+
 WITHIN = 0.95
 """Of the contact's radius: as held-out presses are scored in colour."""
 

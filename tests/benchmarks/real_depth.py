@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from ball_depth import WITHIN, BallFit, fit_ball, taught, usable
+from ball_depth import FOTS, R15, WITHIN, BallFit, fit_ball, taught, usable
 from real_data import WHY_NOT, find_shared_data
 from rich.console import Console
 from rich.table import Table
@@ -27,8 +27,6 @@ from harness.sim.inverse_error import height_errors
 from harness.sim.poisson import free_heights
 
 CONSOLE = Console(width=118, highlight=False)
-R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
-FOTS = Identity("GelSight", "FOTS", "MIT", "2026-01-01", 1e-3 / 19.58, 2.35e-3)
 
 
 @dataclass(frozen=True, eq=False)
