@@ -87,6 +87,10 @@ COMMANDS = {
         "experiments.commands.object_render_vision:render",
         "Render a picture from any side in any light, or a turntable of them, by the networks.",
     ),
+    "object view": Command(
+        "experiments.commands.object_view:view",
+        "Turn an object with the mouse, in a browser on this machine.",
+    ),
     "object compare vision": Command(
         "experiments.commands.object_compare_vision:compare",
         "A camera's picture beside the networks': exposure and white balance fitted, what is left.",

@@ -32,5 +32,10 @@ def read_image(path: Path) -> ByteArray:
 
 def write_png(path: Path, image: ByteArray) -> None:
     """Write ``(rows, columns, 3)`` RGB, pixel for pixel; the same picture gives the same bytes."""
+    path.write_bytes(png_bytes(image))
+
+
+def png_bytes(image: ByteArray) -> bytes:
+    """What ``write_png`` writes."""
     _, data = cv2.imencode(".png", np.ascontiguousarray(image[..., ::-1]))
-    path.write_bytes(data.tobytes())
+    return data.tobytes()
