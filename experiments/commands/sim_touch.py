@@ -22,7 +22,8 @@ def touch(
         Path | None,
         typer.Option(
             help="A height map in place of a mesh: (rows, columns) float metres of indentation, positive "
-            "into the gel, 0 where it is not reached, in gel coordinates (x along columns, y along rows).",
+            "into the gel, 0 where it is not reached, NaN where it is not known, in gel coordinates (x along "
+            "columns, y along rows).",
             metavar="FILE.npy",
         ),
     ] = None,
