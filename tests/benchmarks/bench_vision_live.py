@@ -24,14 +24,15 @@ from harness.srgb import bytes_from_linear
 
 _BENCH = np.array([0.10, 0.12, 0.16])
 _NOISE = 0.006
-_QUALITY = 92
 
 
-def photograph(image: LinearImage, gain: FloatArray, black: FloatArray, seed: int) -> ByteArray:
-    """As a camera sends it."""
+def photograph(image: LinearImage, gain: FloatArray, black: FloatArray, seed: int, quality: int) -> ByteArray:
+    """As a camera sends it; without compression where the quality is 0."""
     light = gain * image.colour + black * image.alpha[..., None] + (1.0 - image.alpha)[..., None] * _BENCH
     noisy = bytes_from_linear(light + np.random.default_rng(seed).normal(0.0, _NOISE, light.shape))
-    _, jpeg = cv2.imencode(".jpg", noisy[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    if quality == 0:
+        return noisy
+    _, jpeg = cv2.imencode(".jpg", noisy[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
     seen = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
     assert seen is not None
     return np.ascontiguousarray(seen[..., ::-1], dtype=np.uint8)
@@ -44,6 +45,7 @@ def main() -> None:
     parser.add_argument("mesh")
     parser.add_argument("--views", type=int, default=8)
     parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--quality", type=int, default=92, help="of JPEG; 0 for none")
     asked = parser.parse_args()
     vision, lit = open_vision(ObjectFile.open(asked.folder), 1), LitObject(appearance_of(asked.mesh, None))
     camera = camera_for(vision.surface, asked.size, asked.size)
@@ -54,8 +56,10 @@ def main() -> None:
         light = light_for(here)
         gain, black = random.uniform(0.4, 1.0, 3), random.uniform(0.0, 0.04, 3)
         exact = lit.render(here, [light], 4).image
-        live = photograph(exact, gain, black, 2 * view)
-        bench = photograph(LinearImage(0.0 * exact.colour, 0.0 * exact.alpha, exact.depth), gain, black, 1)
+        live = photograph(exact, gain, black, 2 * view, asked.quality)
+        bench = photograph(
+            LinearImage(0.0 * exact.colour, 0.0 * exact.alpha, exact.depth), gain, black, 1, asked.quality
+        )
         found = [compare_live(live, vision.picture(here, light).image, behind) for behind in (bench, None)]
         fit, own = found[0].exposure, compare_live(live, exact, bench)
         off, errors = fit.gain / gain - 1.0, fit.gain_error / gain
