@@ -120,7 +120,7 @@ def write_text_whole(path: Path, text: str) -> None:
 
 def _read_header(path: Path) -> RunHeader:
     if not path.exists():
-        raise WrongUse(f"{path.parent} is not a run: it has no run.json")
+        raise WrongUse(f"{path.parent} is not a run: it has no run.json; give the folder that a run wrote")
     try:
         fields = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:

@@ -76,6 +76,7 @@ def modes(
     from harness.sim.modal_file import modes_of_file
     from harness.store import Store, default_folder
 
+    _check_is_file(mesh)
     of = _material(material, young, poisson, density, alpha, beta)
     found = modes_of_file(
         mesh,
@@ -95,6 +96,23 @@ def modes(
         return 0
     emit(_as_json(mesh.name, found, of, count))
     return 0
+
+
+def _check_is_file(mesh: Path) -> None:
+    """Refuse a built-in object by its name, which other commands take.
+
+    Raises:
+        WrongUse: it is one.
+    """
+    from harness.errors import WrongUse
+    from harness.scene import BUILTIN
+
+    if str(mesh).startswith(BUILTIN):
+        raise WrongUse(
+            f"sim modes takes a mesh file and not {mesh}; `touchstone object build {mesh} --material M "
+            "--out FOLDER` solves its modes, which `touchstone object info FOLDER` shows; FOLDER/mesh.ply "
+            "is its surface in metres"
+        )
 
 
 def _material(

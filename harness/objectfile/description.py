@@ -87,7 +87,10 @@ def read_description(path: Path) -> Description:
             mistake is named, an unknown key with the nearest known one.
     """
     if not path.is_file():
-        raise DataRefused(f"{path.parent} is no ObjectFile: there is no {path.name} in it; give its folder")
+        raise DataRefused(
+            f"{path.parent} is no ObjectFile: there is no {path.name} in it; give its folder, or make one "
+            "with `touchstone object build`"
+        )
     if path.stat().st_size > _MOST_BYTES:
         raise DataRefused(f"{path} has {path.stat().st_size} bytes, more than {_MOST_BYTES}; build it again")
     try:

@@ -89,6 +89,12 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.Captur
     assert answer["exit_code"] == 1
 
 
+def test_a_built_in_object_is_sent_to_the_command_that_takes_it(capsys: pytest.CaptureFixture[str]) -> None:
+    answer = answered(capsys, "builtin:mug", "--material", "ceramic")
+    assert "touchstone object build builtin:mug" in str(answer["error"])
+    assert answer["exit_code"] == 2
+
+
 def _floats(values: object) -> list[float]:
     assert isinstance(values, list)
     return [float(value) for value in values]
