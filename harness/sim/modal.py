@@ -21,7 +21,7 @@ from harness.sim.surface_measure import enclosed_volume, thin_wall
 from harness.sim.tetrahedra import Tetrahedra
 from harness.store import Store, digest
 
-VERSION = 3
+VERSION = 4
 """Raised with every change of what is computed here, so that stored modes are dropped."""
 
 HEARING = 20e3
