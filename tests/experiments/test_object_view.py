@@ -23,7 +23,9 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_ctrl_c_ends_it_and_frees_its_port(box: Path) -> None:
-    program = "import sys; from harness.cli import invoke; sys.exit(invoke(sys.argv[1:]))"
+    # As at a terminal: a test run in the background hands on that Ctrl-C is ignored.
+    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    program = f"{heed}; import sys; from harness.cli import invoke; sys.exit(invoke(sys.argv[1:]))"
     asked = ["object", "view", str(box), "--port", "0", "--threads", "1", "--json"]
     with subprocess.Popen(
         [sys.executable, "-c", program, *asked], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

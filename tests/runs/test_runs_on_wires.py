@@ -30,7 +30,10 @@ MUG = (
 )
 KILLS = int(os.environ.get("TOUCHSTONE_KILLS", "2"))
 PATIENCE = 150.0
-SAME_ANSWER = 0.2e-3
+SAME_ANSWER = 0.5
+"""Of the answer's own 90 % radius, 2 mm. Most are within 0.05 mm; but poses differ by micrometres, other draws follow
+from them, and with three contacts one in thirty sets of draws leans on a single one of them, 0.6 mm away."""
+
 PHASES = (10.0, *[7.0] * (CONTACTS - 1), 3.0)
 """s within which to kill while the first contact is made, each other one, and after the last. The run
 estimates then, and draws its report, which takes longer."""
@@ -107,7 +110,8 @@ def resumed(folder: Path) -> dict[str, Any]:
 
 def assert_same_answer(result: dict[str, Any], whole: Whole) -> None:
     mine, theirs = (np.array(r["estimates"]["touch"]["position_m"]) for r in (result, whole.result))
-    assert float(np.linalg.norm(mine - theirs)) < SAME_ANSWER
+    radius = float(whole.result["estimates"]["touch"]["credible90_m"])
+    assert float(np.linalg.norm(mine - theirs)) < SAME_ANSWER * radius
 
 
 @pytest.mark.parametrize("kill", range(KILLS))
