@@ -31,8 +31,8 @@ MUG = (
 KILLS = int(os.environ.get("TOUCHSTONE_KILLS", "2"))
 PATIENCE = 150.0
 SAME_ANSWER = 0.5
-"""Of the answer's own 90 % radius, 2 mm. Most are within 0.05 mm; but poses differ by micrometres, other draws follow
-from them, and with three contacts one in thirty sets of draws leans on a single one of them, 0.6 mm away."""
+"""Of the answer's own 90 % radius, 2 mm. Most are within 0.05 mm; but poses differ by micrometres, so other
+draws follow from them, and with three contacts one set in thirty leans on a single draw, 0.6 mm away."""
 
 PHASES = (10.0, *[7.0] * (CONTACTS - 1), 3.0)
 """s within which to kill while the first contact is made, each other one, and after the last. The run
