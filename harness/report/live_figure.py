@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from harness.arrays import AnyArray, BoolArray, ByteArray
-from harness.report.style import ANSWER, TOOL, blank, styled
+from harness.arrays import BoolArray, ByteArray
+from harness.report.style import ANSWER, TOOL, blank, styled, titled_picture
 from harness.report.tiles import DIFFERENCE_GAIN, difference
 
 _WIDTH, _WORDS = 4.0, 0.95
@@ -51,11 +51,11 @@ def live_figure(shown: LivePictures) -> Figure:
         figure = blank(3 * _WIDTH, _WIDTH * rows / columns + _WORDS)
         figure.set_layout_engine("constrained")
         live, simulated, left = np.asarray(figure.subplots(1, 3)).tolist()
-        _picture(live, live_part, "live", shown.words[0])
+        titled_picture(live, live_part, "live", shown.words[0])
         _outline(live, shown.silhouette[near], ANSWER)
         _outline(live, shown.mask[near], TOOL)
-        _picture(simulated, simulated_part, "simulated, as exposed", shown.words[1])
-        _picture(
+        titled_picture(simulated, simulated_part, "simulated, as exposed", shown.words[1])
+        titled_picture(
             left,
             difference(live_part, simulated_part),
             f"live - simulated, x {DIFFERENCE_GAIN:g}",
@@ -74,14 +74,6 @@ def _about(mask: BoolArray) -> tuple[slice, slice]:
         margin = 1 + int(_MARGIN * (places[-1] - places[0] + 1))
         shown.append(slice(max(0, int(places[0]) - margin), int(places[-1]) + 1 + margin))
     return shown[0], shown[1]
-
-
-def _picture(axes: Axes, picture: AnyArray, title: str, words: str) -> None:
-    axes.imshow(picture, interpolation="nearest")
-    axes.set_title(title, fontsize=10)
-    axes.set_xlabel(words, fontsize=8)
-    axes.set_xticks([])
-    axes.set_yticks([])
 
 
 def _outline(axes: Axes, mask: BoolArray, colour: str) -> None:

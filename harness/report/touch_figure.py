@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from harness.arrays import AnyArray, ByteArray, FloatArray
-from harness.report.style import blank, styled
+from harness.arrays import ByteArray, FloatArray
+from harness.report.style import blank, styled, titled_picture
 from harness.report.tiles import DIFFERENCE_GAIN, difference
 
 _WIDTH, _TITLES = 3.6, 0.62
@@ -49,10 +49,10 @@ def touch_figure(shown: TouchPictures) -> Figure:
         figure.set_layout_engine("constrained")
         grid = np.asarray(figure.subplots(down, 3, squeeze=False))
         _heights(figure, grid[0, 0], shown)
-        _picture(grid[0, 1], shown.image, "simulated", shown.words[1])
+        titled_picture(grid[0, 1], shown.image, "simulated", shown.words[1])
         _difference(grid[0, 2], shown.image, shown.background, "simulated - background", shown.words[2])
         if shown.live is not None:
-            _picture(grid[1, 0], shown.live, "live", shown.words[3])
+            titled_picture(grid[1, 0], shown.live, "live", shown.words[3])
             _difference(grid[1, 1], shown.live, shown.image, "live - simulated", shown.words[4])
             _difference(grid[1, 2], shown.live, shown.background, "live - background", shown.words[5])
     return figure
@@ -97,7 +97,7 @@ def levels_figure(shown: LevelPictures) -> Figure:
         low, high = min(0.0, float(shown.heights.min())), max(1e-6, float(shown.heights.max()))
         _map(figure, grid[0, 0], 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")
         grid[0, 0].set_title(f"indentation, {shown.level}", fontsize=10)
-        _picture(grid[0, 1], shown.image, shown.level, "")
+        titled_picture(grid[0, 1], shown.image, shown.level, "")
         _difference(grid[0, 2], shown.image, shown.background, f"{shown.level} - background", "")
         if shown.reference is not None:
             heights, image = shown.reference
@@ -105,7 +105,7 @@ def levels_figure(shown: LevelPictures) -> Figure:
             most = max(1e-3, float(np.abs(apart).max()))
             _map(figure, grid[1, 0], apart, shown.pitch, (-most, most), "um", "RdBu_r")
             grid[1, 0].set_title(f"indentation, {shown.level} - rasteriser", fontsize=10)
-            _picture(grid[1, 1], image, "rasteriser", "")
+            titled_picture(grid[1, 1], image, "rasteriser", "")
             _difference(grid[1, 2], shown.image, image, f"{shown.level} - rasteriser", "")
         figure.supxlabel("\n".join(shown.words[:down]), fontsize=8)
     return figure
@@ -145,16 +145,8 @@ def _map(
     bar.ax.tick_params(labelsize=7)
 
 
-def _picture(axes: Axes, picture: AnyArray, title: str, words: str) -> None:
-    axes.imshow(picture, interpolation="nearest")
-    axes.set_title(title, fontsize=10)
-    axes.set_xlabel(words, fontsize=8)
-    axes.set_xticks([])
-    axes.set_yticks([])
-
-
 def _difference(axes: Axes, of: ByteArray, less: ByteArray, title: str, words: str) -> None:
-    _picture(axes, difference(of, less), f"{title}, x {DIFFERENCE_GAIN:g}", words)
+    titled_picture(axes, difference(of, less), f"{title}, x {DIFFERENCE_GAIN:g}", words)
 
 
 def _check(shown: TouchPictures) -> None:
