@@ -27,8 +27,9 @@ ANSWERS = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isat
 
 
 def emit(result: Mapping[str, Any]) -> None:
-    """Print the one JSON object of a command."""
+    """Print the one JSON object of a command, at once: some go on until they are told to end."""
     sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
+    sys.stdout.flush()
 
 
 def warn(sentence: str) -> None:

@@ -1,6 +1,5 @@
 """``touchstone object view``: turn an object with the mouse, in a browser on this machine."""
 
-import sys
 from typing import Annotated
 
 import typer
@@ -36,7 +35,6 @@ def view(
         frames.frame(Asked())
         if json:
             emit({"schema": 1, "object": frames.name, "url": server.url, "port": server.server_port})
-            sys.stdout.flush()  # a script waits for it, and the program goes on
         else:
             ANSWERS.print(f"{frames.name}: {server.url}", markup=False)
         CONSOLE.print("Ctrl-C ends it")

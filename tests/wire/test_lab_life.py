@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import shutil
 import signal
 import socket
@@ -175,3 +176,27 @@ def test_two_labs_live_side_by_side_and_end_of_file_ends_one(
     other.close()
     assert gone(pids, where.arm)
     assert answers(lab[1].arm, 30004)
+
+
+def test_a_script_reads_where_the_instruments_are_while_they_run_and_ends_them() -> None:
+    """What it waits for may not stay in a buffer, as a pipe's does unless the environment says otherwise."""
+    # As at a terminal: a test run in the background hands on that Ctrl-C is ignored.
+    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    program = f"{heed}; import sys; from harness.cli import invoke; sys.exit(invoke(sys.argv[1:]))"
+    command = [sys.executable, "-c", program, "mock-lab", "--json"]
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, cwd=ROOT, env=buffered) as bench:
+        assert bench.stdout is not None
+        try:
+            assert select.select([bench.stdout], [], [], 60.0)[0], "no line was said"
+            where = json.loads(bench.stdout.readline())
+            assert bench.poll() is None
+            assert answers(where["arm"], 30004)
+            (lab_pid,) = children(bench.pid)
+            pids = [lab_pid, *children(lab_pid)]
+            bench.send_signal(signal.SIGINT)
+            assert bench.wait(20.0) == 0
+            assert bench.stdout.read() == b"", "one object, and no more"
+            assert gone(pids, where["arm"])
+        finally:
+            bench.kill()
