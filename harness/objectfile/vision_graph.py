@@ -1,7 +1,7 @@
 """The tiny networks as one graph, and out of it again.
 
 Samples come in blocks of one network each. ``vision.onnx`` holds every network's weights as they were
-given, in float16, by the names of ``VisionWeights`` after ``networks.``; what does not depend on the query
+given, in float16, by the names of ``vision_kept`` after ``networks.``; what does not depend on the query
 (the products of two layers with nothing between) is written as operations on constants, which onnxruntime
 computes once when it opens the file.
 
@@ -12,7 +12,7 @@ Outputs: ``density`` float32 ``(n, b, 1)``, 1/m; ``scattered`` float32 ``(n, b, 
 A network that there is not must be left out before: onnxruntime takes -1 for the last one without a word.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from onnx import ModelProto, TensorProto, helper, numpy_helper
@@ -21,22 +21,12 @@ from harness.arrays import AnyArray
 from harness.errors import DataRefused, WrongUse
 from harness.objectfile.graph import Nodes
 from harness.objectfile.graph_check import checked_graph, declared
-from harness.objectfile.vision_network import (
-    BLOCK,
-    EXTRAS,
-    Kind,
-    NetworkSize,
-    VisionGrid,
-    VisionModel,
-    VisionWeights,
-)
-from harness.objectfile.vision_plain import scatter_rows
+from harness.objectfile.vision_kept import WEIGHTS, held_weights, kept_weights
+from harness.objectfile.vision_network import BLOCK, NetworkSize, VisionGrid, VisionModel
 
 FILE = "vision.onnx"
 
-_GRID = ("low", "cell", "cells")
-_WEIGHTS = "networks."
-"""Before the names of weights; outputs have names of their own."""
+_NEEDED = ("low", "cell", "cells", "density_scale")
 
 
 @dataclass
@@ -69,10 +59,14 @@ class _Blocks:
         product = self.nodes.add("MatMul", value, self.of_block(weight))
         return self.nodes.add("Add", product, self.of_block(bias))
 
-    def rows(self, every: str, rows: slice) -> str:
-        """Rows of every network's matrix."""
-        start, stop, axis = (self.nodes.constant(np.array([n])) for n in (rows.start, rows.stop, 1))
-        return self.nodes.add("Slice", every, start, stop, axis)
+    def weights(self, name: str, array: AnyArray) -> str:
+        """Those of every network, float32, from what is kept of them: of all that are the same, one."""
+        cast = self.nodes.add("Cast", self.kept(f"{WEIGHTS}{name}", array), to=TensorProto.FLOAT)
+        count = len(self.model.grid)
+        if len(array) == count:
+            return cast
+        shape = np.array([count, *array.shape[1:]], np.int64)
+        return self.nodes.add("Expand", cast, self.nodes.constant(shape))
 
     def encoded(self, value: str, octaves: int) -> str:
         """As ``vision_plain.encoded``; an octave from the one before by the double angle."""
@@ -106,9 +100,8 @@ def vision_graph(model: VisionModel, block: int = BLOCK) -> ModelProto:
     weights, size, nodes = model.weights.rounded(), model.weights.size, Nodes()
     flat = nodes.add("Reshape", "network", nodes.constant(np.array([-1])))
     made = _Blocks(model, nodes, {}, flat)
-    for name, array in weights.arrays():
-        whole = array[:, None] if name.endswith("bias") else array
-        made.names[name] = nodes.add("Cast", made.kept(f"{_WEIGHTS}{name}", whole), to=TensorProto.FLOAT)
+    for name, array in kept_weights(weights).items():
+        made.names[name] = made.weights(name, array)
     _networks(made, size, _local(made, model.grid))
     inputs = [
         helper.make_tensor_value_info("network", TensorProto.INT64, ["n", 1]),
@@ -141,7 +134,6 @@ def _local(made: _Blocks, grid: VisionGrid) -> str:
 
 def _networks(made: _Blocks, size: NetworkSize, local: str) -> None:
     nodes, names = made.nodes, made.names
-    at = scatter_rows(size)
     hidden = nodes.add(
         "Relu", made.layer(made.encoded(local, size.octaves), names["first"], names["first_bias"])
     )
@@ -149,19 +141,19 @@ def _networks(made: _Blocks, size: NetworkSize, local: str) -> None:
     raw = nodes.add("Relu", made.layer(hidden, names["density"], names["density_bias"]))
     scale = made.kept("density_scale", np.array(made.model.weights.density_scale, np.float32))
     nodes.add("Mul", raw, scale, name="density")
-    of_feature = made.rows(names["scatter"], at["feature"])
+    of_feature = names["scatter.feature"]
     folded = nodes.add("MatMul", names["feature"], of_feature)
     bias = nodes.add("Add", nodes.add("MatMul", names["feature_bias"], of_feature), names["scatter_bias"])
     lit = nodes.add("Unsqueeze", made.encoded("light", size.turns), nodes.constant(np.array([1], np.int64)))
-    lit = nodes.add("MatMul", lit, made.of_block(made.rows(names["scatter"], at["light"])))
+    lit = nodes.add("MatMul", lit, made.of_block(names["scatter.light"]))
     lit = nodes.add("Add", lit, made.of_block(bias))
     seen, matrix = (
         [hidden, made.encoded("views", size.turns)],
-        [folded, made.rows(names["scatter"], at["view"])],
+        [folded, names["scatter.view"]],
     )
     if size.extras:
         seen.append("extras")
-        matrix.append(made.rows(names["scatter"], at["extras"]))
+        matrix.append(names["scatter.extras"])
     every = nodes.add("Concat", *matrix, axis=1)
     product = nodes.add("MatMul", nodes.add("Concat", *seen, axis=-1), made.of_block(every))
     hidden = nodes.add("Relu", nodes.add("Add", product, lit))
@@ -179,30 +171,23 @@ def vision_model(data: bytes, name: str = FILE) -> VisionModel:
     """
     model = checked_graph(data, name)
     held = {tensor.name: numpy_helper.to_array(tensor) for tensor in model.graph.initializer}
-    names = [field.name for field in fields(VisionWeights)[2:]]
-    wanted = (*_GRID, "density_scale", *(_WEIGHTS + key for key in names))
-    missing = [key for key in wanted if key not in held]
+    missing = [key for key in _NEEDED if key not in held]
     if missing:
         raise DataRefused(
             f"{name} holds no {missing[0]!r}: it is no graph of networks of vision; build it again"
         )
     try:
         grid = VisionGrid(held["low"], held["cell"].item(), held["cells"].reshape(-1, 3))
-        whole = {key: held[_WEIGHTS + key] for key in names}
-        arrays = {key: each[:, 0] if key.endswith("bias") else each for key, each in whole.items()}
-        size = _size(arrays, "extras" in declared(model))
-        return VisionModel(grid, VisionWeights(size, held["density_scale"].item(), **arrays))
+        told = "extras" in declared(model)
+        return VisionModel(grid, held_weights(held, len(grid), told, held["density_scale"].item()))
+    except KeyError as error:
+        raise DataRefused(
+            f"{name} holds no {error}: it is no graph of networks of vision; build it again"
+        ) from error
     except (WrongUse, IndexError, ValueError, TypeError) as error:
         raise DataRefused(
             f"{name} holds networks that do not fit together ({error}); build it again"
         ) from error
-
-
-def _size(arrays: dict[str, AnyArray], told: bool) -> NetworkSize:
-    place, wide = arrays["first"].shape[1:]
-    kind: Kind = "osf-v" if told else "osf"
-    directions = arrays["scatter"].shape[1] - wide - EXTRAS[kind]
-    return NetworkSize(wide, (place - 3) // 6, (directions // 2 - 3) // 6, kind)
 
 
 def graph_block(data: bytes, name: str = FILE) -> int:

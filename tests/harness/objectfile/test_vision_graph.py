@@ -13,6 +13,7 @@ from harness.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.runtime import Network
 from harness.objectfile.vision_fold import folded
 from harness.objectfile.vision_graph import graph_block, vision_graph, vision_model
+from harness.objectfile.vision_kept import WEIGHTS, held_weights, kept_weights
 from harness.objectfile.vision_kernels import ask_blocks
 from harness.objectfile.vision_network import (
     COMPACT,
@@ -22,7 +23,7 @@ from harness.objectfile.vision_network import (
     VisionModel,
     VisionWeights,
 )
-from harness.objectfile.vision_plain import Asked, encoded, evaluate
+from harness.objectfile.vision_plain import Asked, encoded, evaluate, scatter_rows
 from harness.objectfile.vision_tensors import vision_tensors
 from harness.objectfile.vision_tiles import LANES, SAMPLES
 
@@ -102,14 +103,74 @@ def test_weights_come_back_bit_for_bit(name: str) -> None:
     back = vision_model(data)
     assert back.weights.size == SIZES[name]
     assert back.weights.density_scale == np.float32(SCALE)
-    for (key, kept), (_, found) in zip(model.weights.arrays(), back.weights.arrays(), strict=True):
+    for (key, given), (_, found) in zip(model.weights.arrays(), back.weights.arrays(), strict=True):
         assert found.dtype == np.float16
-        assert kept.tobytes() == found.tobytes(), key
+        assert given.tobytes() == found.tobytes(), key
     assert np.array_equal(back.grid.cells, GRID.cells)
     assert np.array_equal(back.grid.low, GRID.low)
     assert back.grid.cell == GRID.cell
-    assert 0 < len(data) - 2 * len(GRID) * SIZES[name].parameters < 20_000
+    kept = 2 * sum(array.size for array in kept_weights(model.weights).values())
+    assert kept <= 2 * len(GRID) * SIZES[name].parameters
+    assert 0 < len(data) - kept < 20_000
     assert graph_block(data) == 32
+
+
+def unlike(size: NetworkSize) -> VisionModel:
+    """Networks that have no number in common."""
+    random = np.random.default_rng(9)
+    arrays = {
+        name: random.standard_normal((len(GRID), *shape)) / np.sqrt(max(shape[0], 4))
+        for name, shape in size.shapes.items()
+    }
+    return VisionModel(GRID, VisionWeights(size, SCALE, **arrays).rounded())
+
+
+def alike(model: VisionModel) -> VisionModel:
+    """The same, with rows of views that are 0 and a feature that is passed on as it is."""
+    size, arrays = model.weights.size, dict(model.weights.arrays())
+    rows, scatter = scatter_rows(size), np.array(arrays["scatter"])
+    scatter[:, rows["view"]], scatter[:, rows["feature"]] = 0.0, np.eye(size.width)
+    told = arrays | {"scatter": scatter, "feature_bias": np.zeros_like(arrays["feature_bias"])}
+    return VisionModel(model.grid, VisionWeights(size, model.weights.density_scale, **told))
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_what_all_networks_have_alike_is_kept_once(name: str) -> None:
+    size, model = SIZES[name], unlike(SIZES[name])
+    same = alike(model)
+    assert sum(array.size for array in kept_weights(model.weights).values()) == len(GRID) * size.parameters
+    once = (size.width + size.direction) * size.width + size.width
+    assert len(file_of(model)) - len(file_of(same)) == pytest.approx(2 * (len(GRID) - 1) * once, abs=200)
+    back = vision_model(file_of(same))
+    for (key, kept), (_, found) in zip(same.weights.arrays(), back.weights.arrays(), strict=True):
+        assert kept.tobytes() == found.tobytes(), key
+    query = asked(same, 60, 6)
+    density, scattered = evaluate(same, query)
+    found_density, found_scattered = by_graph(same, query)
+    np.testing.assert_allclose(found_density, density, rtol=0, atol=phase(size) * density.max())
+    np.testing.assert_allclose(found_scattered, scattered, rtol=0, atol=phase(size))
+
+
+def test_zeros_of_two_signs_come_back_as_they_were() -> None:
+    same = alike(unlike(SMALL))
+    scatter = np.array(same.weights.scatter)
+    scatter[2, scatter_rows(SMALL)["view"]] = -0.0
+    signed = VisionModel(GRID, replace(same.weights, scatter=scatter))
+    assert vision_model(file_of(signed)).weights.scatter.tobytes() == scatter.tobytes()
+
+
+@pytest.mark.parametrize("name", ["compact", "told"])
+def test_files_with_the_whole_layer_are_read_too(name: str) -> None:
+    """As they were written before what is alike was kept once."""
+    model = unlike(SIZES[name])
+    held = {f"{WEIGHTS}{key}": array for key, array in kept_weights(model.weights).items()}
+    for part in [key for key in held if "scatter." in key]:
+        held.pop(part)
+    told, count = SIZES[name].extras > 0, len(GRID)
+    held[f"{WEIGHTS}scatter"] = np.array(model.weights.scatter)
+    found = held_weights(held, count, told, SCALE)
+    for (key, kept), (_, back) in zip(model.weights.arrays(), found.arrays(), strict=True):
+        assert kept.tobytes() == back.tobytes(), key
 
 
 def test_sizes_are_the_papers() -> None:
