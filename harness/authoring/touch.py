@@ -33,6 +33,9 @@ SPACINGS = tuple(1e-3 * each for each in (4, 5, 6, 7, 8, 10, 12, 14, 17, 20))
 OFF = 1.3
 """Spacings that a press may be from its node: nodes are closer; smooth normals lean from a face's."""
 
+COARSENED = (1.0, 4.0 / 3.0, 5.0 / 3.0, 2.0)
+"""Times the profile's pitch that a patch's pixels may be, where no spacing leaves room for finer ones."""
+
 _TIMED = 20
 
 Settings = dict[str, str | float | int | bool | None]
@@ -108,6 +111,7 @@ def author_touch(
     settings: Settings = {
         "network": "codes",
         **asdict(profile.codes),
+        "pitch": coded.patches.pitch,
         "spacing": spacing,
         "nodes": len(coded.nodes),
         "variance_kept": coded.kept,
@@ -133,21 +137,26 @@ def spaced_codes(
 ) -> tuple[CodedSurface, float]:
     """Codes of a surface, with nodes as dense as the file allows; and the spacing.
 
+    Pixels are those of ``spec`` wherever any spacing leaves room for them, and else the finest of
+    ``COARSENED`` for which one does: a large object in a small file is seen less sharply.
+
     Raises:
-        WrongUse: it allows none of ``SPACINGS``.
+        WrongUse: it allows none of ``SPACINGS`` with pixels of any pitch.
     """
-    for spacing in SPACINGS:
-        patch = PatchSpec(spacing, spec.pitch, spec.width)
-        # Whoever needs more room than a node for each square of the spacing need not be counted.
-        if raster.mesh.face_areas.sum() / spacing**2 * patch_bytes(sensor, patch) > 4.0 * spec.most_bytes:
-            continue
-        nodes = choose_nodes(raster.mesh, spacing, seed)
-        if len(nodes) * patch_bytes(sensor, patch) <= spec.most_bytes:
-            return code_surface(raster, nodes, sensor, patch, seed), spacing
+    for coarsened in COARSENED:
+        patches = [PatchSpec(spacing, coarsened * spec.pitch, spec.width) for spacing in SPACINGS]
+        for patch in patches:
+            each = patch_bytes(sensor, patch)
+            # Whoever needs more room than a node for each square of the spacing need not be counted.
+            if raster.mesh.face_areas.sum() / patch.spacing**2 * each > 4.0 * spec.most_bytes:
+                continue
+            nodes = choose_nodes(raster.mesh, patch.spacing, seed)
+            if len(nodes) * each <= spec.most_bytes:
+                return code_surface(raster, nodes, sensor, patch, seed), patch.spacing
     raise WrongUse(
         f"the object's surface, {raster.mesh.face_areas.sum() * 1e4:.4g} cm^2, does not fit into codes of "
-        f"{spec.most_bytes / 1e6:.3g} MB even with nodes {SPACINGS[-1] * 1e3:g} mm apart; allow a larger "
-        "file, a coarser pitch, or a width"
+        f"{spec.most_bytes / 1e6:.3g} MB even with nodes {SPACINGS[-1] * 1e3:g} mm apart and pixels of "
+        f"{COARSENED[-1] * spec.pitch * 1e3:.2g} mm; take a profile with a larger file"
     )
 
 

@@ -1,15 +1,24 @@
 """``touchstone object build --only touch`` on a small block: what it writes, says, keeps and refuses."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import trimesh
 
+from harness.authoring.touch import COARSENED, SPACINGS, spaced_codes
+from harness.authoring.touch_codes import PatchSpec, patch_bytes
+from harness.authoring.touch_data import choose_nodes
+from harness.authoring.touch_profiles import touch_profile
 from harness.cli import invoke
+from harness.errors import WrongUse
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.touch import open_touch
 from harness.objectfile.verify import verify
+from harness.objects.household import build as named_object
+from harness.sensor import GELSIGHT_R15
+from harness.sim.height_map import RasterMesh
 
 
 @pytest.fixture
@@ -57,3 +66,25 @@ def test_a_block_becomes_an_object_file_that_can_be_touched(
 def test_an_unknown_profile_of_touch_is_wrong_use(block: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert build(block, "--profile", "small") == 2
     assert "no profile 'small' of touch" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["mug", "bowl", "plate", "pitcher", "tray", "wrench"])
+def test_the_smallest_profile_has_room_for_every_built_in_object(name: str) -> None:
+    """The pixels grow only where no distance of nodes leaves room for the profile's own."""
+    raster, spec = RasterMesh(named_object(name)), touch_profile("smoke").codes
+    coded, spacing = spaced_codes(raster, GELSIGHT_R15, spec, 0)
+    pitch = coded.patches.pitch
+    patch = PatchSpec(spacing, pitch)
+    assert len(coded.nodes) * patch_bytes(GELSIGHT_R15, patch) <= spec.most_bytes
+    coarsened = [each * spec.pitch for each in COARSENED]
+    assert pitch in coarsened
+    if pitch > coarsened[0]:
+        finer = PatchSpec(SPACINGS[-1], coarsened[coarsened.index(pitch) - 1])
+        nodes = choose_nodes(raster.mesh, SPACINGS[-1], 0)
+        assert len(nodes) * patch_bytes(GELSIGHT_R15, finer) > spec.most_bytes
+
+
+def test_an_object_with_no_room_for_its_touch_is_told_to_take_a_larger_file() -> None:
+    spec = replace(touch_profile("smoke").codes, most_bytes=10_000)
+    with pytest.raises(WrongUse, match=r"does not fit .* 0\.01 MB .* pixels of 1\.2 mm; take a profile"):
+        spaced_codes(RasterMesh(named_object("wrench")), GELSIGHT_R15, spec, 0)
