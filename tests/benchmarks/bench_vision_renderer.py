@@ -123,11 +123,11 @@ def plain_seconds(model: VisionModel, mesh: Mesh, size: int, crop: int) -> float
 def errors(data: bytes, mesh: Mesh) -> None:
     """What ending rays early, beginning them late and few sub-pixels change, at 256."""
     renderer, camera = VisionRenderer(data, mesh), camera_of(mesh, 256)
-    every = RenderSettings(termination=0.0, lead=np.inf, coverage=5)
+    every = RenderSettings(termination=0.0, coverage=5)
     whole = renderer.render(camera, LIGHT, every)
     CONSOLE.print(f"  whole shell, no ray ended: {whole.samples} samples")
     for said, settings in (
-        ("rays end at 0.03", replace(every, termination=0.03)),
+        ("rays end at 0.03, the default", replace(every, termination=0.03)),
         ("and begin 1 voxel before the mesh", replace(every, termination=0.03, lead=1.0)),
         ("one sample", replace(every, level="one_sample")),
     ):

@@ -39,9 +39,10 @@ CONSOLE = Console(width=140, highlight=False, emoji=False)
 
 WAYS = {
     "default": RenderSettings(),
+    "lead 1": RenderSettings(lead=1.0),
     "coverage 5": RenderSettings(coverage=5),
     "one sample": RenderSettings(level="one_sample"),
-    "whole shell": RenderSettings(lead=float("inf"), termination=0.0),
+    "whole shell": RenderSettings(termination=0.0),
 }
 
 
