@@ -24,6 +24,7 @@ from harness.sim.markers import draw_markers, marker_displacements
 from harness.sim.noise import with_camera_noise
 from harness.sim.shadow_image import darkened, darkening
 from harness.sim.sound_effects import SOUND_EFFECTS
+from harness.sim.tactile_calibration import Float32Array
 from harness.sim.touch_drawing import optics, reached
 from harness.sim.touch_file_effects import FILE_EFFECTS, SHAPES, gel_from
 
@@ -60,7 +61,7 @@ def _colour(given: Given, levels: Levels) -> ByteArray:
     return drawn.render(given["touch.gel"]).images
 
 
-def _darkening(given: Given, _levels: Levels) -> tuple[FloatArray, FloatArray]:
+def _darkening(given: Given, _levels: Levels) -> tuple[Float32Array, FloatArray]:
     return darkening(
         given["touch.colour"],
         given["touch.height_map"],

@@ -6,14 +6,16 @@ that depth was seen to leave. For sensors whose light grazes; others need no suc
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
+import cv2
 import numpy as np
-from scipy import ndimage
 
 from harness.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused, OutOfDomain
-from harness.sim.compiled import compiled
+from harness.sim.shadow_kernels import CHANNELS, Lists, throw
+from harness.sim.tactile_calibration import Float32Array
 
 RIM = 4
 """Pixels to each side by which the rim of a contact reaches past it."""
@@ -62,11 +64,47 @@ class ShadowTable:
                 f"{self.fan_step:g} rad cannot be: all three are above zero; fit the calibration again"
             )
 
+    @cached_property
+    def longest(self) -> IntArray:
+        """``(d, k)`` samples of the longest of the three channels' lists."""
+        return read_only(np.ascontiguousarray(self.lengths.max(axis=0)).astype(np.int64))
+
+    @cached_property
+    def levels(self) -> FloatArray:
+        """``(d, k, samples, CHANNELS)`` the lists of all channels side by side, +inf beyond their ends."""
+        levels = np.full((*self.lengths.shape[1:], int(self.lengths.max(initial=0)), CHANNELS), np.inf)
+        lists = np.split(self.values, np.cumsum(self.lengths.ravel())[:-1])
+        for (c, d, k), one in zip(np.ndindex(self.lengths.shape), lists, strict=True):
+            levels[d, k, : len(one), c] = one
+        return read_only(levels)
+
+    @cached_property
+    def levels_single(self) -> Float32Array:
+        """``levels`` in single precision."""
+        single: Float32Array = self.levels.astype(np.float32)
+        return read_only(single)
+
+    @cached_property
+    def rays(self) -> FloatArray:
+        """``(d, rays, samples, 2)`` pixels down and along from the rim to each sample; NaN of no ray."""
+        fans = [np.arange(one - self.fan, one + self.fan, self.fan_step) for one in self.directions]
+        samples = int(self.lengths.max(initial=0))
+        rays = np.full((len(fans), max(len(fan) for fan in fans), samples, 2), np.nan)
+        for d, fan in enumerate(fans):
+            across = self.sample_step * np.stack([np.sin(fan), np.cos(fan)], axis=-1)
+            rays[d, : len(fan)] = np.arange(samples)[None, :, None] * across[:, None, :]
+        return read_only(rays)
+
+    def lists(self, levels: FloatArray | Float32Array) -> Lists:
+        """What the loops take, with ``levels`` or ``levels_single``."""
+        step = float(self.directions[1] - self.directions[0])
+        return levels, self.longest, self.rays, (self.shallowest, self.depth_step, step)
+
 
 def rim(core: BoolArray) -> BoolArray:
     """``(rows, columns)`` the ring of four pixels around a contact, from which shadows are thrown."""
-    wide = ndimage.maximum_filter(core.view(np.uint8), 2 * RIM + 1, mode="constant") > 0
-    ring: BoolArray = wide & ~core
+    wide = cv2.dilate(core.view(np.uint8), np.ones((2 * RIM + 1, 2 * RIM + 1), np.uint8))
+    ring: BoolArray = np.asarray(wide, dtype=np.bool_) & ~core
     return ring
 
 
@@ -104,83 +142,14 @@ def cast_shadows(
         raise OutOfDomain(
             f"colours {change.shape}, heights {indentation.shape} and core {core.shape} disagree"
         )
-    starts = np.concatenate([[0], np.cumsum(table.lengths.ravel())]).astype(np.int64)
-    lists = (table.lengths, starts, table.values)
-    rays = _rays(table)
+    lists = table.lists(table.levels)
     shaded, outside = change.copy(), np.zeros(len(change))
     for n in range(len(change)):
-        ring = np.argwhere(rim(core[n]))
-        if not len(ring):
+        ring = rim(core[n])
+        if not ring.any():
             continue
-        deep = indentation[n][ring[:, 0], ring[:, 1]]
-        row = np.floor((deep - table.shallowest) / table.depth_step + 1e-9).astype(np.int64)
-        held = np.clip(row, 0, table.lengths.shape[2] - 1)
-        missing = row != held
-        outside[n] = missing.sum() / len(ring)
-        throws = ~missing if beyond == "skip" else np.ones(len(ring), np.bool_)
-        direction = _direction_rows(surface[n], ring[throws], table)
-        _throw(shaded[n], surface[n], ring[throws], held[throws], direction, rays, lists, table.sample_step)
+        floor = np.full((*ring.shape, CHANNELS), np.inf)
+        thrown, missing = throw(floor, surface[n], indentation[n], ring, lists, beyond == "hold")
+        np.minimum(shaded[n], floor[..., :3], out=shaded[n])
+        outside[n] = missing / thrown
     return read_only(shaded), read_only(outside)
-
-
-def _rays(table: ShadowTable) -> FloatArray:
-    """``(d, rays)`` rad, NaN where a fan has fewer."""
-    fans = [
-        np.arange(direction - table.fan, direction + table.fan, table.fan_step)
-        for direction in table.directions
-    ]
-    rays = np.full((len(fans), max(len(fan) for fan in fans)), np.nan)
-    for k, fan in enumerate(fans):
-        rays[k, : len(fan)] = fan
-    return rays
-
-
-def _direction_rows(surface: FloatArray, at: IntArray, table: ShadowTable) -> IntArray:
-    """``(n,)`` which lists pixels ``(n, 2)`` throw; at the picture's border slopes count as none."""
-    i, j = at.T
-    rows, columns = surface.shape
-    within_rows, within_columns = (i > 0) & (i < rows - 1), (j > 0) & (j < columns - 1)
-    inside = within_rows & within_columns
-    above, below = np.maximum(i - 1, 0), np.minimum(i + 1, rows - 1)
-    left, right = np.maximum(j - 1, 0), np.minimum(j + 1, columns - 1)
-    down = np.where(inside, (surface[below, j] - surface[above, j]) / 2.0, 0.0)
-    along = np.where(inside, (surface[i, right] - surface[i, left]) / 2.0, 0.0)
-    # The slope climbs towards the contact; the shadow falls the other way, half a turn on.
-    outwards = np.arctan2(down, along) + np.pi
-    step = float(table.directions[1] - table.directions[0])
-    return np.minimum(np.floor_divide(outwards, step).astype(np.int64), len(table.directions) - 1)
-
-
-@compiled
-def _throw(
-    shaded: FloatArray,
-    surface: FloatArray,
-    at: IntArray,
-    depth_row: IntArray,
-    direction_row: IntArray,
-    rays: FloatArray,
-    lists: tuple[IntArray, IntArray, FloatArray],
-    step: float,
-) -> None:
-    lengths, starts, values = lists
-    rows, columns = surface.shape
-    for p in range(len(at)):
-        i, j = at[p, 0], at[p, 1]
-        d, k = direction_row[p], depth_row[p]
-        for ray in range(rays.shape[1]):
-            turn = rays[d, ray]
-            if np.isnan(turn):
-                continue
-            across, along = step * np.cos(turn), step * np.sin(turn)
-            longest = max(lengths[0, d, k], lengths[1, d, k], lengths[2, d, k])
-            for s in range(1, longest):
-                x, y = int(j + s * across), int(i + s * along)
-                if x < 0 or x >= columns or y < 0 or y >= rows:
-                    # Rays are straight: what has left the picture does not come back.
-                    break
-                if surface[i, j] <= surface[y, x]:
-                    continue
-                for c in range(3):
-                    if s < lengths[c, d, k]:
-                        level = values[starts[(c * lengths.shape[1] + d) * lengths.shape[2] + k] + s]
-                        shaded[y, x, c] = min(shaded[y, x, c], level)

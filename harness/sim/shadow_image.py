@@ -7,8 +7,9 @@ from harness.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.sensor import TactileSensor
 from harness.sim.gel import over_range
 from harness.sim.height_map import rest_surface
-from harness.sim.shadow import RIM, ShadowTable, cast_shadows
-from harness.sim.tactile_calibration import TactileCalibration
+from harness.sim.shadow import RIM, ShadowTable, cast_shadows, rim
+from harness.sim.shadow_kernels import CHANNELS, lay_over, take, throw
+from harness.sim.tactile_calibration import Float32Array, TactileCalibration
 
 SOFTNESS = 59e-6
 """Metres, sigma of the blur of shadows: two pixels of the sensor of Taxim (Si and Yuan, 2022)."""
@@ -22,7 +23,7 @@ def darkening(
     calibration: TactileCalibration,
     table: ShadowTable,
     rest: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Float32Array, FloatArray]:
     """How much darker shadows make each picture.
 
     A shadow only holds colours down, so it may work on rounded ones: rounding and clipping keep order.
@@ -46,16 +47,19 @@ def darkening(
     core = (held > calibration.header.skirt.core * deepest) & (held > 0.0)
     untouched = -rest_surface(sensor) if rest is None else rest
     pitch = calibration.header.pitch
-    soft, outside = np.zeros(pictures.shape), np.zeros(len(pictures))
+    soft, outside = np.zeros(pictures.shape, np.float32), np.zeros(len(pictures))
     for n in range(len(pictures)):
         box = _reached(core[n], table, pitch)
         if box is None:
             continue
-        change = pictures[n][box].astype(np.float64) - calibration.background[box]
         surface = (indentation[n][box] + untouched[box]) / pitch
-        parts = (change[None], indentation[n][box][None], surface[None], core[n][box][None])
-        taken, share = soft_shadows(*parts, table, pitch)
-        soft[n][box], outside[n] = taken[0], share[0]
+        floor = np.full((*surface.shape, CHANNELS), np.inf, np.float32)
+        ring = rim(core[n][box])
+        lists = table.lists(table.levels_single)
+        thrown, missing = throw(floor, surface, indentation[n][box], ring, lists, hold=True)
+        outside[n] = missing / max(thrown, 1)
+        take(pictures[n][box], calibration.background[box], floor, soft[n][box])
+        soft[n][box] = _blurred(soft[n][box], SOFTNESS / pitch)
     return read_only(soft), read_only(outside)
 
 
@@ -79,17 +83,20 @@ def soft_shadows(
     table: ShadowTable,
     pitch: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """What ``cast_shadows`` takes from the colours, blurred as shadows are; otherwise as ``darkening``.
+    """What ``cast_shadows`` takes from colours that are no picture's, blurred as ``darkening`` does.
 
     ``pitch`` in metres a pixel says how many pixels the blur is wide.
     """
     shaded, outside = cast_shadows(change, indentation, surface, core, table)
-    sigma = SOFTNESS / pitch
-    size = 2 * _radius(sigma) + 1
-    soft = np.subtract(change, shaded, dtype=np.float32, casting="same_kind")
-    for one in soft:
-        cv2.GaussianBlur(one, (size, size), sigma, dst=one, borderType=cv2.BORDER_REFLECT)
+    taken = np.subtract(change, shaded, dtype=np.float32, casting="same_kind")
+    soft = np.stack([_blurred(one, SOFTNESS / pitch) for one in taken])
     return read_only(soft.astype(np.float64)), outside
+
+
+def _blurred(taken: Float32Array, sigma: float) -> Float32Array:
+    size = 2 * _radius(sigma) + 1
+    blurred = cv2.GaussianBlur(taken, (size, size), sigma, borderType=cv2.BORDER_REFLECT)
+    return np.asarray(blurred, dtype=np.float32)
 
 
 def _radius(sigma: float) -> int:
@@ -97,14 +104,10 @@ def _radius(sigma: float) -> int:
     return max(1, int(4.0 * sigma + 0.5))
 
 
-def darkened(pictures: ByteArray, by: FloatArray) -> ByteArray:
+def darkened(pictures: ByteArray, by: Float32Array) -> ByteArray:
     """The pictures, darker by grey levels; the same to the bit where that is zero."""
-    drawn = pictures.copy()
-    for n in range(len(by)):
-        rows = np.flatnonzero(by[n].any(axis=(1, 2)))
-        if len(rows):
-            part = slice(int(rows[0]), int(rows[-1]) + 1)
-            columns = np.flatnonzero(by[n, part].any(axis=(0, 2)))
-            box = (part, slice(int(columns[0]), int(columns[-1]) + 1))
-            drawn[n][box] = np.clip(np.rint(pictures[n][box] - by[n][box]), 0.0, 255.0)
+    drawn = np.empty_like(pictures, order="C")
+    lay_over(
+        np.ascontiguousarray(pictures).reshape(-1), np.ascontiguousarray(by).reshape(-1), drawn.reshape(-1)
+    )
     return read_only(drawn)

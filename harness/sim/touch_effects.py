@@ -17,7 +17,7 @@ from harness.sim.gel import over_range
 from harness.sim.markers import draw_markers, marker_displacements
 from harness.sim.optics import TactileImages
 from harness.sim.shadow_image import darkening
-from harness.sim.tactile_calibration import TactileCalibration
+from harness.sim.tactile_calibration import Float32Array, TactileCalibration
 from harness.sim.touch_drawing import optics, reached
 
 Given = Mapping[str, Any]
@@ -91,7 +91,7 @@ def _extrapolated(given: Given, _levels: Levels) -> IntArray:
     return counts
 
 
-def _darkening(given: Given, _levels: Levels) -> tuple[FloatArray, FloatArray]:
+def _darkening(given: Given, _levels: Levels) -> tuple[Float32Array, FloatArray]:
     return darkening(
         given["touch.colour"],
         given["touch.height_map"],

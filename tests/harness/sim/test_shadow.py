@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from harness.arrays import FloatArray
+from harness.arrays import BoolArray, FloatArray
 from harness.errors import CalibrationRefused, OutOfDomain
 from harness.sensor import GELSIGHT_R15
 from harness.sim.optics_kernels import change_exactly
@@ -112,6 +112,56 @@ def test_depths_outside_the_table_are_counted_and_held_or_skipped(beyond: Beyond
     assert shaded.any() == thrown
 
 
+def _drawn_at_random(seed: int) -> ShadowTable:
+    """Lists of every length, none among them, by channel, direction and depth."""
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(0, 14, (3, 63, 9))
+    return ShadowTable(
+        np.linspace(0.0, 6.2, 63), lengths, rng.normal(-20.0, 10.0, int(lengths.sum())), shallowest=0.2e-3
+    )
+
+
+def _thrown(
+    surface: FloatArray, deep: FloatArray, core: BoolArray, table: ShadowTable, beyond: Beyond
+) -> FloatArray:
+    """What shadows leave of nothing, sample by sample as the method says it (Si and Yuan, 2022)."""
+    left = np.zeros((*surface.shape, 3))
+    lists = np.split(table.values, np.cumsum(table.lengths.ravel())[:-1])
+    down, along = (np.pad((surface[2:, 1:-1] - surface[:-2, 1:-1]) / 2, 1), np.zeros_like(surface))
+    along[1:-1, 1:-1] = (surface[1:-1, 2:] - surface[1:-1, :-2]) / 2
+    for i, j in np.argwhere(rim(core)):
+        row = int(np.floor((deep[i, j] - table.shallowest) / table.depth_step))
+        if beyond == "skip" and not 0 <= row < 9:
+            continue
+        row = min(max(row, 0), 8)
+        d = int((np.arctan2(down[i, j], along[i, j]) + np.pi) // 0.1)
+        for turn in np.arange(table.directions[d] - 0.1, table.directions[d] + 0.1, 0.05):
+            for c in range(3):
+                levels = lists[(c * 63 + d) * 9 + row]
+                for s in range(1, len(levels)):
+                    y, x = int(i + 1.25 * s * np.sin(turn)), int(j + 1.25 * s * np.cos(turn))
+                    within = 0 <= y < surface.shape[0] and 0 <= x < surface.shape[1]
+                    if within and surface[i, j] > surface[y, x]:
+                        left[y, x, c] = min(left[y, x, c], levels[s])
+    return left
+
+
+@pytest.mark.parametrize("beyond", ["hold", "skip"])
+@pytest.mark.parametrize("seed", range(4))
+def test_every_sample_of_every_ray_falls_where_the_method_says(seed: int, beyond: Beyond) -> None:
+    rng = np.random.default_rng(seed)
+    deep = 1.4e-3 * ndimage.gaussian_filter(_post(1.0)[0] + rng.normal(0, 0.3, (60, 70)), 1.5)
+    # At the border too, where rays leave the picture.
+    core = (_post(1.0)[0] > 0) | (rng.random((60, 70)) < 0.002)
+    table = _drawn_at_random(seed)
+    shaded, _ = cast_shadows(
+        np.zeros((1, 60, 70, 3)), deep[None], deep[None] / PITCH, core[None], table, beyond=beyond
+    )
+    wanted = _thrown(deep / PITCH, deep, core, table, beyond)
+    assert (wanted < 0.0).sum() > 500
+    assert np.array_equal(shaded[0], wanted)
+
+
 def test_the_rim_is_four_pixels_wide() -> None:
     ring = rim(_post(1.0)[0] > 0)
     assert ring.sum() == 18 * 18 - 10 * 10
@@ -150,4 +200,6 @@ def test_a_shadow_is_the_same_whether_a_part_or_all_of_the_picture_is_looked_at(
     assert outside[0] == share[0]
     drawn = darkened(plain, taken)
     assert np.array_equal(drawn[0][taken[0] == 0.0], plain[0][taken[0] == 0.0])
-    assert np.array_equal(drawn, np.clip(np.rint(plain - taken), 0.0, 255.0).astype(np.uint8))
+    assert np.array_equal(
+        drawn, np.clip(np.rint(plain - taken.astype(np.float64)), 0.0, 255.0).astype(np.uint8)
+    )
