@@ -269,14 +269,15 @@ class Child:
     # The end
 
     def _give_up(self, error: Exception) -> None:
+        fault = error if isinstance(error, TouchstoneError) else self._named(error)
         with contextlib.suppress(BenchFault):
             self._link.halt()
-        fault = (
-            error
-            if isinstance(error, TouchstoneError)
-            else BenchFault(f"ur_rtde failed ({error}); check the network cable of the control box")
-        )
         self._reply({"id": -1, "ok": False, "error": type(fault).__name__, "text": str(fault)[:2000]})
+
+    def _named(self, error: Exception) -> TouchstoneError:
+        """What the controller's state says about a call of the library that failed."""
+        cause = self._link.why()
+        return type(cause)(f"ur_rtde failed ({error}); {cause}")
 
     def _leave(self) -> None:
         """Stop, end the script. Sockets are closed by the exit: disconnecting takes 0.5 s an interface."""

@@ -13,10 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers import pipe, ur_motion, ur_words
+from drivers.ur_child import Child
 from drivers.ur_motion import Motion, Outcome
 from drivers.ur_stream import Guard, Stream
 from harness.arrays import FloatArray
-from harness.errors import BenchFault, SafetyStop, TouchstoneError
+from harness.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
 
 Z = np.array([0.0, 0.0, 1.0])
 Json = st.recursive(
@@ -375,3 +376,30 @@ def _bare() -> pipe.Message:
         "force_press": 10.0,
         "force_any": 25.0,
     }
+
+
+@pytest.mark.parametrize("cause", [BenchFault, ProtectiveStop])
+def test_a_call_that_the_library_could_not_make_is_told_with_the_controllers_state(
+    cause: type[TouchstoneError],
+) -> None:
+    """The library says only that its call failed; a starved watchdog or a safety stop is why."""
+
+    class Failing(ScriptedLink):
+        patience = 0.1
+
+        def why(self) -> TouchstoneError:
+            assert not self.done, "asked while the controller still ran the program"
+            return cause("its watchdog kept waiting for 300 ms")
+
+    link: Any = Failing()
+    out, replies = os.pipe()
+    Child(link, -1, replies)._give_up(RuntimeError("isProgramRunning() function did not succeed!"))
+    os.close(replies)
+    ((_, payload),) = pipe.read_frames(out)
+    os.close(out)
+    told = pipe.unpack_message(payload)
+    assert link.done == ["halt"]
+    assert told["error"] == cause.__name__
+    assert told["text"] == (
+        "ur_rtde failed (isProgramRunning() function did not succeed!); its watchdog kept waiting for 300 ms"
+    )
