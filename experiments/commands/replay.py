@@ -26,13 +26,15 @@ def replay(
 ) -> int:
     """Estimate again from a recording alone; no bench is opened.
 
-    At the same levels the numbers are the same to the bit. Other levels trade accuracy for time on the
-    same readings.
+    It takes the levels that the run's own result was found at, and gives the same numbers to the bit;
+    --level turns one of them, which trades accuracy for time on the same readings.
 
     Try: touchstone replay runs/... --level localization.method=particle
     """
     from experiments.contact_localization import session_of
     from experiments.contact_localization.dials import chosen
+    from experiments.contact_localization.result import levels_of_result
+    from harness.errors import RecordingDamaged
     from harness.recording import Recording
     from harness.wav_export import export_wav
 
@@ -40,9 +42,15 @@ def replay(
     if wav is not None:
         files = export_wav(recording, wav)
         warn(f"{len(files)} WAV files in {wav}; counts, rates and times in wav.json beside them")
+    try:
+        own = levels_of_result(recording.folder)
+    except RecordingDamaged as error:
+        own = {}
+        warn(f"{error}; the default levels are taken")
+    accuracy = chosen(level or [], own)
     folder = out or run.with_name(f"{run.name}-replay")
     folder.mkdir(parents=True, exist_ok=True)
     with CONSOLE.status("estimating from the recording"):
-        result = session_of.finish(recording, chosen(level or []), None, folder)
+        result = session_of.finish(recording, accuracy, None, folder)
     show(result, json)
     return 0

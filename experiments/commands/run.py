@@ -173,11 +173,12 @@ def _with_cost(result: dict[str, Any], cost: dict[str, Any], recording: Any) -> 
     """The result, here and on the disk, with what was asked and what it took; said in two lines."""
     from json import dumps
 
+    from experiments.contact_localization.result import RESULT
     from experiments.contact_localization.within_words import sentences
     from harness.recording import write_text_whole
 
     whole = {**result, "cost": cost}
-    write_text_whole(recording.folder / "result.json", dumps(whole, indent=1, allow_nan=False) + "\n")
+    write_text_whole(recording.folder / RESULT, dumps(whole, indent=1, allow_nan=False) + "\n")
     for sentence in sentences(cost):
         CONSOLE.print(sentence, markup=False)
     return whole

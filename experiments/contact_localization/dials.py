@@ -24,7 +24,9 @@ SENSES = Knob(
 SPACING = Knob(
     "localization.spacing", (4e-3, 3e-3, 2e-3, 1.5e-3), "m", "number", 2e-3, "between surface samples"
 )
-ROUNDS = Knob("localization.rounds", (0, 1, 2, 3), "rounds", "number", 3, "refinements after the grid")
+ROUNDS = Knob(
+    "localization.rounds", (0, 1, 2, 3, 5), "rounds", "number", 5, "most refinements after the grid"
+)
 SAMPLES = Knob(
     "localization.samples", (600, 1500, 3000, 6000), "", "number", 3000, "hypotheses a refinement draws"
 )
@@ -61,23 +63,27 @@ _GRIDS = (
     (2e-3, 0, 3000, 8),
     (3e-3, 1, 1500, 16),
     (2e-3, 1, 1500, 16),
-    (2e-3, 3, 1500, 8),
-    (2e-3, 3, 3000, 8),
-    (1.5e-3, 3, 6000, 8),
+    (2e-3, 5, 1500, 8),
+    (2e-3, 5, 3000, 8),
+    (1.5e-3, 5, 6000, 8),
 )
 """Spacing, rounds, samples and block: from the cheapest to the finest, where the front is likely to lie."""
 
-FINEST = _grid("both", 1.5e-3, 3, 6000, 8)
+FINEST = _grid("both", 1.5e-3, 5, 6000, 8)
 """What is asked after an answer, to say what more time would have given."""
 
 
-def chosen(texts: list[str]) -> Accuracy:
+def chosen(texts: list[str], start: Mapping[str, Level] | None = None) -> Accuracy:
     """The default accuracy but for what an operator wrote, for example ``["localization.rounds=1"]``.
+
+    Args:
+        texts: what was written.
+        start: levels to turn from instead of the default ones.
 
     Raises:
         WrongUse: an unknown dial or level, and the nearest is named; a touch that no run carries.
     """
-    accuracy = Accuracy.default(KNOBS).with_texts(texts)
+    accuracy = Accuracy.default(KNOBS).with_(start or {}).with_texts(texts)
     if accuracy[DRAWN.name] != DRAWN.default:
         raise WrongUse(
             f"{DRAWN.name} = {accuracy[DRAWN.name]}: a run is compared with the mesh that it carries, and it "
@@ -127,7 +133,7 @@ def settings(thorough: bool = False, sound: bool = True, objectfile: bool = Fals
 def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
     """The few settings that are measured with fewer contacts too."""
     cheapest = _grid("touch", 4e-3, 0, 3000, 16)
-    dials = ((2e-3, 0, 3000, 16), (2e-3, 3, 3000, 8))
+    dials = ((2e-3, 0, 3000, 16), (2e-3, 5, 3000, 8))
     touch = [cheapest, *(_grid("touch", *each) for each in dials)]
     both = [_grid("both", *each) for each in dials]
     return [*touch, *both, _by_sound(4e-3), _by_sound(2e-3)] if sound else touch

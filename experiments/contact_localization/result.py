@@ -1,7 +1,9 @@
 """The answer as JSON: what a script reads, and what ``result.json`` holds."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,17 +11,21 @@ import numpy as np
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.baselines import mean_random_error
 from experiments.contact_localization.comparison import Comparison
+from experiments.contact_localization.dials import KNOBS
 from experiments.contact_localization.estimate import Estimate
 from experiments.contact_localization.gate import Gate
 from experiments.contact_localization.posterior import Mode
 from experiments.contact_localization.truth import Truth
+from harness.accuracy import Level
 from harness.arrays import FloatArray
-from harness.errors import FitRefused
+from harness.errors import FitRefused, RecordingDamaged, WrongUse
 from harness.explain import as_json
 from harness.run_folder import RunFiles
 from harness.symmetry import SymmetryGroup
 
 SCHEMA = 1
+RESULT = "result.json"
+"""In a run's folder, and in that of a replay."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +88,23 @@ def result_of(scored: Scored, report: str | None) -> dict[str, Any]:
         "recording": str(run.recording.folder),
         "report": report,
     }
+
+
+def levels_of_result(folder: Path) -> dict[str, Level]:
+    """The levels that the result in a folder was found at; none where it has no result.
+
+    Raises:
+        RecordingDamaged: the result cannot be read, or was found at a level that is no longer there.
+    """
+    path = folder / RESULT
+    if not path.exists():
+        return {}
+    known = {knob.name: knob for knob in KNOBS}
+    try:
+        levels = json.loads(path.read_text())["accuracy"]
+        return {name: known[name].checked(level) for name, level in levels.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, WrongUse) as error:
+        raise RecordingDamaged(f"{path} does not say at which levels it was found ({error})") from error
 
 
 def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:

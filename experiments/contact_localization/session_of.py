@@ -21,7 +21,7 @@ from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model_of import model_of_run
 from experiments.contact_localization.planning import RunPlan, plan_run
 from experiments.contact_localization.report_of import report_of
-from experiments.contact_localization.result import Scored, result_of
+from experiments.contact_localization.result import RESULT, Scored, result_of
 from experiments.contact_localization.sound_gate import doubts_of_sound
 from experiments.contact_localization.strike import Ask, by_hand, somebody
 from experiments.contact_localization.trade import trade
@@ -168,7 +168,7 @@ def finish(
         report_of(scored, _geometry_errors(scored), _trade(scored), health), folder / "report"
     )
     result = result_of(scored, str(page))
-    write_text_whole(folder / "result.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    write_text_whole(folder / RESULT, json.dumps(result, indent=1, allow_nan=False) + "\n")
     return result
 
 

@@ -214,3 +214,23 @@ def test_a_replay_without_the_truth_has_the_same_answer_and_no_scores(
     assert [result[key] for key in ("random_baseline_m", "geometry_baseline_m", "world")] == [None] * 3
     assert Path(result["report"]).parent.parent == tmp_path / "run-replay"
     assert (tmp_path / "run-replay" / "result.json").is_file()
+
+
+def test_a_replay_takes_the_levels_of_the_runs_own_result(
+    done: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A budget or ``--level`` chose other levels than the default ones; only --level turns them again."""
+    run = copied(done, tmp_path / "run")
+    first = session_of.finish(run, chosen(["localization.samples=600", "localization.rounds=1"]), None)
+    assert invoke(["replay", str(run.folder), "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert without_what_may_differ(again) == without_what_may_differ(json.loads(json.dumps(first)))
+    assert again["accuracy"]["localization.samples"] == 600
+    assert invoke(["replay", str(run.folder), "--json", "--level", "localization.rounds=0"]) == 0
+    turned = json.loads(capsys.readouterr().out)["accuracy"]
+    assert turned == {**first["accuracy"], "localization.rounds": 0}
+    (run.folder / "result.json").write_text("{}")
+    assert invoke(["replay", str(run.folder), "--json"]) == 0
+    said = capsys.readouterr()
+    assert "does not say at which levels it was found" in said.err
+    assert json.loads(said.out)["accuracy"] == dict(chosen([]))

@@ -10,14 +10,16 @@ import pytest
 from synthetic_press import PRESSES
 
 from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.dials import chosen
 from experiments.contact_localization.estimate import Estimate, locate
 from experiments.contact_localization.gate import Gate
 from experiments.contact_localization.hypotheses import Contact, Noise
 from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.result import Scored, estimate_of, flags_of
+from experiments.contact_localization.result import Scored, estimate_of, flags_of, levels_of_result
 from experiments.contact_localization.truth import Truth, read_truth
+from harness.errors import RecordingDamaged
 from harness.geometry import translation
 from harness.recording import Recording
 from harness.symmetry import SymmetryGroup, find_symmetries
@@ -140,3 +142,20 @@ def test_a_run_without_a_truth_beside_it_has_none(tmp_path: Path) -> None:
     assert sorted(truth.points) == [0, 2]
     assert truth.points[0].tolist() == [1.0, 2.0, 3.0]
     assert truth.differences == {"mesh_faces": 7}
+
+
+@pytest.mark.parametrize(
+    "written",
+    ["", "[]", "{}", '{"accuracy": 3}', '{"accuracy": {"old": 1}}', '{"accuracy": {"touch.gel": "x"}}'],
+)
+def test_a_result_that_does_not_say_its_levels_is_damaged(tmp_path: Path, written: str) -> None:
+    assert levels_of_result(tmp_path) == {}
+    (tmp_path / "result.json").write_text(written)
+    with pytest.raises(RecordingDamaged, match="at which levels"):
+        levels_of_result(tmp_path)
+
+
+def test_a_result_says_the_levels_it_was_found_at(tmp_path: Path) -> None:
+    levels = dict(chosen(["localization.spacing=0.0015", "localization.senses=touch"]))
+    (tmp_path / "result.json").write_text(json.dumps({"accuracy": levels}))
+    assert levels_of_result(tmp_path) == levels
