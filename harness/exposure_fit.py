@@ -11,7 +11,8 @@ import numpy as np
 
 from harness.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
 from harness.errors import DataRefused, WrongUse
-from harness.robust_fit import robust_fit, scatter
+from harness.exposure_error import BLOCK, Together, group_variance, mistaken_light, together
+from harness.robust_fit import TUKEY, robust_fit, scatter
 from harness.srgb import LINEAR_OF_BYTE
 from harness.toml_file import nearest
 
@@ -20,9 +21,6 @@ KINDS: tuple[ExposureKind, ...] = get_args(ExposureKind)
 
 DARKEST, BRIGHTEST = 2, 250
 """Grey levels that a camera measures; JPEG smears black and white by some levels."""
-
-BLOCK = 16
-"""Pixels along a block: what the simulation does not know errs alike in pixels that are near each other."""
 
 LEAST_PIXELS = 200
 LEAST_BLOCKS = 8
@@ -48,9 +46,10 @@ class ExposureFit:
         kind: what was fitted; of what was not the error is zero.
         gain: ``(3,)`` linear light of the picture for one of the simulation.
         offset: ``(3,)`` linear light where the simulation is black.
-        gain_error: ``(3,)`` one standard deviation.
+        gain_error: ``(3,)`` one standard deviation, with ``attenuation``.
         offset_error: the same.
         balance_error: ``(3,)`` one standard deviation of the gain over green's, relative; zero for green.
+        attenuation: ``(3,)`` of it, what the simulation's own errors may have made the gain smaller by.
         scatter: ``(3,)`` robust standard deviation of what is left, linear light.
         pixels: ``(3,)`` that were fitted.
         saturated: ``(3,)`` that were asked for, and left out as black or white.
@@ -63,13 +62,15 @@ class ExposureFit:
     gain_error: FloatArray
     offset_error: FloatArray
     balance_error: FloatArray
+    attenuation: FloatArray
     scatter: FloatArray
     pixels: AnyArray
     saturated: AnyArray
     outliers: FloatArray
 
     def __post_init__(self) -> None:
-        for each in (self.gain, self.offset, self.gain_error, self.offset_error, self.balance_error):
+        errors = (self.gain_error, self.offset_error, self.balance_error, self.attenuation)
+        for each in (self.gain, self.offset, *errors):
             read_only(each)
 
     @property
@@ -91,10 +92,11 @@ class ExposureFit:
 
 @dataclass(frozen=True, eq=False)
 class _Channel:
-    """One channel's ``(gain, offset)``, and how much each block moves them."""
+    """One channel's ``(gain, offset)``, how much each group moves them, and what a wrong simulation may."""
 
     values: FloatArray
     moved: FloatArray
+    biased: FloatArray
     scatter: float
     pixels: int
     saturated: int
@@ -118,9 +120,10 @@ def fit_exposure(
 ) -> ExposureFit:
     """Fit gain and offset of each channel.
 
-    Standard errors are by blocks of 16 x 16 pixels, which may disagree for any reason: noise, a highlight, a
-    network's patch. They do not tell what is wrong everywhere: errors of the simulation make gains smaller,
-    as errors of any abscissa do, and cameras mix the colours of neighbours.
+    Standard errors are by blocks of 16 x 16 pixels and by shades, which may disagree for any reason: noise, a
+    highlight, a network's patch, a colour that JPEG rounded. The simulation's own errors make gains smaller,
+    as errors of any abscissa do; what they may have done, if they are all that is left beyond the noise of
+    single pixels, is counted as an error and not corrected.
 
     Args:
         live: ``(rows, columns, 3)`` RGB in sRGB.
@@ -133,18 +136,19 @@ def fit_exposure(
             nor white, a simulated object of one brightness, or no light of it in the live picture.
     """
     _require_alike(live, simulated, where)
-    blocks = _blocks(where)
-    found = []
-    for channel, name in enumerate(CHANNELS):
-        levels, light = live[..., channel][where], simulated[..., channel][where]
-        found.append(_channel(levels, light, blocks, kind, name))
-    values = np.array([each.values for each in found])
+    groups = together(where, simulated[where])
+    found = [
+        _channel(live[..., k][where], simulated[..., k][where], where, groups, kind, name)
+        for k, name in enumerate(CHANNELS)
+    ]
+    values, biased = np.array([each.values for each in found]), np.array([each.biased for each in found])
     moved = np.array([each.moved for each in found])
-    count = moved.shape[1]
-    unbiased = count / (count - 1.0)
-    errors = np.sqrt(unbiased * (moved**2).sum(axis=1))
-    relative = moved[:, :, 0] / values[:, 0, None]
-    balance = np.sqrt(unbiased * ((relative - relative[1]) ** 2).sum(axis=1))
+    errors = np.sqrt(np.array([group_variance(each, groups) for each in moved]) + biased**2)
+    # Of a balance both gains may be too small, by chance one more than the other.
+    relative, loss = moved[:, :, 0] / values[:, 0, None], biased[:, 0] / values[:, 0]
+    apart = group_variance((relative - relative[1]).T, groups)
+    balance = np.sqrt(apart + loss**2 + loss[1] ** 2)
+    balance[1] = 0.0
     return ExposureFit(
         kind=kind,
         gain=values[:, 0],
@@ -152,6 +156,7 @@ def fit_exposure(
         gain_error=errors[:, 0],
         offset_error=errors[:, 1],
         balance_error=balance,
+        attenuation=biased[:, 0],
         scatter=np.array([each.scatter for each in found]),
         pixels=np.array([each.pixels for each in found]),
         saturated=np.array([each.saturated for each in found]),
@@ -175,34 +180,42 @@ def _require_alike(live: ByteArray, simulated: FloatArray, where: BoolArray) -> 
         )
 
 
-def _blocks(where: BoolArray) -> AnyArray:
-    """``(n,)`` number of the block of every pixel that counts, from 0 without a gap."""
-    rows, columns = np.nonzero(where)
-    across = where.shape[1] // BLOCK + 1
-    return np.unique(rows // BLOCK * across + columns // BLOCK, return_inverse=True)[1]
-
-
 def _channel(
-    levels: ByteArray, light: FloatArray, blocks: AnyArray, kind: ExposureKind, name: str
+    levels: ByteArray, light: FloatArray, where: BoolArray, groups: Together, kind: ExposureKind, name: str
 ) -> _Channel:
     measured = (levels >= DARKEST) & (levels <= BRIGHTEST)
-    _require_enough(levels, measured, blocks, name)
+    _require_enough(levels, measured, groups.block[groups.group], name)
     live, x = LINEAR_OF_BYTE[levels[measured]], light[measured]
     _require_told(x, kind, name)
-    count = int(blocks.max()) + 1
+    pixels, saturated = live.size, levels.size - live.size
     if kind == "none":
-        left, still = scatter(live - x), np.zeros((count, 2))
-        return _Channel(np.array([1.0, 0.0]), still, left, live.size, levels.size - live.size, 0.0)
+        left, still = scatter(live - x), np.zeros((len(groups), 2))
+        return _Channel(np.array([1.0, 0.0]), still, np.zeros(2), left, pixels, saturated, 0.0)
     design = np.column_stack([x, np.ones_like(x)]) if kind == "gain-offset" else x[:, None]
-    fit = robust_fit(design, live, blocks[measured], count, _LEAST_SCATTER)
+    fit = robust_fit(design, live, groups.group[measured], len(groups), _LEAST_SCATTER)
     if fit is None:
         raise DataRefused(
             f"{name}: its pixels are mostly outliers to any gain and offset; check object, pose and light"
         )
-    _require_light(fit.values, fit.moved, name)
-    values, moved = np.zeros(2), np.zeros((count, 2))
+    _require_light(fit.values, group_variance(fit.moved, groups), name)
+    values, moved = np.zeros(2), np.zeros((len(groups), 2))
     values[: fit.values.size], moved[:, : fit.values.size] = fit.values, fit.moved
-    return _Channel(values, moved, fit.scale, live.size, levels.size - live.size, fit.outliers)
+    seen = where.copy()
+    seen[where] = measured
+    wrong = mistaken_light(live - design @ fit.values, seen, TUKEY * fit.scale)
+    return _Channel(
+        values, moved, _biased(wrong, x, values[0], kind), fit.scale, pixels, saturated, fit.outliers
+    )
+
+
+def _biased(wrong: float, light: FloatArray, gain: float, kind: ExposureKind) -> FloatArray:
+    """``(2,)`` what gain and offset are moved by if a variance of live light is the simulation's doing.
+
+    A line turns about the middle of its pixels: with a gain too small goes an offset too large.
+    """
+    middle = float(light.mean()) if kind == "gain-offset" else 0.0
+    loss = wrong / gain / float(np.mean((light - middle) ** 2))
+    return np.array([loss, loss * middle])
 
 
 def _require_enough(levels: ByteArray, measured: BoolArray, blocks: AnyArray, name: str) -> None:
@@ -235,8 +248,9 @@ def _require_told(light: FloatArray, kind: ExposureKind, name: str) -> None:
         )
 
 
-def _require_light(values: FloatArray, moved: FloatArray, name: str) -> None:
-    error = float(np.sqrt((moved[:, 0] ** 2).sum()))
+def _require_light(values: FloatArray, variance: FloatArray, name: str) -> None:
+    # A simulation's errors make a gain smaller, never one of nothing: they are no doubt that there is light.
+    error = float(np.sqrt(variance[0]))
     if not values[0] > _SURE * error:
         raise DataRefused(
             f"{name}: the live picture does not get brighter where the simulated one does (gain "

@@ -11,7 +11,7 @@ import numpy as np
 
 from harness.arrays import AnyArray, FloatArray, read_only
 
-_TUKEY = 4.685
+TUKEY = 4.685
 """Robust standard deviations beyond which a point says nothing: 95 % efficient where errors are normal."""
 
 _NORMAL = 1.4826
@@ -70,13 +70,13 @@ def robust_fit(
     values = _settled(design, wanted, start, scale)
     if values is None:
         return None
-    u = (wanted - design @ values) / (_TUKEY * scale)
+    u = (wanted - design @ values) / (TUKEY * scale)
     inside = np.abs(u) < 1.0
     slope = np.where(inside, (1.0 - u**2) * (1.0 - 5.0 * u**2), 0.0)
     bread = (design * slope[:, None]).T @ design
     if np.linalg.eigvalsh(bread)[0] <= 0.0:
         return None
-    pull = np.where(inside, _TUKEY * scale * u * (1.0 - u**2) ** 2, 0.0)[:, None] * design
+    pull = np.where(inside, TUKEY * scale * u * (1.0 - u**2) ** 2, 0.0)[:, None] * design
     pulls = np.column_stack([np.bincount(blocks, column, count) for column in pull.T])
     moved: FloatArray = np.asarray(np.linalg.solve(bread, pulls.T).T, np.float64)
     return RobustFit(values, moved, scale, float(np.mean(~inside)))
@@ -94,7 +94,7 @@ def _least_absolute(design: FloatArray, wanted: FloatArray, floor: float) -> Flo
 def _settled(design: FloatArray, wanted: FloatArray, values: FloatArray, scale: float) -> FloatArray | None:
     """Values that no further round changes."""
     for _ in range(_ROUNDS):
-        u = (wanted - design @ values) / (_TUKEY * scale)
+        u = (wanted - design @ values) / (TUKEY * scale)
         weights = np.where(np.abs(u) < 1.0, (1.0 - u**2) ** 2, 0.0)
         before, values = values, _weighted(design, wanted, weights)
         if np.abs(values - before).max() <= _SETTLED:

@@ -116,6 +116,7 @@ def as_json(compared: Compared, files: Mapping[str, Path | None]) -> dict[str, A
             "fit": fit.kind,
             "gain": fit.gain.tolist(),
             "gain_error": fit.gain_error.tolist(),
+            "attenuation": fit.attenuation.tolist(),
             "offset": fit.offset.tolist(),
             "offset_error": fit.offset_error.tolist(),
             "stops": fit.stops,
