@@ -90,13 +90,28 @@ def default_edge(
     """
     check_limit(limit, most)
     wall = thin_wall(mesh, 0.5)
-    speed = np.sqrt(material.young / (material.density * (1.0 - material.poisson**2)))
     if most is not None:
         middle = 0.5 * float(mesh.face_areas.sum())
-        limit = min(limit, 1.5 * most * wall * speed / (np.sqrt(3.0) * middle))
-    bending = np.sqrt(np.pi * wall * speed / (np.sqrt(3.0) * limit))
+        limit = min(limit, 1.5 * most * wall * _plate_speed(material) / (np.sqrt(3.0) * middle))
+    bending = bending_wave(material, wall, limit)
     shear = np.sqrt(0.5 * material.young / ((1.0 + material.poisson) * material.density)) / limit
     return float(min(share * min(bending, shear), 0.2 * mesh.diagonal))
+
+
+def bending_wave(material: Material, wall: float, frequency: float) -> float:
+    """Metres from crest to crest of a wave that bends a thin wall at a frequency in Hz.
+
+    Args:
+        material: of the wall.
+        wall: m, its thickness; small against the wave.
+        frequency: above zero.
+    """
+    return float(np.sqrt(np.pi * wall * _plate_speed(material) / (np.sqrt(3.0) * frequency)))
+
+
+def _plate_speed(material: Material) -> float:
+    """Metres in a second, of a wave that stretches a thin wall."""
+    return float(np.sqrt(material.young / (material.density * (1.0 - material.poisson**2))))
 
 
 def solve_modes(

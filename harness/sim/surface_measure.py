@@ -13,6 +13,12 @@ _LINES = 256
 _ASKED = 800
 """Places whose wall is measured to know how thin a mesh is."""
 
+_PLANES = 20
+"""Directions at most in which planes are looked for; each has a like share of the surface at least."""
+
+_ALIKE = np.cos(np.radians(1.0))
+"""Cosine between normals above which two faces are of parallel planes."""
+
 _LIFT = 1e-9
 """Of the diagonal, by which a ray starts inside its own face."""
 
@@ -56,6 +62,28 @@ def thin_wall(mesh: Mesh, share: float = 0.02) -> float:
     shares = random.dirichlet(np.ones(3), _ASKED)
     points = np.einsum("nc,ncd->nd", shares, mesh.corners[picked])
     return float(np.quantile(wall_thickness(mesh, points, mesh.face_normals[picked]), share))
+
+
+def flat_share(mesh: Mesh) -> float:
+    """Share of a surface's area in planes of few directions: 1 for a box or a tray, near 0 for a ball.
+
+    Of each direction counted the surface has a twentieth at least; a cylinder's side has none, nor have
+    the narrow sides of a thin plate.
+    """
+    area, normals = mesh.face_areas / mesh.face_areas.sum(), mesh.face_normals
+    flat, left = 0.0, area > 0.0
+    for _ in range(_PLANES):
+        if not left.any():
+            break
+        _, which = np.unique(np.round(normals[left], 6), axis=0, return_inverse=True)
+        of_direction = np.bincount(which.reshape(-1), weights=area[left])
+        towards = normals[left][np.argmax(of_direction[which.reshape(-1)])]
+        alike = left & (normals @ towards > _ALIKE)
+        share = float(area[alike].sum())
+        if share < 1.0 / _PLANES:
+            break
+        flat, left = flat + share, left & ~alike
+    return flat
 
 
 def nearest_on_surface(

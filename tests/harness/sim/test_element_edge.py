@@ -11,11 +11,13 @@ from volume_meshes import box
 from harness.arrays import FloatArray
 from harness.materials import MATERIALS
 from harness.mesh import Mesh
+from harness.objects.builtin import build
 from harness.sim import element_edge
 from harness.sim import filled as filling
 from harness.sim.element_edge import FINE_SHARE, fine_edge, finely_filled, weyl_frequency
 from harness.sim.modal import curved
 from harness.sim.modal_solve import solve_mesh
+from harness.sim.surface_measure import thin_wall
 from harness.sim.tetrahedra import Tetrahedra
 from harness.store import Store
 
@@ -101,6 +103,60 @@ def test_modes_of_a_thin_plate_are_within_a_thousandth_of_ritz_with_rims_cut(
     solved = solve_mesh(curved(inside, plate, inside), STEEL, np.inf, least=3)
     exact = ritz_frequencies(sides, STEEL, 18)[:3]
     assert np.abs(solved.modes.frequencies[:3] / exact - 1.0).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("sides", "count"),
+    [((0.05, 0.04, 0.003), 4), ((0.06, 0.015, 0.001), 3), ((0.03, 0.02, 0.0005), 3)],
+    ids=["4 to 3", "4 to 1", "half a millimetre"],
+)
+def test_all_modes_of_a_thin_plate_up_to_a_frequency_are_within_a_thousandth_of_ritz(
+    sides: tuple[float, float, float], count: int
+) -> None:
+    exact = ritz_frequencies(sides, STEEL, 18)
+    limit = 0.5 * float(exact[count - 1] + exact[count])
+    plate = brick(sides)
+    inside, _, _ = finely_filled(plate, STEEL, limit, None, None)
+    solved = solve_mesh(curved(inside, plate, inside), STEEL, limit)
+    assert len(solved.modes.frequencies) == count
+    assert np.abs(solved.modes.frequencies / exact[:count] - 1.0).max() < 1e-3
+    assert solved.unknowns < 150_000
+
+
+def test_a_flat_wall_is_cut_by_the_wave_that_bends_it_at_the_limit() -> None:
+    """The wave is as the root of wall over frequency, the edge as that of wall times wave."""
+    of = {wall: fine_edge(brick((0.05, 0.04, wall)), STEEL, 18e3, None) for wall in (0.0018, 0.002)}
+    assert of[0.002] / of[0.0018] == pytest.approx((0.002 / 0.0018) ** 0.75, rel=1e-3)
+    plate = brick((0.05, 0.04, 0.002))
+    assert of[0.002] / fine_edge(plate, STEEL, 12e3, None) == pytest.approx((12.0 / 18.0) ** 0.25, rel=1e-3)
+
+
+def test_a_narrow_strip_is_cut_for_its_twist_however_long_its_waves_are() -> None:
+    """Below a wave twice as long as it is wide, no limit lets its edges grow."""
+    edges = [fine_edge(brick((0.4, 0.015, 0.001)), STEEL, limit, None) for limit in (1e3, 3e3)]
+    assert edges[0] == pytest.approx(edges[1], rel=1e-12)
+    assert fine_edge(brick((0.4, 0.03, 0.001)), STEEL, 1e3, None) / edges[0] == pytest.approx(
+        2**0.5, rel=0.02
+    )
+
+
+def test_a_flat_wall_too_thin_and_wide_for_that_is_cut_as_far_as_unknowns_allow() -> None:
+    wide = brick((0.4, 0.3, 0.001))
+    edge = fine_edge(wide, STEEL, 2e4, None)
+    assert edge == pytest.approx(fine_edge(wide, STEEL, 1e4, None))
+    assert edge > 2.0 * fine_edge(brick((0.04, 0.03, 0.001)), STEEL, 2e4, None)
+
+
+def test_a_curved_wall_is_cut_no_shorter_for_bending_up_to_a_frequency() -> None:
+    """Filling makes twice as many unknowns of it, in ten times the time."""
+    mug = build("mug")
+    edges = [fine_edge(mug, MATERIALS["ceramic"], limit, None) for limit in (8e3, 20e3)]
+    assert edges[0] == edges[1] > 1.2 * thin_wall(mug, 0.5)
+
+
+def test_a_compact_body_is_cut_by_the_wave_of_shear_at_the_limit() -> None:
+    limit = 1.3 * weyl_frequency(brick(CUBE), STEEL, 40, float(np.prod(CUBE)))
+    assert fine_edge(brick(CUBE), STEEL, limit, None) == pytest.approx(FINE_SHARE * shear_wave(limit))
 
 
 def test_a_bar_of_any_length_is_cut_across_its_section() -> None:
