@@ -119,7 +119,7 @@ class Child:
             raise SafetyStop("a stop was requested before this motion began; it was not sent")
         self._require_calm("move")
         motion = Motion.from_message(message, self._stream.force)
-        if motion.pose is not None and not self._link.reachable(motion.pose, motion.near):
+        if motion.pose is not None and not self._reachable(motion.pose, motion.near):
             raise BenchFault(
                 f"{motion.what}: the controller finds no joints for the target; nothing was moved"
             )
@@ -132,6 +132,19 @@ class Child:
         except TouchstoneError:
             self._end_motion()
             raise
+
+    def _reachable(self, pose: list[float], near: list[float]) -> bool:
+        """Ask the controller; once more where this computer's own delay ended the script that was asked.
+
+        Nothing has begun to move yet, so asking twice does nothing twice.
+        """
+        try:
+            return self._link.reachable(pose, near)
+        except RuntimeError:
+            self._check_script()
+            if not self._link.program_running():
+                raise
+            return self._link.reachable(pose, near)
 
     def _zero_force(self) -> None:
         self._require_calm("zero the force sensor")

@@ -403,3 +403,47 @@ def test_a_call_that_the_library_could_not_make_is_told_with_the_controllers_sta
     assert told["text"] == (
         "ur_rtde failed (isProgramRunning() function did not succeed!); its watchdog kept waiting for 300 ms"
     )
+
+
+@dataclass
+class AskedLink(ScriptedLink):
+    """A link whose script ends while it is asked for joints, as often as it is told to."""
+
+    patience: float = 0.1
+    ends: int = 1
+    asked: int = 0
+
+    def reachable(self, pose: list[float], near: list[float]) -> bool:
+        self.asked += 1
+        if self.asked > self.ends:
+            return True
+        self.alive = False
+        raise RuntimeError("getInverseKinematicsHasSolution() function did not succeed!")
+
+    def revive(self) -> None:
+        self.done.append("revive")
+        self.alive = True
+
+    def kick(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("case", ["late once", "late twice", "not late", "not at rest"])
+def test_joints_are_asked_for_again_only_where_a_late_kick_ended_the_script(case: str) -> None:
+    link: Any = AskedLink(ends=2 if case == "late twice" else 1)
+    out, replies = os.pipe()
+    child = Child(link, -1, replies)
+    child._watchdog.start()
+    for k in range(3):
+        child._stream._accept(a_packet(100.0 + 0.002 * k, speed=0.5 if case == "not at rest" else 0.0), 0.002)
+    if case != "not late":
+        child._watchdog._kicked -= 1.0
+    if case == "late once":
+        assert child._reachable([0.0] * 6, [0.0] * 6)
+        assert link.done == ["revive"]
+    else:
+        with pytest.raises(RuntimeError, match="did not succeed"):
+            child._reachable([0.0] * 6, [0.0] * 6)
+        assert link.done == (["revive"] if case == "late twice" else [])
+    os.close(out)
+    os.close(replies)
