@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
+from inspect import signature
 from typing import Any
 
 import typer
@@ -23,8 +24,9 @@ class Interrupted(TouchstoneError):
 
     exit_code = 130
 
-    def __init__(self) -> None:
-        super().__init__("interrupted; what is committed is kept, go on with --resume")
+    def __init__(self, resumes: bool = False) -> None:
+        kept = "; what was recorded is kept, go on with --resume" if resumes else ""
+        super().__init__(f"interrupted{kept}")
 
 
 @dataclass(frozen=True)
@@ -199,7 +201,7 @@ def _interruptible(body: Callable[..., Any]) -> Callable[..., Any]:
         try:
             return body(*arguments, **options)
         except KeyboardInterrupt as interrupt:
-            raise Interrupted from interrupt
+            raise Interrupted("resume" in signature(body).parameters) from interrupt
 
     return command
 

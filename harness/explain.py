@@ -44,15 +44,31 @@ def as_json(chosen: Plan) -> dict[str, Any]:
     return {"ran": ran, "skipped": skipped}
 
 
-def as_table(chosen: Plan) -> Table:
-    """The same for a terminal."""
+def as_table(chosen: Plan, left_out: bool = True) -> Table:
+    """The same for a terminal.
+
+    Args:
+        chosen: the plan.
+        left_out: whether an effect that does not run has a row too.
+    """
     table = Table(title=f"to compute {', '.join(chosen.wanted)}")
     for heading in ("effect", "runs", "why", "levels"):
         table.add_column(heading)
     for step in chosen.ran:
         levels = ", ".join(f"{name} = {level}" for name, level in step.levels.items())
         table.add_row(step.effect.provides, "[green]yes[/]", step.reason, levels)
-    for skipped in chosen.skipped:
+    for skipped in chosen.skipped if left_out else ():
         reason = skipped.reason.replace("[", r"\[")
         table.add_row(skipped.effect.provides, "no", reason, "", style="dim")
     return table
+
+
+def left_out(chosen: Plan) -> list[str]:
+    """A sentence for each reason why effects do not run: ``"the gel has no markers: touch.markers, ..."``."""
+    named: dict[str, list[str]] = {}
+    for skipped in chosen.skipped:
+        name = skipped.effect.provides
+        # What passes through in its place, and its own name, would make every reason another one.
+        reason = skipped.reason.split("; ")[0].replace(f" {name}", " it")
+        named.setdefault(reason, []).append(name)
+    return [f"{reason}: {', '.join(names)}" for reason, names in named.items()]

@@ -17,12 +17,13 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from harness.errors import TouchstoneError
 from harness.step_file import Step
 
-CONSOLE = Console(stderr=True, highlight=False, soft_wrap=True)
 WIDE = 132
-"""Columns of a table where standard output is no terminal."""
+"""Columns of a table where what it is written to is no terminal."""
 
+CONSOLE = Console(stderr=True, highlight=False, soft_wrap=True, width=None if sys.stderr.isatty() else WIDE)
 ANSWERS = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else WIDE)
 
 
@@ -35,6 +36,16 @@ def emit(result: Mapping[str, Any]) -> None:
 def warn(sentence: str) -> None:
     """Something the operator should know."""
     CONSOLE.print(f"[yellow]note:[/] {escape(sentence)}")
+
+
+@contextmanager
+def resumable(how: str) -> Iterator[None]:
+    """Where a bench fails within it, say with which command the run goes on; the failure is raised on."""
+    try:
+        yield
+    except TouchstoneError:
+        warn(f"what was recorded is kept; go on with `{how}`")
+        raise
 
 
 class StepProgress:

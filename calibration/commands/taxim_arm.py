@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from harness.errors import WrongUse
-from harness.output import CONSOLE, emit
+from harness.output import CONSOLE, emit, resumable
 from harness.step_file import Step
 
 if TYPE_CHECKING:
@@ -67,7 +67,8 @@ def pressed(wanted: Wanted, as_json: bool) -> Path | None:
     total = len(recording.header.plan["steps"])
     if recording.committed < total:
         CONSOLE.print(f"recording to {recording.folder}", markup=False)
-        with _progress(recording.committed, total) as told:
+        how = f"touchstone calibrate taxim --resume {recording.folder}"
+        with resumable(how), _progress(recording.committed, total) as told:
             complete, _ = perform_on_bench(recording, told, told.say)
         if not complete:
             _stopped(recording, as_json)

@@ -8,7 +8,7 @@ import typer
 
 from harness import options
 from harness.errors import WrongUse
-from harness.output import ANSWERS, CONSOLE, emit, millimetres, step_progress, warn
+from harness.output import ANSWERS, CONSOLE, emit, millimetres, resumable, step_progress, warn
 
 
 class Experiment(StrEnum):
@@ -109,7 +109,7 @@ def run(
             _foresee(target, wanted)
         begun = session_of.start(wanted, bench, wanted.localization.seed if seed is None else seed, gap, out)
         recording = begun.recording
-        _describe(begun)
+        _describe(begun, accuracy)
     complete, health = _perform(recording, accuracy, json)
     if not complete:
         return _stopped(recording, json)
@@ -248,7 +248,8 @@ def _perform(recording: Any, accuracy: Any, as_json: bool) -> tuple[bool, Any]:
     if recording.committed == total:
         return True, None  # nothing is left to touch: no bench is opened
     CONSOLE.print(f"recording to {recording.folder}", markup=False)
-    with step_progress(recording.committed, total) as progress:
+    how = f"touchstone run contact-localization --resume {recording.folder}"
+    with resumable(how), step_progress(recording.committed, total) as progress:
         return session_of.perform_on_bench(recording, progress, None if as_json else _ask, accuracy)
 
 
@@ -257,9 +258,9 @@ def _ask(what: str) -> None:
     CONSOLE.print(what, markup=False, style="bold")
 
 
-def _describe(begun: Any) -> None:
-    """What is about to happen, before anything moves."""
-    from harness.explain import as_table, scene_plan
+def _describe(begun: Any, accuracy: Any) -> None:
+    """What is about to happen, before anything moves; what is simulated, at the levels that were turned."""
+    from harness.explain import as_table, left_out, scene_plan
     from harness.run_folder import RunFiles
 
     run = RunFiles(begun.recording)
@@ -273,7 +274,11 @@ def _describe(begun: Any) -> None:
         f"rehearsed in the twin: {begun.plan.rehearsal.segments} motions, none refused; "
         f"{len(begun.plan.rehearsal.warnings)} warnings"
     )
-    CONSOLE.print(as_table(scene_plan(run.scene, run.station.gel.sensor)))
+    effects = scene_plan(run.scene, run.station.gel.sensor, accuracy)
+    CONSOLE.print(as_table(effects, left_out=False))
+    CONSOLE.print("not simulated:")
+    for sentence in left_out(effects):
+        CONSOLE.print(f"  {sentence}", markup=False)
 
 
 def _refuse_with_resume(**given: object) -> None:

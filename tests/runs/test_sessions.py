@@ -154,9 +154,35 @@ def test_what_no_command_foresaw_is_one_sentence_too(
     assert code == answer["exit_code"] == (130 if isinstance(error, KeyboardInterrupt) else 1)
     assert "Traceback" not in captured.err
     assert answer["error"] in (
-        "interrupted; what is committed is kept, go on with --resume",
+        "interrupted; what was recorded is kept, go on with --resume",
         "runs/x: Permission denied",
     )
+
+
+def test_ctrl_c_of_a_command_that_does_not_resume_does_not_send_to_resume(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], done: Recording, tmp_path: Path
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(session_of, "finish", fail)
+    assert invoke(["replay", str(done.folder), "--out", str(tmp_path / "replay")]) == 130
+    assert capsys.readouterr().err == "error: interrupted\n"
+
+
+def test_a_run_that_its_bench_ends_says_how_it_goes_on(
+    done: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise BenchFault("the arm is gone")
+
+    monkeypatch.setattr(session_of, "perform_on_bench", fail)
+    folder = copied(done, tmp_path / "run").folder
+    (folder / "steps" / "002.mcap").unlink()
+    assert invoke(["run", "--resume", str(folder)]) == 1
+    said = capsys.readouterr().err
+    assert f"touchstone run contact-localization --resume {folder}" in said
+    assert said.endswith("error: the arm is gone\n")
 
 
 def test_a_warning_keeps_its_brackets(capsys: pytest.CaptureFixture[str]) -> None:

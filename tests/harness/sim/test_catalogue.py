@@ -12,7 +12,7 @@ from harness.accuracy import Accuracy
 from harness.effects import Effect, Facts, by_name, knobs_of
 from harness.errors import WrongUse
 from harness.evaluate import evaluate
-from harness.explain import as_json, as_table, scene_plan
+from harness.explain import as_json, as_table, left_out, scene_plan
 from harness.geometry import inverse, transform
 from harness.mesh import Mesh
 from harness.objects.household import build
@@ -251,3 +251,14 @@ def test_names_and_knobs_are_unique() -> None:
 
 def test_the_table_has_a_row_for_every_effect() -> None:
     assert as_table(scene_plan(SCENE, GELSIGHT_R15)).row_count == len(EFFECTS)
+
+
+def test_what_runs_has_a_row_and_each_reason_not_to_run_a_sentence() -> None:
+    made = scene_plan(SCENE, GELSIGHT_R15)
+    assert as_table(made, left_out=False).row_count == len(made.ran)
+    sentences = dict(sentence.split(": ") for sentence in left_out(made))
+    named = [name for names in sentences.values() for name in names.split(", ")]
+    assert sorted(named) == sorted(skipped.effect.provides for skipped in made.skipped)
+    assert len(sentences) < len(named)
+    assert "touch.shadow" in sentences["the sensor casts no shadows"]
+    assert "arm.dynamics" in sentences["nothing asked for it"]
