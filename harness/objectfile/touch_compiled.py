@@ -16,13 +16,14 @@ from harness.arrays import AnyArray
 from harness.errors import DataRefused, WrongUse
 from harness.objectfile.entries import NetworkEntry
 from harness.objectfile.graph_check import checked_graph, require_declared
-from harness.objectfile.touch_graph import LOOKUPS, PatchCodes, coarseness, codes_graph, ray_places
+from harness.objectfile.touch_graph import LOOKUPS, PatchCodes, coarseness, codes_graph
 from harness.objectfile.touch_kernels import press
+from harness.objectfile.touch_rays import ray_places
 from harness.sensor import TactileSensor
 from harness.sim.gel import half_kernel
 from harness.sim.tactile_calibration import GelSkirt
 
-_CODES, _COLUMNS, _MEAN, _COVER, _SCALE = "c1", "c2", "c4", "c6", "c8"
+_CODES, _COLUMNS, _MEAN, _COVER, _SCALE = "c1", "c2", "c4", "c7", "c9"
 """Names of constants, as ``codes_graph`` counts them."""
 
 
@@ -38,11 +39,14 @@ class CompiledCodes:
 
     def __init__(self, patches: PatchCodes, sensor: TactileSensor, skirt: GelSkirt, threads: int = 1) -> None:
         self.sensor, self.threads = sensor, threads
-        inside, count = patches.inside.ravel(), len(patches.codes)
-        self._heights = np.full((count, inside.size), np.float32(patches.outside))
+        # A ring of nothing about a patch: what lies farther out is as far from the gel as all outside is.
+        inside, count = np.pad(patches.inside, 1).ravel(), len(patches.codes)
+        self._outside = np.float32(patches.outside)
+        self._heights = np.zeros((count, inside.size), np.float32)
         # As the graph: half precision's millimetres to float32's metres.
         millimetres = (patches.codes * 1e3).astype(np.float16)
-        self._heights[:, inside] = millimetres * np.float32(1e-3) + patches.mean.astype(np.float32)
+        above = patches.mean.astype(np.float32) - self._outside
+        self._heights[:, inside] = millimetres * np.float32(1e-3) + above
         self._covers = np.zeros(self._heights.shape, np.uint8)
         self._covers[:, inside] = patches.cover
         half = 0.5 * len(patches.inside) * patches.pitch
@@ -65,6 +69,7 @@ class CompiledCodes:
                 "counted from 0; they were not built together, build the object again"
             )
         motions = np.swapaxes(inputs["node_from_gel"].astype(np.float32), 1, 2) * self._scale
+        motions[:, 3, 2] -= self._outside
         maps = np.empty((len(nodes), self.sensor.rows, self.sensor.columns), np.float32)
         parts = np.array_split(np.arange(len(nodes)), max(1, min(self.threads, len(nodes))))
         if len(parts) == 1:

@@ -21,6 +21,7 @@ from onnx import ModelProto, TensorProto, helper
 from harness.arrays import AnyArray, BoolArray, ByteArray, FloatArray
 from harness.errors import WrongUse
 from harness.objectfile.graph import Nodes, Storage
+from harness.objectfile.touch_rays import between, ray_places, row_terms
 from harness.objectfile.touch_skirt import hung
 from harness.sensor import TactileSensor
 from harness.sim.tactile_calibration import GelSkirt
@@ -103,15 +104,14 @@ def codes_graph(
     half_width = 0.5 * size * patches.pitch
     moved = nodes.add("Transpose", nodes.add("Cast", "node_from_gel", to=TensorProto.FLOAT), perm=[0, 2, 1])
     scale = np.array([1.0 / half_width, 1.0 / half_width, 1.0], np.float32)
-    motion = _Motion(nodes, nodes.add("Mul", moved, nodes.constant(scale)), sensor)
+    motion = _Motion(nodes, nodes.add("Mul", moved, nodes.constant(scale)), sensor, patches.outside)
     coarse, half = coarseness(patches, sensor)
-    along = None
+    near: str | None = None
     for _ in range(lookups - 1):
-        along = motion.to_height(heights, along, coarse)
-    near = None if along is None else motion.clipped(along)
-    covered = motion.look_up(covers, None if near is None else motion.finer(near, coarse, half), half)
-    along = motion.to_height(heights, None if near is None else motion.finer(near, coarse, 1), 1)
-    reached = motion.where_covered(nodes.add("Neg", along), motion.finer(covered, half, 1))
+        near = motion.clipped(motion.to_height(heights, near, coarse, coarse))
+    covered = motion.finer(motion.look_up(covers, near, coarse, half), half)
+    along = motion.to_height(heights, near, coarse, 1)
+    reached = motion.where_covered(nodes.add("Neg", along), covered)
     limits = [nodes.constant(np.array(value, np.float32)) for value in (0.0, sensor.gel_thickness)]
     deep = nodes.add("Clip", reached, *limits)
     nodes.add("Identity", hung(nodes, deep, sensor, skirt), name="maps")
@@ -127,7 +127,7 @@ def codes_graph(
 
 
 def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
-    """``(n, 1, size, size)``: heights of the asked nodes, and covers."""
+    """``(n, 1, size, size)``: heights of the asked nodes over that of all that lies outside, and covers."""
     size = len(patches.inside)
     asked = nodes.add("Reshape", "node", _shape(nodes, -1))
     # In half precision what is below 60 um would be lost, were it metres.
@@ -147,9 +147,8 @@ def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
         flat = nodes.add("MatMul", code, nodes.add("Gather", held, index, axis=1))
     mean = np.append(patches.mean, patches.outside)[columns.ravel()].astype(np.float32)
     metres = nodes.add("Mul", flat, nodes.constant(np.array(1e-3, np.float32)))
-    heights = nodes.add(
-        "Reshape", nodes.add("Add", metres, nodes.constant(mean)), _shape(nodes, -1, 1, size, size)
-    )
+    above = nodes.add("Sub", nodes.constant(mean), nodes.constant(np.array(patches.outside, np.float32)))
+    heights = nodes.add("Reshape", nodes.add("Add", metres, above), _shape(nodes, -1, 1, size, size))
     none = np.zeros((len(patches.cover), 1), np.uint8)
     cover = nodes.add("Gather", nodes.constant(np.hstack([patches.cover, none])), asked, axis=0)
     spread = nodes.add("Cast", nodes.add("Gather", cover, index, axis=1), to=TensorProto.FLOAT)
@@ -163,45 +162,60 @@ def coarseness(patches: PatchCodes, sensor: TactileSensor) -> tuple[int, int]:
     return coarse, 2 if coarse > 1 and 2.0 * sensor.pitch <= patches.pitch else 1
 
 
-def ray_places(sensor: TactileSensor, coarse: int) -> tuple[AnyArray, AnyArray]:
-    """Float32 x and y, m, of rays that are ``coarse`` pixels apart."""
-    rows, columns, pitch = sensor.rows // coarse, sensor.columns // coarse, sensor.pitch * coarse
-    x = (np.arange(columns) + 0.5 - columns / 2) * pitch
-    y = (np.arange(rows) + 0.5 - rows / 2) * pitch
-    return x.astype(np.float32), y.astype(np.float32)
-
-
 class _Motion:
     """The rays of a gel's pixels through the heights of a node."""
 
-    def __init__(self, nodes: Nodes, motion: str, sensor: TactileSensor) -> None:
+    def __init__(self, nodes: Nodes, motion: str, sensor: TactileSensor, outside: float) -> None:
         self._nodes, self._sensor = nodes, sensor
-        self._rays: dict[int, str] = {}
+        self._names: dict[tuple[str, int], str] = {}
         columns, height = self._cut(motion, 2, 0, 2), self._cut(motion, 2, 2, 3)
-        self._across, self._height = columns, height
+        # Heights are counted from the height outside, and so are those of the gel's plane.
+        over = np.array([[0.0], [0.0], [0.0], [outside]], np.float32)
+        self._across, self._height = columns, nodes.add("Sub", height, nodes.constant(over))
         self._drift = self._cut(columns, 1, 2, 3)
         least = nodes.constant(np.array(_LEAST_COSINE, np.float32))
         self._rise = nodes.add("Max", self._cut(height, 1, 2, 3), least)
         limits = (-sensor.gel_thickness, sensor.gel_thickness)
         self._limits = [nodes.constant(np.array(value, np.float32)) for value in limits]
 
-    def to_height(self, heights: str, along: str | None, coarse: int) -> str:
-        """``(n, rays, 1)`` m along the gel's z axis to the height under where ``along`` is."""
+    def to_height(self, heights: str, near: str | None, coarse: int, fine: int) -> str:
+        """``(n, rows, columns)`` m along the gel's z axis to the height under the rays, as ``look_up``."""
         nodes = self._nodes
-        found = self.look_up(heights, None if along is None else self.clipped(along), coarse)
-        plane = nodes.add("MatMul", self._spread(coarse), self._height)
+        found = self.look_up(heights, near, coarse, fine)
+        plane = nodes.add("MatMul", self._rows(fine), self._line(self._height, fine))
         return nodes.add("Div", nodes.add("Sub", found, plane), self._rise)
 
-    def look_up(self, image: str, near: str | None, coarse: int) -> str:
-        """``(n, rays, 1)`` of an image of the node, where rays are ``near`` metres along the gel's z."""
+    def look_up(self, image: str, near: str | None, coarse: int, fine: int) -> str:
+        """``(n, rows, columns)`` of an image of the node, of rays that are ``fine`` pixels apart.
+
+        They are ``near`` metres along the gel's z, ``(n, rows, columns)`` of rays ``coarse`` pixels apart and
+        linear between them; in the gel's plane if None.
+        """
         nodes, sensor = self._nodes, self._sensor
-        where = nodes.add("MatMul", self._spread(coarse), self._across)
-        if near is not None:
-            where = nodes.add("Add", where, nodes.add("MatMul", near, self._drift))
-        rows, columns = sensor.rows // coarse, sensor.columns // coarse
-        grid = nodes.add("Reshape", where, _shape(nodes, -1, rows, columns, 2))
-        found = nodes.add("GridSample", image, grid, mode="bilinear", padding_mode="border", align_corners=0)
-        return nodes.add("Reshape", found, _shape(nodes, -1, rows * columns, 1))
+        rows, columns = sensor.rows // fine, sensor.columns // fine
+        grid = nodes.add("Reshape", self._places(near, coarse, fine), _shape(nodes, -1, rows, columns, 2))
+        found = nodes.add("GridSample", image, grid, mode="bilinear", padding_mode="zeros", align_corners=0)
+        return nodes.add("Reshape", found, _shape(nodes, -1, rows, columns))
+
+    def _places(self, near: str | None, coarse: int, fine: int) -> str:
+        """``(n, rows, 2 columns)``: where the rays are in the patch, x and y in turn.
+
+        A place is a sum of what its row says, what its column says and the way along the ray, so that all are
+        found by products with a few columns: one for each ray takes onnxruntime five times as long.
+        """
+        nodes, sensor = self._nodes, self._sensor
+        line = self._line(self._across, fine)
+        if near is None:
+            return nodes.add("MatMul", self._rows(fine), line)
+        rows, columns, step = sensor.rows // coarse, sensor.columns // coarse, coarse // fine
+        shift = nodes.add("MatMul", nodes.add("Reshape", near, _shape(nodes, 0, -1, 1)), self._drift)
+        shift = nodes.add("Reshape", shift, _shape(nodes, -1, rows, 2 * columns))
+        if step == 1:
+            return nodes.add("Add", nodes.add("MatMul", self._rows(fine), line), shift)
+        wide = np.kron(between(columns * step, step).T, np.eye(2, dtype=np.float32))
+        shift = nodes.add("MatMul", shift, nodes.constant(wide))
+        tall = np.hstack([between(rows * step, step), row_terms(sensor, fine)])
+        return nodes.add("MatMul", nodes.constant(tall), nodes.add("Concat", shift, line, axis=1))
 
     def clipped(self, along: str) -> str:
         """No farther from the gel's plane than the gel is thick; beyond is no touch, or too much."""
@@ -209,54 +223,42 @@ class _Motion:
 
     def where_covered(self, reached: str, covers: str) -> str:
         """``(n, rows, columns)`` m that the object reaches into the gel; 0 where there is no surface."""
+        nodes = self._nodes
+        covered = nodes.add("Greater", covers, nodes.constant(np.array(_COVERED, np.float32)))
+        return nodes.add("Where", covered, reached, nodes.constant(np.array(0.0, np.float32)))
+
+    def finer(self, image: str, coarse: int) -> str:
+        """``(n, rows, columns)`` of the pixels, linear between rays that are ``coarse`` pixels apart."""
+        if coarse == 1:
+            return image
         nodes, sensor = self._nodes, self._sensor
-        # As images: comparing rays, whose last axis is 1 long, costs onnxruntime ten times as much.
-        images = [
-            nodes.add("Reshape", value, _shape(nodes, -1, sensor.rows, sensor.columns))
-            for value in (reached, covers)
-        ]
-        covered = nodes.add("Greater", images[1], nodes.constant(np.array(_COVERED, np.float32)))
-        return nodes.add("Where", covered, images[0], nodes.constant(np.array(0.0, np.float32)))
+        tall = nodes.add("MatMul", nodes.constant(between(sensor.rows, coarse)), image)
+        return nodes.add("MatMul", tall, nodes.constant(between(sensor.columns, coarse).T))
 
-    def finer(self, value: str, coarse: int, fine: int) -> str:
-        """``(n, rays, 1)`` of rays ``fine`` pixels apart, linear between those ``coarse`` pixels apart."""
-        if coarse == fine:
-            return value
-        nodes, rows, columns = self._nodes, self._sensor.rows // fine, self._sensor.columns // fine
-        step = coarse // fine
-        image = nodes.add("Reshape", value, _shape(nodes, -1, rows // step, columns // step))
-        tall = nodes.add("MatMul", nodes.constant(_between(rows, step)), image)
-        wide = nodes.add("MatMul", tall, nodes.constant(_between(columns, step).T))
-        return nodes.add("Reshape", wide, _shape(nodes, -1, rows * columns, 1))
+    def _line(self, motion: str, fine: int) -> str:
+        """``(n, 2, columns k)`` of a motion to k numbers, ``(n, 4, k)``.
 
-    def _spread(self, coarse: int) -> str:
-        """The rays' places, kept once in the file."""
-        if coarse not in self._rays:
-            self._rays[coarse] = self._nodes.constant(_rays(self._sensor, coarse))
-        return self._rays[coarse]
+        What a place's column says of it, in which x and 1 count, and the step along y: a row's terms times
+        these are the motion of all its places.
+        """
+        x = ray_places(self._sensor, fine)[0]
+        terms = np.zeros((2, len(x), 4), np.float32)
+        terms[0, :, 0], terms[0, :, 3], terms[1, :, 1] = x, 1.0, 1.0
+        line = self._nodes.add("MatMul", self._kept(("columns", fine), terms.reshape(-1, 4)), motion)
+        return self._nodes.add("Reshape", line, _shape(self._nodes, 0, 2, -1))
+
+    def _rows(self, fine: int) -> str:
+        return self._kept(("rows", fine), row_terms(self._sensor, fine))
+
+    def _kept(self, name: tuple[str, int], value: AnyArray) -> str:
+        """The constant of that name, once in the file."""
+        if name not in self._names:
+            self._names[name] = self._nodes.constant(value)
+        return self._names[name]
 
     def _cut(self, value: str, axis: int, first: int, last: int) -> str:
         ends = [self._nodes.constant(np.array([number])) for number in (first, last, axis)]
         return self._nodes.add("Slice", value, *ends)
-
-
-def _rays(sensor: TactileSensor, coarse: int) -> AnyArray:
-    """``(rays, 4)`` float32: places of the gel's plane, homogeneous."""
-    x, y = ray_places(sensor, coarse)
-    places = np.zeros((len(y), len(x), 4), np.float32)
-    places[:, :, 0], places[:, :, 1], places[:, :, 3] = x, y[:, None], 1.0
-    return places.reshape(-1, 4)
-
-
-def _between(size: int, coarse: int) -> AnyArray:
-    """``(size, size / coarse)`` float32: linear between coarse pixels, constant beyond the outer ones."""
-    count = size // coarse
-    at = np.clip((np.arange(size) + 0.5) / coarse - 0.5, 0.0, count - 1.0)
-    first = np.minimum(at.astype(np.int64), max(count - 2, 0))
-    matrix = np.zeros((size, count), np.float32)
-    matrix[np.arange(size), first] = 1.0 - (at - first)
-    np.add.at(matrix, (np.arange(size), np.minimum(first + 1, count - 1)), at - first)
-    return matrix
 
 
 def _shape(nodes: Nodes, *sizes: int) -> str:

@@ -33,10 +33,11 @@ def press(
     """Maps of presses.
 
     Args:
-        heights: ``(nodes, size * size)`` m, float32.
-        covers: ``(nodes, size * size)`` uint8.
+        heights: ``(nodes, size * size)`` m over that of all outside, float32, with a ring of zeros.
+        covers: ``(nodes, size * size)`` uint8, likewise.
         nodes: ``(n,)`` of each press.
-        motions: ``(n, 4, 3)``: places of the gel's plane, homogeneous, to the patch's width and to m.
+        motions: ``(n, 4, 3)``: places of the gel's plane, homogeneous, to the patch's width and to m over all
+            outside.
         grids: of the coarse rays, the covers' and the pixels': pixels a side of each, and its x and y in m.
         lookups: along each ray.
         thickness: m, of the gel.
@@ -91,10 +92,10 @@ def _along(
 def _look_up(
     image: AnyArray, motion: AnyArray, x: AnyArray, y: AnyArray, near: AnyArray, out: AnyArray
 ) -> None:
-    """A square image, linear between its pixels and constant beyond them, where the rays are."""
+    """A square image with a ring of zeros, linear between its pixels and zero beyond, where the rays are."""
     size = math.sqrt(len(image))
     across, last, most = np.uint32(size), np.float32(size - 1), np.uint32(size - 2)
-    scale, shift = np.float32(0.5 * size), np.float32(0.5 * (size - 1))
+    scale, shift = np.float32(0.5 * (size - 2)), np.float32(0.5 * (size - 1))
     a0, a1, a2 = motion[0, 0] * scale, motion[1, 0] * scale, motion[2, 0] * scale
     b0, b1, b2 = motion[0, 1] * scale, motion[1, 1] * scale, motion[2, 1] * scale
     a3, b3 = motion[3, 0] * scale + shift, motion[3, 1] * scale + shift

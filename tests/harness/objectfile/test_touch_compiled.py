@@ -101,6 +101,21 @@ def test_a_window_that_coarse_rays_do_not_divide_is_computed_too(peg: ObjectFile
     assert np.count_nonzero(apart > ROUNDING) <= 1e-3 * apart.size
 
 
+def test_beyond_a_patch_there_is_nothing_to_touch(peg: ObjectFile) -> None:
+    compiled, graph = maps_of(peg), maps_of(peg, compiled=False)
+    assert isinstance(compiled.network, CompiledCodes)
+    patches = tb.coded().patches
+    half = 0.5 * len(patches.inside) * patches.pitch
+    # The gel's middle is on the patch's rim, 1 mm deep; its right half is beyond.
+    pose = np.eye(4)[None, :3].repeat(2, axis=0)
+    pose[0, 0, 3], pose[1, 0, 3], pose[:, 2, 3] = half, 40.0 * half, 1e-3
+    asked = {"node": np.zeros((2, 1), np.int64), "node_from_gel": pose}
+    maps = graph.network(asked)["maps"]
+    np.testing.assert_allclose(compiled.network(asked)["maps"], maps, rtol=0.0, atol=ROUNDING)
+    assert not maps[0, :, -tb.SENSOR.columns // 3 :].any()
+    assert not maps[1].any()
+
+
 def test_only_what_codes_graph_makes_is_taken_for_codes(peg: ObjectFile) -> None:
     patches = tb.coded().patches
     assert recognised(codes_graph(patches, tb.SENSOR, tb.SKIRT), peg) is not None
