@@ -148,9 +148,10 @@ def _by_contact(scored: Scored, geometry: tuple[float, ...] | None) -> tuple[Cur
         float(np.linalg.norm(estimate.position_in_object - point))
         for estimate, point in zip(scored.found.estimates, true, strict=True)
     )
-    curves = [Curve(SENSES[scored.found.sense], counts, ours), *_by_other_senses(scored, true)]
+    sense = scored.found.sense
+    curves = [Curve(SENSES[sense], counts, ours, by=sense), *_by_other_senses(scored, true)]
     if geometry is not None:
-        curves.append(Curve("translations alone, no image", counts, geometry))
+        curves.append(Curve("translations alone, no image", counts, geometry, by="geometry"))
     return tuple(curves)
 
 
@@ -169,7 +170,7 @@ def _by_other_senses(scored: Scored, true: FloatArray) -> Iterator[Curve]:
             continue
         points = [estimate.position_in_object for estimate in (*early, last)]
         errors = tuple(float(np.linalg.norm(p - t)) for p, t in zip(points, true, strict=True))
-        yield Curve(SENSES[sense], tuple(float(k + 1) for k in range(count)), errors)
+        yield Curve(SENSES[sense], tuple(float(k + 1) for k in range(count)), errors, by=sense)
 
 
 def _by_seconds(trade: tuple[Point, ...]) -> tuple[Curve, ...] | Missing:
@@ -185,9 +186,17 @@ def _by_seconds(trade: tuple[Point, ...]) -> tuple[Curve, ...] | Missing:
             tuple(point.seconds_a_contact for point in points),
             tuple(point.error for point in points),
             tuple(point.name for point in points),
+            by=_by(points[0].levels, heard),
         )
         for name, points in methods.items()
     )
+
+
+def _by(levels: Levels, heard: bool) -> str:
+    """What answers: the paper's filter, or a sense; of a run without sound all are touch."""
+    if levels.method == "particle":
+        return levels.method
+    return levels.senses if heard else "touch"
 
 
 def _method(levels: Levels, heard: bool) -> str:
@@ -221,12 +230,21 @@ def _world(scored: Scored) -> dict[str, str] | Missing:
         "optics_level, the comparison's": str(scored.accuracy.get("touch.optics", "")),
         "calibration_sha256, the estimator's": scored.run.calibration.sha256,
     }
-    return {name: _said(value) for name, value in (*scored.truth.differences.items(), *ours.items())}
+    return {name: _said(value) for name, value in (*_flat(scored.truth.differences), *ours.items())}
+
+
+def _flat(tree: Mapping[str, object], above: str = "") -> Iterator[tuple[str, object]]:
+    """Names and values of a tree, those of a branch with its name before theirs."""
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value
 
 
 def _said(value: object) -> str:
     if isinstance(value, float):
-        return f"{value:.4g}"
+        return f"{value:.4g}" if value else "0"  # nor -0
     if isinstance(value, list):
         return ", ".join(_said(item) for item in value)
     return str(value)

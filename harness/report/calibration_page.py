@@ -203,6 +203,7 @@ def moves_figure(moves: MovesFigure) -> Figure:
         axes.autoscale_view()
         axes.set_aspect("equal")
         axes.invert_yaxis()
+        axes.set_title(f"arrows: off the arm's map, {_LONGER:g} times as long", fontsize=9, loc="left")
         axes.set_xlabel("x of the tool's gel frame, mm")
         axes.set_ylabel("y, mm")
         axes.legend(frameon=False, fontsize=9, loc="upper right")

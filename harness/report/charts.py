@@ -1,5 +1,7 @@
 """Errors against contacts and against seconds."""
 
+from types import MappingProxyType
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -9,6 +11,10 @@ from harness.report.marks import key, number_marks
 from harness.report.style import blank, styled
 
 _COLOURS = ("#c2410c", "#5b616b", "#0f766e", "#1b3fae", "#9d6b00", "#8a2d79")
+_OF = MappingProxyType(
+    {"both": "#c2410c", "touch": "#0f766e", "audio": "#1b3fae", "geometry": "#5b616b", "particle": "#8a2d79"}
+)
+"""Colours of what a curve is by, the same in every chart of a report."""
 
 
 def error_chart(curves: tuple[Curve, ...], x_label: str, logarithmic_x: bool) -> Figure:
@@ -37,7 +43,7 @@ def error_chart(curves: tuple[Curve, ...], x_label: str, logarithmic_x: bool) ->
                 marker="o" if strong else ".",
                 lw=2.2 if strong else 1.2,
                 ls="-" if strong else "--",
-                color=_COLOURS[index % len(_COLOURS)],
+                color=_OF.get(curve.by, _COLOURS[index % len(_COLOURS)]),
                 label=curve.name,
                 zorder=3 if strong else 2,
             )
@@ -56,7 +62,8 @@ def error_chart(curves: tuple[Curve, ...], x_label: str, logarithmic_x: bool) ->
             axes.set_xticks(sorted({x for curve in curves for x in curve.x}))
         axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)
         axes.set_axisbelow(True)
-        axes.legend(frameon=False, fontsize=9)
+        # Named, "best" is looked for as long as it takes; left out, a slow machine is warned of.
+        axes.legend(loc="best", frameon=False, fontsize=9)
         if labels:
             at = np.array(
                 [

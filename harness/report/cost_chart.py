@@ -46,7 +46,7 @@ def cost_chart(points: Sequence[Point], families: Sequence[str], title: str, sta
         axes.set_xlabel("seconds of CPU time, from readings to answer (geometric mean, 90 % interval)")
         axes.set_ylabel("error in mm (mean, each at most 20 mm; 90 % interval)")
         _logarithmic(axes)
-        axes.legend(frameon=False, fontsize=8)
+        axes.legend(loc="best", frameon=False, fontsize=8)  # named: see charts.py
         key(axes, [f"{number}  {point.name}" for number, point in enumerate(best, start=1)])
         number_marks(figure, axes, at, [str(number) for number in range(1, len(best) + 1)])
     return figure

@@ -111,12 +111,15 @@ class Curve:
         x: contacts, or seconds.
         error: metres, as many.
         labels: beside each point, or empty.
+        by: "both", "touch", "audio", "geometry" or "particle", which has a colour of its own; empty for
+            the next of the chart's colours.
     """
 
     name: str
     x: tuple[float, ...]
     error: tuple[float, ...]
     labels: tuple[str, ...] = ()
+    by: str = ""
 
 
 @dataclass(frozen=True)

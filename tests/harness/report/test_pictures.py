@@ -150,6 +150,18 @@ def test_errors_of_zero_are_drawn_on_a_logarithmic_scale() -> None:
     assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["ours", "other"]  # type: ignore[union-attr]
 
 
+def test_what_answers_has_one_colour_in_every_chart() -> None:
+    def colours(*named: str) -> dict[str, str]:
+        curves = tuple(Curve(by, (1.0, 2.0), (1e-3, 2e-3), by=by) for by in named)
+        lines = error_chart(curves, "contacts used", False).axes[0].lines
+        return {str(line.get_label()): str(line.get_color()) for line in lines}
+
+    every = colours("both", "touch", "audio", "geometry", "particle")
+    assert len(set(every.values())) == len(every)
+    for others in (("touch", "particle"), ("audio", "both", "touch")):
+        assert colours(*others) == {by: every[by] for by in others}
+
+
 @pytest.mark.parametrize(
     ("seconds", "said"),
     [(None, "–"), (4e-5, "40 µs"), (0.0123, "12.3 ms"), (2.5, "2.50 s")],  # noqa: RUF001
