@@ -9,12 +9,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from whole_run import copied
 
+from experiments.contact_localization import answer as answer_module
 from experiments.contact_localization import session_of
 from experiments.contact_localization.dials import chosen
+from experiments.contact_localization.estimate import Estimate, each_estimate
+from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.result import result_of
 from harness.cli import invoke
 from harness.effects import Effect
@@ -234,3 +238,25 @@ def test_a_replay_takes_the_levels_of_the_runs_own_result(
     said = capsys.readouterr()
     assert "does not say at which levels it was found" in said.err
     assert json.loads(said.out)["accuracy"] == dict(chosen([]))
+
+
+@pytest.mark.parametrize("compiles", [True, False])
+def test_an_answers_seconds_are_those_with_every_kernel_loaded(
+    done: Recording, monkeypatch: pytest.MonkeyPatch, compiles: bool
+) -> None:
+    """The first answer of a process loads kernels; where it does, the same one is timed again."""
+    run, quick = RunFiles(done), Levels(rounds=1, samples=300)
+    asked: list[tuple[Estimate, ...]] = []
+
+    def first(*arguments: Any, **named: Any) -> tuple[Estimate, ...]:
+        if compiles:
+            numba.njit(lambda number: number + 1)(len(asked))
+        asked.append(each_estimate(*arguments, **named))
+        return (*asked[-1][:-1], replace(asked[-1][-1], seconds={"images": 1e6}))
+
+    answer_module.answer(run, quick)  # loads what it needs
+    monkeypatch.setattr(answer_module, "each_estimate", first)
+    found = answer_module.answer(run, quick)
+    assert (found.seconds == 1e6) is not compiles
+    assert np.array_equal(found.last.contacts, asked[0][-1].contacts)
+    assert len(found.estimates) == len(asked[0])
