@@ -71,6 +71,17 @@ class Hypotheses:
         """``(n,)``, summing to 1."""
         return normalised(self.log_weights)
 
+    @property
+    def effective(self) -> float:
+        """How many equal weights would make as sure a mean (Kong, 1992): one over the sum of squares."""
+        return float(1.0 / np.sum(self.weights**2))
+
+    @property
+    def perplexity(self) -> float:
+        """How many equal weights would be as undecided as these."""
+        positive = self.weights[self.weights > 0.0]
+        return float(np.exp(-np.sum(positive * np.log(positive))))
+
     def told(self, nats: FloatArray) -> "Hypotheses":
         """With ``(n,)`` nats more, up to a constant."""
         total = self.log_weights + nats

@@ -17,7 +17,7 @@ class Levels:
         spacing: metres between the surface's samples.
         particles: of the paper's filter.
         block: tactile pixels averaged into one of the compared map, each way.
-        rounds: of refinement; 0 answers from the grid.
+        rounds: of refinement at most; 0 answers from the grid.
         samples: hypotheses drawn in each round where the yaw is known; four times as many where not.
     """
 
@@ -26,5 +26,5 @@ class Levels:
     spacing: float = 2.0e-3
     particles: int = 1000
     block: int = 8
-    rounds: int = 3
+    rounds: int = 5
     samples: int = 3000

@@ -60,19 +60,3 @@ def moves(noise: SharedNoise, places: FloatArray, attitudes: FloatArray, members
 def log_prior(shared: FloatArray | None) -> FloatArray | float:
     """``(n,)`` nats, up to a constant; 0 where nothing is named."""
     return 0.0 if shared is None else np.asarray(-0.5 * np.sum(shared**2, axis=1))
-
-
-def stepped(shared: FloatArray, width: float, rng: np.random.Generator) -> FloatArray:
-    """Draws around ``(n, 6)`` parents that leave the prior as it is (a Gaussian autoregression).
-
-    Args:
-        shared: in sigmas.
-        width: of the step; 1 forgets the parents.
-        rng: of the draws.
-    """
-    return around(shared, width) + width * rng.normal(size=shared.shape)
-
-
-def around(shared: FloatArray, width: float) -> FloatArray:
-    """``(n, 6)``: where the steps from ``shared`` are centred."""
-    return np.asarray(np.sqrt(1.0 - width**2) * shared)

@@ -1,4 +1,4 @@
-"""A uniform grid of a mesh's faces, so that a small window asks only its neighbourhood."""
+"""A uniform grid of a mesh's faces, so that a ray or a point asks only its neighbourhood."""
 
 from dataclasses import dataclass
 
@@ -73,71 +73,3 @@ def _lists(first: IntArray, last: IntArray, shape: IntArray) -> tuple[IntArray, 
                     faces[filled[c]] = f
                     filled[c] += 1
     return starts, faces
-
-
-@compiled
-def faces_in_box(
-    view_from_object: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    origin: FloatArray,
-    cell: float,
-    shape: IntArray,
-    starts: IntArray,
-    faces: IntArray,
-    stamp: int,
-    stamps: IntArray,
-    found: IntArray,
-) -> int:
-    """Write into ``found`` each face of a cell that may meet a box of the view's frame.
-
-    Args:
-        view_from_object: ``(4, 4)`` rigid.
-        low: ``(3,)`` metres, the box's least corner in the view's frame; may be infinite.
-        high: ``(3,)`` metres, its greatest.
-        origin: of the grid, and so are ``cell``, ``shape``, ``starts``, ``faces``.
-        cell: metres.
-        shape: cells along each side.
-        starts: see ``FaceGrid``.
-        faces: see ``FaceGrid``.
-        stamp: a number not yet in ``stamps``.
-        stamps: ``(faces,)``, remembers which faces were found; overwritten.
-        found: ``(faces,)``, overwritten.
-
-    Returns:
-        How many were found.
-    """
-    count = 0
-    r = view_from_object
-    # A cell is a cube; along a view axis it reaches half its edge times the 1-norm of that axis.
-    ex = 0.5 * cell * (abs(r[0, 0]) + abs(r[0, 1]) + abs(r[0, 2]))
-    ey = 0.5 * cell * (abs(r[1, 0]) + abs(r[1, 1]) + abs(r[1, 2]))
-    ez = 0.5 * cell * (abs(r[2, 0]) + abs(r[2, 1]) + abs(r[2, 2]))
-    for i in range(shape[0]):
-        x = origin[0] + (i + 0.5) * cell
-        for j in range(shape[1]):
-            y = origin[1] + (j + 0.5) * cell
-            u0 = r[0, 0] * x + r[0, 1] * y + r[0, 3]
-            v0 = r[1, 0] * x + r[1, 1] * y + r[1, 3]
-            w0 = r[2, 0] * x + r[2, 1] * y + r[2, 3]
-            for k in range(shape[2]):
-                c = (i * shape[1] + j) * shape[2] + k
-                if starts[c] == starts[c + 1]:
-                    continue
-                z = origin[2] + (k + 0.5) * cell
-                u = u0 + r[0, 2] * z
-                if u + ex < low[0] or u - ex > high[0]:
-                    continue
-                v = v0 + r[1, 2] * z
-                if v + ey < low[1] or v - ey > high[1]:
-                    continue
-                w = w0 + r[2, 2] * z
-                if w + ez < low[2] or w - ez > high[2]:
-                    continue
-                for at in range(starts[c], starts[c + 1]):
-                    f = faces[at]
-                    if stamps[f] != stamp:
-                        stamps[f] = stamp
-                        found[count] = f
-                        count += 1
-    return count

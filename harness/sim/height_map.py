@@ -12,7 +12,7 @@ from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import OutOfDomain
 from harness.mesh import Mesh
 from harness.sensor import TactileSensor
-from harness.sim.face_grid import FaceGrid, build_face_grid
+from harness.sim.face_clusters import FaceClusters, cluster_faces
 from harness.sim.raster_kernels import rasterise
 
 STAND_OFF = 50e-3
@@ -29,15 +29,15 @@ class RasterMesh:
 
     Attributes:
         mesh: in metres, in the object's frame.
-        grid: its faces by cell.
+        clusters: its faces by neighbourhood.
     """
 
     mesh: Mesh
-    grid: FaceGrid
+    clusters: FaceClusters
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
-        self.grid = build_face_grid(mesh)
+        self.clusters = cluster_faces(mesh)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +162,7 @@ def depth_image(
 def first_surface(
     raster: RasterMesh, view_from_object: FloatArray, pitch: float, rows: int, columns: int
 ) -> FloatArray:
-    """``(rows, columns)`` metres: the depth of ``depth_image`` alone, in a third of its time.
+    """``(rows, columns)`` metres: the depth of ``depth_image`` alone, without whose it is.
 
     Raises:
         OutOfDomain: as ``depth_image`` does.
@@ -197,11 +197,9 @@ def _run(
     depth: FloatArray,
     face: IntArray,
 ) -> None:
-    grid = raster.grid
+    of = raster.clusters
     rasterise(
-        raster.mesh.vertices,
-        raster.mesh.faces,
-        (grid.origin, grid.cell, grid.shape, grid.starts, grid.faces),
+        (of.corners, of.faces, of.boxes, of.groups),
         poses,
         corner,
         pitch,

@@ -17,7 +17,7 @@ from experiments.contact_localization.shared_errors import SharedNoise
 from harness.arrays import FloatArray
 from harness.geometry import rotation_about, rotation_from_vector, translation
 
-QUICK = Levels(spacing=3e-3, rounds=2, samples=300)
+QUICK = Levels(spacing=3e-3, samples=1000)
 UP = np.array([0.0, 0.0, 1.0])
 TRUE = np.array([press.point for press in PRESSES])
 ALL = np.arange(len(PRESSES))
