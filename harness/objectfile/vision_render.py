@@ -56,7 +56,7 @@ class VisionRenderer:
         self._closed = is_closed(mesh)
         self._crew, self._room = Crew(threads), Room()
         self._follower = Follower(Volume(self.model, self.shell, per_cell), self._crew, self._room)
-        self._extras = SurfaceExtras(mesh, self.model.weights.size.extras)
+        self._extras = SurfaceExtras(mesh, self.model.weights.size.extras, self._crew, self._room)
         self._askers: dict[str, Asker] = {}
 
     def render(
@@ -96,7 +96,7 @@ class VisionRenderer:
         begin = np.zeros(len(slant))
         if len(outline.depth) and np.isfinite(chosen.lead):
             begin = np.maximum(surface - chosen.lead * self.shell.voxel, 0.0)
-        extras = self._extras(camera.eye, ways, light.direction)
+        extras = self._extras(camera.eye, ways, light.direction, surface)
         return Rays(camera.eye, ways, surface, Scene(views, extras, light.direction), begin), slant
 
     def _aim(self, camera: Pinhole, outline: Outline) -> tuple[FloatArray, AnyArray, FloatArray]:

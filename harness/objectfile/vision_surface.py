@@ -4,10 +4,14 @@ import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
 from harness.mesh import Mesh
-from harness.pinhole import DirectionalLight
+from harness.objectfile.vision_faces import FaceCubes, first_met, lamp_seen
+from harness.objectfile.vision_work import Crew, Room
 from harness.sim.appearance import plain
-from harness.sim.lambert import irradiance, places_seen, sees_light
-from harness.sim.ray_mesh import RayMesh
+from harness.sim.lambert_kernels import faced_places, lit_by
+from harness.sim.ray_mesh import LEAST
+
+_EARLY = 0.25
+"""Cubes before the known depth from which on a ray is followed: depth is kept as float32."""
 
 
 class SurfaceExtras:
@@ -16,14 +20,16 @@ class SurfaceExtras:
     Args:
         mesh: in metres.
         count: of further inputs: 4, or 0 for networks that are told nothing more.
+        crew: shares the rays.
+        room: that arrays are taken from.
     """
 
-    def __init__(self, mesh: Mesh, count: int) -> None:
-        self._count = count
+    def __init__(self, mesh: Mesh, count: int, crew: Crew, room: Room) -> None:
+        self._count, self._crew, self._room = count, crew, room
         if count:
-            self._rays, self._appearance = RayMesh(mesh), plain(mesh, (1.0, 1.0, 1.0))
+            self._cubes, self._appearance = FaceCubes.of(mesh), plain(mesh, (1.0, 1.0, 1.0))
 
-    def __call__(self, eye: FloatArray, ways: FloatArray, light: FloatArray) -> AnyArray:
+    def __call__(self, eye: FloatArray, ways: FloatArray, light: FloatArray, depth: FloatArray) -> AnyArray:
         """``(n, 4)`` float32: 1 where the light is seen, else 0; unit normal on the side that is seen.
 
         All are 0 for a ray that meets nothing.
@@ -32,15 +38,44 @@ class SurfaceExtras:
             eye: ``(3,)`` m, where rays begin.
             ways: ``(n, 3)`` unit.
             light: ``(3,)`` unit, towards the lamp.
+            depth: ``(n,)`` m along each ray where the mesh is; infinite where that is not known.
         """
-        told = np.zeros((len(ways), self._count), np.float32)
+        told = np.empty((len(ways), self._count), np.float32)
         if not told.size:
             return told
-        hits = self._rays.first_hits(eye, ways)
-        met = np.flatnonzero(hits.face >= 0)
-        places = places_seen(self._appearance, hits.face[met], hits.weights[met], ways[met])
-        lamp = DirectionalLight(light)
-        faced = irradiance(places, lamp, self._appearance.mesh.diagonal) > 0.0
-        told[met, 0] = sees_light(self._rays, places, lamp, faced)
-        told[met, 1:] = places.normals
+        begin = np.where(np.isfinite(depth), np.maximum(depth - _EARLY * self._cubes.edge, 0.0), 0.0)
+        arrays = [self._room.take(f"extras {k}", (len(ways), 3), np.float64) for k in range(4)]
+        weights = self._room.take("extras weights", (len(ways), 2), np.float64)
+        faces = self._room.take("extras faces", (len(ways),), np.int64)
+        lamp = np.array(light, np.float64)
+
+        def work(first: int, last: int) -> None:
+            part = slice(first, last)
+            places = [each[part] for each in arrays]
+            first_met(eye, ways[part], begin[part], self._cubes.lists, faces[part], weights[part])
+            self._tell(ways[part], lamp, faces[part], weights[part], places, told[part])
+
+        self._crew.share(work, len(ways), 4 * self._crew.threads)
         return told
+
+    def _tell(
+        self,
+        ways: FloatArray,
+        lamp: FloatArray,
+        faces: AnyArray,
+        weights: FloatArray,
+        places: list[FloatArray],
+        told: AnyArray,
+    ) -> None:
+        """Fill in what is told of the places that rays met; ``places`` is room for them."""
+        mesh, (points, normals, flat, lifted) = self._appearance.mesh, places
+        # Of a ray that meets nothing the last face is looked at, and nothing of it is told.
+        faced_places(
+            *(faces, weights, ways, mesh.corners, mesh.face_normals, self._appearance.normals),
+            *(points, normals, flat, lifted),
+        )
+        faced = lit_by(lamp[None], points, normals, flat, lifted, mesh.diagonal)
+        seen = np.empty(len(ways), np.bool_)
+        lamp_seen(lifted, lamp, LEAST * mesh.diagonal, faces, faced, self._cubes.lists, seen)
+        told[:, 0], told[:, 1:] = seen, normals
+        told[faces < 0] = 0.0

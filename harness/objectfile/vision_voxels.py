@@ -5,6 +5,9 @@ import numpy as np
 from harness.arrays import AnyArray, FloatArray
 from harness.sim.compiled import compiled
 
+Three = FloatArray | tuple[float, float, float]
+"""Numbers along x, y, z."""
+
 _WIDER = 1e-6
 """Of a voxel: by which it is enlarged, so that rounding leaves out no triangle that it touches."""
 
@@ -29,14 +32,14 @@ def touch_voxels(corners: FloatArray, words: AnyArray) -> None:
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):
-                    if _touches(face, i + 0.5, j + 0.5, k + 0.5):
+                    if touches(face, i + 0.5, j + 0.5, k + 0.5):
                         bit = ((i & 3) << 4) | ((j & 3) << 2) | (k & 3)
                         words[i >> 2, j >> 2, k >> 2] |= np.uint64(1) << np.uint64(bit)
 
 
 @compiled
-def _touches(face: FloatArray, x: float, y: float, z: float) -> bool:
-    """Whether a triangle touches the unit cube around a place: no axis separates them."""
+def touches(face: FloatArray, x: float, y: float, z: float) -> bool:
+    """Whether a triangle ``(3, 3)`` touches the unit cube around a place: no axis separates them."""
     half = 0.5 + _WIDER
     a = (face[0, 0] - x, face[0, 1] - y, face[0, 2] - z)
     b = (face[1, 0] - x, face[1, 1] - y, face[1, 2] - z)
@@ -62,7 +65,7 @@ def _touches(face: FloatArray, x: float, y: float, z: float) -> bool:
 
 
 @compiled
-def entered(eye: FloatArray, way: FloatArray, words: AnyArray) -> tuple[float, float]:
+def entered(eye: Three, way: Three, words: AnyArray) -> tuple[float, float]:
     """From where to where a ray is in the lattice; from infinity where it is not.
 
     A ray along a face of the box lies in it if its place does: nothing is multiplied by infinity.
@@ -80,7 +83,8 @@ def entered(eye: FloatArray, way: FloatArray, words: AnyArray) -> tuple[float, f
 
 
 @compiled
-def _clamped(place: float, least: int, most: int) -> int:
+def clamped(place: float, least: int, most: int) -> int:
+    """The whole number below a place, from the least to the most."""
     return int(min(max(np.floor(place), least), most))
 
 
@@ -117,9 +121,9 @@ def walk(
     sx, sy, sz = (1 if wx > 0.0 else -1), (1 if wy > 0.0 else -1), (1 if wz > 0.0 else -1)
     ux, uy, uz = (1 if wx > 0.0 else 0), (1 if wy > 0.0 else 0), (1 if wz > 0.0 else 0)
     nx, ny, nz = words.shape
-    bx = _clamped((ex + t * wx) * 0.25, 0, nx - 1)
-    by = _clamped((ey + t * wy) * 0.25, 0, ny - 1)
-    bz = _clamped((ez + t * wz) * 0.25, 0, nz - 1)
+    bx = clamped((ex + t * wx) * 0.25, 0, nx - 1)
+    by = clamped((ey + t * wy) * 0.25, 0, ny - 1)
+    bz = clamped((ez + t * wz) * 0.25, 0, nz - 1)
     count, is_open = 0, False
     while t < end:
         tx = (4 * (bx + ux) - ex) * rx if wx != 0.0 else np.inf
@@ -133,9 +137,9 @@ def walk(
                 if count == len(runs):
                     return count, runs[count - 1, 1]
         else:
-            vx = _clamped(ex + t * wx, 4 * bx, 4 * bx + 3) - 4 * bx
-            vy = _clamped(ey + t * wy, 4 * by, 4 * by + 3) - 4 * by
-            vz = _clamped(ez + t * wz, 4 * bz, 4 * bz + 3) - 4 * bz
+            vx = clamped(ex + t * wx, 4 * bx, 4 * bx + 3) - 4 * bx
+            vy = clamped(ey + t * wy, 4 * by, 4 * by + 3) - 4 * by
+            vz = clamped(ez + t * wz, 4 * bz, 4 * bz + 3) - 4 * bz
             while 0 <= vx < 4 and 0 <= vy < 4 and 0 <= vz < 4:
                 px = (4 * bx + vx + ux - ex) * rx if wx != 0.0 else np.inf
                 py = (4 * by + vy + uy - ey) * ry if wy != 0.0 else np.inf

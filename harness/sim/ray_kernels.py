@@ -95,7 +95,7 @@ def nearest(
     best: Hit = (np.inf, -1, 0.0, 0.0)
     while True:
         index = (at[0] * shape[1] + at[1]) * shape[2] + at[2]
-        best = _in_cell(
+        best = nearest_of(
             origin, direction, least, without, starts[index], starts[index + 1], faces, triangles, best
         )
         next_border = min(border[0], border[1], border[2])
@@ -141,7 +141,7 @@ def _through_box(
 
 
 @compiled
-def _in_cell(
+def nearest_of(
     o: FloatArray,
     d: FloatArray,
     least: float,

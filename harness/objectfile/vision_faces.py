@@ -1,0 +1,223 @@
+"""A mesh's faces by the small cubes that they touch, for rays that know about where they meet it.
+
+Rays of a picture meet a surface where its depth says, and rays towards a lamp leave it again: cubes of about
+a face's size ask few faces, and bricks of 4 x 4 x 4 of them without a face are passed in one step.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only
+from harness.mesh import Mesh
+from harness.objectfile.vision_voxels import clamped, entered, touches
+from harness.sim.compiled import compiled
+from harness.sim.ray_kernels import Hit, nearest_of
+
+ALONG = 128
+"""Cubes along the longest side of the mesh's box."""
+
+_BESIDE = 1e-3
+"""Cubes between that box and the lattice's border."""
+
+_WIDER = 1e-6
+"""Of a cube: by which it is enlarged, as in ``touches``."""
+
+Lists = tuple[FloatArray, float, AnyArray, AnyArray, AnyArray, FloatArray]
+"""Least corner (m), edge (m), bricks, starts, faces and triangles of ``FaceCubes``."""
+
+
+@dataclass(frozen=True, eq=False)
+class FaceCubes:
+    """Which faces touch each cube.
+
+    Attributes:
+        low: ``(3,)`` m, least corner of the lattice, object frame.
+        edge: m, of a cube.
+        bricks: ``(x, y, z)`` int32: number of each brick of 4 x 4 x 4 cubes that a face touches, else -1.
+        starts: ``(64 bricks + 1,)`` int32: where each cube's list begins in ``faces``; cube (i, j, k) of a
+            brick is its ``16 i + 4 j + k``-th.
+        faces: int64 indices.
+        triangles: ``(m, 3, 3)`` m: first corner of each face, and the ways from it to the others.
+    """
+
+    low: FloatArray
+    edge: float
+    bricks: AnyArray
+    starts: AnyArray
+    faces: AnyArray
+    triangles: FloatArray
+
+    @classmethod
+    def of(cls, mesh: Mesh, along: int = ALONG) -> "FaceCubes":
+        """The faces of a mesh, in metres.
+
+        Args:
+            mesh: of one face or more that is not a point.
+            along: cubes along its longest side.
+        """
+        bounds, corners = mesh.bounds, mesh.corners
+        edge = float((bounds[1] - bounds[0]).max()) / along
+        low = bounds[0] - _BESIDE * edge
+        sides = np.floor((bounds[1] - low) / edge + _BESIDE).astype(np.int64) // 4 + 1
+        cubes, owners = _touched(np.ascontiguousarray((corners - low) / edge), 4 * sides)
+        order = np.argsort(cubes, kind="stable")
+        cubes, owners = cubes[order], owners[order]
+        there, number = np.unique(cubes >> 6, return_inverse=True)
+        bricks = np.full(int(sides.prod()), -1, np.int32)
+        bricks[there] = np.arange(len(there), dtype=np.int32)
+        counts = np.bincount(64 * number.reshape(-1) + (cubes & 63), minlength=64 * len(there))
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        triangles = np.stack(
+            [corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1
+        )
+        for each in (low, bricks, starts, owners, triangles):
+            read_only(each)
+        return cls(low, edge, bricks.reshape(sides), starts, owners, triangles)
+
+    @property
+    def lists(self) -> Lists:
+        """As the compiled loops take them."""
+        return self.low, self.edge, self.bricks, self.starts, self.faces, self.triangles
+
+
+@compiled
+def _touched(corners: FloatArray, sides: IntArray) -> tuple[AnyArray, AnyArray]:
+    """Cubes, counted brick by brick, and the face that touches each.
+
+    Args:
+        corners: ``(m, 3, 3)`` in cubes from the lattice's least corner.
+        sides: ``(3,)`` cubes, multiples of four.
+    """
+    cubes, owners, count = np.empty(16 * len(corners), np.int64), np.empty(16 * len(corners), np.int64), 0
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    for m in range(len(corners)):
+        face = corners[m]
+        for axis in range(3):
+            least = min(face[0, axis], face[1, axis], face[2, axis]) - _WIDER
+            most = max(face[0, axis], face[1, axis], face[2, axis]) + _WIDER
+            low[axis] = min(max(int(np.floor(least)), 0), sides[axis] - 1)
+            high[axis] = min(max(int(np.floor(most)), 0), sides[axis] - 1)
+        for i in range(low[0], high[0] + 1):
+            for j in range(low[1], high[1] + 1):
+                for k in range(low[2], high[2] + 1):
+                    if not touches(face, i + 0.5, j + 0.5, k + 0.5):
+                        continue
+                    if count == len(cubes):
+                        cubes = np.concatenate((cubes, np.empty(count, np.int64)))
+                        owners = np.concatenate((owners, np.empty(count, np.int64)))
+                    brick = ((i >> 2) * (sides[1] >> 2) + (j >> 2)) * (sides[2] >> 2) + (k >> 2)
+                    cubes[count] = (brick << 6) | ((i & 3) << 4) | ((j & 3) << 2) | (k & 3)
+                    owners[count] = m
+                    count += 1
+    return cubes[:count], owners[:count]
+
+
+@compiled
+def first_met(
+    eye: FloatArray, ways: FloatArray, begin: FloatArray, lists: Lists, faces: IntArray, weights: FloatArray
+) -> None:
+    """Fill in which face each ray meets first from ``begin`` on.
+
+    Args:
+        eye: ``(3,)`` m, where all rays begin.
+        ways: ``(n, 3)`` unit.
+        begin: ``(n,)`` m along each.
+        lists: of the mesh.
+        faces: ``(n,)`` written; -1 where nothing is met.
+        weights: ``(n, 2)`` of the face's second and third corner, 0 to 1, written.
+    """
+    for n in range(len(ways)):
+        _, faces[n], b, c = _meet(eye, ways[n], begin[n], -1, False, lists)
+        # Rays on an edge are met by faces a little wider than they are.
+        weights[n, 0], weights[n, 1] = min(max(b, 0.0), 1.0), min(max(c, 0.0), 1.0)
+
+
+@compiled
+def lamp_seen(
+    starts: FloatArray,
+    lamp: FloatArray,
+    least: float,
+    faces: IntArray,
+    faced: FloatArray,
+    lists: Lists,
+    seen: BoolArray,
+) -> None:
+    """Fill in whether nothing is between places and a lamp that they face.
+
+    Args:
+        starts: ``(n, 3)`` m.
+        lamp: ``(3,)`` unit, towards it.
+        least: m, how far from its start a ray meets anything.
+        faces: ``(n,)`` that each begins on, which does not stop it; -1 where there is no place.
+        faced: ``(n,)`` cosine, 0 where a place looks away.
+        lists: of the mesh.
+        seen: ``(n,)`` written.
+    """
+    for n in range(len(starts)):
+        asked = faces[n] >= 0 and faced[n] > 0.0
+        seen[n] = asked and _meet(starts[n], lamp, least, faces[n], True, lists)[1] < 0
+
+
+@compiled
+def _meet(
+    origin: FloatArray, way: FloatArray, least: float, without: int, any_will_do: bool, lists: Lists
+) -> Hit:
+    """What one ray meets first farther than ``least`` m; the face -1 where that is nothing.
+
+    As ``vision_voxels.walk`` goes: borders from their own numbers, cubes by counting.
+    """
+    low, edge, bricks, firsts, faces, triangles = lists
+    ex, ey, ez = (origin[0] - low[0]) / edge, (origin[1] - low[1]) / edge, (origin[2] - low[2]) / edge
+    wx, wy, wz = way[0] / edge, way[1] / edge, way[2] / edge
+    best: Hit = (np.inf, -1, 0.0, 0.0)
+    begin, end = entered((ex, ey, ez), (wx, wy, wz), bricks)
+    t = max(begin, least)
+    if not t < end:
+        return best
+    # An infinity here is never multiplied: without a way along an axis its borders are at infinity.
+    rx = 1.0 / wx if wx != 0.0 else np.inf
+    ry = 1.0 / wy if wy != 0.0 else np.inf
+    rz = 1.0 / wz if wz != 0.0 else np.inf
+    sx, sy, sz = (1 if wx > 0.0 else -1), (1 if wy > 0.0 else -1), (1 if wz > 0.0 else -1)
+    ux, uy, uz = (1 if wx > 0.0 else 0), (1 if wy > 0.0 else 0), (1 if wz > 0.0 else 0)
+    nx, ny, nz = bricks.shape
+    bx = clamped((ex + t * wx) * 0.25, 0, nx - 1)
+    by = clamped((ey + t * wy) * 0.25, 0, ny - 1)
+    bz = clamped((ez + t * wz) * 0.25, 0, nz - 1)
+    while t < end:
+        tx = (4 * (bx + ux) - ex) * rx if wx != 0.0 else np.inf
+        ty = (4 * (by + uy) - ey) * ry if wy != 0.0 else np.inf
+        tz = (4 * (bz + uz) - ez) * rz if wz != 0.0 else np.inf
+        brick = bricks[bx, by, bz]
+        if brick >= 0:
+            vx = clamped(ex + t * wx, 4 * bx, 4 * bx + 3) - 4 * bx
+            vy = clamped(ey + t * wy, 4 * by, 4 * by + 3) - 4 * by
+            vz = clamped(ez + t * wz, 4 * bz, 4 * bz + 3) - 4 * bz
+            while 0 <= vx < 4 and 0 <= vy < 4 and 0 <= vz < 4:
+                px = (4 * bx + vx + ux - ex) * rx if wx != 0.0 else np.inf
+                py = (4 * by + vy + uy - ey) * ry if wy != 0.0 else np.inf
+                pz = (4 * bz + vz + uz - ez) * rz if wz != 0.0 else np.inf
+                cube = 64 * brick + ((vx << 4) | (vy << 2) | vz)
+                first, last = firsts[cube], firsts[cube + 1]
+                if first < last:
+                    best = nearest_of(origin, way, least, without, first, last, faces, triangles, best)
+                    # A face may reach on into cubes farther on: what is met counts once none can be nearer.
+                    if best[1] >= 0 and (any_will_do or best[0] <= min(px, min(py, pz))):
+                        return best
+                if px <= py and px <= pz:
+                    vx += sx
+                elif py <= pz:
+                    vy += sy
+                else:
+                    vz += sz
+        t = max(t, min(tx, min(ty, tz)))
+        if tx <= ty and tx <= tz:
+            bx += sx
+        elif ty <= tz:
+            by += sy
+        else:
+            bz += sz
+        if not (0 <= bx < nx and 0 <= by < ny and 0 <= bz < nz):
+            break
+    return best
