@@ -6,6 +6,7 @@
 damping, see ``modal_sound.impulse_response``.
 """
 
+import threading
 import time
 from dataclasses import dataclass
 from functools import cache
@@ -20,8 +21,9 @@ from harness.sim.modal_sound import audible, check_modes, check_rate, impulse_re
 from harness.sim.synthesis_tables import Steps, fill_sound, longest_sum
 
 SynthesisLevel = Literal["fast", "double", "exact"]
-"""``"fast"``: tables in single precision from phases in double; ``"double"``: tables in double
-precision; ``"exact"``: every sine of every mode summed in double precision, the reference."""
+"""``"fast"``: tables in single precision from phases in double, and a spectrum in double precision of modes
+that hardly die away, if they are many; ``"double"``: tables in double precision; ``"exact"``: every sine of
+every mode summed in double precision, the reference."""
 
 _FADED = 65.0
 """Times the time constant after which a heavily damped mode is over: 1e-28."""
@@ -95,7 +97,7 @@ def synthesize(
     heard = audible(frequencies, rate)
     f, d, parts = frequencies[heard], dampings[heard], amplitudes[:, heard]
     direct = np.full(len(f), True) if level == "exact" else is_heavy(f, d)
-    with _one_core().limit(limits=1):
+    with _one_sum, _one_core().limit(limits=1):
         sound, errors = _blocks(f[~direct], d[~direct], parts[:, ~direct], samples, rate, level)
         if direct.any():
             sound += _summed(f[direct], d[direct], parts[:, direct], samples, rate)
@@ -104,6 +106,11 @@ def synthesize(
     return Synthesis(
         read_only(sound), rate, read_only(~heard), decibels(errors, peaks), time.perf_counter() - begun
     )
+
+
+_one_sum = threading.Lock()
+"""The number of cores belongs to the process, and a second thread's limit is not heeded: when the first left,
+the second's products had all cores back, and other last bits."""
 
 
 @cache

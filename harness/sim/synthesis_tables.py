@@ -1,19 +1,21 @@
 """A sum of decaying sines as products of two tables: underdamped modes after one impulse.
 
 The kernels of ``harness.sim.synthesis_kernels`` make the tables; here is which modes are in them, for how
-long, and in which order they are multiplied.
+long, and in which order they are multiplied. Many modes that hardly die away are left to
+``harness.sim.synthesis_spectrum``.
 """
 
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from scipy.linalg.blas import dgemm, sgemm
 
-from harness.arrays import AnyArray, FloatArray, IntArray
+from harness.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from harness.sim.synthesis_kernels import TILE, block_counts, fill, largest_rest
+from harness.sim.synthesis_memory import MEMORY
+from harness.sim.synthesis_spectrum import add_modes, may_be_added
 
 TableLevel = Literal["fast", "double"]
 """Tables in single precision, from phases in double; or tables in double precision."""
@@ -39,43 +41,15 @@ TOGETHER = 128
 """Modes multiplied together at most: their sum is rounded at its own size, not at that of all, so that
 roundings of 2048 modes add up to a third."""
 
+_LASTING = 150
+"""Modes as long as the whole sound, or more that are shorter, which transforms sum sooner than tables do."""
+
+_SHORTEST = 4096
+"""Samples from which a sound may be summed by transforms."""
+
 _SPLITS = 24
 """Groups more than that that ``_LIKE`` can make of a sound of ``_SEGMENT`` blocks, nearly: each sounds
 for less than three quarters of the one before."""
-
-_KEPT = 1 << 24
-"""Bytes of working memory that a thread keeps from one sound to the next."""
-
-
-class _Memory(threading.local):
-    """Memory of one thread, handed out piece by piece and used again by its next sound.
-
-    Fresh memory has to be cleared by the system page by page, which took as long as all the
-    arithmetic of a sound of 512 modes.
-    """
-
-    def __init__(self) -> None:
-        self._bytes = np.empty(0, np.uint8)
-        self._used = self._wanted = 0
-
-    def forget(self) -> None:
-        """Begin a sound: all pieces are free again, and as many bytes there as the last one took."""
-        size = min(self._wanted, _KEPT)
-        if size > len(self._bytes):
-            self._bytes = np.empty(size, np.uint8)
-        self._used = self._wanted = 0
-
-    def piece(self, shape: tuple[int, int], kind: np.dtype[Any]) -> AnyArray:
-        """An array with whatever was there before."""
-        size = -(-int(np.prod(shape)) * kind.itemsize // 64) * 64
-        self._wanted += size
-        if self._used + size > len(self._bytes):
-            return np.empty(shape, kind)
-        begin, self._used = self._used, self._used + size
-        return self._bytes[begin : begin + size].view(kind)[: shape[0] * shape[1]].reshape(shape)
-
-
-_memory = _Memory()
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,24 +87,38 @@ def fill_sound(steps: Steps, weights: AnyArray, sound: FloatArray, level: TableL
         level: precision.
 
     Returns:
-        The most that any sample lacks of modes left out because they were nearly over.
+        The most that any sample lacks of modes left out because they were nearly over, or of their spectrum.
     """
     sizes = np.abs(weights)
     loudest = float(sizes.max())
     if loudest == 0.0:
         return 0.0
-    _memory.forget()
+    MEMORY.forget()
     sizes /= loudest
     blocks, length = sound.shape
     seconds = length / steps.rate
     quiet = 10.0 ** (-CUTS[level] / 20.0) * float(np.linalg.norm(sizes)) / len(sizes)
     counts = block_counts(sizes, steps.dampings, quiet, seconds, blocks, _MULTIPLE)
+    lasting = _lasting(steps, counts, blocks, length, level)
+    counts[lasting], sizes[lasting] = 0, 0.0
     rest = largest_rest(sizes, steps.dampings, counts, seconds, blocks, _MULTIPLE)
+    missed = loudest * (rest + 4.0 * len(sizes) * _FLOORS[level])
     order = np.argsort(-counts, kind="stable")[: np.count_nonzero(counts)]
-    tables = _Tables(steps.take(order), weights[order] / loudest, counts[order], level, length)
-    for first in range(0, int(counts[order[0]]), _SEGMENT):
-        tables.multiply(first, loudest, sound[first : first + _SEGMENT])
-    return loudest * (rest + 4.0 * len(sizes) * _FLOORS[level])
+    if len(order):
+        tables = _Tables(steps.take(order), weights[order] / loudest, counts[order], level, length)
+        for first in range(0, int(counts[order[0]]), _SEGMENT):
+            tables.multiply(first, loudest, sound[first : first + _SEGMENT])
+    if lasting.any():
+        slow, flat = steps.take(np.flatnonzero(lasting)), sound.reshape(-1)
+        missed += add_modes(slow.dampings, slow.turns, weights[lasting], steps.rate, flat)
+    return missed
+
+
+def _lasting(steps: Steps, counts: IntArray, blocks: int, length: int, level: TableLevel) -> BoolArray:
+    """``(m,)``: modes that are summed by their spectrum: those that hardly die away, if they are many."""
+    slow = may_be_added(steps.dampings, blocks * length, steps.rate) & (counts > 0)
+    enough = level == "fast" and blocks * length >= _SHORTEST and counts[slow].sum() >= _LASTING * blocks
+    return np.asarray(slow & enough)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +155,7 @@ class _Tables:
         self._groups = tuple(self._group(modes, counts, sample[modes]) for modes in _together(counts))
 
     def _group(self, modes: slice, counts: IntArray, sample: AnyArray) -> _Group:
-        within = _memory.piece((self._block, _width(len(sample))), self._type)
+        within = MEMORY.piece((self._block, _width(len(sample))), self._type)
         whole = np.full(within.shape[1] // (2 * TILE), self._block)
         fill(within, whole, _in_tiles(np.ones_like(sample)), _in_tiles(sample), self._floor, True)
         return _Group(modes, counts[modes][::TILE].copy(), within)
@@ -181,7 +169,7 @@ class _Tables:
             if rows <= 0:
                 break
             if not product.size:
-                product = _memory.piece((rows, self._block), self._type)
+                product = MEMORY.piece((rows, self._block), self._type)
                 product[:] = 0.0
             starts = self._starts(group, begin, counts)
             self._gemm(1.0, group.within.T, starts.T, 1.0, product[:rows].T, trans_a=True, overwrite_c=True)
@@ -192,7 +180,7 @@ class _Tables:
         weights = self._weights[group.modes]
         if begin:
             weights = weights * self._steps.over(begin * self._block)[group.modes]
-        starts = _memory.piece((int(counts[0]), group.within.shape[1]), self._type)
+        starts = MEMORY.piece((int(counts[0]), group.within.shape[1]), self._type)
         for tile, count in enumerate(counts):
             starts[max(count, 0) :, 2 * TILE * tile : 2 * TILE * (tile + 1)] = 0.0
         fill(starts, counts, _in_tiles(weights), _in_tiles(self._ahead[group.modes]), self._floor, False)
