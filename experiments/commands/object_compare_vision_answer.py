@@ -68,9 +68,8 @@ def draw(compared: Compared, out: Path) -> None:
     from harness.report.figures import Album
     from harness.report.live_figure import LivePictures, live_figure
 
-    begun, found = time.perf_counter(), compared.found
-    shown = LivePictures(found.live, found.simulated, found.silhouette, found.mask, _words(compared))
-    Album(out.parent).photograph(out.stem, live_figure(shown))
+    begun = time.perf_counter()
+    Album(out.parent).photograph(out.stem, live_figure(LivePictures(compared.found, _words(compared))))
     compared.seconds["draw"] = time.perf_counter() - begun
 
 

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from harness.arrays import BoolArray, ByteArray
+from harness.arrays import BoolArray
+from harness.live_picture import LiveComparison
 from harness.report.style import ANSWER, TOOL, blank, styled, titled_picture
 from harness.report.tiles import DIFFERENCE_GAIN, difference
 
@@ -21,17 +22,11 @@ class LivePictures:
     """What is shown of a comparison.
 
     Attributes:
-        live: ``(rows, columns, 3)`` RGB.
-        simulated: the same.
-        silhouette: ``(rows, columns)`` the object's pixels in the simulation.
-        mask: the same in the live picture.
+        found: the comparison.
         words: under each of the three pictures.
     """
 
-    live: ByteArray
-    simulated: ByteArray
-    silhouette: BoolArray
-    mask: BoolArray
+    found: LiveComparison
     words: tuple[str, str, str]
 
 
@@ -41,19 +36,20 @@ def live_figure(shown: LivePictures) -> Figure:
     Raises:
         ValueError: pictures of other shapes.
     """
-    shapes = {shown.live.shape, shown.simulated.shape}
-    if len(shapes) != 1 or {shown.silhouette.shape, shown.mask.shape} != {shown.live.shape[:2]}:
-        raise ValueError(f"pictures of {shapes} with masks of {shown.silhouette.shape}, {shown.mask.shape}")
-    near = _about(shown.mask | shown.silhouette)
-    live_part, simulated_part = shown.live[near], shown.simulated[near]
+    found = shown.found
+    shapes = {found.live.shape, found.simulated.shape}
+    if len(shapes) != 1 or {found.silhouette.shape, found.mask.shape} != {found.live.shape[:2]}:
+        raise ValueError(f"pictures of {shapes} with masks of {found.silhouette.shape}, {found.mask.shape}")
+    near = _about(found.mask | found.silhouette)
+    live_part, simulated_part = found.live[near], found.simulated[near]
     rows, columns = live_part.shape[:2]
     with styled():
         figure = blank(3 * _WIDTH, _WIDTH * rows / columns + _WORDS)
         figure.set_layout_engine("constrained")
         live, simulated, left = np.asarray(figure.subplots(1, 3)).tolist()
         titled_picture(live, live_part, "live", shown.words[0])
-        _outline(live, shown.silhouette[near], ANSWER)
-        _outline(live, shown.mask[near], TOOL)
+        _outline(live, found.silhouette[near], ANSWER)
+        _outline(live, found.mask[near], TOOL)
         titled_picture(simulated, simulated_part, "simulated, as exposed", shown.words[1])
         titled_picture(
             left,

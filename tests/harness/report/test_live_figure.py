@@ -4,13 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from exposed_pictures import pictured, taken
+from exposed_pictures import bench_alone, pictured, taken
 
+from harness.live_picture import compare_live
 from harness.report.live_figure import LivePictures, live_figure
 
 IMAGE = pictured(radius=12.0)
 MASK = IMAGE.alpha >= 0.5
-SHOWN = LivePictures(taken(IMAGE), taken(IMAGE, seed=2), MASK, np.roll(MASK, 3, axis=1), ("a", "b", "c"))
+LARGE = pictured()
+FOUND = replace(
+    compare_live(taken(LARGE), LARGE, bench_alone(LARGE)),
+    live=taken(IMAGE),
+    simulated=taken(IMAGE, seed=2),
+    silhouette=MASK,
+    mask=np.roll(MASK, 3, axis=1),
+)
+"""Of an object too small for an exposure to be fitted, as one that was."""
+SHOWN = LivePictures(FOUND, ("a", "b", "c"))
 
 
 def test_the_sheet_shows_the_object_three_times_and_what_is_around_it() -> None:
@@ -24,13 +34,14 @@ def test_the_sheet_shows_the_object_three_times_and_what_is_around_it() -> None:
 
 
 def test_an_object_at_the_edge_or_not_there_is_shown_all_the_same() -> None:
-    whole = replace(SHOWN, silhouette=~MASK, mask=MASK)
-    none = replace(SHOWN, silhouette=MASK & ~MASK, mask=MASK & ~MASK)
-    for shown in (whole, none):
+    whole = replace(FOUND, silhouette=~MASK, mask=MASK)
+    none = replace(FOUND, silhouette=MASK & ~MASK, mask=MASK & ~MASK)
+    for found in (whole, none):
+        shown = replace(SHOWN, found=found)
         assert np.asarray(live_figure(shown).axes[0].images[0].get_array()).shape == (96, 96, 3)
 
 
 def test_pictures_of_two_sizes_are_refused() -> None:
-    for wrong in ({"live": SHOWN.live[1:]}, {"mask": MASK[1:]}):
+    for wrong in (replace(FOUND, live=FOUND.live[1:]), replace(FOUND, mask=MASK[1:])):
         with pytest.raises(ValueError, match="pictures of"):
-            live_figure(replace(SHOWN, **wrong))
+            live_figure(replace(SHOWN, found=wrong))
