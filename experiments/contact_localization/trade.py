@@ -37,8 +37,8 @@ LEVELS: dict[str, Setting] = {
     "3 mm, no refinement": _grid(3.0e-3, 0, 3000),
     "2 mm, no refinement": _grid(2.0e-3, 0, 3000),
     "2 mm, refined once": _grid(2.0e-3, 1, 3000),
-    "2 mm, refined": _grid(2.0e-3, 3, 3000),
-    "1.5 mm, refined": _grid(1.5e-3, 3, 6000),
+    "2 mm, refined": _grid(2.0e-3, 5, 3000),
+    "1.5 mm, refined": _grid(1.5e-3, 5, 6000),
     "300 particles": _particles(300),
     "1,000 particles": _particles(1000),
     "3,000 particles": _particles(3000),
@@ -48,7 +48,7 @@ LEVELS: dict[str, Setting] = {
 BY_SENSE: dict[str, Setting] = {
     "touch: 4 mm, no refinement": {SENSES.name: "touch", **_grid(4.0e-3, 0, 3000)},
     "touch: 2 mm, no refinement": {SENSES.name: "touch", **_grid(2.0e-3, 0, 3000)},
-    "touch: 2 mm, refined": {SENSES.name: "touch", **_grid(2.0e-3, 3, 3000)},
+    "touch: 2 mm, refined": {SENSES.name: "touch", **_grid(2.0e-3, 5, 3000)},
     "sound: 4 mm": {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: 4.0e-3},
     "sound: 2 mm": {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: 2.0e-3},
 }
