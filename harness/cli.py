@@ -152,7 +152,9 @@ def invoke(arguments: list[str]) -> int:
     except OSError as error:
         return _report(_of_system(error), 1, "--json" in arguments)
     except TyperException as error:
-        return _report(error.format_message(), error.exit_code, "--json" in arguments)
+        # The library's checker of values puts its own kind of error before what is said.
+        said = error.format_message().replace("Value error, ", "")
+        return _report(said, error.exit_code, "--json" in arguments)
     return result if isinstance(result, int) else 0
 
 

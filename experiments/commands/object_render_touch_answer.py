@@ -154,7 +154,7 @@ def _title(rendered: RenderedPress) -> str:
     leant, towards, turned = (math.degrees(angle) for angle in (tilt, azimuth, yaw))
     return (
         f"{rendered.of.description.name} pressed at ({x:g}, {y:g}, {z:g}) mm, {depth * 1e3:g} mm deep, "
-        f"tilted {leant:.3g} deg towards {towards:.3g}, turned {turned:.3g}; {rendered.touch.level}"
+        f"tilted {leant:.3g} deg towards {towards:.3g} deg, turned {turned:.3g} deg; {rendered.touch.level}"
     )
 
 

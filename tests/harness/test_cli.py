@@ -39,6 +39,13 @@ def test_wrong_use_exits_with_2() -> None:
     assert invoke(["run", "--no-such-option"]) == 2
 
 
+def test_a_mistyped_word_is_told_in_the_programs_own_words(capsys: pytest.CaptureFixture[str]) -> None:
+    assert invoke(["run", "contact-localisation"]) == 2
+    said = capsys.readouterr().err
+    assert "'contact-localisation' is not one of 'contact-localization'" in said
+    assert "Value error" not in said
+
+
 def test_json_is_one_object_even_for_an_error(capsys: pytest.CaptureFixture[str]) -> None:
     code = invoke(["explain", "no_such_scene.toml", "--json"])
     captured = capsys.readouterr()
