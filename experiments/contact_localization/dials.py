@@ -56,15 +56,17 @@ def _by_sound(spacing: float) -> dict[str, Level]:
     return {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: spacing}
 
 
+_COARSEST = (4e-3, 0, 3000, 16)
+_DEFAULT = (2e-3, 5, 3000, 8)
 _GRIDS = (
-    (4e-3, 0, 3000, 16),
+    _COARSEST,
     (3e-3, 0, 3000, 16),
     (2e-3, 0, 3000, 16),
     (2e-3, 0, 3000, 8),
     (3e-3, 1, 1500, 16),
     (2e-3, 1, 1500, 16),
     (2e-3, 5, 1500, 8),
-    (2e-3, 5, 3000, 8),
+    _DEFAULT,
     (1.5e-3, 5, 6000, 8),
 )
 """Spacing, rounds, samples and block: from the cheapest to the finest, where the front is likely to lie."""
@@ -132,8 +134,8 @@ def settings(thorough: bool = False, sound: bool = True, objectfile: bool = Fals
 
 def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
     """The few settings that are measured with fewer contacts too."""
-    cheapest = _grid("touch", 4e-3, 0, 3000, 16)
-    dials = ((2e-3, 0, 3000, 16), (2e-3, 5, 3000, 8))
+    cheapest = _grid("touch", *_COARSEST)
+    dials = ((2e-3, 0, 3000, 16), _DEFAULT)
     touch = [cheapest, *(_grid("touch", *each) for each in dials)]
     both = [_grid("both", *each) for each in dials]
     return [*touch, *both, _by_sound(4e-3), _by_sound(2e-3)] if sound else touch
@@ -142,7 +144,7 @@ def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
 def _other_modes() -> list[dict[str, Level]]:
     """Fewer modes, and modes of coarser elements, than the default ones."""
     few: tuple[dict[str, Level], ...] = ({MODES.name: 16}, {MODES.name: 32}, {EDGE.name: 0.7})
-    full, quick = _grid("both", 2e-3, 3, 3000, 8), _grid("both", 4e-3, 0, 3000, 16)
+    full, quick = _grid("both", *_DEFAULT), _grid("both", *_COARSEST)
     return [*({**full, **level} for level in few), {**quick, **few[0]}, {**_by_sound(2e-3), **few[1]}]
 
 
@@ -151,14 +153,14 @@ def _other_shapes() -> list[dict[str, Level]]:
     others: list[dict[str, Level]] = [
         {SHAPES.name: level} for level in SHAPES.levels if level != SHAPES.default
     ]
-    quick = (_grid("both", 4e-3, 0, 3000, 16), _grid("both", 2e-3, 3, 3000, 8), _by_sound(2e-3))
+    quick = (_grid("both", *_COARSEST), _grid("both", *_DEFAULT), _by_sound(2e-3))
     return [{**setting, **shapes} for shapes in others for setting in quick]
 
 
 def _turned(sound: bool) -> Iterator[dict[str, Level]]:
     """Every dial of the grid turned from its default, one at a time."""
     for senses in ("touch", "both") if sound else ("touch",):
-        default = _grid(senses, 2e-3, 3, 3000, 8)
+        default = _grid(senses, *_DEFAULT)
         for knob in (SPACING, ROUNDS, SAMPLES, BLOCK, *((MODES, EDGE) if senses == "both" else ())):
             for level in knob.levels:
                 if level == knob.default:
@@ -167,7 +169,7 @@ def _turned(sound: bool) -> Iterator[dict[str, Level]]:
 
 
 def setting_name(setting: Mapping[str, Level]) -> str:
-    """For people: ``"both, grid, spacing 2 mm, rounds 3, samples 3000, block 8"``."""
+    """For people: ``"both, grid, spacing 2 mm, rounds 5, samples 3000, block 8"``."""
     knobs = {knob.name: knob for knob in KNOBS}
     said = [str(setting[name]) for name in (SENSES.name, METHOD.name) if name in setting]
     for name, level in setting.items():
