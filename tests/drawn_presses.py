@@ -50,12 +50,16 @@ class DrawnGel:
         sine = np.minimum(away, contact) / BALL * np.exp(-np.maximum(away - contact, 0.0) / _SKIRT)
         share = sine / np.maximum(away, 1e-9)
         normal = np.stack([share * right, share * down, np.sqrt(1.0 - sine**2)], axis=-1)
-        lit = normal @ LIGHTS.T - LIGHTS[:, 2]
-        bright = 1.0 + 0.15 * (x / COLUMNS - 0.5) - 0.1 * (y / ROWS - 0.5)
+        lit = _lit(normal, x, y)
         dim = self.dimming * (away <= contact)
         noise = np.random.default_rng(seed).normal(0.0, self.noise, (ROWS, COLUMNS, 3))
-        drawn: FloatArray = self.rest() + _GAIN * lit * bright[..., None] - dim[..., None] + noise
+        drawn: FloatArray = self.rest() + lit - dim[..., None] + noise
         return drawn
+
+    def colours(self, x: FloatArray, y: FloatArray, normals: FloatArray) -> FloatArray:
+        """``(n, ..., 3)`` grey levels against the untouched gel, of ``(..., 3)`` normals at n places."""
+        places = (len(x), *[1] * (normals.ndim - 1))
+        return _lit(normals[None], x.reshape(places), y.reshape(places)) - self.dimming
 
 
 def spread_centres(count: int, seed: int = 0) -> FloatArray:
@@ -84,6 +88,12 @@ def drawn_set(count: int, gel: DrawnGel | None = None) -> tuple[Pictures, FloatA
     centres = spread_centres(count)
     images = [rounded(gel.press((x, y), seed)) for seed, (x, y) in enumerate(centres)]
     return press_set(images, rounded(gel.rest())), centres
+
+
+def _lit(normal: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    bright = 1.0 + 0.15 * (x / COLUMNS - 0.5) - 0.1 * (y / ROWS - 0.5)
+    shade: FloatArray = _GAIN * (normal @ LIGHTS.T - LIGHTS[:, 2]) * bright[..., None]
+    return shade
 
 
 def _places() -> tuple[FloatArray, FloatArray]:

@@ -1,5 +1,6 @@
 """What a fit of ball presses hands on: the calibration of its model."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,14 +9,18 @@ from calibration.taxim.held_out import Model
 from calibration.taxim.light_fit import per_metre
 from harness.arrays import ByteArray
 from harness.sim.lit_calibration import LitCalibration
-from harness.sim.tactile_calibration import CalibrationHeader
+from harness.sim.tactile_calibration import CalibrationHeader, Float32Array
 
 if TYPE_CHECKING:
     from calibration.taxim.mark_free import Identity
 
 
 def calibration_of(
-    background: ByteArray, model: Model, identity: "Identity", made_from: str
+    background: ByteArray,
+    model: Model,
+    identity: "Identity",
+    made_from: str,
+    error: Float32Array | None = None,
 ) -> LitCalibration:
     """The artefact of a model, which says nothing of its quality yet.
 
@@ -24,6 +29,7 @@ def calibration_of(
         model: of the presses.
         identity: pitch, ball and names.
         made_from: in words.
+        error: of the table's colours, see ``table_error``; None where it was not asked for.
     """
     header = CalibrationHeader(
         sensor=identity.sensor,
@@ -42,4 +48,5 @@ def calibration_of(
     )
     seen = np.clip(np.round(background + model.rest), 0.0, 255.0).astype(np.uint8)
     lit = per_metre(model.light.lit, identity.pitch)
-    return LitCalibration(header, seen, model.table, model.support, model.plain.colours, lit)
+    made = LitCalibration(header, seen, model.table, model.support, model.plain.colours, lit)
+    return made if error is None else replace(made, uncertainty=error)

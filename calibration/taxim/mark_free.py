@@ -21,10 +21,11 @@ from calibration.taxim.pictures import Pictures, Refused, in_order_of_content
 from calibration.taxim.shadow_fit import ShadowFit, fit_shadow
 from calibration.taxim.shadow_score import ShadowScore, score_shadow
 from calibration.taxim.smooth_fit import changes
+from calibration.taxim.table_error import table_error
 from harness.arrays import FloatArray, IntArray, read_only
 from harness.errors import CalibrationRefused
 from harness.sim.lit_calibration import LitCalibration, with_shadow
-from harness.sim.tactile_calibration import TactileCalibration
+from harness.sim.tactile_calibration import Float32Array, TactileCalibration
 from harness.square_pixels import stated
 
 LEAST_GAIN = 12.0
@@ -177,11 +178,12 @@ def _calibrated(
         for k in range(len(names))
     ]
     _check_gain(scores)
+    error = table_error(pack, change - model.rest, model.fit, ball)
     shadow = fit_shadow(pack, change - model.rest, model.fit.centres, model.light)
     worth = None if shadow.table is None else score_shadow(pack, change, out, identity.pitch, ball)
     drawn = None if worth is None or not worth.worth else shadow
     return MarkFree(
-        _artefact(pictures, len(pack.images), model, identity, scores, drawn),
+        _artefact(pictures, len(pack.images), model, identity, scores, drawn, error),
         tuple(sorted(used, key=lambda press: pictures.names.index(press.name))),
         tuple(sorted([*refused, *pictures.refused], key=lambda one: one.name)),
         model.fit.edge,
@@ -269,9 +271,10 @@ def _artefact(
     identity: Identity,
     scores: list[Score],
     shadow: ShadowFit | None,
+    error: Float32Array,
 ) -> LitCalibration:
     made_from = f"sha256 {pictures.sha256}, {presses} presses without marks{stated(pictures.aspect)}"
-    made = calibration_of(pictures.background, model, identity, made_from)
+    made = calibration_of(pictures.background, model, identity, made_from, error)
     header = replace(
         made.header,
         held_out_db=float(np.median([one.smooth for one in scores])),

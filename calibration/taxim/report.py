@@ -11,9 +11,11 @@ from calibration.taxim.rest import AWAY, SIGHTINGS
 from calibration.taxim.shadow_polar import SAMPLE_STEP
 from calibration.taxim.smooth_fit import distance
 from harness.arrays import ByteArray, FloatArray
+from harness.report.bins_figure import BinsFigure
 from harness.report.calibration_page import CalibrationReport, Example, MovesFigure, PressLine
 from harness.report.shadow_figure import ShadowFigure
 from harness.sim.gel import deform
+from harness.sim.lit_calibration import LitCalibration
 from harness.sim.optics import Optics
 from harness.sim.tactile_calibration import TactileCalibration
 
@@ -58,6 +60,7 @@ def report_of(
         _examples(made, pictures),
         None if scale is None or arm is None else _moves(scale, arm),
         _shadow_figure(made),
+        bins_of(made.calibration),
     )
 
 
@@ -160,6 +163,24 @@ def _shadow_figure(made: MarkFree) -> ShadowFigure:
     dark_sides = np.array([one.dark_side for one in shadow.colours])
     return ShadowFigure(
         lines, shadow.directions, pitch * SAMPLE_STEP, shadow.typical, shadow.cells, dark_sides
+    )
+
+
+def bins_of(calibration: TactileCalibration) -> BinsFigure | None:
+    """The table's bins and their errors; None of a calibration that does not say these."""
+    if not (isinstance(calibration, LitCalibration) and calibration.uncertainty.size):
+        return None
+    error = np.sqrt((calibration.uncertainty.astype(np.float64) ** 2).mean(axis=2))
+    steepest, support = float(np.arcsin(calibration.header.slope_limit)), calibration.support
+    inside = np.zeros_like(support)
+    inside[: int(np.nonzero(support.any(axis=1))[0].max(initial=0)) + 1] = True
+    filled = inside & ~support
+    return BinsFigure(
+        error,
+        support,
+        steepest,
+        float(np.median(error[support])),
+        float(np.median(error[filled])) if filled.any() else np.nan,
     )
 
 

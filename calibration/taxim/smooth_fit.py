@@ -195,7 +195,7 @@ def refined_centre(
     steps: int = 2,
 ) -> FloatArray:
     """The centre ``(2,)`` in pixels that explains one press best; Gauss-Newton steps of limited length."""
-    place = contact_pixels(pack.shape, centre, edge, _stride(edge))
+    place = contact_pixels(pack.shape, centre, edge, stride(edge))
     # What the contact adds by the place alone does not move with the centre.
     seen = change[place[:, 0], place[:, 1]] - _offset(pack, place, colours)
     longest = max(1.0, _LONGEST_STEP * ball)
@@ -232,7 +232,7 @@ def coefficients(
     pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float, manner: Manner
 ) -> tuple[FloatArray, FloatArray]:
     """The colours ``(120 or 126, 3)`` that explain presses at known centres, and the normal matrix."""
-    places = [contact_pixels(pack.shape, centre, edge, _stride(edge)) for centre in centres]
+    places = [contact_pixels(pack.shape, centre, edge, stride(edge)) for centre in centres]
     normal = np.concatenate([p[:, ::-1] - c for c, p in zip(centres, places, strict=True)]) / ball
     wanted = np.concatenate([change[k][place[:, 0], place[:, 1]] for k, place in enumerate(places)])
     where = scaled_place(pack, np.concatenate(places))
@@ -240,7 +240,7 @@ def coefficients(
     weight = np.ones(len(wanted))
     for _ in range(2):
         gram, right = terms.normal_equations(weight, wanted)
-        ridged = gram + np.diag(_ridge(np.diag(gram), manner.place_ridge))
+        ridged = gram + np.diag(ridge_of(np.diag(gram), manner.place_ridge))
         colours = np.asarray(np.linalg.solve(ridged, right), dtype=np.float64)
         weight = huber(terms.shades(colours) - wanted)
     return colours, np.asarray(ridged, dtype=np.float64)
@@ -272,13 +272,15 @@ def _slope_shades(
     return shade, by_normal
 
 
-def _ridge(diagonal: FloatArray, place_ridge: float) -> FloatArray:
+def ridge_of(diagonal: FloatArray, place_ridge: float) -> FloatArray:
+    """``(t,)`` what is added to the diagonal of the normal equations, see ``Manner.place_ridge``."""
     constants = diagonal.reshape(-1, POSITION_TERMS)[:, :1]
     ridge: FloatArray = _RIDGE * diagonal + (place_ridge * constants * _PLACE_DEGREES**2).ravel()
     return ridge
 
 
-def _stride(edge: float) -> int:
+def stride(edge: float) -> int:
+    """Every how many rows and columns a contact of this radius in pixels is looked at."""
     return max(1, int(np.ceil(edge / _ENOUGH)))
 
 

@@ -6,6 +6,8 @@ shrunk towards none. Rows beyond the steepest supported slope repeat the last su
 adds whatever its slope is let in over the first few degrees: flat gel keeps the background's colour.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from calibration.taxim.pack import PressPack
@@ -13,12 +15,12 @@ from calibration.taxim.smooth_fit import SmoothFit, ball_shades, changes, contac
 from harness.arrays import BoolArray, FloatArray, IntArray
 from harness.sim.lit_calibration import place_terms
 from harness.sim.shading import POSITION_TERMS, design, scaled_position
-from harness.sim.tactile_calibration import Float32Array
+from harness.sim.tactile_calibration import Float32Array, smooth_terms
 
 BINS = 120
 """ObjectFolder's."""
 
-_SHRINK = 4.0
+SHRINK = 4.0
 """Pixels' worth of belief in the smooth model, per bin."""
 
 _LET_IN = np.radians(4.0)
@@ -45,17 +47,25 @@ def fit_table(
     """
     rows, columns = pack.shape
     table = _from_smooth(fit, ball, rows, columns)
-    total, count = _residuals(pack, fit, ball, changes(pack) if change is None else change)
-    table[..., 5, :] += total / (count + _SHRINK)[..., None]
+    total, count = np.zeros((BINS, BINS, 3)), np.zeros((BINS, BINS))
+    for left, pixels in bin_residuals(pack, fit, ball, changes(pack) if change is None else change):
+        total += left
+        count += pixels
+    table[..., 5, :] += total / (count + SHRINK)[..., None]
     if len(fit.offset):
         table[0] = 0.0
-    last = int(np.floor(np.arcsin(fit.edge / ball) / (0.5 * np.pi / (BINS - 1)))) - 1
+    last = steepest_row(fit, ball)
     table[last + 1 :] = table[last]
     table[:, BINS - 1] = table[:, 0]
     support = count > 0
     support[last + 1 :] = False
     support[:, BINS - 1] = support[:, 0]
     return table.astype(np.float32), support
+
+
+def steepest_row(fit: SmoothFit, ball: float) -> int:
+    """The last row of the table that presses support, of a ball's radius in pixels."""
+    return int(np.floor(np.arcsin(fit.edge / ball) / (0.5 * np.pi / (BINS - 1)))) - 1
 
 
 def table_shades(table: Float32Array, centre: FloatArray, place: IntArray, ball: float) -> FloatArray:
@@ -71,18 +81,33 @@ def _bins_of_ball(right: FloatArray, down: FloatArray, ball: float) -> tuple[Int
     return bin_of(np.arcsin(np.hypot(right, down) / ball), np.arctan2(-down, -right), BINS)
 
 
-def _from_smooth(fit: SmoothFit, ball: float, rows: int, columns: int) -> FloatArray:
+def bin_terms(edge: float, ball: float) -> FloatArray:
+    """``(120 * 120, 21)`` what bins have of each group of the smooth model: 20 of slopes, and the offset.
+
+    Args:
+        edge: pixels, of the contact line; steeper bins have its slope.
+        ball: radius in pixels.
+    """
     step = 0.5 * np.pi / (BINS - 1)
     magnitude, direction = np.meshgrid(
         (np.arange(BINS) + 0.5) * step, -np.pi + (np.arange(BINS) + 0.5) * 4.0 * step, indexing="ij"
     )
-    sine = np.minimum(np.sin(magnitude), fit.edge / ball).ravel()
+    sine = np.minimum(np.sin(magnitude), edge / ball).ravel()
     # A height's gradient (a down, b right) has the normal's image part pointing the other way.
     normal = -np.stack([sine * np.cos(direction.ravel()), sine * np.sin(direction.ravel())], axis=1)
     slopes = design(normal, np.zeros_like(normal))[:, ::POSITION_TERMS]
-    by_place = np.tensordot(slopes, fit.smooth.reshape(-1, POSITION_TERMS, 3), axes=1)  # (bins^2, 6, 3)
-    if len(fit.offset):
-        by_place += np.minimum(1.0, magnitude.ravel() / _LET_IN)[:, None, None] * fit.offset
+    return np.column_stack([slopes, np.minimum(1.0, magnitude.ravel() / _LET_IN)])
+
+
+def by_group(colours: FloatArray) -> FloatArray:
+    """``(21, 6, 3)`` of coefficients, the offset's last: zero where it was not fitted."""
+    full = np.zeros(((smooth_terms() // POSITION_TERMS + 1) * POSITION_TERMS, 3))
+    full[: len(colours)] = colours
+    return full.reshape(-1, POSITION_TERMS, 3)
+
+
+def _from_smooth(fit: SmoothFit, ball: float, rows: int, columns: int) -> FloatArray:
+    by_place = np.tensordot(bin_terms(fit.edge, ball), by_group(fit.colours), axes=1)  # (bins^2, 6, 3)
     # Both are all the quadratics of the place: nine places give the one from the other exactly.
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, columns - 1, 3), np.linspace(0, rows - 1, 3)))
     raw = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=1)
@@ -91,15 +116,16 @@ def _from_smooth(fit: SmoothFit, ball: float, rows: int, columns: int) -> FloatA
     return table
 
 
-def _residuals(
+def bin_residuals(
     pack: PressPack, fit: SmoothFit, ball: float, change: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    total, count = np.zeros((BINS, BINS, 3)), np.zeros((BINS, BINS))
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Of each press ``(120, 120, 3)`` what the smooth model leaves over, summed by bin, and its pixels."""
     for k, centre in enumerate(fit.centres):
+        total, count = np.zeros((BINS, BINS, 3)), np.zeros((BINS, BINS))
         place = contact_pixels(pack.shape, centre, fit.edge, 1)
         seen = change[k][place[:, 0], place[:, 1]]
         left = seen - ball_shades(pack, centre, place, fit.colours, ball)
         at = _bins_of_ball(place[:, 1] - centre[0], place[:, 0] - centre[1], ball)
         np.add.at(total, at, left)
         np.add.at(count, at, 1.0)
-    return total, count
+        yield total, count

@@ -99,7 +99,7 @@ class Touched:
 def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path | None) -> dict[str, Any]:
     """The one JSON object."""
     from harness.explain import as_json as plan_json
-    from harness.sim.supported import filled_share
+    from harness.sim.supported import colour_error, filled_share
 
     press, place = touched.press, touched.place
     sensor, calibration = press.gel.sensor, press.gel.calibration
@@ -139,6 +139,7 @@ def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path 
             "held_out_db": _claimed(calibration.header.held_out_db),
             "held_out_table_db": _claimed(calibration.header.held_out_table_db),
             "residual_rms_grey": _finite(calibration.header.residual_rms),
+            "table_colour_grey": colour_error(_towards_camera(press), calibration),
             "maps_measured": press.maps_measured,
         },
         "live": None if touched.live is None else _compared(touched),

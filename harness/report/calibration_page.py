@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from harness.arrays import AnyArray, BoolArray, ByteArray, FloatArray, IntArray
+from harness.report.bins_figure import BinsFigure, bins_figure
 from harness.report.figures import Album, Picture
 from harness.report.shadow_figure import ShadowFigure, shadow_figure
 from harness.report.style import ANSWER, INK, SOFT, TOOL, blank, styled
@@ -94,6 +95,7 @@ class CalibrationReport:
         examples: from the worst press to the best.
         moves: of the arm between the presses; None where none are known.
         shadow: what presses leave over around their contacts.
+        bins: of the table; None where its errors are not known.
     """
 
     title: str
@@ -108,6 +110,7 @@ class CalibrationReport:
     examples: Sequence[Example]
     moves: MovesFigure | None = None
     shadow: ShadowFigure | None = None
+    bins: BinsFigure | None = None
 
 
 @dataclass(frozen=True)
@@ -140,6 +143,7 @@ def write_calibration_page(report: CalibrationReport, folder: Path) -> Path:
         moved=None if report.moves is None else album.drawing("moves", moves_figure(report.moves)),
         longer=f"{_LONGER:g}",
         shadowed=None if report.shadow is None else album.drawing("shadow", shadow_figure(report.shadow)),
+        believed=None if report.bins is None else album.drawing("bins", bins_figure(report.bins)),
     )
     (folder / PAGE).write_text(page, encoding="utf-8")
     return folder / PAGE

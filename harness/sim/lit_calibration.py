@@ -14,7 +14,7 @@ Without it the file is one of ``harness.sim.tactile_calibration``. Presses that 
 """
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from zipfile import BadZipFile, is_zipfile
 
@@ -28,6 +28,7 @@ from harness.sim.tactile_calibration import (
     POSITION_DEGREE,
     SCHEMA,
     CalibrationHeader,
+    Float32Array,
     GelSkirt,
     TactileCalibration,
     load_calibration,
@@ -40,9 +41,16 @@ LIT = "lit"
 SHADOW = ("shadow_directions", "shadow_lengths", "shadow_values", "shadow_rays")
 """Of the arrays of a shadow in the file."""
 
+UNCERTAINTY = "uncertainty"
+"""Of the array in the file."""
+
 LIGHT_DEGREE = 2
 LIGHT_POWERS = tuple((a, b) for a in range(LIGHT_DEGREE + 1) for b in range(LIGHT_DEGREE + 1 - a))
 """Of the normal's x and y, in the light's terms; the first is the constant one."""
+
+
+def _not_said() -> Float32Array:
+    return np.empty((0, 0, 3), np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +60,15 @@ class LitCalibration(TactileCalibration):
     Attributes:
         lit: ``(156, 3)``: 120 coefficients of slopes as in ``smooth``, then six of the position for each of
             ``LIGHT_POWERS``, in grey levels a metre of indentation.
+        uncertainty: ``(bins, bins, 3)`` grey levels, the standard error of each colour of ``table``
+            (``calibration.taxim.table_error``); ``(0, 0, 3)`` in files that do not say it.
     """
 
     lit: FloatArray
+    uncertainty: Float32Array = field(default_factory=_not_said, kw_only=True)
 
     def __post_init__(self) -> None:
+        _require_errors(self.uncertainty, self.bins)
         wanted = (smooth_terms() + len(LIGHT_POWERS) * POSITION_TERMS, 3)
         found = self.lit
         if found.shape != wanted or found.dtype != np.float64 or not np.isfinite(found).all():
@@ -69,7 +81,8 @@ class LitCalibration(TactileCalibration):
     @property
     def arrays(self) -> dict[str, AnyArray]:
         """Every array by its name in the file."""
-        return {**super().arrays, LIT: self.lit}
+        said = {UNCERTAINTY: self.uncertainty} if self.uncertainty.size else {}
+        return {**super().arrays, LIT: self.lit, **said}
 
     @property
     def slopes(self) -> FloatArray:
@@ -133,6 +146,15 @@ class ShadowedCalibration(LitCalibration):
         return float(self.shadow_rays[5])
 
 
+def _require_errors(found: Float32Array, bins: int) -> None:
+    fits = found.shape in ((bins, bins, 3), (0, 0, 3)) and found.dtype == np.float32
+    if not fits or not np.isfinite(found).all() or (found < 0.0).any():
+        raise CalibrationRefused(
+            f"uncertainty is {found.dtype} {found.shape}, below zero or not finite; finite float32 "
+            f"{(bins, bins, 3)} of 0 or more are wanted: fit the calibration again"
+        )
+
+
 def with_shadow(calibration: LitCalibration, table: ShadowTable, seen: float) -> ShadowedCalibration:
     """The same calibration with the shadows of rims of ``seen`` metres."""
     rays = (table.shallowest, table.depth_step, table.sample_step, table.fan, table.fan_step, seen)
@@ -192,6 +214,8 @@ def _lit(found: dict[str, AnyArray], path: Path) -> LitCalibration:
     wanted = {"header", "background", "table", "support", "smooth", LIT}
     shadowed = not set(SHADOW).isdisjoint(found)
     wanted |= set(SHADOW) if shadowed else set()
+    # Files of before it was measured do not say it.
+    wanted |= {UNCERTAINTY} & set(found)
     if set(found) != wanted:
         raise CalibrationRefused(f"{path} holds {sorted(found)} where a calibration holds {sorted(wanted)}")
     header, sha256 = _header(str(found.pop("header")), path)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -93,6 +94,44 @@ def test_damage_is_refused(lit: LitCalibration, tmp_path: Path) -> None:
         np.savez(path, **{k: v for k, v in (good | change).items() if v is not None})
         with pytest.raises(CalibrationRefused, match=words):
             read_calibration(path)
+
+
+def test_errors_of_colours_are_read_back_and_counted(lit: LitCalibration, tmp_path: Path) -> None:
+    errors = np.random.default_rng(1).uniform(0.0, 9.0, (lit.bins, lit.bins, 3)).astype(np.float32)
+    known = dataclasses.replace(lit, uncertainty=errors)
+    assert known.sha256 != lit.sha256
+    save_calibration(known, tmp_path / "a.npz")
+    again = read_calibration(tmp_path / "a.npz")
+    assert isinstance(again, LitCalibration)
+    assert np.array_equal(again.uncertainty, errors)
+    assert again.sha256 == known.sha256
+    assert np.array_equal(dataclasses.replace(again, lit=lit.lit).uncertainty, errors)
+
+
+def test_a_file_of_before_errors_were_measured_reads_and_says_none(
+    lit: LitCalibration, tmp_path: Path
+) -> None:
+    save_calibration(lit, tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz", allow_pickle=False) as archive:
+        assert "uncertainty" not in archive.files
+    again = read_calibration(tmp_path / "a.npz")
+    assert isinstance(again, LitCalibration)
+    assert again.uncertainty.size == 0
+
+
+@pytest.mark.parametrize(
+    "errors",
+    [
+        np.full((120, 120, 3), -1.0, np.float32),
+        np.full((120, 120, 3), np.nan, np.float32),
+        np.zeros((120, 120, 3)),
+        np.zeros((120, 119, 3), np.float32),
+    ],
+    ids=["below zero", "no number", "double", "a column short"],
+)
+def test_errors_that_cannot_be_are_refused(lit: LitCalibration, errors: Any) -> None:
+    with pytest.raises(CalibrationRefused, match="uncertainty is"):
+        dataclasses.replace(lit, uncertainty=errors)
 
 
 def test_a_file_of_one_array_is_named_for_what_it_is(tmp_path: Path) -> None:

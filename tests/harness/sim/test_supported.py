@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from harness.arrays import FloatArray
-from harness.sim.supported import filled_share
+from harness.sim.lit_calibration import LitCalibration
+from harness.sim.supported import colour_error, filled_share
 from harness.sim.tactile_calibration import shipped_calibration
 
 WORLD = shipped_calibration("gelsight_r15_world")
@@ -56,3 +57,37 @@ def test_the_sign_of_nothing_chooses_no_bin() -> None:
 def test_a_published_table_does_not_say() -> None:
     silent = replace(WORLD, header=replace(WORLD.header, slope_limit=1.0))
     assert filled_share(plane(0.3, 0.3), silent) is None
+
+
+def unsure(uncertainty: FloatArray) -> LitCalibration:
+    """The world's calibration with errors of its colours, and no light of a press."""
+    parts = {name: vars(WORLD)[name] for name in ("header", "background", "table", "support", "smooth")}
+    lit = np.concatenate([WORLD.smooth, np.zeros((36, 3))])
+    return LitCalibration(**parts, lit=lit, uncertainty=uncertainty.astype(np.float32))
+
+
+def test_a_plane_s_colour_is_as_uncertain_as_its_bin() -> None:
+    step, around = 0.5 * np.pi / 119, 2.0 * np.pi / 119
+    errors = np.random.default_rng(0).uniform(0.0, 20.0, (120, 120, 3))
+    known = unsure(errors)
+    for row, column in np.argwhere(np.ones((60, 119)))[::97]:
+        found = colour_error(plane((row + 0.5) * step, (column + 0.5) * around - np.pi), known)
+        assert found == pytest.approx(np.sqrt(np.mean(errors[row, column] ** 2)), rel=1e-6)
+
+
+def test_of_two_planes_the_errors_are_taken_together() -> None:
+    errors = np.zeros((120, 120, 3))
+    errors[:, 60:] = 4.0
+    roof = np.concatenate([plane(0.3, -1.0)[:, :40], plane(0.3, 1.0)[:, 40:]], axis=1)
+    assert colour_error(roof, unsure(errors)) == pytest.approx(4.0 * np.sqrt(119.0 / 158.0), rel=0.01)
+
+
+def test_what_no_colour_is_drawn_of_is_not_uncertain() -> None:
+    known = unsure(np.full((120, 120, 3), 4.0))
+    assert colour_error(np.full((120, 160), 1e-3), known) == 0.0
+    assert colour_error(plane(1.2, 0.3), known) == 0.0
+
+
+def test_a_calibration_without_errors_does_not_say() -> None:
+    assert colour_error(plane(0.3, 0.3), WORLD) is None
+    assert colour_error(plane(0.3, 0.3), unsure(np.empty((0, 0, 3)))) is None
