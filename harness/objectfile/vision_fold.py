@@ -17,19 +17,25 @@ class FoldedWeights:
     Attributes:
         size: of each network.
         density_scale: 1/m.
+        looks: whether any network answers otherwise from another side.
         packed: ``(networks, numbers)`` float32: of each network ``first_bias``, ``first``, ``second_bias``,
             ``second``, ``density_bias``, ``density``, the feature folded into ``scatter`` with the rows of
-            view and extras, ``colour_bias`` and ``colour`` padded to four columns. Matrices are tiles of
-            ``OUTPUTS`` columns.
+            view (where one ``looks``) and extras, ``colour_bias`` and ``colour`` padded to four columns.
+            Matrices are tiles of ``OUTPUTS`` columns.
         light_rows: ``(networks, direction, width)`` float32, of ``scatter``.
         bias: ``(networks, width)`` float32, of ``scatter`` without a light.
     """
 
     size: NetworkSize
     density_scale: float
+    looks: bool
     packed: AnyArray
     light_rows: AnyArray
     bias: AnyArray
+
+    def seen(self, views: AnyArray) -> AnyArray:
+        """``(r, 3)`` float32 views as the kernel takes them: ``(r, 0)`` where no network looks at them."""
+        return views if self.looks else np.empty((len(views), 0), np.float32)
 
     def lit(self, light: FloatArray) -> AnyArray:
         """``(networks, width)`` float32: the bias of ``scatter`` under a light that comes from far away.
@@ -46,7 +52,9 @@ def folded(weights: VisionWeights) -> FoldedWeights:
     size, at = weights.size, scatter_rows(weights.size)
     w = {name: array.astype(np.float32) for name, array in weights.arrays()}
     of_feature = w["scatter"][:, at["feature"]]
-    scatter = [w["feature"] @ of_feature, w["scatter"][:, at["view"]], w["scatter"][:, at["extras"]]]
+    of_view = w["scatter"][:, at["view"]]
+    looks = bool(of_view.any())
+    scatter = [w["feature"] @ of_feature, *([of_view] if looks else []), w["scatter"][:, at["extras"]]]
     bias = w["scatter_bias"] + (w["feature_bias"][:, None] @ of_feature)[:, 0]
     parts = [
         *(w["first_bias"], _tiled(w["first"]), w["second_bias"], _tiled(w["second"])),
@@ -55,7 +63,7 @@ def folded(weights: VisionWeights) -> FoldedWeights:
     ]
     packed = np.concatenate([part.reshape(len(weights), -1) for part in parts], axis=1)
     light_rows = np.ascontiguousarray(w["scatter"][:, at["light"]])
-    return FoldedWeights(size, weights.density_scale, np.ascontiguousarray(packed), light_rows, bias)
+    return FoldedWeights(size, weights.density_scale, looks, np.ascontiguousarray(packed), light_rows, bias)
 
 
 def _tiled(matrices: AnyArray) -> AnyArray:

@@ -56,7 +56,7 @@ def ask_blocks(
         order: of samples, so that those of a block are next to each other.
         local: ``(n, 3)`` float32, -1 to 1 in each sample's cell.
         rays: ``(n,)`` of each sample.
-        views: ``(r, 3)`` float32 unit, of each ray.
+        views: ``(r, 3)`` float32 unit, of each ray; ``(r, 0)`` where ``packed`` has no rows of them.
         extras: ``(r, 0)`` or ``(r, 4)`` float32.
         packed: ``(networks, numbers)`` float32, as ``vision_fold`` lays them out.
         lit: ``(networks, width)`` float32: bias of the layer that sees directions, with the light's part.
@@ -65,7 +65,8 @@ def ask_blocks(
         density: ``(n,)`` float32, written; in units of the weights' scale.
         scattered: ``(n, 3)`` float32, written.
     """
-    wide, place, seen, more = lit.shape[1], 3 + 6 * octaves, 3 + 6 * turns, extras.shape[1]
+    wide, place, more, looks = lit.shape[1], 3 + 6 * octaves, extras.shape[1], views.shape[1] > 0
+    seen = 3 + 6 * turns if looks else 0
     encoding = np.zeros(place * SAMPLES, np.float32)
     hidden = np.zeros(wide * SAMPLES, np.float32)
     scatter = np.zeros((wide + seen + more) * SAMPLES, np.float32)
@@ -80,15 +81,18 @@ def ask_blocks(
             ray = rays[sample]
             for c in range(3):
                 encoding[c * across + i] = local[sample, c]
+            for c in range(views.shape[1]):
                 toward[c * across + i] = views[ray, c]
             for c in range(more):
                 toward[(seen + c) * across + i] = extras[ray, c]
         if across == LANES:
             waves_narrow(encoding.ctypes.data, octaves)
-            waves_narrow(toward.ctypes.data, turns)
+            if looks:
+                waves_narrow(toward.ctypes.data, turns)
         else:
             waves(encoding.ctypes.data, octaves)
-            waves(toward.ctypes.data, turns)
+            if looks:
+                waves(toward.ctypes.data, turns)
         at = packed[network].ctypes.data
         _layer(encoding.ctypes.data, at + 4 * wide, at, hidden.ctypes.data, place, wide, across)
         at += 4 * wide * (place + 1)

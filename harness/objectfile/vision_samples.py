@@ -99,11 +99,11 @@ class FusedAsker:
     def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene, crew: Crew) -> None:
         """As ``Asker``."""
         weights, lit = self._weights, self._under(scene.light)
-        rays = np.repeat(samples.rays, samples.most)
+        rays, views = np.repeat(samples.rays, samples.most), weights.seen(scene.views)
 
         def ask(first: int, last: int) -> None:
             ask_blocks(
-                *(blocks[first:last], order, samples.local, rays, scene.views, scene.extras),
+                *(blocks[first:last], order, samples.local, rays, views, scene.extras),
                 *(weights.packed, lit, weights.size.octaves, weights.size.turns),
                 *(samples.density, samples.scattered),
             )

@@ -89,7 +89,13 @@ def by_kernel(model: VisionModel, query: Asked, block: int) -> tuple[AnyArray, A
     density, scattered = np.full(count, np.nan, np.float32), np.full((count, 3), np.nan, np.float32)
     size = model.weights.size
     ask_blocks(
-        *(np.array(blocks, np.int32), order, local, np.arange(count), query.views.astype(np.float32)),
+        *(
+            np.array(blocks, np.int32),
+            order,
+            local,
+            np.arange(count),
+            folds.seen(query.views.astype(np.float32)),
+        ),
         *(query.extras.astype(np.float32), folds.packed, folds.lit(query.light), size.octaves, size.turns),
         *(density, scattered),
     )
@@ -196,12 +202,23 @@ def test_the_graph_says_what_plain_float64_says(name: str) -> None:
 @pytest.mark.parametrize("block", [1, LANES, SAMPLES])
 @pytest.mark.parametrize("name", SIZES)
 def test_the_kernel_says_what_plain_float64_says(name: str, block: int) -> None:
-    model = drawn_look(GRID, SIZES[name], SCALE)
-    query = asked(model, 500, 2)
-    density, scattered = evaluate(model, query)
-    found_density, found_scattered = by_kernel(model, query, block)
-    np.testing.assert_allclose(found_density, density, rtol=0, atol=phase(SIZES[name]) * density.max())
-    np.testing.assert_allclose(found_scattered, scattered, rtol=0, atol=phase(SIZES[name]))
+    """Of networks that look the same from every side, and of others."""
+    drawn = drawn_look(GRID, SIZES[name], SCALE)
+    assert not folded(drawn.weights).looks
+    assert folded(sided(drawn).weights).looks
+    for model in (drawn, sided(drawn)):
+        query = asked(model, 500, 2)
+        density, scattered = evaluate(model, query)
+        found_density, found_scattered = by_kernel(model, query, block)
+        np.testing.assert_allclose(found_density, density, rtol=0, atol=phase(SIZES[name]) * density.max())
+        np.testing.assert_allclose(found_scattered, scattered, rtol=0, atol=phase(SIZES[name]))
+
+
+def sided(model: VisionModel) -> VisionModel:
+    """The same with colours that depend on the view, in one network alone."""
+    rows, scatter = scatter_rows(model.weights.size)["view"], np.array(model.weights.scatter)
+    scatter[1, rows] = np.random.default_rng(11).normal(0.0, 0.2, scatter[1, rows].shape)
+    return VisionModel(model.grid, replace(model.weights, scatter=scatter))
 
 
 def test_octaves_are_counted_in_the_cell() -> None:
