@@ -179,3 +179,14 @@ def gap_path(name: str) -> Path:
 def load_gap(name: str) -> Gap:
     """A gap by name or path; ``WrongUse`` as ``gap_path`` and ``load_toml``."""
     return load_toml(gap_path(name), Gap)
+
+
+def lasting_name(name: str) -> str:
+    """What to write of a gap in a run: a shipped name, or a path that holds wherever it is resumed from.
+
+    Raises:
+        WrongUse: the gap cannot be read.
+    """
+    load_gap(name)
+    path = gap_path(name)
+    return name if path.stem == name else str(path)

@@ -13,7 +13,7 @@ from calibration.taxim.arm_press import BallPresses
 from calibration.taxim.arm_record import NAME
 from harness.device import Health
 from harness.errors import WrongUse
-from harness.gap import gap_path, load_gap
+from harness.gap import lasting_name
 from harness.objects.targets import BALL_RADIUS
 from harness.recording import Recording, require_unused
 from harness.run_folder import RunFiles, create_run, station_calibration
@@ -86,7 +86,7 @@ def begin(
     """
     if folder is not None:
         require_unused(folder)
-    mock = None if station.mock is None else {"gap": _gap(gap or GAP)}
+    mock = None if station.mock is None else {"gap": lasting_name(gap or GAP)}
     if gap is not None and mock is None:
         raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")
     mesh = known_object(scene).mesh
@@ -129,13 +129,6 @@ def perform_on(
     presses = BallPresses(partial(way_between, twin), ball, say=say)
     complete = perform(presses, bench, recording, bench.arm.stop, progress)
     return complete, {"arm": bench.arm.health(), "gel": bench.gel.health()}
-
-
-def _gap(named: str) -> str:
-    """A gap that can be read: a shipped name, or a path that holds wherever the run is resumed from."""
-    load_gap(named)
-    path = gap_path(named)
-    return named if path.stem == named else str(path)
 
 
 def _new_folder() -> Path:

@@ -30,7 +30,7 @@ from harness.accuracy import Accuracy
 from harness.arrays import FloatArray
 from harness.device import Health
 from harness.errors import WrongUse
-from harness.gap import gap_path, load_gap
+from harness.gap import lasting_name
 from harness.recording import Recording, require_unused, write_text_whole
 from harness.report.page import write_report
 from harness.run_folder import RunFiles, create_run, station_acquisition, station_calibration
@@ -65,7 +65,7 @@ def start(
     """
     if folder is not None:
         require_unused(folder)
-    mock = None if station.mock is None else {"gap": _gap(gap or station.mock.gap)}
+    mock = None if station.mock is None else {"gap": lasting_name(gap or station.mock.gap)}
     if gap is not None and mock is None:
         raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")
     known = known_object(scene)
@@ -206,13 +206,6 @@ def _doubts(found: Answer) -> tuple[str, ...]:
         f"the answer is ambiguous: {len(found.last.modes)} places stay likely ({shares}); "
         "one more contact elsewhere on the object would tell them apart",
     )
-
-
-def _gap(named: str) -> str:
-    """A gap that can be read: a shipped name, or a path that holds wherever the run is resumed from."""
-    load_gap(named)
-    path = gap_path(named)
-    return named if path.stem == named else str(path)
 
 
 def _new_folder(scene: SceneFile) -> Path:

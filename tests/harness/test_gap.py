@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.errors import WrongUse
-from harness.gap import Gap, gap_path, load_gap
+from harness.gap import Gap, gap_path, lasting_name, load_gap
 from harness.toml_file import validate
 
 
@@ -97,6 +97,17 @@ def test_a_gap_of_ones_own_is_read_by_path(tmp_path: Path) -> None:
     text = gap_path("none").read_text(encoding="utf-8").replace("0.02 mm", "1 mm")
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
     assert load_gap(str(tmp_path / "mine.toml")).arm.translation == 1e-3
+
+
+def test_a_run_keeps_a_shipped_gap_by_name_and_any_other_by_its_whole_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert lasting_name("default") == "default"
+    (tmp_path / "own.toml").write_text(gap_path("none").read_text())
+    monkeypatch.chdir(tmp_path)
+    assert lasting_name("own.toml") == str(tmp_path / "own.toml")
+    with pytest.raises(WrongUse, match="no gap file 'other'"):
+        lasting_name("other")
 
 
 def test_an_unknown_gap_names_the_shipped_ones() -> None:
