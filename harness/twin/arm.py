@@ -54,13 +54,13 @@ def add_arm(spec: Any, model: str) -> Any:
     table = arm_table(model)
     hulls = link_hulls(model)
     body = spec.worldbody.add_body(name="base")
-    _add_hull(spec, body, "base", hulls["base"], ARM_COLOUR)
+    add_hull(spec, body, "base", hulls["base"], ARM_COLOUR)
     for joint, link in enumerate(LINKS[1:], start=1):
         placement = link_from_previous(table, joint)
         body = body.add_body(name=link, pos=placement[:3, 3], quat=_quaternion(placement[:3, :3]))
         body.add_joint(name=f"joint_{joint}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
         _set_inertia(body, table, joint)
-        _add_hull(spec, body, link, hulls[link], ARM_COLOUR if joint < 4 else JOINT_COLOUR)
+        add_hull(spec, body, link, hulls[link], ARM_COLOUR if joint < 4 else JOINT_COLOUR)
     # MuJoCo leaves out parent and child, but not where the parent stands still.
     spec.add_exclude(bodyname1="base", bodyname2="shoulder")
     return body
@@ -97,7 +97,8 @@ def _swept(table: ArmTable, joint: int, radius: float, low: float, high: float) 
     return float(np.hypot(furthest, radius)), -radius, radius
 
 
-def _add_hull(spec: Any, body: Any, name: str, vertices: FloatArray, colour: tuple[float, ...]) -> None:
+def add_hull(spec: Any, body: Any, name: str, vertices: FloatArray, colour: tuple[float, ...]) -> None:
+    """Give a body of a model the convex hull of ``(n, 3)`` points, in metres of its frame, as its shape."""
     spec.add_mesh(name=name, uservert=vertices.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
     body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, mass=0.0, rgba=colour)
 

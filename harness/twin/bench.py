@@ -17,7 +17,7 @@ from harness.errors import WrongUse
 from harness.geometry import apply, inverse
 from harness.mesh import Mesh
 from harness.sensor import TactileSensor
-from harness.twin.arm import Part, add_arm, arm_parts, reaches
+from harness.twin.arm import Part, add_arm, add_hull, arm_parts, reaches
 from harness.twin.striker import striker
 from harness.twin.triangles import ConvexBody, Solid
 from harness.ur_tables import arm_table
@@ -236,8 +236,8 @@ class TwinBench:
         spec.compiler.degree = False
         flange = add_arm(spec, self.model)
         for part, colour in zip(tool, (_GREY, _BLACK, _GEL, _GREY), strict=False):
-            _add_hull(spec, flange, part.name, part.vertices, colour)
-        _add_hull(spec, spec.worldbody, "object", self._object_in_base, _OBJECT)
+            add_hull(spec, flange, part.name, part.vertices, colour)
+        add_hull(spec, spec.worldbody, "object", self._object_in_base, _OBJECT)
         low = self._object_in_base[:, 2].min()
         if low < table_height - NO_GAP:
             raise WrongUse(
@@ -300,8 +300,3 @@ def _tool(sensor: TactileSensor, flange_from_gel: FloatArray) -> tuple[Part, Par
         Part("housing", 6, apply(flange_from_gel, housing.vertices)),
         Part("gel", 6, apply(flange_from_gel, gel.vertices)),
     )
-
-
-def _add_hull(spec: Any, body: Any, name: str, vertices: FloatArray, colour: tuple[float, ...]) -> None:
-    spec.add_mesh(name=name, uservert=vertices.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
-    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, mass=0.0, rgba=colour)
