@@ -9,7 +9,7 @@ import numpy as np
 
 from drivers.hammer import DataqHammer
 from harness.acquisition import AcquisitionCalibration, shipped_acquisition
-from harness.arrays import AnyArray
+from harness.arrays import AnyArray, FloatArray
 from mocks.daq.box import DaqBox, Source
 from mocks.daq.source import Played
 from mocks.faults import Fault
@@ -105,3 +105,11 @@ def opened(bench: Bench, **options: object) -> Iterator[DataqHammer]:
         yield hammer
     finally:
         hammer.close()
+
+
+def measured_delay(force: FloatArray, pressure: FloatArray, rate: float) -> float:
+    """s by which the pressure is later, from the phase of the cross spectrum."""
+    cross = np.fft.rfft(pressure) * np.conj(np.fft.rfft(force))
+    omega = 2 * np.pi * np.fft.rfftfreq(len(force), 1 / rate)
+    weight = np.abs(cross) * (np.abs(cross) > 1e-2 * np.abs(cross).max())
+    return -float(np.sum(weight * omega * np.angle(cross)) / np.sum(weight * omega**2))

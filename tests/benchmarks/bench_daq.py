@@ -13,6 +13,7 @@ import pytest
 from daq_bench import (
     CALIBRATION,
     OFFSETS,
+    measured_delay,
     mocked_box,
     numbered,
     numbered_begin,
@@ -23,7 +24,6 @@ from daq_bench import (
 
 from harness.acquisition import strike_from_readings
 from harness.acquisition_channels import BLOCK, CLOCK, FORCE, PRESSURE
-from harness.arrays import FloatArray
 from mocks.daq.source import Wiring, skewed
 
 pytestmark = [
@@ -70,13 +70,6 @@ def test_a_minute_of_two_channels_loses_no_sample() -> None:
     assert len(counts) == SECONDS * RATE
 
 
-def _delay(first: FloatArray, second: FloatArray, rate: float) -> float:
-    cross = np.fft.rfft(second) * np.conj(np.fft.rfft(first))
-    omega = 2 * np.pi * np.fft.rfftfreq(len(first), 1 / rate)
-    weight = np.abs(cross) * (np.abs(cross) > 1e-2 * np.abs(cross).max())
-    return -float(np.sum(weight * omega * np.angle(cross)) / np.sum(weight * omega**2))
-
-
 @pytest.mark.parametrize("centre", [1000.0, 6000.0, 15000.0, 19000.0])
 def test_the_skew_of_the_channels(centre: float) -> None:
     t = (np.arange(20_000) - 2000) / RATE
@@ -93,9 +86,9 @@ def test_the_skew_of_the_channels(centre: float) -> None:
     began = time.process_time()
     strike = strike_from_readings(readings, CALIBRATION)
     cost = time.process_time() - began
-    corrected = _delay(strike.force, strike.pressure, strike.rate)
+    corrected = measured_delay(strike.force, strike.pressure, strike.rate)
     _say(
-        f"{centre / 1e3:4.0f} kHz: raw {_delay(raw[0], raw[1], RATE) * 1e6:+.3f} us, corrected "
+        f"{centre / 1e3:4.0f} kHz: raw {measured_delay(raw[0], raw[1], RATE) * 1e6:+.3f} us, corrected "
         f"{corrected * 1e6:+.4f} us; reading {len(strike.force)} samples took {cost * 1e3:.0f} ms"
     )
     assert abs(corrected) < 1e-6

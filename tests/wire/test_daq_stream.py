@@ -10,6 +10,7 @@ from daq_bench import (
     OFFSETS,
     Bench,
     idle_counts,
+    measured_delay,
     mocked_box,
     numbered,
     numbered_begin,
@@ -126,14 +127,6 @@ def test_the_clock_is_the_crystals_and_not_nominal(drift: float) -> None:
     assert (rate / RATE - 1.0) * 1e6 == pytest.approx(drift, abs=200.0)
     assert np.abs(readings[CLOCK].values[:, 1]).min() < 1e-9
     assert np.median(readings[CLOCK].values[:, 1]) < 1e-3
-
-
-def measured_delay(force: FloatArray, pressure: FloatArray, rate: float) -> float:
-    """s by which the pressure is later, from the phase of the cross spectrum."""
-    cross = np.fft.rfft(pressure) * np.conj(np.fft.rfft(force))
-    omega = 2 * np.pi * np.fft.rfftfreq(len(force), 1 / rate)
-    weight = np.abs(cross) * (np.abs(cross) > 1e-2 * np.abs(cross).max())
-    return -float(np.sum(weight * omega * np.angle(cross)) / np.sum(weight * omega**2))
 
 
 def test_the_skew_of_the_channels_is_corrected_to_a_microsecond() -> None:
