@@ -192,3 +192,8 @@ def needs_sound(setting: Mapping[str, Level]) -> bool:
 def needs_objectfile(setting: Mapping[str, Level]) -> bool:
     """Whether a setting takes the modes from an ObjectFile."""
     return setting.get(SHAPES.name, SHAPES.default) != SHAPES.default
+
+
+def saves_no_answer_time(setting: Mapping[str, Level]) -> bool:
+    """Whether a setting's modes are of coarser elements: found sooner, once an object; heard no faster."""
+    return setting.get(EDGE.name, EDGE.default) != EDGE.default

@@ -11,9 +11,11 @@ from experiments.contact_localization.dials import (
     chosen,
     levels_of,
     needs_sound,
+    saves_no_answer_time,
     settings,
     settings_by_count,
 )
+from experiments.contact_localization.front import front_of, shipped_curve
 from experiments.contact_localization.levels import Levels
 from harness.accuracy import Accuracy, Knob
 from harness.errors import WrongUse
@@ -94,3 +96,14 @@ def test_a_run_takes_no_touch_that_it_does_not_carry(level: str) -> None:
     with pytest.raises(WrongUse, match=rf"touch\.shapes = {level}: .*take touch\.shapes = reference"):
         chosen([f"touch.shapes={level}"])
     assert chosen(["touch.shapes=reference"]) == chosen([])
+
+
+def test_a_shipped_budget_never_buys_coarser_elements() -> None:
+    """They are found sooner, once an object, and save an answer nothing: only luck would choose them."""
+    curve = shipped_curve()
+    measured = [point for point in curve.points if saves_no_answer_time(point.levels)]
+    assert measured, "the curve no longer says what coarser elements cost"
+    for condition in curve.conditions():
+        offered = front_of(curve, condition, (), shipped=True).points
+        assert offered
+        assert not [point.name for point in offered if saves_no_answer_time(point.levels)]
