@@ -282,9 +282,13 @@ class Child:
     # The end
 
     def _give_up(self, error: Exception) -> None:
-        fault = error if isinstance(error, TouchstoneError) else self._named(error)
-        with contextlib.suppress(BenchFault):
-            self._link.halt()
+        try:
+            # Before the halt, which ends the program whose state says why.
+            fault = error if isinstance(error, TouchstoneError) else self._named(error)
+        finally:
+            # Nothing that words may run into keeps the arm from being halted.
+            with contextlib.suppress(BenchFault):
+                self._link.halt()
         self._reply({"id": -1, "ok": False, "error": type(fault).__name__, "text": str(fault)[:2000]})
 
     def _named(self, error: Exception) -> TouchstoneError:

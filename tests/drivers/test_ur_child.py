@@ -447,3 +447,16 @@ def test_joints_are_asked_for_again_only_where_a_late_kick_ended_the_script(case
         assert link.done == (["revive"] if case == "late twice" else [])
     os.close(out)
     os.close(replies)
+
+
+def test_the_arm_is_halted_even_where_its_state_cannot_be_told() -> None:
+    class Speechless(ScriptedLink):
+        patience = 0.1
+
+        def why(self) -> TouchstoneError:
+            raise IndexError("a packet without the field")
+
+    link: Any = Speechless()
+    with pytest.raises(IndexError):
+        Child(link, -1, -1)._give_up(RuntimeError("isProgramRunning() function did not succeed!"))
+    assert link.done == ["halt"]
