@@ -18,13 +18,17 @@ CARRIED = 0.6e-3
 FLOOR = 0.15
 
 
-class Slanted:
-    """A place known to 0.1 mm but for what shared errors carry it: thin in ten dimensions."""
+class OneContact:
+    """What a round asks of a run with one contact, its yaw known."""
 
     def __init__(self) -> None:
         self.prior = Prior(np.eye(3), "known")
         self.positions = np.zeros((1, 3))
         self.yaw_observable = True
+
+
+class Slanted(OneContact):
+    """A place known to 0.1 mm but for what shared errors carry it: thin in ten dimensions."""
 
     def weigh(
         self, at: Hypotheses, members: IntArray, step: int, rings: int, within: float = np.inf
@@ -37,13 +41,8 @@ class Slanted:
         return told.best(within, len(at.yaws))
 
 
-class Floor:
+class Floor(OneContact):
     """Every place of a flat square is alike, and what is off it by more than a little is none."""
-
-    def __init__(self) -> None:
-        self.prior = Prior(np.eye(3), "known")
-        self.positions = np.zeros((1, 3))
-        self.yaw_observable = True
 
     def weigh(
         self, at: Hypotheses, members: IntArray, step: int, rings: int, within: float = np.inf
