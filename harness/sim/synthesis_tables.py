@@ -23,7 +23,10 @@ TableLevel = Literal["fast", "double"]
 CUTS: Mapping[TableLevel, float] = {"fast": 100.0, "double": 260.0}
 """dB: all modes that are left out late together stay that far below the root of the sum of squares of
 all first amplitudes. Few are ever near their share of it: with random amplitudes of a hundred modes
-or more it comes to 25 dB more."""
+or more it comes to 25 dB more. Modes that all die at one rate are, and sound for longer: see ``_FARTHER``."""
+
+_FARTHER = 20.0
+"""dB by which what is left out at any one time is to be below ``CUTS`` even where all end together."""
 
 _FLOORS: Mapping[TableLevel, float] = {"fast": 1e-12, "double": 1e-140}
 """Entries of a table below are zero: neither a product nor a difference of two is then subnormal."""
@@ -97,8 +100,7 @@ def fill_sound(steps: Steps, weights: AnyArray, sound: FloatArray, level: TableL
     sizes /= loudest
     blocks, length = sound.shape
     seconds = length / steps.rate
-    quiet = 10.0 ** (-CUTS[level] / 20.0) * float(np.linalg.norm(sizes)) / len(sizes)
-    counts = block_counts(sizes, steps.dampings, quiet, seconds, blocks, _MULTIPLE)
+    counts = _counts(sizes, steps.dampings, seconds, blocks, level)
     lasting = _lasting(steps, counts, blocks, length, level)
     counts[lasting], sizes[lasting] = 0, 0.0
     rest = largest_rest(sizes, steps.dampings, counts, seconds, blocks, _MULTIPLE)
@@ -112,6 +114,21 @@ def fill_sound(steps: Steps, weights: AnyArray, sound: FloatArray, level: TableL
         slow, flat = steps.take(np.flatnonzero(lasting)), sound.reshape(-1)
         missed += add_modes(slow.dampings, slow.turns, weights[lasting], steps.rate, flat)
     return missed
+
+
+def _counts(
+    sizes: FloatArray, dampings: FloatArray, seconds: float, blocks: int, level: TableLevel
+) -> IntArray:
+    """``(m,)``: blocks of each mode, so many that no sample misses more than ``_FARTHER`` allows."""
+    cut = 10.0 ** (-CUTS[level] / 20.0) * float(np.linalg.norm(sizes))
+    quiet, most = cut / len(sizes), cut * 10.0 ** (-_FARTHER / 20.0)
+    while True:
+        counts = block_counts(sizes, dampings, quiet, seconds, blocks, _MULTIPLE)
+        rest = largest_rest(sizes, dampings, counts, seconds, blocks, _MULTIPLE)
+        if rest <= most:
+            return counts
+        # Counts are whole multiples, so that a little less may change none.
+        quiet *= min(most / rest, 0.8)
 
 
 def _lasting(steps: Steps, counts: IntArray, blocks: int, length: int, level: TableLevel) -> BoolArray:

@@ -103,6 +103,18 @@ def test_two_thousand_modes_are_known_to_better_than_115_db() -> None:
     assert decibels(found.sound - exact.sound, exact.sound) < found.error < -115.0
 
 
+@pytest.mark.parametrize("modes", [16, 128, 700])
+@pytest.mark.parametrize("rate_of_decay", [14.0, 50.0])
+def test_modes_that_all_end_together_are_known_to_better_than_115_db(
+    modes: int, rate_of_decay: float
+) -> None:
+    """All of them are left out at one time, and what they then add up to is bounded with one sign."""
+    f, _, g = drawn(modes, modes)
+    d = np.full(modes, rate_of_decay)
+    found, exact = (synthesize(f, d, g, 1.5, RATE, level) for level in ("fast", "exact"))
+    assert decibels(found.sound - exact.sound, exact.sound) < found.error < -115.0
+
+
 @pytest.mark.parametrize("level", ["fast", "double"])
 def test_it_is_what_an_impulse_of_force_rings(level: SynthesisLevel) -> None:
     f, d, g = drawn(3, 40)
