@@ -70,6 +70,10 @@ COMMANDS = {
         "experiments.commands.cost:contact_localization",
         "Error against seconds of the estimate; `run --budget` and `run --error` go by it.",
     ),
+    "cost vision": Command(
+        "experiments.commands.cost_vision:vision",
+        "Error against seconds of an object's pictures, knob by knob.",
+    ),
     "object build": Command(
         "experiments.commands.object_build:build",
         "Build an object's sound, touch or look: networks, and what they are off by.",

@@ -98,6 +98,29 @@ def author_vision(
     return AuthoredVision(model, errors, _settings(profile.networks, training), clock.seconds)
 
 
+def networks_alone(
+    lit: LitObject,
+    held_out: HeldOut,
+    spec: CellsSpec,
+    seed: int,
+    checkpoint: Path,
+    report: Report,
+    threads: int | None = None,
+) -> VisionModel:
+    """Networks as ``author_vision`` makes them, not judged; arguments and errors as there.
+
+    Args:
+        lit: the object.
+        held_out: what nothing is learned from.
+        spec: of the networks.
+        seed: of all that is drawn.
+        checkpoint: file that a killed training goes on from; it is left there.
+        report: told of progress.
+        threads: None for as many as the process has cores.
+    """
+    return _Making(lit, held_out, seed, report, threads, _Clock()).trained(spec, checkpoint, "").finish()
+
+
 @dataclass(frozen=True, eq=False)
 class _Making:
     """What all networks of an object have in common; names of their times and errors begin with a word."""
