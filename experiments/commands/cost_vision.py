@@ -50,12 +50,12 @@ def vision(
 
     Try: touchstone cost vision builtin:wrench --threads 1
     """
-    from harness.authoring.object_source import surface_of
     from harness.authoring.vision_cost import Views
     from harness.authoring.vision_data import held_out_pictures
     from harness.authoring.vision_profiles import vision_profile
     from harness.sim.appearance_source import appearance_of
     from harness.sim.direct_image import LitObject
+    from harness.sim.taken_surface import surface_of
 
     spec = vision_profile(profile).networks
     chosen = _chosen(spec, size, knob)

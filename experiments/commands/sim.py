@@ -20,12 +20,15 @@ _SI_OR_UNIT = "a number in SI units, or with its unit"
 
 def modes(
     mesh: Annotated[
-        Path,
+        str,
         typer.Argument(
-            help="A surface, or tetrahedra of four or ten nodes (.inp, .msh, .vtu, ...).", metavar="MESH"
+            help="A surface, or tetrahedra of four or ten nodes (.inp, .msh, .vtu, ...); or builtin:NAME.",
+            metavar="MESH",
         ),
     ],
-    material: Annotated[str | None, typer.Option(help="What it is made of.", metavar="M")] = None,
+    material: Annotated[
+        str | None, typer.Option(help="What it is made of; a built-in object's own if left out.", metavar="M")
+    ] = None,
     units: Annotated[
         str | None, typer.Option(help="Of the file's numbers: m, cm, mm or in.", metavar="U")
     ] = None,
@@ -76,8 +79,7 @@ def modes(
     from harness.sim.modal_file import modes_of_file
     from harness.store import Store, default_folder
 
-    _check_is_file(mesh)
-    of = _material(material, young, poisson, density, alpha, beta)
+    of = _material(material or _own_material(mesh), young, poisson, density, alpha, beta)
     found = modes_of_file(
         mesh,
         of,
@@ -92,27 +94,18 @@ def modes(
     if not json:
         for sentence in found.said:
             warn(sentence)
-        _print(mesh.name, found, of, count)
+        _print(Path(mesh).name, found, of, count)
         return 0
-    emit(_as_json(mesh.name, found, of, count))
+    emit(_as_json(Path(mesh).name, found, of, count))
     return 0
 
 
-def _check_is_file(mesh: Path) -> None:
-    """Refuse a built-in object by its name, which other commands take.
-
-    Raises:
-        WrongUse: it is one.
-    """
-    from harness.errors import WrongUse
+def _own_material(mesh: str) -> str | None:
+    """What one of our own objects is made of; None of a file."""
+    from harness.objects.household import MATERIALS
     from harness.scene import BUILTIN
 
-    if str(mesh).startswith(BUILTIN):
-        raise WrongUse(
-            f"sim modes takes a mesh file and not {mesh}; `touchstone object build {mesh} --material M "
-            "--out FOLDER` solves its modes, which `touchstone object info FOLDER` shows; FOLDER/mesh.ply "
-            "is its surface in metres"
-        )
+    return MATERIALS.get(mesh.removeprefix(BUILTIN)) if mesh.startswith(BUILTIN) else None
 
 
 def _material(

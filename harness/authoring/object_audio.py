@@ -9,13 +9,7 @@ import numpy as np
 from harness.authoring.audio import CHECKPOINT, AuthoredAudio, author_audio
 from harness.authoring.audio_data import canonical
 from harness.authoring.audio_profiles import profile
-from harness.authoring.object_source import (
-    PartRequest,
-    created_object,
-    provenance_of,
-    source_of,
-    surface_of,
-)
+from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
 from harness.authoring.training import Report
 from harness.errors import DataRefused, MeshRefused
 from harness.mesh import Mesh
@@ -27,6 +21,7 @@ from harness.sim.modal import HEARING, default_edge, solved_once
 from harness.sim.modal_file import modes_of_file
 from harness.sim.modes import Modes, dampings
 from harness.sim.stage_seconds import CPU, cpu, renamed, timed, wall
+from harness.sim.taken_surface import surface_of
 from harness.sim.volume_mesh import read_volume
 from harness.store import Store
 

@@ -1,4 +1,4 @@
-"""What an ObjectFile is built from: a mesh's origin, its surface, and the folder's object."""
+"""What an ObjectFile is built from: a mesh's origin, and the folder's object."""
 
 import hashlib
 from collections.abc import Mapping
@@ -7,16 +7,13 @@ from pathlib import Path
 from typing import Literal
 
 from harness.code_version import content_hash
-from harness.errors import MeshRefused, WrongUse
+from harness.errors import WrongUse
 from harness.materials import Material
 from harness.mesh import Mesh
 from harness.objectfile.entries import DESCRIPTION, Provenance, Source
 from harness.objectfile.file import MESH, ObjectFile, create_object, file_entry
 from harness.objectfile.surface_file import ply_bytes
-from harness.objects.household import build
 from harness.scene import BUILTIN
-from harness.sim.intake import take_in
-from harness.sim.walls import walled
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,49 +72,15 @@ def source_of(mesh: str, licence: str) -> Source:
         licence: of the mesh.
 
     Raises:
-        MeshRefused: there is no such file.
+        WrongUse: there is no such file.
     """
     if mesh.startswith(BUILTIN):
         return Source(what="mesh", origin=mesh, licence=licence)
     path = Path(mesh)
     if not path.is_file():
-        raise MeshRefused(f"there is no file {path}; say a mesh file, or {BUILTIN} and a name")
+        raise WrongUse(f"there is no file {path}; say a mesh file, or {BUILTIN} and a name")
     sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
     return Source(what="mesh", origin=path.name, licence=licence, sha256=sha256)
-
-
-@dataclass(frozen=True, eq=False)
-class TakenSurface:
-    """The surface of an object's material.
-
-    Attributes:
-        mesh: in metres.
-        units: of the file's numbers; None of a built-in object, which has none.
-        said: what was done to the mesh and what to look at.
-    """
-
-    mesh: Mesh
-    units: str | None
-    said: tuple[str, ...]
-
-
-def surface_of(mesh: str, units: str | None, wall: float | None) -> TakenSurface:
-    """The surface of an object's material.
-
-    Args:
-        mesh: a file of a surface, or ``builtin:`` and a name.
-        units: of the file's numbers; None to take the only ones that make sense.
-        wall: m, of a hollow thing of which the file has the outside.
-
-    Raises:
-        MeshRefused: a mesh that cannot stand for an object.
-        WrongUse: units or a wall that cannot be.
-    """
-    if mesh.startswith(BUILTIN):
-        return TakenSurface(build(mesh.removeprefix(BUILTIN)), None, ())
-    intake = take_in(Path(mesh), units, wall=wall)
-    said = (*intake.report.repairs, *intake.report.warnings)
-    return TakenSurface(walled(intake.mesh, wall), intake.report.units, said)
 
 
 def created_object(

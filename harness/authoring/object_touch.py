@@ -5,13 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from harness.authoring.object_source import (
-    PartRequest,
-    created_object,
-    provenance_of,
-    source_of,
-    surface_of,
-)
+from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
 from harness.authoring.touch import CHECKPOINT, AuthoredTouch, author_touch
 from harness.authoring.touch_data import DEPTHS, MOST_TILT
 from harness.authoring.touch_profiles import touch_profile
@@ -21,6 +15,7 @@ from harness.objectfile.touch_part import TouchPart, with_touch
 from harness.sensor import GELSIGHT_R15, TactileSensor
 from harness.sim.gel import skirt_for
 from harness.sim.press_pose import MOST_MOVED
+from harness.sim.taken_surface import surface_of
 
 
 @dataclass(frozen=True, eq=False)

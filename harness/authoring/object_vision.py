@@ -9,13 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.authoring.object_source import (
-    PartRequest,
-    created_object,
-    provenance_of,
-    source_of,
-    surface_of,
-)
+from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
 from harness.authoring.training import Report
 from harness.authoring.vision import CHECKPOINT, STRICT_CHECKPOINT, AuthoredVision, author_vision
 from harness.authoring.vision_profiles import vision_profile
@@ -27,6 +21,7 @@ from harness.objectfile.vision_part import VisionPart, with_vision
 from harness.scene import BUILTIN
 from harness.sim.appearance import Appearance
 from harness.sim.appearance_source import appearance_of
+from harness.sim.taken_surface import surface_of
 
 
 @dataclass(frozen=True, eq=False)

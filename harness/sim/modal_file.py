@@ -1,4 +1,4 @@
-"""The modes of what a file holds: a surface that is filled, or tetrahedra on their own nodes."""
+"""The modes of a mesh: a surface that is filled, or a file's tetrahedra on their own nodes."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,16 +11,15 @@ import numpy as np
 from harness.arrays import BoolArray, IntArray
 from harness.errors import WrongUse
 from harness.materials import Material
-from harness.mesh import Mesh
+from harness.scene import BUILTIN
 from harness.sim.element_edge import finely_filled
 from harness.sim.filled import filled
-from harness.sim.intake import take_in
 from harness.sim.modal import HEARING, curved
 from harness.sim.modal_mesh import QuadraticMesh
 from harness.sim.modal_solve import Elasticity, Solution, check_elasticity, check_limit, solve_mesh
+from harness.sim.taken_surface import surface_of
 from harness.sim.tetrahedra import check_closed
 from harness.sim.volume_mesh import read_volume
-from harness.sim.walls import walled
 from harness.store import Store
 from harness.toml_file import nearest
 
@@ -37,12 +36,12 @@ _SIDES = {f"{axis}-{end}": (number, end) for number, axis in enumerate("xyz") fo
 
 @dataclass(frozen=True, eq=False)
 class FileModes:
-    """The modes of a file, and how they came about.
+    """The modes of a mesh, and how they came about.
 
     Attributes:
         solution: the modes.
         volume: whether the file held tetrahedra.
-        units: the unit that the file's numbers were taken in.
+        units: the unit that the file's numbers were taken in; metres of a built-in object.
         bodies: separate ones.
         edge: m, longest edge of an element aimed at; None for a volume mesh.
         held: nodes that are held.
@@ -73,7 +72,7 @@ class _Taken:
 
 
 def modes_of_file(
-    path: Path,
+    mesh: str | Path,
     material: Material,
     units: str | None = None,
     wall: float | None = None,
@@ -83,10 +82,10 @@ def modes_of_file(
     fixed: Sequence[str] = (),
     store: Store | None = None,
 ) -> FileModes:
-    """The modes of an object given by a file.
+    """The modes of an object given by a file, or of one of our own.
 
     Args:
-        path: of a surface or of tetrahedra.
+        mesh: a file of a surface or of tetrahedra, or ``builtin:`` and a name.
         material: of all of it.
         units: "m", "cm", "mm" or "in"; None to take the only one that makes sense.
         wall: m, of a hollow thing of which the file has the outside; not for tetrahedra.
@@ -104,10 +103,11 @@ def modes_of_file(
     check_limit(HEARING if limit is None else limit, count)
     check_elasticity(Elasticity.uniform(material, 1), 1)
     seconds = dict.fromkeys(("intake", "mesh"), 0.0)
-    taken = _volume(path, units, wall, edge, seconds)
+    mesh = str(mesh)
+    taken = None if mesh.startswith(BUILTIN) else _volume(Path(mesh), units, wall, edge, seconds)
     volume = taken is not None
     if taken is None:
-        taken = _surface(path, units, wall, edge, material, _highest(limit, count), count, seconds, store)
+        taken = _surface(mesh, units, wall, edge, material, _highest(limit, count), count, seconds, store)
     held = _held(taken, fixed)
     highest = np.inf if limit is None and count is not None else _highest(limit, count)
     solution = solve_mesh(taken.mesh, material, highest, least=count, held=held)
@@ -144,7 +144,7 @@ def _volume(
 
 
 def _surface(
-    path: Path,
+    mesh: str,
     units: str | None,
     wall: float | None,
     edge: float | None,
@@ -155,17 +155,17 @@ def _surface(
     store: Store | None,
 ) -> _Taken:
     with _timed(seconds, "intake"):
-        intake = take_in(path, units, wall=wall)
-        surface: Mesh = walled(intake.mesh, wall)
+        given = surface_of(mesh, units, wall)
+        surface = given.mesh
         check_closed(surface)
     with _timed(seconds, "mesh"):
         if edge is None:
             inside, edge, kept = finely_filled(surface, material, limit, count, store)
         else:
             inside, kept = filled(surface, edge, store)
-        mesh = curved(inside, surface, inside)
-    said = (*intake.report.repairs, *intake.report.warnings, *((_KEPT,) if kept else ()))
-    return _Taken(mesh, {}, intake.report.units, inside.bodies, edge, said)
+        snapped = curved(inside, surface, inside)
+    said = (*given.said, *((_KEPT,) if kept else ()))
+    return _Taken(snapped, {}, given.units, inside.bodies, edge, said)
 
 
 def _held(taken: _Taken, fixed: Sequence[str]) -> BoolArray:

@@ -28,12 +28,12 @@ from rich.table import Table
 from experiments.contact_localization.table import REAL
 from harness.authoring.audio_profiles import PROFILES
 from harness.authoring.object_audio import MODES, STAGES, AudioRequest, build_audio
-from harness.authoring.object_source import surface_of
 from harness.materials import material
 from harness.objects.household import MATERIALS
 from harness.scene import BUILTIN
 from harness.sim.modal import default_edge
 from harness.sim.stage_seconds import cpu, wall
+from harness.sim.taken_surface import surface_of
 from harness.store import Store
 
 WAYS = ("network", "nearest_trained", "linear", "table_float16")
