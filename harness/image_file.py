@@ -6,19 +6,20 @@ import cv2
 import numpy as np
 
 from harness.arrays import ByteArray, read_only
-from harness.errors import DataRefused
+from harness.errors import DataRefused, WrongUse
 
 
 def read_image(path: Path) -> ByteArray:
     """``(rows, columns, 3)`` RGB of a picture of 8 bits a channel.
 
     Raises:
-        DataRefused: no such file, or one that is no such picture.
+        WrongUse: no such file, or none that may be read.
+        DataRefused: it is no such picture.
     """
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise DataRefused(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
     # OpenCV fails on a buffer without bytes instead of answering that it is no picture.
     seen = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     if seen is None:

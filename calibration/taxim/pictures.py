@@ -11,7 +11,7 @@ import numpy as np
 
 from calibration.taxim.pack import read_pack
 from harness.arrays import ByteArray, FloatArray, read_only
-from harness.errors import CalibrationRefused
+from harness.errors import CalibrationRefused, WrongUse
 from harness.image_file import read_image
 from harness.square_pixels import made_square, square_places
 
@@ -112,6 +112,7 @@ def read_pictures(path: Path, background: Path | None = None, channels: Channels
             pictures, blue first for data packs.
 
     Raises:
+        WrongUse: no such folder or file.
         CalibrationRefused: no pictures, or none that belong together.
         DataRefused: a file that is no picture.
     """
@@ -119,7 +120,7 @@ def read_pictures(path: Path, background: Path | None = None, channels: Channels
     if packed.is_file():
         return _from_pack(packed, background, channels or "bgr")
     if not path.is_dir():
-        raise CalibrationRefused(f"{path} is no folder and no {PACK}; name the folder of the press pictures")
+        raise WrongUse(f"{path} is no folder and no {PACK}; name the folder of the press pictures")
     files = [file for file in sorted(path.iterdir()) if file.suffix.lower() in SUFFIXES]
     rest = background or next((file for file in files if file.stem.lower() in REST_NAMES), None)
     presses = [file for file in files if rest is None or not _same(file, rest)]

@@ -46,6 +46,7 @@ def localization(
     from experiments.contact_localization.table import by_object, measure, objects, rows
     from experiments.contact_localization.table_cell import Cell, cells
     from harness.errors import WrongUse
+    from harness.gap import load_gap
     from harness.toml_file import nearest
 
     folder = data or _data_folder()
@@ -55,6 +56,8 @@ def localization(
     for name in only or []:
         if name not in scenes:
             raise WrongUse(f"no object {name!r} in this table; {nearest(name, scenes)}")
+    for name in gap or []:
+        load_gap(name)
     wanted = cells(
         only or list(scenes),
         range(first_seed, first_seed + seeds),

@@ -72,8 +72,9 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """Of the cell's file."""
-        plain = f"{self.object}-{self.spacing}-{self.gap}-{self.yaw}-{self.seed}"
+        """Of the cell's file; a gap may be a path."""
+        gap = self.gap.replace("/", "_")
+        plain = f"{self.object}-{self.spacing}-{gap}-{self.yaw}-{self.seed}"
         return f"{plain}-sound" if self.sound else plain
 
 

@@ -83,11 +83,12 @@ def read_description(path: Path) -> Description:
     """Read ``object.json``.
 
     Raises:
-        DataRefused: it is missing, damaged, of another schema, or says something unknown; every
+        WrongUse: it is missing.
+        DataRefused: it is damaged, of another schema, or says something unknown; every
             mistake is named, an unknown key with the nearest known one.
     """
     if not path.is_file():
-        raise DataRefused(
+        raise WrongUse(
             f"{path.parent} is no ObjectFile: there is no {path.name} in it; give its folder, or make one "
             "with `touchstone object build`"
         )

@@ -34,8 +34,8 @@ def read_appearance(path: Path, units: str, scale: float = 1.0, crease: float = 
         crease: rad, as of ``smooth_normals``.
 
     Raises:
-        WrongUse: no such unit, or a scale that is none.
-        MeshRefused: no such file, or no surface in it.
+        WrongUse: no such file or unit, or a scale that is none.
+        MeshRefused: no surface in it.
     """
     if units not in METRES or not (np.isfinite(scale) and scale > 0.0):
         raise WrongUse(
@@ -43,7 +43,7 @@ def read_appearance(path: Path, units: str, scale: float = 1.0, crease: float = 
             "and a scale above zero"
         )
     if not path.is_file():
-        raise MeshRefused(f"there is no mesh file {path}; check the path")
+        raise WrongUse(f"there is no mesh file {path}; check the path")
     pieces = _pieces(path)
     vertices = np.vstack([np.asarray(piece.vertices, np.float64) for piece in pieces])
     before = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])

@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from harness.arrays import AnyArray, BoolArray, FloatArray, read_only
-from harness.errors import DataRefused, OutOfDomain
+from harness.errors import DataRefused, OutOfDomain, WrongUse
 from harness.sensor import TactileSensor
 
 Heights = Literal["object", "gel"]
@@ -51,11 +51,14 @@ def read_heights(path: Path, sensor: TactileSensor, of: Heights = "object") -> G
         of: what the map is of.
 
     Raises:
+        WrongUse: there is no such file.
         DataRefused: the file does not read, or holds something else than numbers.
         OutOfDomain: another shape, no height at all, or heights in another unit or of another sign.
     """
     if path.suffix != ".npy":
         raise DataRefused(f"{path}: a height map is read from a .npy file; write it with numpy.save")
+    if not path.is_file():
+        raise WrongUse(f"there is no height map {path}; check the path")
     try:
         found: AnyArray = np.load(path, allow_pickle=False)
     except (OSError, EOFError, ValueError) as error:

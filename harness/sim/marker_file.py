@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from harness.arrays import FloatArray, read_only
-from harness.errors import CalibrationRefused, OutOfDomain
+from harness.errors import CalibrationRefused, OutOfDomain, WrongUse
 from harness.recording import write_text_whole
 from harness.sensor import MarkerGrid
 
@@ -126,12 +126,13 @@ def read_markers(path: Path) -> MarkerFile:
     """Read the file, strictly.
 
     Raises:
-        CalibrationRefused: missing, or not what ``write_markers`` writes.
+        WrongUse: missing, or none that may be read.
+        CalibrationRefused: not what ``write_markers`` writes.
     """
     try:
         return MarkerFile.model_validate_json(path.read_bytes())
     except OSError as error:
-        raise CalibrationRefused(f"{path} does not read as a file of markers: {error}") from error
+        raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

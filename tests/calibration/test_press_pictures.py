@@ -16,7 +16,7 @@ from calibration.taxim.polycalib import write_polycalib
 from calibration.taxim.rest import SIGHTINGS, rest_change
 from calibration.taxim.smooth_fit import changes
 from harness import cli
-from harness.errors import CalibrationRefused, DataRefused
+from harness.errors import CalibrationRefused, DataRefused, WrongUse
 from harness.image_file import write_png
 from harness.sim.lit_calibration import LitCalibration, read_calibration
 from harness.sim.published_pack import read_table
@@ -104,7 +104,7 @@ def test_a_picture_of_another_size_is_refused_by_name(tmp_path: Path) -> None:
 
 
 def test_folders_without_presses_and_files_that_are_no_pictures_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(CalibrationRefused, match="no folder"):
+    with pytest.raises(WrongUse, match="no folder"):
         read_pictures(tmp_path / "nowhere")
     with pytest.raises(CalibrationRefused, match="no pictures"):
         read_pictures(tmp_path)

@@ -57,10 +57,10 @@ def test_verify_ends_with_1_and_says_which_failed(folder: Path, capsys: pytest.C
 
 
 @pytest.mark.parametrize("command", ["info", "verify"])
-def test_a_folder_that_is_no_object_is_a_named_failure(
+def test_a_folder_that_is_no_object_is_wrong_use(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
-    assert invoke(["object", command, str(tmp_path), "--json"]) == 1
+    assert invoke(["object", command, str(tmp_path), "--json"]) == 2
     answer = json.loads(capsys.readouterr().out)
     assert "no ObjectFile" in answer["error"]
 

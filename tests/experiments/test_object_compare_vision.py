@@ -132,7 +132,7 @@ def test_people_are_told_what_differs(
         (("--station", "mock"), 2, "needs --scene FILE"),
         ((*CAMERA, "--scene", "s.toml"), 2, "say which with --station NAME"),
         ((), 2, "--live IMAGE with --camera X Y Z"),
-        ((*CAMERA, "--background", "none.png"), 1, "none.png cannot be read"),
+        ((*CAMERA, "--background", "none.png"), 2, "none.png cannot be read"),
     ],
 )
 def test_what_cannot_be_compared_is_refused(
@@ -161,12 +161,12 @@ def test_pictures_that_say_nothing_are_refused(
     half = tmp_path / "half.png"
     write_png(half, read_image(photographed(image, tmp_path / "a.png"))[:60])
     asked = ["object", "compare", "vision", str(box), *CAMERA, "--out", str(tmp_path / "s.png")]
-    for more, said in (
-        (("--live", str(white)), "are saturated"),
-        (("--live", str(tmp_path / "a.png"), "--background", str(half)), "take all by one camera"),
-        (("--live", str(tmp_path / "no.png")), "cannot be read"),
+    for more, code, said in (
+        (("--live", str(white)), 1, "are saturated"),
+        (("--live", str(tmp_path / "a.png"), "--background", str(half)), 1, "take all by one camera"),
+        (("--live", str(tmp_path / "no.png")), 2, "cannot be read"),
     ):
-        assert invoke([*asked, *more]) == 1
+        assert invoke([*asked, *more]) == code
         assert said in capsys.readouterr().err
 
 

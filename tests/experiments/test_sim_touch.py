@@ -211,7 +211,7 @@ def test_a_contact_that_fills_the_window_is_said(tmp_path: Path, capsys: pytest.
         (("builtin:mug", "--contact", "-0.04", "0", "0.05", "--heights-of", "gel"), "--heights-of", 2),
         (("builtin:mug", "--height", "h.npy"), "either a MESH", 2),
         (("--height", "h.npy", "--depth", "1mm"), "are of a mesh", 2),
-        (("--height", "absent.npy"), "does not read", 1),
+        (("--height", "absent.npy"), "there is no height map", 2),
         (("--height", "h.npy", "--heights-of", "gle"), "object and gel", 2),
         (("--height", "h.npy", "--sensor", "gelsight"), "did you mean 'gelsight-r1.5'", 2),
         (("--height", "h.npy", "--calibration", "."), "polycalib.npz", 1),

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from harness.arrays import FloatArray, IntArray
-from harness.errors import MeshRefused
+from harness.errors import MeshRefused, WrongUse
 from harness.mesh import Mesh
 from harness.objects.household import build
 from harness.sim.intake import Intake, take_in
@@ -217,5 +217,5 @@ def test_one_stray_vertex_far_away_is_a_matter_of_size_and_welds_nothing(mug: Me
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(MeshRefused, match="there is no mesh file"):
+    with pytest.raises(WrongUse, match="there is no mesh file"):
         take_in(tmp_path / "nowhere.stl", "m")

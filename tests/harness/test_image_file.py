@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from harness.errors import DataRefused, OutOfDomain
+from harness.errors import DataRefused, OutOfDomain, WrongUse
 from harness.image_file import read_image, write_png
 from harness.image_metrics import mean_square, psnr
 
@@ -25,7 +25,7 @@ def test_a_picture_reads_back_and_red_is_red(tmp_path: Path) -> None:
 
 def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.png"
-    with pytest.raises(DataRefused, match="cannot be read"):
+    with pytest.raises(WrongUse, match="cannot be read"):
         read_image(path)
     for content in (b"", b"not a picture"):
         path.write_bytes(content)

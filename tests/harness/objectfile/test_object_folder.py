@@ -148,7 +148,7 @@ def test_a_description_that_is_none(spoiled: Path, text: str, said: str) -> None
 
 
 def test_a_folder_without_a_description_is_no_object(tmp_path: Path) -> None:
-    with pytest.raises(DataRefused, match="no ObjectFile"):
+    with pytest.raises(WrongUse, match="no ObjectFile"):
         ObjectFile.open(tmp_path)
 
 

@@ -200,7 +200,7 @@ def test_a_scan_whose_texture_is_missing_says_so(shared_data: Path) -> None:
 
 
 def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(MeshRefused, match="no mesh file"):
+    with pytest.raises(WrongUse, match="no mesh file"):
         read_appearance(tmp_path / "none.obj", "m")
     path = tmp_path / "empty.obj"
     path.write_text("v 0 0 0\n")

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.arrays import FloatArray
-from harness.errors import DataRefused, OutOfDomain
+from harness.errors import DataRefused, OutOfDomain, WrongUse
 from harness.sensor import GELSIGHT_R15, TactileSensor
 from harness.sim.given_heights import given_heights, read_heights, spanned
 
@@ -156,7 +156,7 @@ def test_a_gel_that_only_bulges_has_its_sign_the_wrong_way() -> None:
 
 
 def test_what_is_no_array_of_heights_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataRefused, match="does not read"):
+    with pytest.raises(WrongUse, match="there is no height map"):
         read_heights(tmp_path / "absent.npy", SENSOR)
     with pytest.raises(DataRefused, match=r"\.npy"):
         read_heights(tmp_path / "h.png", SENSOR)

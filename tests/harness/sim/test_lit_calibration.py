@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.arrays import FloatArray
-from harness.errors import CalibrationRefused
+from harness.errors import CalibrationRefused, WrongUse
 from harness.sim.gel import R15_SKIRT, deform
 from harness.sim.lit_calibration import LIGHT_POWERS, LitCalibration, light_design, read_calibration
 from harness.sim.optics import Optics, OpticsLevel
@@ -138,7 +138,7 @@ def test_a_file_of_one_array_is_named_for_what_it_is(tmp_path: Path) -> None:
     np.save(tmp_path / "heights.npy", np.zeros((3, 3)))
     with pytest.raises(CalibrationRefused, match=r"heights.npy does not read .* no \.npz archive; give"):
         read_calibration(tmp_path / "heights.npy")
-    with pytest.raises(CalibrationRefused, match="does not read"):
+    with pytest.raises(WrongUse, match="there is no calibration"):
         read_calibration(tmp_path / "absent.npz")
 
 

@@ -95,7 +95,7 @@ def test_what_is_not_such_a_file_is_refused_by_name(spoil: object, says: str, tm
     path.write_text("no json")
     with pytest.raises(CalibrationRefused, match="calibrate markers"):
         read_markers(path)
-    with pytest.raises(CalibrationRefused, match="does not read"):
+    with pytest.raises(WrongUse, match="cannot be read"):
         read_markers(tmp_path / "nowhere.json")
 
 
