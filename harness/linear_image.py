@@ -62,6 +62,33 @@ class LinearImage:
         return bytes_from_linear(exposure * self.colour + (1.0 - self.alpha)[..., None] * behind)
 
 
+def binned(image: LinearImage, by: int) -> LinearImage:
+    """The picture in pixels ``by`` times as large, each the mean of those that it is made of.
+
+    Args:
+        image: both sides a multiple of ``by``.
+        by: pixels along the new one, one or more.
+
+    Raises:
+        OutOfDomain: sides that are no multiple.
+    """
+    rows, columns = image.alpha.shape
+    if by < 1 or rows % by or columns % by:
+        raise OutOfDomain(f"a picture of {rows} x {columns} pixels is no whole number of {by} x {by}")
+    alpha = _means(image.alpha, by)
+    # What is not covered has no depth, and none of the weight.
+    seen = _means(image.alpha * np.where(image.alpha > 0.0, image.depth, 0.0), by)
+    depth = np.divide(seen, alpha, out=np.full_like(alpha, np.inf), where=alpha > 0.0)
+    colour = np.stack([_means(image.colour[..., c], by) for c in range(3)], axis=-1)
+    return LinearImage(colour, alpha, depth)
+
+
+def _means(values: FloatArray, by: int) -> FloatArray:
+    rows, columns = values.shape
+    blocks: FloatArray = values.reshape(rows // by, by, columns // by, by).mean(axis=(1, 3))
+    return blocks
+
+
 def root_mean_square(a: LinearImage, b: LinearImage) -> float:
     """How far two pictures are apart: linear light, root of the mean square over pixels and channels.
 

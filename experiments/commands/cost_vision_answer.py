@@ -72,8 +72,7 @@ def draw(found: Measured, mesh: str, out: Path) -> Path:
     from harness.report.vision_cost_figure import vision_cost_figure
 
     panels = [_panel(found, knob) for knob in dict.fromkeys(each.knob for each in found.trades)]
-    count = "1 thread" if found.cores == 1 else f"{found.cores} threads"
-    title = f"What a picture of {Path(mesh).name} costs and errs ({count}, CPU time of all of them)"
+    title = f"What a picture of {Path(mesh).name} costs and errs ({_threads(found)}, CPU time of all)"
     return out / Album(out).drawing("curve", vision_cost_figure(panels, title)).file
 
 
@@ -137,7 +136,7 @@ def _finite(errors: Mapping[str, float]) -> dict[str, float | None]:
 
 def print_answer(found: Measured, picture: Path) -> None:
     """For people: a table of every knob."""
-    drawn = Table(title=f"{found.cores} threads, {found.repeat} times each; load before {_said(found.load)}")
+    drawn = Table(title=f"{_threads(found)}, {found.repeat} times each; load before {_said(found.load)}")
     for heading in (
         *("knob", "level", "samples", "exact, dB", "SSIM", "object, dB", "many, dB", "CPU, ms", "clock, ms"),
         "MB",
@@ -160,6 +159,10 @@ def _cells(cost: "Cost") -> tuple[str, ...]:
         *(f"{exact['psnr_db_object']:.2f}", f"{worth.many['psnr_db']:.2f}"),
         *(f"{1e3 * cost.cpu.middle:.1f}", f"{1e3 * cost.wall.middle:.1f}", f"{worth.weight_bytes / 1e6:.2f}"),
     )
+
+
+def _threads(found: Measured) -> str:
+    return "1 thread" if found.cores == 1 else f"{found.cores} threads"
 
 
 def _said(load: float | None) -> str:

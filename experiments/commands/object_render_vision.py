@@ -23,7 +23,7 @@ from harness.output import emit
 if TYPE_CHECKING:
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.vision import ObjectVision
-    from harness.objectfile.vision_settings import VisionLevel
+    from harness.objectfile.vision_settings import RenderSettings
 
 _MOST_SHEET = 2**24
 """Pixels of all pictures of a turntable."""
@@ -42,6 +42,12 @@ def render(
     light: vision_options.Light = None,
     size: Annotated[str, typer.Option(help="Pixels: a side, or columns x rows.", metavar="WxH")] = "256",
     level: vision_options.Level = "fused",
+    rays: Annotated[
+        int,
+        typer.Option(
+            help="Along a pixel: 2 are four, and see the edges of prints and shadows within it.", min=1, max=8
+        ),
+    ] = 1,
     turntable: Annotated[
         int | None,
         typer.Option(help="So many pictures of the object turned about its z, on one sheet.", metavar="N"),
@@ -67,13 +73,14 @@ def render(
     """
     from harness.image_file import write_png
     from harness.objectfile.vision import vision_level
+    from harness.objectfile.vision_settings import RenderSettings
     from harness.quantities import ANGLE
 
     options.require_files(
         ("--out", out, ".png"), ("--depth-out", depth_out, ".npy"), ("--alpha-out", alpha_out, ".npy")
     )
     angle = options.quantity("--field-of-view", field_of_view, ANGLE)
-    chosen, pixels = vision_level(level), _pixels(size, turntable)
+    chosen, pixels = RenderSettings(level=vision_level(level), rays=rays), _pixels(size, turntable)
     begun = time.perf_counter()
     of, vision = vision_options.opened(folder, threads)
     views = _views(vision, pixels, camera, look_at, up, light, angle, turntable)
@@ -138,13 +145,12 @@ def _rendered(
     of: "ObjectFile",
     vision: "ObjectVision",
     views: tuple[View, ...],
-    level: "VisionLevel",
+    settings: "RenderSettings",
     compare: bool,
     begun: float,
 ) -> RenderedLook:
-    from harness.objectfile.vision_settings import RenderSettings
+    from dataclasses import replace
 
-    settings = RenderSettings(level=level)
     # The first picture, a small one, loads the compiled loops for all that follow.
     camera, light = views[0]
     width = min(camera.width, _FIRST)
@@ -156,7 +162,7 @@ def _rendered(
     if not compare:
         return RenderedLook(of, vision, views, pictures, None, seconds)
     begun = time.perf_counter()
-    every = RenderSettings(step=0.25, termination=0.0, lead=float("inf"), coverage=settings.coverage)
+    every = replace(settings, level="fused", step=0.25, termination=0.0, lead=float("inf"))
     finest = tuple(vision.picture(*view, every) for view in views)
     seconds["compare"] = time.perf_counter() - begun
     return RenderedLook(of, vision, views, pictures, finest, seconds)

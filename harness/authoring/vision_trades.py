@@ -23,6 +23,7 @@ _TERMINATIONS = (0.3, 0.1, 0.03, 0.01, 0.0)
 _LEADS = (0.5, 1.0, 2.0, float("inf"))
 _CELLS = (8, 12, 16, 24)
 _WIDTHS = (16, 32, 64)
+_RAYS = (1, 2, 3)
 _SIDES = (64, 128, 256, 400)
 
 
@@ -82,6 +83,7 @@ def trades(spec: CellsSpec, side: int) -> tuple[Trade, ...]:
         *(("step, voxels", f"{step:g}", RenderSettings(step=step)) for step in _STEPS),
         *(("termination", f"{end:g}", RenderSettings(termination=end)) for end in _TERMINATIONS),
         *(("coverage, sub-pixels", str(of), RenderSettings(coverage=of)) for of in COVERS),
+        *(("rays, along a pixel", str(rays), RenderSettings(rays=rays)) for rays in _RAYS),
         *(("lead, voxels", f"{lead:g}", RenderSettings(lead=lead)) for lead in _LEADS),
     ]
     made: list[tuple[str, str, Networks]] = [
@@ -105,10 +107,10 @@ def _sized(spec: CellsSpec, size: NetworkSize) -> Networks:
 def every_sample(settings: RenderSettings) -> RenderSettings:
     """Many samples of the whole shell, no ray ended: what skipping, ending and thinning out leave out.
 
-    The outline is asked as finely as it was, since it is no networks' matter; it tells in the errors
-    against exact pictures.
+    Pixels are cut up as they were, which is no networks' matter: it tells in the errors against exact
+    pictures.
     """
-    return RenderSettings(step=0.125, termination=0.0, coverage=settings.coverage)
+    return RenderSettings(step=0.125, termination=0.0, coverage=settings.coverage, rays=settings.rays)
 
 
 def in_bits(model: VisionModel, bits: int) -> VisionModel:

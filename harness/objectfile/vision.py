@@ -43,9 +43,9 @@ class ObjectVision:
             settings: None for the default.
 
         Raises:
-            OutOfDomain: a camera within the object, or a picture larger than is drawn.
+            OutOfDomain: a camera within the object, or a picture larger than is drawn, all its rays counted.
         """
-        require_size(camera.width, camera.height)
+        require_size(camera.width, camera.height, 1 if settings is None else settings.rays)
         require_outside(self.surface, camera.eye)
         return self.renderer.render(camera, light, settings)
 

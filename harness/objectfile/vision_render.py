@@ -9,7 +9,7 @@ import time
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
-from harness.linear_image import LinearImage
+from harness.linear_image import LinearImage, binned
 from harness.mesh import Mesh
 from harness.objectfile.runtime import Network
 from harness.objectfile.vision_blocks import aim
@@ -69,7 +69,18 @@ class VisionRenderer:
             light: from far away.
             settings: None for the default.
         """
-        chosen, watch = settings or RenderSettings(), Watch()
+        chosen, begun = settings or RenderSettings(), time.perf_counter()
+        if chosen.rays == 1:
+            return self._one_ray(camera, light, chosen)
+        fine = camera.resized(chosen.rays * camera.width, chosen.rays * camera.height)
+        found = self._one_ray(fine, light, chosen)
+        image = binned(found.image, chosen.rays)
+        seconds = {**found.seconds, "render": time.perf_counter() - begun}
+        return Rendered(image, found.level, found.samples, found.rays, seconds)
+
+    def _one_ray(self, camera: Pinhole, light: DirectionalLight, chosen: RenderSettings) -> Rendered:
+        """A picture of one ray a pixel."""
+        watch = Watch()
         asker = self._asker(chosen.level)
         watch.lap("open")
         outline = self._outline(camera, chosen)

@@ -14,6 +14,10 @@ COVERS = (1, 3, 5, 7)
 """Sub-pixels along a pixel: odd, so that one is its centre."""
 
 
+MOST_RAYS = 8
+"""Along a pixel."""
+
+
 @dataclass(frozen=True)
 class RenderSettings:
     """What a picture is to be like; each is a knob of cost against error.
@@ -28,6 +32,8 @@ class RenderSettings:
             also where it begins for coverage 1, whose rays know of no mesh. A finite lead is cheaper and not
             only a way to skip: networks are a little fatter than the mesh, so that it cuts an outline that
             lies before another part of the object as coverage cuts the outermost.
+        rays: along a pixel, so that 2 are four of them. With one, the edge of a print or of a shadow within a
+            pixel is on this side or on that.
         wave: samples of a ray that are asked for together; changes no picture, only its cost.
     """
 
@@ -36,6 +42,7 @@ class RenderSettings:
     termination: float = 0.03
     coverage: int = 3
     lead: float = float("inf")
+    rays: int = 1
     wave: int = 4
 
     def __post_init__(self) -> None:
@@ -44,6 +51,8 @@ class RenderSettings:
                 f"level {self.level!r} with coverage {self.coverage}; levels are {', '.join(LEVELS)}, "
                 f"coverages {', '.join(map(str, COVERS))}"
             )
+        if not 1 <= self.rays <= MOST_RAYS:
+            raise WrongUse(f"{self.rays} rays along a pixel; 1 to {MOST_RAYS}, so that 2 are four of them")
         if not self.lead >= 0.0:
             raise WrongUse(f"a lead of {self.lead} voxels; 0 or more, or infinite for the whole shell")
         if not (0.01 <= self.step <= 100.0 and 0.0 <= self.termination < 1.0 and 1 <= self.wave <= 1024):

@@ -28,16 +28,23 @@ _LOOKS = 15
 """Rays that tell whether an eye is within a closed surface: odd, and more than one that grazes an edge."""
 
 
-def require_size(width: int, height: int) -> None:
+def require_size(width: int, height: int, rays: int = 1) -> None:
     """Refuse pictures that are none, or larger than is drawn.
+
+    Args:
+        width: columns of pixels.
+        height: rows of pixels.
+        rays: along a pixel; each counts as a pixel.
 
     Raises:
         OutOfDomain: naming the limit.
     """
-    if not (1 <= width <= MOST_SIDE and 1 <= height <= MOST_SIDE) or width * height > MOST_PIXELS:
+    across, down = rays * width, rays * height
+    if not (1 <= across <= MOST_SIDE and 1 <= down <= MOST_SIDE) or across * down > MOST_PIXELS:
+        each = f" with {rays} x {rays} rays in each" if rays > 1 else ""
         raise OutOfDomain(
-            f"a picture of {width} x {height} pixels was asked for; each side has 1 to {MOST_SIDE} and all "
-            f"together at most {MOST_PIXELS}, as 2048 x 2048 has: ask for fewer"
+            f"a picture of {width} x {height} pixels{each} was asked for; each side has 1 to {MOST_SIDE} and "
+            f"all together at most {MOST_PIXELS}, as 2048 x 2048 has: ask for fewer"
         )
 
 

@@ -80,6 +80,19 @@ def test_levels_show_one_picture(box: Path, tmp_path: Path, capsys: pytest.Captu
     assert one.said["samples"] == one.said["rays"]
 
 
+def test_more_rays_in_a_pixel_change_nothing_of_one_colour(
+    box: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one, more = (draw(box, tmp_path, capsys, "--size", "24", "--rays", rays) for rays in ("1", "3"))
+    assert more.image.shape == one.image.shape
+    assert more.said["rays"] > 8 * one.said["rays"]
+    inside = (one.alpha > 0.999) & (more.alpha > 0.999)
+    assert np.abs(one.image.astype(int) - more.image)[inside].max() <= 1
+    # Three sub-pixels along a pixel against nine.
+    assert np.abs(one.alpha - more.alpha).max() < 0.25
+    assert one.alpha.mean() == pytest.approx(more.alpha.mean(), rel=0.02)
+
+
 def test_metres_are_metres(box: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Twice as far is half as large, and depth says how far."""
     asked = ("--size", "96", "--field-of-view", "20deg")
@@ -165,6 +178,8 @@ def test_a_camera_that_looks_away_sees_nothing_and_says_so(
         (("--size", "0"), 1, "a picture of 0 x 0 pixels"),
         (("--size", "4096x2048"), 1, "at most 4194304"),
         (("--size", "9000x1"), 1, "1 to 8192"),
+        (("--size", "1024", "--rays", "3"), 1, "a picture of 1024 x 1024 pixels with 3 x 3 rays in each"),
+        (("--rays", "9"), 2, "--rays"),
         (("--size", "big"), 2, "--size big is no number of pixels"),
         (("--size", "-5"), 2, "no number of pixels"),
         (("--level", "onxx"), 2, "did you mean 'onnx'?"),

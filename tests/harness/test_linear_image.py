@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.errors import OutOfDomain
-from harness.linear_image import LinearImage, root_mean_square
+from harness.linear_image import LinearImage, binned, root_mean_square
 from harness.srgb import LINEAR_OF_BYTE, bytes_from_linear, linear_from_srgb, srgb_from_linear
 
 
@@ -69,3 +69,27 @@ def test_pictures_of_other_shapes_are_refused() -> None:
     other = LinearImage(np.zeros((2, 2, 3)), np.zeros((2, 2)), np.zeros((2, 2)))
     with pytest.raises(OutOfDomain, match="compared"):
         root_mean_square(picture(1.0), other)
+
+
+def test_larger_pixels_hold_the_same_light_and_the_depth_of_what_they_show() -> None:
+    random = np.random.default_rng(4)
+    alpha = random.random((6, 8)) * (random.random((6, 8)) < 0.5)
+    alpha[:2, :2] = 0.0
+    depth = np.where(alpha > 0.0, random.uniform(1.0, 2.0, (6, 8)), np.inf)
+    fine = LinearImage(random.random((6, 8, 3)) * alpha[..., None], alpha, depth)
+    found = binned(fine, 2)
+    assert found.alpha.shape == (3, 4)
+    np.testing.assert_allclose(found.colour.sum(axis=(0, 1)), fine.colour.sum(axis=(0, 1)) / 4.0)
+    np.testing.assert_allclose(found.alpha.sum(), alpha.sum() / 4.0)
+    assert np.isinf(found.depth[0, 0])
+    corner = (slice(2, 4), slice(4, 6))
+    assert found.depth[1, 2] == pytest.approx(
+        np.average(depth[corner][alpha[corner] > 0.0], weights=alpha[corner][alpha[corner] > 0.0])
+    )
+    np.testing.assert_array_equal(binned(fine, 1).colour, fine.colour)
+
+
+@pytest.mark.parametrize("by", [0, 4, 5])
+def test_pixels_that_do_not_fit_into_larger_ones_are_refused(by: int) -> None:
+    with pytest.raises(OutOfDomain, match="no whole number"):
+        binned(picture(1.0), by)

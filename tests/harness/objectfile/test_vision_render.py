@@ -177,6 +177,18 @@ def test_moving_object_camera_and_light_together_changes_nothing(mug: VisionRend
     assert np.mean(np.abs(a.colour - b.colour).max(axis=2) > 1e-3) < 0.01
 
 
+def test_rays_within_a_pixel_are_the_mean_of_smaller_pixels(mug: VisionRenderer) -> None:
+    camera = looking(MUG, 2.0, 20, 14)
+    fine = mug.render(camera.resized(40, 28), LIGHT)
+    found = mug.render(camera, LIGHT, RenderSettings(rays=2))
+    means = fine.image.colour.reshape(14, 2, 20, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(found.image.colour, means, rtol=1e-12, atol=1e-15)
+    assert (found.samples, found.rays) == (fine.samples, fine.rays)
+    single = mug.render(camera, LIGHT).image
+    both = (found.image.alpha > 0.0) & (single.alpha > 0.0)
+    assert np.median(np.abs(found.image.depth[both] - single.depth[both])) < mug.shell.voxel
+
+
 def test_light_is_linear(mug: VisionRenderer) -> None:
     camera = looking(MUG, 2.0, 32)
     one = mug.render(camera, LIGHT).image
@@ -221,7 +233,14 @@ def test_settings_that_make_no_sense_are_refused() -> None:
     for wrong in ({"level": "nerf"}, {"coverage": 2}, {"step": 0.0}, {"step": np.nan}, {"termination": 1.0}):
         with pytest.raises(WrongUse):
             replace(RenderSettings(), **wrong)
-    for more in ({"termination": -0.1}, {"wave": 0}, {"lead": -1.0}, {"lead": np.nan}):
+    for more in (
+        {"termination": -0.1},
+        {"wave": 0},
+        {"lead": -1.0},
+        {"lead": np.nan},
+        {"rays": 0},
+        {"rays": 9},
+    ):
         with pytest.raises(WrongUse):
             replace(RenderSettings(), **more)
     with pytest.raises(WrongUse):
