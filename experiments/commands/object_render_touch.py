@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.touch import ObjectTouch, TouchLevel
     from harness.sim.press_pose import ContactPlace
-    from harness.sim.touch_press import Gel, Press
+    from harness.sim.pressed_gel import Gel
+    from harness.sim.touch_press import Press
 
 Three = tuple[float, float, float]
 

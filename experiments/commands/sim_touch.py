@@ -1,11 +1,13 @@
 """``touchstone sim touch``: what a gel shows of a height map, or of a mesh that it is pressed onto."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from experiments.commands import force_options as forces
 from experiments.commands import sim_touch_sources as sources
 from experiments.commands.sim_touch_answer import Touched, as_json, draw, print_answer
 from experiments.commands.sim_touch_sources import Three, refuse
@@ -112,7 +114,8 @@ def touch(
         list[str] | None,
         typer.Option(
             help="Turn one dial, as touch.optics=exact; may be given again. touch.shapes, touch.gel, "
-            "touch.supersampling, touch.optics, touch.marker_motion.",
+            "touch.supersampling, touch.optics, touch.marker_motion; with --force touch.force and "
+            "touch.force_cells.",
             metavar="D=L",
         ),
     ] = None,
@@ -128,6 +131,12 @@ def touch(
         Path | None,
         typer.Option(help="The height map that was drawn, as --height takes it.", metavar="FILE.npy"),
     ] = None,
+    force: forces.Force = False,
+    gel_modulus: forces.Modulus = None,
+    gel_modulus_error: forces.ModulusError = None,
+    gel_poisson: forces.Poisson = None,
+    force_table: forces.Table = None,
+    pressure_out: forces.PressureOut = None,
     json: options.Json = False,
 ) -> int:
     """What the camera behind a gel sees of a press.
@@ -137,11 +146,15 @@ def touch(
 
     Try: touchstone sim touch builtin:mug --contact -0.04 0 0.05 --depth 1mm --tilt 5deg --out touch.png
     """
-    out = _checked_files(out, picture, height_out)
+    out = _checked_files(out, picture, height_out, pressure_out)
+    own = {"--gel-poisson": gel_poisson, "--force-table": force_table, "--pressure-out": pressure_out}
+    forces.require_force(force, level or [], gel_modulus, gel_modulus_error, **own)
     begun = time.perf_counter()
     if shadow is None and heights_of == "gel" and reached is None:
         shadow = False
     gel = sources.gel(sensor, calibration, pitch, thickness, background, shadow, noise, seed, markers)
+    table, levels = forces.measured(force_table, level or [])
+    gel = replace(gel, elastic=forces.stiffness(gel_modulus, gel_modulus_error, gel_poisson), forces=table)
     loaded = time.perf_counter() - begun
     if (mesh is None) == (height is None):
         refuse("say what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")
@@ -151,13 +164,15 @@ def touch(
                 "--contact, --depth, --tilt, --azimuth, --yaw, --units and --objectfile are of a mesh; "
                 "--height is a map"
             )
-        touched = sources.of_heights(height, heights_of, reached, gel, level or [])
+        touched = sources.of_heights(height, heights_of, reached, gel, levels, force)
     else:
         if contact is None or heights_of != "object" or reached is not None:
             refuse("a mesh needs --contact X Y Z, and --heights-of and --reached are of --height")
         assert mesh is not None
         pose = (depth, tilt, azimuth, yaw)
-        touched = sources.of_mesh(mesh, units, contact, pose, gel, level or [], objectfile)
+        touched = sources.of_mesh(mesh, units, contact, pose, gel, levels, objectfile, force)
+    if pressure_out is not None:
+        _write_pressure(pressure_out, touched)
     return _finish(touched, {"calibration": loaded}, out, live, picture, height_out, json)
 
 
@@ -189,19 +204,32 @@ def _finish(
     return 0
 
 
-def _checked_files(out: Path | None, picture: Path | None, height_out: Path | None) -> Path:
+def _checked_files(
+    out: Path | None, picture: Path | None, height_out: Path | None, pressure_out: Path | None
+) -> Path:
     if out is None:
         refuse("say where the picture goes: --out FILE.png")
     for option, path, suffix in (
         ("--out", out, ".png"),
         ("--picture", picture, ".png"),
         ("--height-out", height_out, ".npy"),
+        ("--pressure-out", pressure_out, ".npy"),
     ):
         if path is not None and path.suffix != suffix:
             refuse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
     if out == picture:
         refuse(f"--out and --picture are both {out}; give them two names")
     return out
+
+
+def _write_pressure(path: Path, touched: Touched) -> None:
+    import numpy as np
+
+    found = touched.press.force
+    assert found is not None
+    if touched.press.levels[forces.LEVEL] == "table":
+        refuse("a table of forces says how much, not where; leave --pressure-out out, or --force-table")
+    np.save(path, found.pressure[0])
 
 
 def _write_heights(path: Path, touched: Touched) -> None:

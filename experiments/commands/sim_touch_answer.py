@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from experiments.commands.force_options import force_json, force_notes, force_row
 from harness.output import ANSWERS
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ class Touched:
             )
         if press.saturated:
             said.append(f"{press.saturated} values of the picture were clipped to black or white")
-        return said
+        return said + force_notes(press)
 
 
 def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path | None) -> dict[str, Any]:
@@ -124,6 +125,7 @@ def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path 
         "contact_pixels": int(press.contact.sum()),
         "contact_area_m2": float(press.contact.sum()) * sensor.pitch**2,
         "deepest_m": press.deepest,
+        **force_json(press),
         "flags": {
             "no_contact": not press.contact.any(),
             "over_range_m": press.over_range,
@@ -180,6 +182,8 @@ def print_answer(touched: Touched, out: Path, picture: Path | None) -> None:
         )
     else:
         ANSWERS.print("no contact")
+    if (pressed := force_row(press)) is not None:
+        ANSWERS.print(pressed)
     for row in _rows(touched):
         ANSWERS.print(row)
     ANSWERS.print(f"{out}", markup=False)

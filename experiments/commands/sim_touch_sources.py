@@ -11,7 +11,7 @@ from harness import options
 if TYPE_CHECKING:
     from harness.scene import SceneFile
     from harness.sim.given_heights import Heights
-    from harness.sim.touch_press import Gel
+    from harness.sim.pressed_gel import Gel
 
 Three = tuple[float, float, float]
 
@@ -62,7 +62,9 @@ def _positive(option: str, value: float | None) -> float | None:
     return value
 
 
-def of_heights(path: Path, of: str, under: Path | None, gel: "Gel", levels: list[str]) -> Touched:
+def of_heights(
+    path: Path, of: str, under: Path | None, gel: "Gel", levels: list[str], force: bool = False
+) -> Touched:
     """The press of a height map; ``under`` is how deep the object reaches below a gel's surface."""
     from harness.sim.given_heights import read_heights
     from harness.sim.touch_press import press_heights
@@ -77,7 +79,7 @@ def of_heights(path: Path, of: str, under: Path | None, gel: "Gel", levels: list
     missing = given.missing if reached is None else given.missing | reached.missing
     touched = None if reached is None else reached.heights
     scene = _scene(str(path), None, gel)
-    press = press_heights(given.heights, kind, gel, scene, levels, touched, missing)
+    press = press_heights(given.heights, kind, gel, scene, levels, touched, missing, force)
     return Touched(press, str(path), seconds={"read": read})
 
 
@@ -99,6 +101,7 @@ def of_mesh(
     gel: "Gel",
     levels: list[str],
     objectfile: Path | None = None,
+    force: bool = False,
 ) -> Touched:
     """The press of a mesh; ``pose`` is depth, tilt, azimuth and yaw with their units, None where left out."""
     import numpy as np
@@ -125,7 +128,7 @@ def of_mesh(
         "contact.gel_from_object": at[None],
         "contact.presses": Presses.one(place.point, place.normal, depth, tilt, azimuth, yaw),
     }
-    press = press_mesh(sources, gel, scene, levels)
+    press = press_mesh(sources, gel, scene, levels, force)
     asked = {"depth_m": depth, "tilt_rad": tilt, "azimuth_rad": azimuth, "yaw_rad": yaw}
     return Touched(press, mesh, place, at, asked, known.warnings, seconds={"mesh": read})
 

@@ -4,9 +4,10 @@ The functions here only take apart what the kernels take; the mathematics is the
 which the caller gives: ``object.mesh`` (``Mesh``), ``object.material`` (``Material``),
 ``contact.gel_from_object`` (``(n, 4, 4)``), ``sensor`` (``TactileSensor``),
 ``sensor.calibration`` (``TactileCalibration``), ``sensor.shadow_table`` (``ShadowTable``),
-``sensor.noise`` (grey levels), ``seed``; for sound those of ``harness.sim.sound_effects``; for pictures
-those of ``harness.sim.camera_effects``; for touch and pictures from an ObjectFile those of
-``harness.sim.touch_file_effects`` and ``harness.sim.camera_file_effects``.
+``sensor.noise`` (grey levels), ``seed``; for forces those of ``harness.sim.force_effects``; for sound
+those of ``harness.sim.sound_effects``; for pictures those of ``harness.sim.camera_effects``; for touch and
+pictures from an ObjectFile those of ``harness.sim.touch_file_effects`` and
+``harness.sim.camera_file_effects``.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,6 +19,7 @@ from harness.accuracy import Knob, Level
 from harness.arrays import ByteArray, FloatArray
 from harness.effects import Condition, Effect
 from harness.sim.camera_file_effects import scene_camera_effects
+from harness.sim.force_effects import FORCE_EFFECT
 from harness.sim.gel import deform, over_range
 from harness.sim.height_map import RasterMesh
 from harness.sim.markers import draw_markers, marker_displacements
@@ -128,6 +130,7 @@ EFFECTS = (
         knobs=(SUPERSAMPLING,),
     ),
     Effect("touch.over_range", ("touch.height_map", "sensor"), _over_range),
+    FORCE_EFFECT,
     *FILE_EFFECTS,
     Effect(
         "touch.gel",

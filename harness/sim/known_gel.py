@@ -7,13 +7,13 @@ from harness.arrays import ByteArray
 from harness.errors import CalibrationRefused, WrongUse
 from harness.sensor import GELSIGHT_R15, TactileSensor
 from harness.sim.lit_calibration import read_calibration, shadow_of
+from harness.sim.pressed_gel import Gel
 from harness.sim.published_pack import SHADOWS, TABLE, PublishedPack, is_published, read_published
 from harness.sim.tactile_calibration import (
     TactileCalibration,
     shipped_calibration,
     with_background,
 )
-from harness.sim.touch_press import Gel
 from harness.square_pixels import aspect_stated, made_square
 from harness.toml_file import nearest
 

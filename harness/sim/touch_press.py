@@ -10,67 +10,15 @@ import numpy as np
 from harness.accuracy import Accuracy
 from harness.arrays import BoolArray, ByteArray, FloatArray
 from harness.effects import Effect, Facts, knobs_of
-from harness.errors import DataRefused, OutOfDomain, WrongUse
+from harness.errors import OutOfDomain, WrongUse
 from harness.evaluate import Evaluation, evaluate
 from harness.plan import Plan, default_accuracy, plan
 from harness.scene import SceneFile
-from harness.sensor import TactileSensor
+from harness.sim.contact_force import ContactForce
+from harness.sim.force_effects import pressed_of_gel
 from harness.sim.given_heights import MOST_BEYOND, Heights
-from harness.sim.marker_file import MarkerFile
-from harness.sim.shadow import ShadowTable
-from harness.sim.tactile_calibration import TactileCalibration
+from harness.sim.pressed_gel import Gel
 from harness.sim.touch_effects import DOTS, REST, contact_of, press_effects
-from harness.square_pixels import aspect_stated
-
-
-@dataclass(frozen=True, eq=False)
-class Gel:
-    """A sensor and all that is known of its gel.
-
-    Attributes:
-        sensor: its geometry; whether it casts shadows is said by ``shadow``.
-        calibration: of its colours.
-        rest: ``(rows, columns)`` metres, the untouched surface towards the camera; None for the sensor's.
-        shadow: of its light; None for one that casts none.
-        noise: grey levels, sigma of the camera's; 0 for none.
-        seed: of the noise.
-        dots: printed on it, as they were measured; None for the sensor's own grid, if it has one.
-    """
-
-    sensor: TactileSensor
-    calibration: TactileCalibration
-    rest: FloatArray | None = None
-    shadow: ShadowTable | None = None
-    noise: float = 0.0
-    seed: int = 0
-    dots: MarkerFile | None = None
-
-    def __post_init__(self) -> None:
-        seen = (self.calibration.rows, self.calibration.columns)
-        if seen != (self.sensor.rows, self.sensor.columns):
-            raise DataRefused(
-                f"the calibration is of {seen[0]} x {seen[1]} pixels and {self.sensor.name} has "
-                f"{self.sensor.rows} x {self.sensor.columns}; give the sensor's own calibration"
-            )
-        if self.dots is not None:
-            self._require_own_dots(self.dots)
-
-    @property
-    def aspect(self) -> float:
-        """A pixel's height over its width in what the camera gives: live pictures are made square by it."""
-        return aspect_stated(self.calibration.header.made_from)
-
-    def with_dots(self, dots: MarkerFile) -> "Gel":
-        """The same gel with the dots measured on it; ``DataRefused`` for those of another picture."""
-        return replace(self, sensor=replace(self.sensor, markers=dots.grid(self.sensor.pitch)), dots=dots)
-
-    def _require_own_dots(self, dots: MarkerFile) -> None:
-        seen, own = (dots.picture_rows, dots.picture_columns), (self.sensor.rows, self.sensor.columns)
-        if seen != own:
-            raise DataRefused(
-                f"the dots were measured in a picture of {seen[0]} x {seen[1]} pixels and {self.sensor.name} "
-                f"has {own[0]} x {own[1]}; measure them at the sensor's own resolution"
-            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +108,12 @@ class Press:
         return None
 
     @property
+    def force(self) -> ContactForce | None:
+        """With how much force it is pressed; None where that was not asked for."""
+        found: ContactForce | None = self.evaluation.values.get("touch.force")
+        return found
+
+    @property
     def levels(self) -> dict[str, Any]:
         """Of every knob of an effect that ran."""
         return {name: level for step in self.plan.ran for name, level in step.levels.items()}
@@ -177,6 +131,7 @@ def press_heights(
     levels: Sequence[str] = (),
     reached: FloatArray | None = None,
     missing: BoolArray | None = None,
+    force: bool = False,
 ) -> Press:
     """Draw the press of a height map.
 
@@ -189,22 +144,25 @@ def press_heights(
         reached: beside a gel, ``(rows, columns)`` metres, how deep the object reaches: shadows and printed
             dots go by it. Without it the contact is taken as what the object surely shapes.
         missing: ``(rows, columns)`` where no height was given: drawn as filled, and counted as no contact.
+        force: whether to compute the force as well. Of a gel without ``reached``, what is deeper than a tenth
+            of its deepest pixel is taken to be pressed.
 
     Raises:
         WrongUse: an unknown knob or level; shadows or dots of a gel of which nobody says what pressed it.
         CalibrationRefused: a level that the calibration does not have.
+        OutOfDomain: a force of an object that reaches the gel's plate, or beyond the table of forces.
     """
     if of == "object":
         sources = {"touch.height_map": np.maximum(heights, 0.0)[None]}
-        return _masked(_pressed(sources, of, gel, scene, levels), missing)
+        return _masked(_pressed(sources, of, gel, scene, levels, force), missing)
     if reached is None and (gel.sensor.casts_shadow or gel.sensor.markers is not None):
         raise WrongUse(
             "the surface of a gel does not say where the object touches, and shadows and dots go by that; "
             "give it with --reached FILE.npy, or leave them out (--no-shadow)"
         )
-    touched = heights if reached is None else reached
+    touched = pressed_of_gel(heights) if reached is None else reached
     sources = {"touch.height_map": np.maximum(touched, 0.0)[None], "touch.gel": heights[None]}
-    press = _pressed(sources, of, gel, scene, levels)
+    press = _pressed(sources, of, gel, scene, levels, force)
     if reached is not None:
         press = replace(press, contact=contact_of(reached, gel.calibration, "object"))
     return _masked(press, missing)
@@ -216,7 +174,13 @@ def _masked(press: Press, missing: BoolArray | None) -> Press:
     return replace(press, contact=press.contact & ~missing, missing=missing)
 
 
-def press_mesh(sources: Mapping[str, Any], gel: Gel, scene: SceneFile, levels: Sequence[str] = ()) -> Press:
+def press_mesh(
+    sources: Mapping[str, Any],
+    gel: Gel,
+    scene: SceneFile,
+    levels: Sequence[str] = (),
+    force: bool = False,
+) -> Press:
     """Draw the press of a mesh.
 
     Args:
@@ -225,14 +189,16 @@ def press_mesh(sources: Mapping[str, Any], gel: Gel, scene: SceneFile, levels: S
         gel: that is pressed.
         scene: says which senses and noises there are, and names an ObjectFile where touch comes from one.
         levels: as an operator writes them, ``"touch.optics=exact"``.
+        force: whether to compute the force as well.
 
     Raises:
         WrongUse: an unknown knob or level; no ObjectFile where one is asked, or one of another object or gel.
         DataRefused: an ObjectFile without the touch that is asked for, or a damaged one.
         CalibrationRefused: a level that the calibration does not have.
-        OutOfDomain: a part of the object is where the sensor would be.
+        OutOfDomain: a part of the object is where the sensor would be; or, where a force is asked for, it
+            reaches the gel's plate, or beyond the table of forces.
     """
-    press = _pressed(sources, "object", gel, scene, levels)
+    press = _pressed(sources, "object", gel, scene, levels, force)
     most = MOST_BEYOND * gel.sensor.gel_thickness
     if press.deepest > most:
         raise OutOfDomain(
@@ -249,7 +215,7 @@ def press_knobs() -> Accuracy:
 
 
 def _pressed(
-    given: Mapping[str, Any], of: Heights, gel: Gel, scene: SceneFile, levels: Sequence[str]
+    given: Mapping[str, Any], of: Heights, gel: Gel, scene: SceneFile, levels: Sequence[str], force: bool
 ) -> Press:
     effects = press_effects(frozenset(given), gel.rest is not None, gel.dots is not None)
     chosen = press_knobs().with_texts(levels)
@@ -257,6 +223,7 @@ def _pressed(
     accuracy = known.with_({name: level for name, level in chosen.items() if name in known.levels})
     wanted = ["touch.image", "touch.saturated", "touch.extrapolated"]
     wanted += ["touch.shadow_out_of_table"] if gel.sensor.casts_shadow else []
+    wanted += ["touch.force"] if force else []
     made = plan(effects, Facts(scene, gel.sensor), wanted, accuracy)
     _refuse_idle(levels, made)
     sources: dict[str, Any] = {
@@ -267,6 +234,8 @@ def _pressed(
         "sensor.shadow_table": gel.shadow,
         "sensor.noise": gel.noise,
         "seed": gel.seed,
+        "sensor.elastic": gel.elastic,
+        "sensor.forces": gel.forces,
     }
     sources |= {"object.wall": scene.object.wall, **_file(made, scene)}
     done = evaluate(made, {**sources, **given})

@@ -15,9 +15,10 @@ from harness.sim.gel import R15_SKIRT, deform, skirt_for
 from harness.sim.given_heights import Heights, given_heights
 from harness.sim.height_map import RasterMesh, height_maps
 from harness.sim.press_pose import contact_place, gel_from_object
+from harness.sim.pressed_gel import Gel
 from harness.sim.shadow import ShadowTable
 from harness.sim.tactile_calibration import shipped_calibration
-from harness.sim.touch_press import Gel, Press, press_heights, press_mesh
+from harness.sim.touch_press import Press, press_heights, press_mesh
 
 SCENE = scene_from_options("builtin:mug")
 PLAIN = Gel(GELSIGHT_R15, shipped_calibration("gelsight_r15_bench"))

@@ -16,9 +16,10 @@ from harness.scene import scene_from_options
 from harness.sensor import GELSIGHT_R15, MarkerGrid
 from harness.sim.gel import deform
 from harness.sim.known_gel import MAKES, known_gel
+from harness.sim.pressed_gel import Gel
 from harness.sim.shadow import ShadowTable
 from harness.sim.tactile_calibration import shipped_calibration
-from harness.sim.touch_press import Gel, press_heights, press_mesh
+from harness.sim.touch_press import press_heights, press_mesh
 
 SCENE = scene_from_options("builtin:mug")
 BENCH = Gel(GELSIGHT_R15, shipped_calibration("gelsight_r15_bench"))

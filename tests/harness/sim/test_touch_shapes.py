@@ -173,7 +173,8 @@ from harness.scene import scene_from_options
 from harness.sensor import GELSIGHT_R15
 from harness.sim.press_pose import contact_place, gel_from_object
 from harness.sim.tactile_calibration import shipped_calibration
-from harness.sim.touch_press import Gel, press_mesh
+from harness.sim.pressed_gel import Gel
+from harness.sim.touch_press import press_mesh
 TOUCH = {"harness.objectfile.touch", "harness.objectfile.touch_level", "onnx", "onnxruntime"}
 mesh = ObjectFile.open(Path(sys.argv[1])).mesh
 at = gel_from_object(contact_place(mesh, np.array([0.01, 0.02, 0.05])), 1e-3, 0.0, 0.0, 0.0)
