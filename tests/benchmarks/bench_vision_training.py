@@ -2,6 +2,7 @@
 
 python tests/benchmarks/bench_vision_training.py builtin:mug builtin:bowl --profile smoke
 python tests/benchmarks/bench_vision_training.py FILE.obj --units m --steps 1000 4000 --sheet pictures.png
+python tests/benchmarks/bench_vision_training.py builtin:mug --profile standard --built OBJECT   (trained)
 """
 
 import argparse
@@ -15,13 +16,13 @@ import numpy as np
 from rich.console import Console
 
 from harness.arrays import ByteArray
-from harness.authoring.vision import AuthoredVision, author_vision
+from harness.authoring.vision import author_vision
 from harness.authoring.vision_data import HeldOut, draw_tuples, held_out_pictures
 from harness.authoring.vision_metrics import BEHIND, network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision_profiles import VisionProfile, vision_profile
 from harness.image_file import write_png
 from harness.linear_image import LinearImage
-from harness.objectfile.vision_graph import vision_graph
+from harness.objectfile.vision_graph import FILE, vision_graph, vision_model
 from harness.objectfile.vision_network import VisionModel
 from harness.objectfile.vision_outline import is_closed, mesh_outline
 from harness.objectfile.vision_plain import Asked, evaluate
@@ -41,6 +42,7 @@ WAYS = {
     "default": RenderSettings(),
     "lead 1": RenderSettings(lead=1.0),
     "coverage 5": RenderSettings(coverage=5),
+    "rays 2": RenderSettings(rays=2),
     "one sample": RenderSettings(level="one_sample"),
     "whole shell": RenderSettings(termination=0.0),
 }
@@ -59,6 +61,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--strict", action="store_true", help="and networks told what the paper's are")
+    parser.add_argument("--built", type=Path, help="an ObjectFile of the object: nothing is trained")
     parser.add_argument("--sheet", type=Path)
     given = parser.parse_args()
     rows = [measure(name, steps, given) for name in given.objects for steps in given.steps or [None]]
@@ -69,6 +72,9 @@ def main() -> None:
 def measure(name: str, steps: int | None, given: argparse.Namespace) -> ByteArray:
     """One object: its networks, and their pictures beside the exact ones."""
     look, profile = appearance_of(name, given.units), chosen(steps, given)
+    if given.built:
+        CONSOLE.print(f"{Path(name).stem}, as {given.built} has it")
+        return by_ways(look, vision_model((given.built / FILE).read_bytes()), profile, given)
     on_core = time.process_time()
     with TemporaryDirectory() as folder:
         made = author_vision(look, profile, given.seed, Path(folder), unsaid, given.threads)
@@ -81,7 +87,7 @@ def measure(name: str, steps: int | None, given: argparse.Namespace) -> ByteArra
     )
     if profile.strict is not None:
         CONSOLE.print(f"  told no more than the paper's {line(made.errors, 'strict_')}")
-    return by_ways(look, made, profile, given)
+    return by_ways(look, made.model, profile, given)
 
 
 def unsaid(_what: str, _share: float) -> None:
@@ -112,13 +118,13 @@ def line(errors: Mapping[str, float], before: str = "") -> str:
 
 
 def by_ways(
-    look: Appearance, made: AuthoredVision, profile: VisionProfile, given: argparse.Namespace
+    look: Appearance, model: VisionModel, profile: VisionProfile, given: argparse.Namespace
 ) -> ByteArray:
     """What settings of the renderer make of the same networks; pictures of the default."""
     lit = LitObject(look)
     held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, given.seed)
     exact = reference_pictures(lit, held_out, profile.samples)
-    renderer = VisionRenderer(vision_graph(made.model).SerializeToString(), look.mesh, given.threads)
+    renderer = VisionRenderer(vision_graph(model).SerializeToString(), look.mesh, given.threads)
     drawn: dict[str, list[LinearImage]] = {}
     for way, settings in WAYS.items():
         drawn[way] = network_pictures(renderer, held_out, settings)
@@ -131,7 +137,7 @@ def by_ways(
         CONSOLE.print(
             f"  exact colours, one ray a pixel, coverage {side}: {line(picture_errors(exact, limit))}"
         )
-    CONSOLE.print(f"  across borders between cells {across_borders(made.model, lit):.2f}/255")
+    CONSOLE.print(f"  across borders between cells {across_borders(model, lit):.2f}/255")
     return np.hstack([beside(exact[0], drawn["default"][0]), beside(exact[-1], drawn["default"][-1])])
 
 
