@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from experiments.commands import depth_force
+from experiments.commands import force_options as forces
 from harness import options
 from harness.output import ANSWERS, emit, warn
 
@@ -64,6 +66,16 @@ def depth(
             help="The heights alone, as `sim touch --heights-of gel` takes them.", metavar="FILE.npy"
         ),
     ] = None,
+    force: forces.Force = False,
+    thickness: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the gel, for --force; that of --station's sensor if left out.", metavar="LENGTH"
+        ),
+    ] = None,
+    gel_modulus: forces.Modulus = None,
+    gel_modulus_error: forces.ModulusError = None,
+    gel_poisson: forces.Poisson = None,
     json: options.Json = False,
 ) -> int:
     """Read the surface of a pressed gel from what its camera saw.
@@ -79,11 +91,13 @@ def depth(
 
     _checked(out, picture, height_out)
     bench = None if station is None else load_station(station_path(station))
+    wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, bench)
     known = _calibration(calibration, bench)
     rest = None if background is None else read_image(background)
     found = read_press(_frames(images), known, _detection(rest), rest)
     frame_from_gel = None if bench is None else bench.flange_from_gel
     points = found.points(frame_from_gel)
+    pressed = depth_force.answer_force(wanted, found)
     _write(found, points, out, height_out)
     if picture is not None:
         _draw(found, picture)
@@ -91,6 +105,9 @@ def depth(
     files = {"out": out, "picture": picture, "height_out": height_out}
     answer |= {name: None if path is None else str(path) for name, path in files.items()}
     answer["images"] = [str(path) for path in images]
+    answer["seconds"]["force_cpu"] = pressed.pop("seconds")
+    answer["notes"] += pressed.pop("notes")
+    answer |= pressed
     for sentence in answer["notes"]:
         warn(sentence)
     if json:
@@ -244,6 +261,8 @@ def _say(answer: dict[str, Any]) -> None:
         )
     else:
         ANSWERS.print("no contact")
+    for row in depth_force.say_force(answer):
+        ANSWERS.print(row)
     moved = ", ".join(f"{level:+.1f}" for level in answer["light_moved_levels"])
     ANSWERS.print(f"the light moved by {moved} grey levels (red, green, blue)")
     seconds = answer["seconds"]

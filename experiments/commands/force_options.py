@@ -9,6 +9,7 @@ import typer
 from harness import options
 
 if TYPE_CHECKING:
+    from harness.sim.contact_force import ContactForce
     from harness.sim.force_table import ForceTable
     from harness.sim.gel_elastic import GelElastic
     from harness.sim.touch_press import Press
@@ -17,8 +18,7 @@ Force = Annotated[
     bool,
     typer.Option(
         "--force",
-        help="How hard the gel is pressed as well, in newtons, with its uncertainty. --level "
-        "touch.force=winkler is cheaper, --force-table is measured.",
+        help="How hard the gel is pressed as well, in newtons, with its uncertainty: docs/touch_force.md.",
     ),
 ]
 Modulus = Annotated[
@@ -101,26 +101,35 @@ def force_json(press: "Press") -> dict[str, Any]:
     found = press.force
     if found is None:
         return {"force_n": None, "force_uncertainty_n": None, "force": None}
-    from harness.sim.contact_force import PARTS
-
-    level, touched = press.levels[LEVEL], bool(found.newtons[0] > 0.0)
-    by_table = level == "table"
+    level = str(press.levels[LEVEL])
+    gel = None if level == "table" else press.gel.elastic
+    said = described(found, level, gel, lower_bound(press))
+    if gel is None and press.gel.forces is not None:
+        table = press.gel.forces
+        said["source"] = f"{table.indenter} on {table.sensor} {table.serial}: {table.made_from}"
     return {
         "force_n": float(found.newtons[0]),
         "force_uncertainty_n": float(found.uncertainty[0]),
-        "force": {
-            "level": level,
-            "uncertainty_shares": dict(zip(PARTS, found.shares[0].tolist(), strict=True)),
-            "centre_m": found.centre[0].tolist() if touched else None,
-            "largest_pressure_pa": None if by_table else float(found.pressure[0].max()),
-            "depth_share": float(found.depth_share[0]),
-            "strain": float(found.strain[0]),
-            "lower_bound": lower_bound(press),
-            "beyond_checked": not by_table and bool(found.beyond_checked[0]),
-            "young_pa": None if by_table else press.gel.elastic.young,
-            "poisson": None if by_table else press.gel.elastic.poisson,
-            "source": _source(press),
-        },
+        "force": said,
+    }
+
+
+def described(found: "ContactForce", level: str, gel: "GelElastic | None", bound: bool) -> dict[str, Any]:
+    """What there is to say of the force of one press; ``gel`` is None where the force was measured."""
+    from harness.sim.contact_force import PARTS
+
+    return {
+        "level": level,
+        "uncertainty_shares": dict(zip(PARTS, found.shares[0].tolist(), strict=True)),
+        "centre_m": found.centre[0].tolist() if found.newtons[0] > 0.0 else None,
+        "largest_pressure_pa": None if gel is None else float(found.pressure[0].max()),
+        "depth_share": float(found.depth_share[0]),
+        "strain": float(found.strain[0]),
+        "lower_bound": bound,
+        "beyond_checked": gel is not None and bool(found.beyond_checked[0]),
+        "young_pa": None if gel is None else gel.young,
+        "poisson": None if gel is None else gel.poisson,
+        "source": None if gel is None else gel.source,
     }
 
 
@@ -133,17 +142,23 @@ def lower_bound(press: "Press") -> bool:
 
 def force_notes(press: "Press") -> list[str]:
     """What the operator should know of the force."""
+    if press.force is None:
+        return []
+    gel = None if press.levels[LEVEL] == "table" else press.gel.elastic
+    return noted(press.force, gel, lower_bound(press))
+
+
+def noted(found: "ContactForce", gel: "GelElastic | None", bound: bool) -> list[str]:
+    """The same of the force of one press; arguments as ``described``."""
     from harness.sim.contact_force import CHECKED
     from harness.sim.gel_elastic import NOT_MEASURED
 
-    found, said = press.force, list[str]()
-    if found is None or found.newtons[0] == 0.0:
+    said = list[str]()
+    if found.newtons[0] == 0.0:
         return said
-    if lower_bound(press):
-        said.append(
-            "the force is a lower bound: what is beyond the window, or has no height, presses as well"
-        )
-    if press.levels[LEVEL] == "table":
+    if bound:
+        said.append("the force is a lower bound: what is not seen, or has no height, presses as well")
+    if gel is None:
         return said
     if found.beyond_checked[0]:
         said.append(
@@ -151,10 +166,10 @@ def force_notes(press: "Press") -> list[str]:
             f"deep; the force is that of a linear gel, checked to {CHECKED[0]:g} and {CHECKED[1]:g}, and its "
             "uncertainty does not count what is beyond"
         )
-    if press.gel.elastic.source == NOT_MEASURED.source:
+    if gel.source == NOT_MEASURED.source:
         said.append(
             "nobody measured this gel's modulus: press a known object with a known force, and say "
-            f"--gel-modulus, {press.gel.elastic.young:g} Pa times measured over computed"
+            f"--gel-modulus, {gel.young:g} Pa times measured over computed"
         )
     return said
 
@@ -162,13 +177,9 @@ def force_notes(press: "Press") -> list[str]:
 def force_row(press: "Press") -> str | None:
     """For people; None where none was asked for."""
     found = press.force
-    if found is None:
-        return None
-    return f"pressed with {found.newtons[0]:.3g} N (one standard deviation {found.uncertainty[0]:.2g} N)"
+    return None if found is None else sentence(float(found.newtons[0]), float(found.uncertainty[0]))
 
 
-def _source(press: "Press") -> str:
-    table = press.gel.forces
-    if press.levels[LEVEL] == "table" and table is not None:
-        return f"{table.indenter} on {table.sensor} {table.serial}: {table.made_from}"
-    return press.gel.elastic.source
+def sentence(newtons: float, uncertainty: float) -> str:
+    """For people."""
+    return f"pressed with {newtons:.3g} N (one standard deviation {uncertainty:.2g} N)"

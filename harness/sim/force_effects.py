@@ -60,16 +60,17 @@ def _by_table(given: Given, _levels: Levels) -> ContactForce:
     return table_force(given["touch.height_map"], sensor.pitch, sensor.gel_thickness, table)
 
 
-def pressed_of_gel(surface: FloatArray) -> FloatArray:
-    """How deep a gel is pressed where only its surface is known: what is deeper than a tenth of its deepest.
+def pressed_of_gel(surface: FloatArray, share: float = OF_GEL) -> FloatArray:
+    """How deep a gel is pressed where only its surface is known: what is deeper than a share of its deepest.
 
     The surface of a gel that is pressed lies where the object is, and what hangs beside it asks for no force;
     a drawn skirt would (``docs/touch_force.md`` has what the tenth costs).
 
     Args:
         surface: ``(rows, columns)`` metres of indentation.
+        share: of the deepest pixel.
     """
-    kept: FloatArray = np.where(surface > OF_GEL * surface.max(), np.maximum(surface, 0.0), 0.0)
+    kept: FloatArray = np.where(surface > share * surface.max(), np.maximum(surface, 0.0), 0.0)
     return kept
 
 
