@@ -6,6 +6,7 @@ Presses of 320 x 240 pixels of 0.0634 mm (a GelSight Mini's) on a gel 2.5 mm thi
 layer on pixels a third of the size, of whose shapes these are the means. Seconds are of the processor, one
 thread, with the error's own statement, after one press that loads what is kept. The second table is by
 Poisson's ratio: what the springs are off by, of a ball and a flat face, small to wider than the gel is thick.
+The third is of four forces measured on a real gel (``published_force``): the modulus that each asks for.
 """
 
 import argparse
@@ -13,6 +14,7 @@ import time
 
 import numpy as np
 from pressed_shapes import Pair, places
+from published_force import DEPTHS, FORCES, THICKNESS, moduli
 from rich.console import Console
 from rich.table import Table
 
@@ -77,6 +79,7 @@ def main() -> None:
         table.add_row(name, f"{truth:.3f}", *texts)
     CONSOLE.print(table)
     CONSOLE.print(_springs())
+    CONSOLE.print(_published())
 
 
 def _row(depth: FloatArray, truth: float, level: ForceLevel, cells: int, repeat: int) -> str:
@@ -110,6 +113,28 @@ def _off(wide: float, poisson: float) -> str:
     springs = contact_force(np.array(shapes), side, 1.0, gel, "winkler").newtons
     layer = contact_force(np.array(shapes), side, 1.0, gel, "layer").newtons
     return " / ".join(f"{off:+.1%}" for off in springs / layer - 1.0)
+
+
+def _published() -> Table:
+    table = Table(title="Young's modulus in MPa that each measured force asks for", title_justify="left")
+    for heading in (
+        "theory, Poisson's ratio",
+        *(f"{1e3 * d:g} mm, {f:.2f} N" for d, f in zip(DEPTHS, FORCES, strict=True)),
+    ):
+        table.add_column(heading, justify="right")
+    table.add_column("mean, scatter", justify="right")
+    theories: tuple[tuple[str, float, float, ForceLevel], ...] = (
+        ("layer, 0.475", 0.475, THICKNESS, "layer"),
+        ("layer, 0.485", 0.485, THICKNESS, "layer"),
+        ("layer, 0.495", 0.495, THICKNESS, "layer"),
+        ("springs, 0.485", 0.485, THICKNESS, "winkler"),
+        ("Hertz's half-space, 0.485", 0.485, np.inf, "layer"),
+    )
+    for words, poisson, thickness, level in theories:
+        found = 1e-6 * moduli(poisson, thickness, level)
+        scatter = found.std(ddof=1) / found.mean()
+        table.add_row(words, *(f"{each:.3f}" for each in found), f"{found.mean():.3f}, {scatter:.1%}")
+    return table
 
 
 if __name__ == "__main__":

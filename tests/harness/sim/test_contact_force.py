@@ -100,6 +100,16 @@ def test_a_ball_on_any_layer_is_what_a_line_of_integrals_says(poisson: float, th
     assert found == pytest.approx(gel.plane * ball_force(RADIUS, DEPTH, thickness, poisson), rel=2e-4)
 
 
+def test_a_thin_gel_that_keeps_its_volume_meets_the_object_beyond_the_map() -> None:
+    """It bulges up beside a ball wider than it is thick; what a map of depths does not hold is missed."""
+    pitch = WINDOW / 96
+    for poisson, missed in ((0.3, 0.0), (0.485, 0.009), (0.5, 0.026)):
+        gel = GelElastic(1e6, 0.1, poisson)
+        found = newtons(paraboloid(RADIUS, 0.5e-3, pitch, 96), pitch, 1e-3, gel)
+        wanted = gel.plane * ball_force(RADIUS, 0.5e-3, 1e-3, poisson)
+        assert found / wanted == pytest.approx(1.0 - missed, abs=1e-3)
+
+
 @pytest.mark.parametrize("level", ["layer", "winkler"])
 @settings(deadline=None, max_examples=10)
 @given(scale=st.floats(0.1, 10.0), depth=st.floats(0.05e-3, 0.4e-3))
