@@ -14,7 +14,7 @@ from scipy.ndimage import find_objects, label
 
 from harness.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.errors import OutOfDomain
-from harness.sim.contact_pressure import contact_pressure, spring_pressure
+from harness.sim.contact_pressure import SETTLED, Pressure, contact_pressure, spring_pressure
 from harness.sim.gel_elastic import GelElastic
 from harness.sim.layer_compliance import disc_stiffness
 
@@ -104,7 +104,7 @@ def contact_force(
 
     Raises:
         OutOfDomain: another shape, a depth that is negative or not finite, or a press deeper than the gel is
-            thick.
+            thick; pressures that do not settle, which no press was found to do.
     """
     require_depths(depth, thickness)
     found = [_one(np.asarray(each, dtype=np.float64), pitch, thickness, gel, level, cells) for each in depth]
@@ -150,11 +150,21 @@ def _pressed(
     if level == "winkler":
         pascals = _foundation(merged, side, thickness, gel)
     else:
-        pascals = contact_pressure(merged, side, thickness, gel).pascals
+        pascals = _settled(contact_pressure(merged, side, thickness, gel))
     # A square at the border may reach past the picture: what it carries is put on the pixels that are seen.
     spread = pascals.repeat(cells, axis=0).repeat(cells, axis=1)[: depth.shape[0], : depth.shape[1]]
     whole = spread.sum()
     return np.asarray(spread * (pascals.sum() * cells**2 / whole if whole > 0.0 else 1.0))
+
+
+def _settled(found: Pressure) -> FloatArray:
+    if found.left > SETTLED:
+        raise OutOfDomain(
+            f"the pressures did not settle in {found.turns} turns: {found.left:.2g} of the energy is left, "
+            f"and the limit is {SETTLED:g}; take larger squares, --level touch.force_cells=4, or "
+            "--level touch.force=winkler"
+        )
+    return found.pascals
 
 
 def _merged(depth: FloatArray, cells: int) -> FloatArray:

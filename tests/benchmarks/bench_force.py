@@ -56,6 +56,7 @@ def _shapes(by: int) -> dict[str, FloatArray]:
         "edge of 0.4 x 8 mm, 0.2 mm": _box((0.2e-3, 4e-3), 0.2e-3, by),
         "rod of 6 mm across the window, 0.3 mm": _rod(3e-3, 0.3e-3, by),
         "six beads of 4 mm, 0.3 mm": np.sum(beads, axis=0),
+        "face over the whole window, 0.2 mm": np.full((ROWS * by, COLUMNS * by), 0.2e-3),
     }
 
 

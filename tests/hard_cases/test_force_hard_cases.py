@@ -7,6 +7,7 @@ from pressed_shapes import paraboloid, punch
 from harness.arrays import FloatArray
 from harness.errors import OutOfDomain
 from harness.sim.contact_force import PARTS, ForceLevel, contact_force
+from harness.sim.contact_pressure import SETTLED, contact_pressure
 from harness.sim.gel_elastic import GelElastic
 
 GEL = GelElastic(0.3e6, 0.1)
@@ -124,6 +125,25 @@ def test_a_checkerboard_and_a_comb_settle() -> None:
     face = contact_force(np.full((1, 40, 40), 0.1e-3), PITCH, THICK, GEL)
     assert (found.newtons < face.newtons).all()
     assert (found.newtons > 0.5 * face.newtons).all()
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.485, 0.5])
+@pytest.mark.parametrize("thickness", [0.5e-3, 2.5e-3])
+def test_rough_and_tilted_faces_over_the_whole_window_settle(poisson: float, thickness: float) -> None:
+    """Contacts of every size at once, on a gel much thinner than they are wide, and on a thick one."""
+    rough = np.random.default_rng(1).normal(0.0, 0.1e-3, (2, 60, 80))
+    rough[1] = np.linspace(-0.2e-3, 0.4e-3, 80)
+    gel = GelElastic(0.3e6, 0.1, poisson)
+    for depth in np.clip(rough, 0.0, 0.4e-3):
+        found = contact_pressure(depth, PITCH, thickness, gel)
+        assert found.left <= SETTLED
+        assert found.turns < 100
+
+
+def test_pressures_that_do_not_settle_are_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("harness.sim.contact_pressure._MOST_TURNS", 1)
+    with pytest.raises(OutOfDomain, match="did not settle in 1 turns"):
+        contact_force(paraboloid(5e-3, 0.4e-3, PITCH, 64)[None], PITCH, THICK, GEL)
 
 
 def test_depths_over_nine_decades_press_in_proportion() -> None:
