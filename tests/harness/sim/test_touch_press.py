@@ -222,7 +222,7 @@ def test_gels_are_put_together_from_what_is_said() -> None:
         (WrongUse, "needs a table of shadows", (None, None), {"shadow": True}),
         (WrongUse, "has pixels of 0.0295 mm", ("taxim-gelsight", "gelsight_r15_world"), {}),
         (CalibrationRefused, "there are gelsight_r15_bench", (None, "gelsight_r16"), {}),
-        (CalibrationRefused, "does not read", (None, "absent.npz"), {}),
+        (WrongUse, "there is no calibration absent.npz", (None, "absent.npz"), {}),
         (CalibrationRefused, "not cropped", (None, None), {"background": fresh[:50]}),
     ]
     for error, words, who, more in cases:
