@@ -1,7 +1,7 @@
 """What the strikes of a run's first contacts say, ready for the search."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from experiments.contact_localization.model import Model
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.sound_analysis import analyse
 from experiments.contact_localization.sound_likelihood import SoundTerm
-from experiments.contact_localization.sound_matching import SoundNoise
 from experiments.contact_localization.sound_places import sound_nats
 from harness.acquisition import Strike
 from harness.arrays import FloatArray, IntArray
@@ -34,14 +33,13 @@ class Heard:
         return sound_nats(search, self.term, self.struck, at, between)
 
 
-def hear(strikes: Sequence[Strike | None], model: Model, spacing: float, alone: bool = False) -> Heard | None:
+def hear(strikes: Sequence[Strike | None], model: Model, spacing: float) -> Heard | None:
     """The strikes as a term; None where nothing was struck.
 
     Args:
         strikes: of the contacts in order; None for one that was not struck.
         model: with the object's modes.
         spacing: metres between the surface's samples.
-        alone: whether no image speaks beside them.
 
     Raises:
         WrongUse: there are strikes, and the model has no modes.
@@ -52,7 +50,5 @@ def hear(strikes: Sequence[Strike | None], model: Model, spacing: float, alone: 
     if model.modes is None or model.material is None:
         raise WrongUse("the contacts were struck, and the model of the object has no modes to compare with")
     evidence = analyse([strike for strike in strikes if strike is not None])
-    noise = SoundNoise()
-    noise = replace(noise, weight=noise.alone) if alone else noise
-    term = SoundTerm(evidence, model.gains(spacing), model.modes, model.material, noise)
+    term = SoundTerm(evidence, model.gains(spacing), model.modes, model.material)
     return Heard(term, np.array(struck, dtype=np.int64))

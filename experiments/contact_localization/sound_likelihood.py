@@ -118,11 +118,6 @@ class SoundTerm:
         self._gain_scales = self._unit_gains()
 
     @property
-    def weight(self) -> float:
-        """Factor on every peak's nats."""
-        return self._noise.weight
-
-    @property
     def says_something(self) -> bool:
         """Whether any peak can set places apart."""
         return len(self._pairs.groups) > 0
