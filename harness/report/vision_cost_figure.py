@@ -58,11 +58,12 @@ def vision_cost_figure(panels: Sequence[Panel], title: str) -> Figure:
     """
     if not panels or any(not mark.cost > 0.0 for panel in panels for mark in panel.marks):
         raise ValueError("give one panel or more, and costs above zero")
-    rows = -(-len(panels) // _COLUMNS)
+    columns = min(_COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
     with styled():
-        figure = blank(_COLUMNS * _WIDE, rows * _HIGH + 0.8)
+        figure = blank(max(2, columns) * _WIDE, rows * _HIGH + 0.8)
         figure.set_layout_engine("constrained")
-        every: list[Axes] = np.asarray(figure.subplots(rows, _COLUMNS, squeeze=False)).ravel().tolist()
+        every: list[Axes] = np.asarray(figure.subplots(rows, columns, squeeze=False)).ravel().tolist()
         drawn = [_draw(axes, panel) for axes, panel in zip(every, panels, strict=False)]
         for axes in every[len(panels) :]:
             axes.set_axis_off()
