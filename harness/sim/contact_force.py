@@ -16,6 +16,7 @@ from harness.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.errors import OutOfDomain
 from harness.sim.contact_pressure import SETTLED, Pressure, contact_pressure, spring_pressure
 from harness.sim.gel_elastic import GelElastic
+from harness.sim.given_heights import require_clear
 from harness.sim.layer_compliance import disc_stiffness
 
 ForceLevel = Literal["winkler", "layer"]
@@ -114,7 +115,7 @@ def contact_force(
 
 
 def require_depths(depth: FloatArray, thickness: float) -> None:
-    """Raise ``OutOfDomain`` for what is no press of a gel, or one that reaches its plate."""
+    """Raise ``OutOfDomain`` for what is no press of a gel, or one that reaches its plate or the sensor."""
     if depth.ndim != 3 or 0 in depth.shape[1:]:
         raise OutOfDomain(f"depths are {depth.shape}; forces are computed of (n, rows, columns)")
     if not (np.isfinite(depth).all() and (depth >= 0.0).all()):
@@ -123,6 +124,7 @@ def require_depths(depth: FloatArray, thickness: float) -> None:
             "not reach"
         )
     deepest = float(depth.max(initial=0.0))
+    require_clear(deepest, thickness)
     if deepest > thickness:
         raise OutOfDomain(
             f"the press is {deepest * 1e3:.3g} mm deep and the gel {thickness * 1e3:g} mm thick; no force is "

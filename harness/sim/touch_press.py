@@ -10,13 +10,13 @@ import numpy as np
 from harness.accuracy import Accuracy
 from harness.arrays import BoolArray, ByteArray, FloatArray
 from harness.effects import Effect, Facts, knobs_of
-from harness.errors import OutOfDomain, WrongUse
+from harness.errors import WrongUse
 from harness.evaluate import Evaluation, evaluate
 from harness.plan import Plan, default_accuracy, plan
 from harness.scene import SceneFile
 from harness.sim.contact_force import ContactForce
 from harness.sim.force_effects import pressed_of_gel
-from harness.sim.given_heights import MOST_BEYOND, Heights
+from harness.sim.given_heights import Heights, require_clear
 from harness.sim.pressed_gel import Gel
 from harness.sim.touch_effects import DOTS, REST, contact_of, press_effects
 
@@ -199,13 +199,7 @@ def press_mesh(
             reaches the gel's plate, or beyond the table of forces.
     """
     press = _pressed(sources, "object", gel, scene, levels, force)
-    most = MOST_BEYOND * gel.sensor.gel_thickness
-    if press.deepest > most:
-        raise OutOfDomain(
-            f"the object reaches {press.deepest * 1e3:.3g} mm past the gel's face; the limit is "
-            f"{most * 1e3:g} mm. Another part of it is in the sensor's way, or the press is too deep: turn, "
-            "tilt or move the contact, or press less"
-        )
+    require_clear(press.deepest, gel.sensor.gel_thickness)
     return press
 
 
