@@ -97,11 +97,13 @@ def _uncollected() -> Iterator[None]:
 
     In a process that holds dozens of runs a collection takes 0.1 s and more; in a run's own it does not.
     """
+    collected = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        gc.enable()
+        if collected:
+            gc.enable()
 
 
 def perform(cell: Cell, scene: SceneFile, station: Station, models: MutableMapping[str, Models]) -> Case:
