@@ -10,6 +10,7 @@ from harness.code_version import content_hash
 from harness.errors import WrongUse
 from harness.materials import Material
 from harness.mesh import Mesh
+from harness.named_file import require_file
 from harness.objectfile.entries import DESCRIPTION, Provenance, Source
 from harness.objectfile.file import MESH, ObjectFile, create_object, file_entry
 from harness.objectfile.surface_file import ply_bytes
@@ -77,8 +78,7 @@ def source_of(mesh: str, licence: str) -> Source:
     if mesh.startswith(BUILTIN):
         return Source(what="mesh", origin=mesh, licence=licence)
     path = Path(mesh)
-    if not path.is_file():
-        raise WrongUse(f"there is no file {path}; say a mesh file, or {BUILTIN} and a name")
+    require_file(path, "file", f"say a mesh file, or {BUILTIN} and a name")
     sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
     return Source(what="mesh", origin=path.name, licence=licence, sha256=sha256)
 

@@ -9,6 +9,7 @@ import numpy as np
 from harness.arrays import ByteArray, FloatArray, read_only
 from harness.errors import MeshRefused, WrongUse
 from harness.mesh import Mesh
+from harness.named_file import require_file
 from harness.sim.appearance import CREASE, NO_TEXTURE, Appearance, smooth_normals
 from harness.sim.intake import METRES
 from harness.srgb import PEAK, linear_from_srgb
@@ -42,8 +43,7 @@ def read_appearance(path: Path, units: str, scale: float = 1.0, crease: float = 
             f"a mesh in {units!r} at scale {scale:g} was asked for; say one of {', '.join(METRES)} "
             "and a scale above zero"
         )
-    if not path.is_file():
-        raise WrongUse(f"there is no mesh file {path}; check the path")
+    require_file(path, "mesh file")
     pieces = _pieces(path)
     vertices = np.vstack([np.asarray(piece.vertices, np.float64) for piece in pieces])
     before = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])

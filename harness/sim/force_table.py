@@ -15,7 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from scipy.interpolate import PchipInterpolator
 
 from harness.arrays import FloatArray
-from harness.errors import CalibrationRefused, OutOfDomain, WrongUse
+from harness.errors import CalibrationRefused, OutOfDomain
+from harness.named_file import require_file
 from harness.recording import write_text_whole
 
 Above = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -112,8 +113,7 @@ def read_force_table(path: Path) -> ForceTable:
         WrongUse: there is no such file.
         CalibrationRefused: not what ``write_force_table`` writes.
     """
-    if not path.is_file():
-        raise WrongUse(f"there is no table of forces {path}; check the path")
+    require_file(path, "table of forces")
     try:
         return ForceTable.model_validate_json(path.read_bytes())
     except OSError as error:

@@ -9,7 +9,8 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from harness.arrays import AnyArray, BoolArray, FloatArray, read_only
-from harness.errors import DataRefused, OutOfDomain, WrongUse
+from harness.errors import DataRefused, OutOfDomain
+from harness.named_file import require_file
 from harness.sensor import TactileSensor
 
 Heights = Literal["object", "gel"]
@@ -58,8 +59,7 @@ def read_heights(path: Path, sensor: TactileSensor, of: Heights = "object") -> G
     """
     if path.suffix != ".npy":
         raise DataRefused(f"{path}: a height map is read from a .npy file; write it with numpy.save")
-    if not path.is_file():
-        raise WrongUse(f"there is no height map {path}; check the path")
+    require_file(path, "height map")
     try:
         found: AnyArray = np.load(path, allow_pickle=False)
     except (OSError, EOFError, ValueError) as error:

@@ -21,7 +21,8 @@ from zipfile import BadZipFile, is_zipfile
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray, IntArray
-from harness.errors import CalibrationRefused, WrongUse
+from harness.errors import CalibrationRefused
+from harness.named_file import require_file
 from harness.sim.shading import POSITION_TERMS
 from harness.sim.shadow import ShadowTable
 from harness.sim.tactile_calibration import (
@@ -196,8 +197,7 @@ def read_calibration(path: Path) -> TactileCalibration:
         WrongUse: there is no such file.
         CalibrationRefused: of another schema, incomplete, or not what was written.
     """
-    if not path.is_file():
-        raise WrongUse(f"there is no calibration {path}; give the file that touchstone calibrate taxim wrote")
+    require_file(path, "calibration", "give the file that touchstone calibrate taxim wrote")
     if not is_zipfile(path):
         raise CalibrationRefused(
             f"{path} does not read as a calibration: it is no .npz archive; give what touchstone calibrate "

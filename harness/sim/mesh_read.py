@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from harness.arrays import FloatArray, IntArray
-from harness.errors import MeshRefused, WrongUse
+from harness.errors import MeshRefused
+from harness.named_file import require_file
 
 _BY_TRIMESH = frozenset({".obj", ".stl", ".stl_ascii", ".ply", ".off", ".glb", ".gltf", ".3mf"})
 _TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -36,8 +37,7 @@ def read_mesh(path: Path) -> RawMesh:
         WrongUse: no such file.
         MeshRefused: an empty one, one that does not parse, or no triangle in it.
     """
-    if not path.is_file():
-        raise WrongUse(f"there is no mesh file {path}; check the path")
+    require_file(path, "mesh file")
     if path.stat().st_size == 0:
         raise MeshRefused(f"{path.name} is empty (0 bytes); export it again")
     read = _with_trimesh if path.suffix.lower() in _BY_TRIMESH else _with_meshio
