@@ -21,7 +21,7 @@ from harness.authoring.audio_metrics import (
     sound_distances,
 )
 from harness.authoring.audio_profiles import PerceptronSpec, Profile
-from harness.authoring.audio_waves import fit_waves
+from harness.authoring.audio_waves import fit_enough_waves
 from harness.authoring.training import Report, median_seconds, train
 from harness.objectfile.audio_graph import audio_graph
 from harness.objectfile.audio_part import NETWORK, network_tensors
@@ -104,10 +104,10 @@ def _made(
     report("fitting waves", 0.0)
     nodes = Samples(modes.points[split.trained], modes.shapes[split.trained])
     number = wave_number(modes)
-    fitted = fit_waves(nodes, np.arange(len(nodes.points)), number, spec.width, seed, spec.reaches)
+    fitted = fit_enough_waves(nodes, np.arange(len(nodes.points)), number, spec, seed)
     return waves_graph(fitted.network), {
         "network": "waves",
-        "width": spec.width,
+        "width": len(fitted.network.phases),
         "wave_number_rad_per_m": number,
         "reach": fitted.reach,
         "ridge": fitted.readout.ridge,

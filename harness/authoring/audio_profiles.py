@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from harness.authoring.audio_waves import REACHES
 from harness.errors import WrongUse
 from harness.toml_file import nearest
+
+REACHES = (0.7, 1.0, 1.4)
+"""Standard deviations of the waves' vectors along an axis that are tried, of the object's wave number."""
 
 
 @dataclass(frozen=True)
@@ -16,10 +18,12 @@ class WavesSpec:
     Attributes:
         width: waves.
         reaches: that are tried.
+        widest: waves at most, where those of ``width`` are too few; they are doubled up to there.
     """
 
     width: int
     reaches: tuple[float, ...] = REACHES
+    widest: int = 0
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ _SMALL = PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epoch
 
 PROFILES: Mapping[str, Profile] = MappingProxyType({
     "smoke": Profile(WavesSpec(768, (1.0,)), sounds=8),
-    "standard": Profile(WavesSpec(1536), sounds=40),
+    "standard": Profile(WavesSpec(1536, widest=3072), sounds=40),
     "small": Profile(_SMALL, sounds=40),
     "paper": Profile(PerceptronSpec(epochs=120), sounds=40),
 })  # fmt: skip

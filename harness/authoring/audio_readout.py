@@ -13,7 +13,7 @@ import numpy as np
 
 from harness.arrays import AnyArray, FloatArray, IntArray
 
-RIDGES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-6)
+RIDGES = (1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-6)
 """Of the largest eigenvalue of the features' products."""
 
 _JUDGED = 1500

@@ -1,9 +1,13 @@
 """The small network of sound: one layer of plane waves and a linear layer solved exactly.
 
 A shape of a mode is smooth at the scale of its wavelength, on thin walls too (the two sides of a
-bent wall move alike but for its slope). Plane waves through space with normally distributed wave
-vectors as long as the object's own are a basis for just such fields (Rahimi and Recht, Random Features
-for Large-Scale Kernel Machines, NeurIPS 2007). Only the linear layer has to be found.
+bent wall move alike but for its slope). Plane waves through space with random wave vectors as long as
+the object's own are a basis for just such fields (Rahimi and Recht, Random Features for Large-Scale
+Kernel Machines, NeurIPS 2007). Only the linear layer has to be found.
+
+Vectors fill a ball evenly: a shape has few parts beyond the waves of its own frequency, and waves that
+no shape needs are waves that others lack. Normally distributed ones err a few per cent more
+(``docs/audionet.md``).
 """
 
 from dataclasses import dataclass
@@ -12,10 +16,15 @@ import numpy as np
 
 from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.authoring.audio_data import Samples
+from harness.authoring.audio_profiles import WavesSpec
 from harness.authoring.audio_readout import Readout, error_shares, solve_readout
 
-REACHES = (0.7, 1.0, 1.4)
-"""Standard deviations of the waves' vectors that are tried, of the object's wave number."""
+ENOUGH = 0.01
+"""Mean relative error that is foretold at which waves are no longer doubled: a third of the most that a
+median may be."""
+
+_BALL = 5.0**0.5
+"""Radius of a ball, of the standard deviation of its places along an axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +83,7 @@ def fit_waves(
         number: rad/m, the object's wave number (``wave_number``).
         width: waves.
         seed: of their vectors and phases.
-        reaches: that are tried, such as ``REACHES``.
+        reaches: that are tried, such as ``audio_profiles.REACHES``.
     """
     targets = samples.shapes.reshape(len(samples.points), -1)
     low, high = samples.points.min(axis=0), samples.points.max(axis=0)
@@ -89,10 +98,36 @@ def fit_waves(
     return min(found, key=lambda one: one.readout.expected)
 
 
+def fit_enough_waves(
+    samples: Samples, measured: IntArray, number: float, spec: WavesSpec, seed: int
+) -> FittedWaves:
+    """As ``fit_waves``; with twice the waves while the error foretold is above ``ENOUGH``.
+
+    Twice the waves reach farther by the square root of two at the same density on a surface, so that
+    this is tried beside the reach that was best before.
+
+    Args:
+        samples: to learn.
+        measured: samples by which is chosen.
+        number: rad/m, the object's wave number.
+        spec: how many waves, and what reaches are tried of the fewest.
+        seed: of vectors and phases.
+    """
+    width = spec.width
+    best = fit_waves(samples, measured, number, width, seed, spec.reaches)
+    while best.readout.expected > ENOUGH and (width := 2 * width) <= spec.widest:
+        reaches = (best.reach, 2.0**0.5 * best.reach)
+        wider = fit_waves(samples, measured, number, width, seed, reaches)
+        best = min(best, wider, key=lambda one: one.readout.expected)
+    return best
+
+
 def _waves(width: int, spread: float, seed: int) -> tuple[FloatArray, FloatArray]:
     """Vectors and phases that single precision holds exactly, so that the graph has the same waves."""
     random = np.random.default_rng([seed, 3])
-    vectors = spread * random.standard_normal((3, width))
+    ways = random.standard_normal((3, width))
+    lengths = _BALL * spread * random.uniform(size=width) ** (1.0 / 3.0)
+    vectors = ways * (lengths / np.linalg.norm(ways, axis=0))
     return _single(vectors), _single(random.uniform(0.0, 2.0 * np.pi, width))
 
 

@@ -11,7 +11,7 @@ from harness.authoring.audio_export import waves_graph
 from harness.authoring.audio_metrics import interpolated, relative_errors
 from harness.authoring.audio_profiles import Profile, WavesSpec, profile
 from harness.authoring.audio_readout import error_shares, solve_readout
-from harness.authoring.audio_waves import FittedWaves, fit_waves
+from harness.authoring.audio_waves import ENOUGH, FittedWaves, fit_enough_waves, fit_waves
 from harness.errors import WrongUse
 from harness.sim.modes import Modes
 
@@ -42,6 +42,20 @@ def test_the_error_foretold_is_the_error_found(egg: Modes) -> None:
 def test_more_waves_err_less(egg: Modes) -> None:
     few, some, many = (fitted(egg, width).readout.expected for width in (40, 100, 300))
     assert few > 2.0 * some > 4.0 * many
+
+
+def test_waves_are_doubled_until_they_are_enough_or_as_many_as_may_be(egg: Modes) -> None:
+    samples = Samples(egg.points, egg.shapes)
+
+    def fitted_within(widest: int) -> FittedWaves:
+        spec = WavesSpec(10, (1.0,), widest)
+        return fit_enough_waves(samples, np.arange(len(samples.points)), wave_number(egg), spec, 0)
+
+    made = {widest: fitted_within(widest) for widest in (0, 19, 20, 640)}
+    assert [len(made[widest].network.phases) for widest in (0, 19, 20)] == [10, 10, 20]
+    assert made[20].readout.expected > ENOUGH >= made[640].readout.expected
+    enough = len(made[640].network.phases)
+    assert fitted_within(enough - 1).readout.expected > ENOUGH
 
 
 def test_the_graph_of_waves_is_the_waves(egg: Modes) -> None:
