@@ -1,11 +1,13 @@
 """``touchstone object render touch``: what a gel's camera sees of a press onto an object."""
 
 import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from experiments.commands import force_options as forces
 from experiments.commands.object_render_touch_answer import RenderedPress, as_json, draw, notes, print_answer
 from harness import options
 from harness.output import emit, warn
@@ -13,6 +15,8 @@ from harness.output import emit, warn
 if TYPE_CHECKING:
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.touch import ObjectTouch, TouchLevel
+    from harness.sim.force_table import ForceTable
+    from harness.sim.gel_elastic import GelElastic
     from harness.sim.press_pose import ContactPlace
     from harness.sim.pressed_gel import Gel
     from harness.sim.touch_press import Press
@@ -58,6 +62,11 @@ def render(
             help="The gel's surface, metres, as `sim touch --heights-of gel` takes it.", metavar="FILE.npy"
         ),
     ] = None,
+    force: forces.Force = False,
+    gel_modulus: forces.Modulus = None,
+    gel_modulus_error: forces.ModulusError = None,
+    gel_poisson: forces.Poisson = None,
+    force_table: forces.Table = None,
     json: options.Json = False,
 ) -> int:
     """What the camera behind a gel sees of a press onto an object, by its ObjectFile.
@@ -79,7 +88,12 @@ def render(
         options.quantity(option, text, ANGLE)
         for option, text in (("--tilt", tilt), ("--azimuth", azimuth), ("--yaw", yaw))
     )
-    rendered = _rendered(folder, _level(level), contact, (deep, tilted, towards, turned), calibration)
+    own = {"--gel-poisson": gel_poisson, "--force-table": force_table}
+    forces.require_force(force, (), gel_modulus, gel_modulus_error, **own)
+    table, levels = forces.measured(force_table, [])
+    gel = _gel(calibration, forces.stiffness(gel_modulus, gel_modulus_error, gel_poisson), table)
+    pressing = _Pressing(gel, (deep, tilted, towards, turned), levels, force)
+    rendered = _rendered(folder, _level(level), contact, pressing)
     write_png(out, rendered.press.image)
     if height_out is not None:
         _write_heights(height_out, rendered)
@@ -94,57 +108,65 @@ def render(
     return 0
 
 
-def _rendered(
-    folder: Path,
-    level: "TouchLevel",
-    contact: Three,
-    pose: tuple[float, float, float, float],
-    calibration: str | None,
-) -> RenderedPress:
+@dataclass(frozen=True, eq=False)
+class _Pressing:
+    """What presses.
+
+    Attributes:
+        gel: that is pressed.
+        pose: depth in m; tilt, azimuth and yaw in rad.
+        levels: of its force.
+        force: whether that is computed.
+    """
+
+    gel: "Gel"
+    pose: tuple[float, float, float, float]
+    levels: list[str]
+    force: bool
+
+
+def _gel(calibration: str | None, elastic: "GelElastic", table: "ForceTable | None") -> "Gel":
+    from harness.sim.known_gel import known_gel
+
+    return replace(known_gel(None, calibration, shadow=False), elastic=elastic, forces=table)
+
+
+def _rendered(folder: Path, level: "TouchLevel", contact: Three, by: _Pressing) -> RenderedPress:
     import numpy as np
 
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.touch import open_touch
     from harness.objectfile.touch_level import require_gel
-    from harness.sim.known_gel import known_gel
     from harness.sim.press_pose import contact_place
 
     begun = time.perf_counter()
     of = ObjectFile.open(folder)
     touch = open_touch(of, level)
-    gel = known_gel(None, calibration, shadow=False)
-    require_gel(of, touch.entry.gel, gel.sensor, gel.calibration.header.skirt)
+    require_gel(of, touch.entry.gel, by.gel.sensor, by.gel.calibration.header.skirt)
     place = contact_place(of.mesh, np.array(contact))
     # The first press loads the compiled loops for all that follow.
-    _pressed(of, touch, gel, place, pose)
+    _pressed(of, touch, place, by)
     loaded, begun = time.perf_counter() - begun, time.perf_counter()
-    press = _pressed(of, touch, gel, place, pose)
+    press = _pressed(of, touch, place, by)
     seconds = {"load": loaded, "render": time.perf_counter() - begun}
     if level == "reference":
-        return RenderedPress(of, touch, place, pose, press, None, seconds)
+        return RenderedPress(of, touch, place, by.pose, press, None, seconds)
     begun = time.perf_counter()
-    beside = open_touch(of, "reference")
-    reference = _pressed(of, beside, gel, place, pose)
+    reference = _pressed(of, open_touch(of, "reference"), place, by)
     seconds["reference"] = time.perf_counter() - begun
-    return RenderedPress(of, touch, place, pose, press, reference, seconds)
+    return RenderedPress(of, touch, place, by.pose, press, reference, seconds)
 
 
-def _pressed(
-    of: "ObjectFile",
-    touch: "ObjectTouch",
-    gel: "Gel",
-    place: "ContactPlace",
-    pose: tuple[float, float, float, float],
-) -> "Press":
+def _pressed(of: "ObjectFile", touch: "ObjectTouch", place: "ContactPlace", by: _Pressing) -> "Press":
     from harness.objectfile.presses import Presses
     from harness.scene import SceneFile
     from harness.sim.touch_press import press_heights
     from harness.toml_file import validate
 
-    surface = touch.at(Presses.one(place.point, place.normal, *pose))[0]
+    surface = touch.at(Presses.one(place.point, place.normal, *by.pose))[0]
     what = {"mesh": str(of.folder / of.description.mesh.file), "material": "steel"}
     scene = validate({"schema": 1, "object": what}, SceneFile, "the options")
-    return press_heights(surface, "gel", gel, scene)
+    return press_heights(surface, "gel", by.gel, scene, by.levels, force=by.force)
 
 
 def _level(text: str) -> "TouchLevel":

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from experiments.commands.force_options import force_json, force_notes, force_row
 from harness.output import ANSWERS
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def beside_the_mesh(rendered: RenderedPress) -> dict[str, float | None] | None:
     """How far map and picture are from the rasteriser's; None where that is the level.
 
     Root mean square, 99th percentile and greatest difference of the maps, m; of the pictures, grey levels and
-    dB, where equal pictures have no dB.
+    dB, where equal pictures have no dB; of the forces N, None where none was asked for.
     """
     import numpy as np
 
@@ -53,12 +54,15 @@ def beside_the_mesh(rendered: RenderedPress) -> dict[str, float | None] | None:
     apart = np.abs(rendered.press.surface - rendered.reference.surface)
     image, truth = rendered.press.image, rendered.reference.image
     decibels = psnr(image, truth)
+    forces = rendered.press.force, rendered.reference.force
+    harder = None if forces[0] is None or forces[1] is None else forces[0].newtons[0] - forces[1].newtons[0]
     return {
         "rms_m": float(np.sqrt((apart**2).mean())),
         "p99_m": float(np.quantile(apart, 0.99)),
         "most_m": float(apart.max()),
         "image_rms_grey": math.sqrt(mean_square(image, truth)),
         "image_psnr_db": decibels if math.isfinite(decibels) else None,
+        "force_n": None if harder is None else float(harder),
     }
 
 
@@ -69,7 +73,7 @@ def notes(rendered: RenderedPress) -> list[str]:
         said.append(f"the contact was moved {rendered.place.moved * 1e3:.3g} mm onto the surface")
     if press.touches_border:
         said.append("the contact reaches the edge of the window; there is more of it than is seen")
-    return said
+    return said + force_notes(press)
 
 
 def draw(rendered: RenderedPress, path: Path) -> None:
@@ -120,6 +124,7 @@ def as_json(
         "moved_m": place.moved,
         "contact_pixels": int(press.contact.sum()),
         "deepest_m": press.deepest,
+        **force_json(press),
         "flags": {
             "touches_border": press.touches_border,
             "saturated_values": press.saturated,
@@ -140,6 +145,8 @@ def print_answer(rendered: RenderedPress, out: Path, picture: Path | None) -> No
     ANSWERS.print(_title(rendered), markup=False)
     pixels, deepest = int(rendered.press.contact.sum()), 1e3 * rendered.press.deepest
     ANSWERS.print(f"{pixels} pixels in contact, {deepest:.3f} mm at the deepest")
+    if (pressed := force_row(rendered.press)) is not None:
+        ANSWERS.print(pressed, markup=False)
     ANSWERS.print(_apart(rendered), markup=False)
     for path in (out, picture):
         if path is not None:

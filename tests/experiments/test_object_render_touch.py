@@ -57,6 +57,31 @@ def test_the_picture_is_of_the_level_s_own_map(
     assert all(seconds > 0.0 for seconds in answer["seconds"].values())
 
 
+FORCE = ("--force", "--gel-modulus", "0.2MPa", "--gel-modulus-error", "10%")
+
+
+def test_the_force_is_that_of_the_gel_that_is_drawn(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heights = tmp_path / "h.npy"
+    answer = rendered(folder, tmp_path, capsys, *PLACE, *POSE, *FORCE, "--height-out", str(heights))
+    truth = rendered(folder, tmp_path, capsys, *PLACE, *POSE, *FORCE, "--level", "reference")
+    again = answered(capsys, tmp_path, "--height", heights, "--heights-of", "gel", *FORCE)
+    assert answer["force_n"] == again["force_n"]
+    assert answer["force"] == again["force"]
+    assert answer["error_estimate"]["from_mesh"]["force_n"] == answer["force_n"] - truth["force_n"]
+    assert 0.1 < answer["force_n"] == pytest.approx(truth["force_n"], rel=0.02)
+
+
+def test_no_force_is_computed_that_nobody_asked_for(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer = rendered(folder, tmp_path, capsys, *PLACE, *POSE)
+    assert answer["force_n"] is answer["force"] is answer["error_estimate"]["from_mesh"]["force_n"] is None
+    refused = rendered(folder, tmp_path, capsys, *PLACE, "--gel-poisson", "0.4", code=2)
+    assert "add --force" in str(refused)
+
+
 def test_the_error_estimate_is_the_distance_to_the_rasteriser(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
