@@ -171,7 +171,8 @@ def _meet(
     ex, ey, ez = (origin[0] - low[0]) / edge, (origin[1] - low[1]) / edge, (origin[2] - low[2]) / edge
     wx, wy, wz = way[0] / edge, way[1] / edge, way[2] / edge
     best: Hit = (np.inf, -1, 0.0, 0.0)
-    begin, end = entered((ex, ey, ez), (wx, wy, wz), bricks)
+    nx, ny, nz = bricks.shape
+    begin, end = entered((ex, ey, ez), (wx, wy, wz), (4 * nx, 4 * ny, 4 * nz))
     t = max(begin, least)
     if not t < end:
         return best
@@ -181,7 +182,6 @@ def _meet(
     rz = 1.0 / wz if wz != 0.0 else np.inf
     sx, sy, sz = (1 if wx > 0.0 else -1), (1 if wy > 0.0 else -1), (1 if wz > 0.0 else -1)
     ux, uy, uz = (1 if wx > 0.0 else 0), (1 if wy > 0.0 else 0), (1 if wz > 0.0 else 0)
-    nx, ny, nz = bricks.shape
     bx = clamped((ex + t * wx) * 0.25, 0, nx - 1)
     by = clamped((ey + t * wy) * 0.25, 0, ny - 1)
     bz = clamped((ez + t * wz) * 0.25, 0, nz - 1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
 from harness.objectfile.vision_network import NetworkSize, VisionWeights
-from harness.objectfile.vision_plain import encoded, scatter_rows
+from harness.objectfile.vision_plain import encoded, looks, scatter_rows
 from harness.objectfile.vision_tiles import OUTPUTS
 
 
@@ -53,8 +53,8 @@ def folded(weights: VisionWeights) -> FoldedWeights:
     w = {name: array.astype(np.float32) for name, array in weights.arrays()}
     of_feature = w["scatter"][:, at["feature"]]
     of_view = w["scatter"][:, at["view"]]
-    looks = bool(of_view.any())
-    scatter = [w["feature"] @ of_feature, *([of_view] if looks else []), w["scatter"][:, at["extras"]]]
+    looked = looks(weights)
+    scatter = [w["feature"] @ of_feature, *([of_view] if looked else []), w["scatter"][:, at["extras"]]]
     bias = w["scatter_bias"] + (w["feature_bias"][:, None] @ of_feature)[:, 0]
     parts = [
         *(w["first_bias"], _tiled(w["first"]), w["second_bias"], _tiled(w["second"])),
@@ -63,7 +63,7 @@ def folded(weights: VisionWeights) -> FoldedWeights:
     ]
     packed = np.concatenate([part.reshape(len(weights), -1) for part in parts], axis=1)
     light_rows = np.ascontiguousarray(w["scatter"][:, at["light"]])
-    return FoldedWeights(size, weights.density_scale, looks, np.ascontiguousarray(packed), light_rows, bias)
+    return FoldedWeights(size, weights.density_scale, looked, np.ascontiguousarray(packed), light_rows, bias)
 
 
 def _tiled(matrices: AnyArray) -> AnyArray:

@@ -9,6 +9,10 @@ Inputs: ``network`` int64 ``(n, 1)``; ``points`` float64 ``(n, b, 3)`` metres, o
 float32 ``(n, b, 3)``; ``light`` float32 ``(n, 3)``; for ``osf-v`` ``extras`` float32 ``(n, b, 4)``.
 Outputs: ``density`` float32 ``(n, b, 1)``, 1/m; ``scattered`` float32 ``(n, b, 3)``, linear, 0 to 1.
 
+Within, a sample is a column: what it is told is put together from whole rows, and the smaller factor of a
+product is the one that is packed. Rows of views that are 0 in every network, as of all that are matt, are
+not asked: ``views`` is then taken and not looked at.
+
 A network that there is not must be left out before: onnxruntime takes -1 for the last one without a word.
 """
 
@@ -23,6 +27,7 @@ from harness.objectfile.graph import Nodes
 from harness.objectfile.graph_check import checked_graph, declared
 from harness.objectfile.vision_kept import WEIGHTS, held_weights, kept_weights
 from harness.objectfile.vision_network import BLOCK, NetworkSize, VisionGrid, VisionModel
+from harness.objectfile.vision_plain import looks
 
 FILE = "vision.onnx"
 
@@ -55,21 +60,25 @@ class _Blocks:
         return self.nodes.add("Gather", every, self.network, axis=0)
 
     def layer(self, value: str, weight: str, bias: str) -> str:
-        """``value @ weight + bias``, of the block's network."""
-        product = self.nodes.add("MatMul", value, self.of_block(weight))
+        """``weight @ value + bias``, of the block's network."""
+        product = self.nodes.add("MatMul", self.of_block(weight), value)
         return self.nodes.add("Add", product, self.of_block(bias))
 
     def weights(self, name: str, array: AnyArray) -> str:
-        """Those of every network, float32, from what is kept of them: of all that are the same, one."""
+        """Those of every network, float32 and transposed, from what is kept of them: of all alike, one."""
         cast = self.nodes.add("Cast", self.kept(f"{WEIGHTS}{name}", array), to=TensorProto.FLOAT)
-        count = len(self.model.grid)
+        turned, count = self.turned(cast), len(self.model.grid)
         if len(array) == count:
-            return cast
-        shape = np.array([count, *array.shape[1:]], np.int64)
-        return self.nodes.add("Expand", cast, self.nodes.constant(shape))
+            return turned
+        shape = np.array([count, *array.shape[:0:-1]], np.int64)
+        return self.nodes.add("Expand", turned, self.nodes.constant(shape))
+
+    def turned(self, value: str, name: str = "") -> str:
+        """Rows for columns: what a sample is told is a column within, so that copies are of whole rows."""
+        return self.nodes.add("Transpose", value, perm=[0, 2, 1], name=name)
 
     def encoded(self, value: str, octaves: int) -> str:
-        """As ``vision_plain.encoded``; an octave from the one before by the double angle."""
+        """As ``vision_plain.encoded``, along axis 1; an octave from the one before by the double angle."""
         parts, nodes = [value], self.nodes
         one, two = nodes.constant(np.array(1.0, np.float32)), nodes.constant(np.array(2.0, np.float32))
         for k in range(octaves):
@@ -82,7 +91,7 @@ class _Blocks:
                     nodes.add("Sub", one, nodes.add("Mul", twice, sine)),
                 )
             parts += [sine, cosine]
-        return nodes.add("Concat", *parts, axis=-1) if octaves else value
+        return nodes.add("Concat", *parts, axis=1) if octaves else value
 
 
 def vision_graph(model: VisionModel, block: int = BLOCK) -> ModelProto:
@@ -120,14 +129,15 @@ def vision_graph(model: VisionModel, block: int = BLOCK) -> ModelProto:
 
 
 def _local(made: _Blocks, grid: VisionGrid) -> str:
-    """The points in their cells, -1 to 1, computed in float64."""
+    """The points in their cells, -1 to 1, computed in float64; ``(n, 3, b)``."""
     nodes = made.nodes
     cells = nodes.add("Cast", made.kept("cells", grid.cells[:, None]), to=TensorProto.DOUBLE)
-    moved = nodes.add("Sub", "points", made.kept("low", grid.low))
-    scaled = nodes.add("Div", moved, made.kept("cell", np.array(grid.cell)))
-    within = nodes.add("Sub", scaled, made.of_block(cells))
-    doubled = nodes.add("Mul", within, nodes.constant(np.array(2.0)))
-    local = nodes.add("Cast", nodes.add("Sub", doubled, nodes.constant(np.array(1.0))), to=TensorProto.FLOAT)
+    cell, half = made.kept("cell", np.array(grid.cell)), nodes.constant(np.array(0.5))
+    middles = nodes.add("Mul", nodes.add("Add", cells, half), cell)
+    middles = nodes.add("Add", middles, made.kept("low", grid.low))
+    moved = nodes.add("Sub", "points", made.of_block(middles))
+    scaled = nodes.add("Div", moved, nodes.add("Mul", cell, half))
+    local = made.turned(nodes.add("Cast", scaled, to=TensorProto.FLOAT))
     least, most = (nodes.constant(np.array([end], np.float32)) for end in (-1.0, 1.0))
     return nodes.add("Min", nodes.add("Max", local, least), most)
 
@@ -140,24 +150,38 @@ def _networks(made: _Blocks, size: NetworkSize, local: str) -> None:
     hidden = nodes.add("Relu", made.layer(hidden, names["second"], names["second_bias"]))
     raw = nodes.add("Relu", made.layer(hidden, names["density"], names["density_bias"]))
     scale = made.kept("density_scale", np.array(made.model.weights.density_scale, np.float32))
-    nodes.add("Mul", raw, scale, name="density")
-    of_feature = names["scatter.feature"]
-    folded = nodes.add("MatMul", names["feature"], of_feature)
-    bias = nodes.add("Add", nodes.add("MatMul", names["feature_bias"], of_feature), names["scatter_bias"])
-    lit = nodes.add("Unsqueeze", made.encoded("light", size.turns), nodes.constant(np.array([1], np.int64)))
-    lit = nodes.add("MatMul", lit, made.of_block(names["scatter.light"]))
-    lit = nodes.add("Add", lit, made.of_block(bias))
-    seen, matrix = (
-        [hidden, made.encoded("views", size.turns)],
-        [folded, names["scatter.view"]],
-    )
+    made.turned(nodes.add("Mul", raw, scale), name="density")
+    matrix, seen = _seen(made, size, hidden)
+    product = nodes.add("MatMul", made.of_block(matrix), seen)
+    hidden = nodes.add("Relu", nodes.add("Add", product, _lit(made, size)))
+    colour = made.layer(hidden, names["colour"], names["colour_bias"])
+    made.turned(nodes.add("Sigmoid", colour), name="scattered")
+
+
+def _lit(made: _Blocks, size: NetworkSize) -> str:
+    """What of the layer that sees directions is the same for all samples of a block."""
+    nodes, names = made.nodes, made.names
+    folded = nodes.add("MatMul", names["scatter.feature"], names["feature_bias"])
+    bias = nodes.add("Add", folded, names["scatter_bias"])
+    code = nodes.add("Unsqueeze", made.encoded("light", size.turns), nodes.constant(np.array([2], np.int64)))
+    product = nodes.add("MatMul", made.of_block(names["scatter.light"]), code)
+    return nodes.add("Add", product, made.of_block(bias))
+
+
+def _seen(made: _Blocks, size: NetworkSize, hidden: str) -> tuple[str, str]:
+    """The rest of that layer's weights, and what they multiply."""
+    nodes, names = made.nodes, made.names
+    matrix = [nodes.add("MatMul", names["scatter.feature"], names["feature"])]
+    seen = [hidden]
+    if looks(made.model.weights):
+        matrix.append(names["scatter.view"])
+        seen.append(made.encoded(made.turned("views"), size.turns))
     if size.extras:
-        seen.append("extras")
         matrix.append(names["scatter.extras"])
-    every = nodes.add("Concat", *matrix, axis=1)
-    product = nodes.add("MatMul", nodes.add("Concat", *seen, axis=-1), made.of_block(every))
-    hidden = nodes.add("Relu", nodes.add("Add", product, lit))
-    nodes.add("Sigmoid", made.layer(hidden, names["colour"], names["colour_bias"]), name="scattered")
+        seen.append(made.turned("extras"))
+    if len(seen) == 1:
+        return matrix[0], hidden
+    return nodes.add("Concat", *matrix, axis=2), nodes.add("Concat", *seen, axis=1)
 
 
 def vision_model(data: bytes, name: str = FILE) -> VisionModel:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
-from harness.objectfile.vision_voxels import walk
+from harness.objectfile.vision_voxels import Three, walk
 from harness.sim.compiled import compiled
 
 _BESIDE = 1e-7
@@ -11,8 +11,8 @@ _BESIDE = 1e-7
 
 
 @compiled
-def network_at(table: AnyArray, place: FloatArray) -> int:
-    """The network of a place in cells, or of the nearest cell that rounding may have missed; -1 for none."""
+def _beside(table: AnyArray, place: Three) -> int:
+    """As ``network_at``, of a place that is on a border or beside it."""
     for reach in (0.0, _BESIDE):
         for corner in range(8 if reach > 0.0 else 1):
             at, inside = (0, 0, 0), True
@@ -33,12 +33,24 @@ def network_at(table: AnyArray, place: FloatArray) -> int:
 
 
 @compiled
-def _put(
-    at: int, place: FloatArray, network: int, cells: AnyArray, networks: AnyArray, local: AnyArray
-) -> None:
+def network_at(table: AnyArray, place: Three) -> int:
+    """The network of a place in cells, or of the nearest cell that rounding may have missed; -1 for none."""
+    i, j, k = int(place[0]), int(place[1]), int(place[2])
+    x, y, z = table.shape
+    # Truncated, what is just below 0 is 0 too; it is told apart.
+    if min(place[0], min(place[1], place[2])) >= 0.0 and i < x and j < y and k < z:
+        found = table[np.uint64(i), np.uint64(j), np.uint64(k)]
+        if found >= 0:
+            return int(found)
+    return _beside(table, place)
+
+
+@compiled
+def _put(at: int, place: Three, network: int, cells: AnyArray, networks: AnyArray, local: AnyArray) -> None:
     networks[at] = network
+    cell = cells[max(network, 0)]
     for axis in range(3):
-        within = 2.0 * (place[axis] - cells[max(network, 0), axis]) - 1.0
+        within = 2.0 * (place[axis] - cell[axis]) - 1.0
         local[at, axis] = min(max(within, -1.0), 1.0)
 
 
@@ -49,7 +61,7 @@ def march(
     eye: FloatArray,
     voxel: float,
     per_cell: int,
-    words: AnyArray,
+    near: AnyArray,
     table: AnyArray,
     cells: AnyArray,
     step: float,
@@ -70,7 +82,7 @@ def march(
         eye: ``(3,)`` voxels from the lattice's least corner.
         voxel: m.
         per_cell: voxels along a cell.
-        words: of the shell.
+        near: of the shell.
         table: of the grid.
         cells: of the grid's networks.
         step: m that a sample stands for at most.
@@ -83,27 +95,31 @@ def march(
         lengths: ``(n * most,)`` float32 m that each sample stands for, written.
         places: ``(n * most,)`` float32 m along the ray, written.
     """
-    runs, way, place = np.empty((runs_at_once, 2)), np.empty(3), np.empty(3)
+    runs, way = np.empty((1, 2)), np.empty(3)
+    ex, ey, ez, share = eye[0], eye[1], eye[2], 1.0 / per_cell
     for n in range(len(rays)):
-        ray, count = rays[n], 0
+        ray, count, stretches, after = rays[n], 0, 0, resume[rays[n]]
         for axis in range(3):
             way[axis] = ways[ray, axis] / voxel
-        found, after = walk(eye, way, resume[ray], words, runs)
-        for run in range(found):
-            begin, end = runs[run, 0], runs[run, 1]
+        wx, wy, wz = way[0], way[1], way[2]
+        # One stretch at a time: what is behind those that fill the places is not walked to.
+        while stretches < runs_at_once and count < most and after < np.inf:
+            found, after = walk(eye, way, after, near, runs)
+            if found == 0:
+                break
+            stretches += 1
+            begin, end = runs[0, 0], runs[0, 1]
             parts = max(1, int(np.ceil((end - begin) / step - 1e-9)))
             part = (end - begin) / parts
             taken = min(parts, most - count)
             for i in range(taken):
                 at, t = n * most + count, begin + (i + 0.5) * part
-                for axis in range(3):
-                    place[axis] = (eye[axis] + t * way[axis]) / per_cell
+                place = (share * (ex + t * wx), share * (ey + t * wy), share * (ez + t * wz))
                 _put(at, place, network_at(table, place), cells, networks, local)
                 lengths[at], places[at] = part, t
                 count += 1
             if taken < parts:
                 after = begin + taken * part
-                break
         counts[n], resume[ray] = count, after
 
 

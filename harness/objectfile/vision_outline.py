@@ -74,7 +74,7 @@ def mesh_outline(mesh: Mesh, closed: bool, camera: Pinhole, side: int, crew: Cre
         draw(seen, mesh.faces, focal, x, y, first * side, last * side, closed and outside, nearness)
         look_through(nearness, side, offsets, first, last, cover, places, depth)
 
-    crew.share(project, len(mesh.vertices), crew.threads)
+    crew.share(project, len(mesh.vertices), crew.threads, 4096)
     crew.share(band, rows, 2 * crew.threads if crew.threads > 1 else 1)
     pixels = np.flatnonzero(cover)
     return Outline(pixels, cover.ravel()[pixels], places.reshape(-1, 2)[pixels], depth.ravel()[pixels])

@@ -14,6 +14,9 @@ from harness.objectfile.vision_settings import RenderSettings
 from harness.objectfile.vision_shell import Shell
 from harness.objectfile.vision_work import Crew, Room
 
+_LEAST = 256
+"""Rays that another thread is asked to follow: fewer are followed sooner than it wakes."""
+
 
 class Watch:
     """Seconds of parts that follow each other."""
@@ -112,7 +115,7 @@ class Follower:
             lengths, places, table, cells = samples.lengths[at], samples.places[at], grid.table, grid.cells
             if chosen.marches:
                 march(
-                    *(going, rays.ways, eye, shell.voxel, per_cell, shell.words, table, cells, step, most),
+                    *(going, rays.ways, eye, shell.voxel, per_cell, shell.near, table, cells, step, most),
                     *(stretches, rays.resume, counts, networks, local, lengths, places),
                 )
             else:
@@ -122,7 +125,7 @@ class Follower:
                 )
                 rays.resume[going] = np.inf
 
-        self._crew.share(work, len(samples.rays), 4 * self._crew.threads)
+        self._crew.share(work, len(samples.rays), 4 * self._crew.threads, _LEAST)
 
     def _sorted(self, samples: Samples, block: int) -> tuple[AnyArray, AnyArray]:
         every, room = len(self._volume.model.grid), self._room
@@ -155,4 +158,4 @@ class Follower:
                 rays.sums,
             )
 
-        self._crew.share(work, len(samples.rays), 2 * self._crew.threads)
+        self._crew.share(work, len(samples.rays), 2 * self._crew.threads, 4 * _LEAST)

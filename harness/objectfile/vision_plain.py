@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray, IntArray
-from harness.objectfile.vision_network import NetworkSize, VisionModel
+from harness.objectfile.vision_network import NetworkSize, VisionModel, VisionWeights
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +38,11 @@ def scatter_rows(size: NetworkSize) -> dict[str, slice]:
     ends = np.cumsum([0, size.width, size.direction, size.direction, size.extras])
     names = ("feature", "view", "light", "extras")
     return {name: slice(int(a), int(b)) for name, a, b in zip(names, ends[:-1], ends[1:], strict=True)}
+
+
+def looks(weights: VisionWeights) -> bool:
+    """Whether any network may answer otherwise from another side: some row of views is not 0."""
+    return bool(weights.scatter[:, scatter_rows(weights.size)["view"]].any())
 
 
 def evaluate(model: VisionModel, asked: Asked) -> tuple[FloatArray, FloatArray]:

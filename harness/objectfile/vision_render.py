@@ -25,6 +25,9 @@ from harness.objectfile.vision_tensors import vision_tensors
 from harness.objectfile.vision_work import Crew, Room
 from harness.pinhole import DirectionalLight, Pinhole
 
+_LEAST = 4096
+"""Rays that another thread is asked to aim: fewer are aimed sooner than it wakes."""
+
 
 class VisionRenderer:
     """An object, ready to be looked at; one picture at a time.
@@ -119,7 +122,7 @@ class VisionRenderer:
         def work(first: int, last: int) -> None:
             aim(rays[first:last], outline.places, camera.focal_px, x, y, rotation, ways, views, slant)
 
-        self._crew.share(work, count, self._crew.threads)
+        self._crew.share(work, count, self._crew.threads, _LEAST)
         return ways, views, slant
 
     def _asker(self, level: VisionLevel) -> Asker:

@@ -7,6 +7,7 @@ import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
 from harness.objectfile.runtime import Network
+from harness.objectfile.vision_asked import fill_asked, take_answers
 from harness.objectfile.vision_fold import FoldedWeights
 from harness.objectfile.vision_kernels import ask_blocks
 from harness.objectfile.vision_network import VisionGrid
@@ -15,6 +16,9 @@ from harness.objectfile.vision_work import Crew, Room
 
 _AT_ONCE = 48
 """Blocks in a run of the graph: what it computes between then stays in the second cache."""
+
+_LEAST = 16
+"""Blocks that another thread is asked for: fewer are done sooner than it wakes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +112,7 @@ class FusedAsker:
                 *(samples.density, samples.scattered),
             )
 
-        crew.share(ask, len(blocks), 4 * crew.threads)
+        crew.share(ask, len(blocks), 4 * crew.threads, _LEAST)
 
     def _under(self, light: FloatArray) -> AnyArray:
         if self._light is None or not np.array_equal(light, self._light):
@@ -136,23 +140,23 @@ class GraphAsker:
             for begin in range(first, last, _AT_ONCE):
                 self._ask(samples, order, blocks[begin : min(begin + _AT_ONCE, last)], scene)
 
-        crew.share(ask, len(blocks), 2 * crew.threads)
+        crew.share(ask, len(blocks), 4 * crew.threads, _AT_ONCE)
 
     def _ask(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene) -> None:
-        lanes = np.arange(self.block)
-        # A block that is not full asks for its last sample again: every network that is asked is there.
-        chosen = order[blocks[:, 1, None] + np.minimum(lanes, blocks[:, 2, None] - 1)]
-        low, cell, network = self._grid.low, self._grid.cell, blocks[:, 0]
-        share = 0.5 * (samples.local[chosen].astype(np.float64) + 1.0)
-        rays = samples.rays[chosen // samples.most]
-        asked = {
-            "network": network[:, None].astype(np.int64),
-            "points": low + cell * (self._grid.cells[network][:, None] + share),
-            "views": scene.views[rays],
-            "light": np.broadcast_to(scene.light.astype(np.float32), (len(blocks), 3)),
+        grid, shape = self._grid, (len(blocks), self.block)
+        asked: dict[str, AnyArray] = {
+            "network": np.empty((len(blocks), 1), np.int64),
+            "points": np.empty((*shape, 3)),
+            "views": np.empty((*shape, 3), np.float32),
+            "light": np.tile(scene.light.astype(np.float32), (len(blocks), 1)),
         }
-        if scene.extras.shape[1]:
-            asked["extras"] = scene.extras[rays]
-        found = self._network(asked)
-        samples.density[chosen] = found["density"][..., 0] / np.float32(self._scale)
-        samples.scattered[chosen] = found["scattered"]
+        told = np.empty((*shape, scene.extras.shape[1]), np.float32)
+        fill_asked(
+            *(blocks, order, samples.local, samples.rays, samples.most, grid.low, grid.cell, grid.cells),
+            *(scene.views, scene.extras, asked["network"], asked["points"], asked["views"], told),
+        )
+        found = self._network(asked | ({"extras": told} if told.shape[2] else {}))
+        take_answers(
+            *(blocks, order, found["density"], found["scattered"], self._scale),
+            *(samples.density, samples.scattered),
+        )

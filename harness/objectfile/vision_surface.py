@@ -13,6 +13,9 @@ from harness.sim.ray_mesh import LEAST
 _EARLY = 0.25
 """Cubes before the known depth from which on a ray is followed: depth is kept as float32."""
 
+_LEAST = 128
+"""Rays that another thread is asked to follow: fewer are followed sooner than it wakes."""
+
 
 class SurfaceExtras:
     """Visibility and normal at the first place of a mesh that a ray meets.
@@ -55,7 +58,7 @@ class SurfaceExtras:
             first_met(eye, ways[part], begin[part], self._cubes.lists, faces[part], weights[part])
             self._tell(ways[part], lamp, faces[part], weights[part], places, told[part])
 
-        self._crew.share(work, len(ways), 4 * self._crew.threads)
+        self._crew.share(work, len(ways), 4 * self._crew.threads, _LEAST)
         return told
 
     def _tell(

@@ -11,6 +11,12 @@ Three = FloatArray | tuple[float, float, float]
 _WIDER = 1e-6
 """Of a voxel: by which it is enlarged, so that rounding leaves out no triangle that it touches."""
 
+OUTSIDE = 255
+"""In ``Shell.near``: beyond the lattice."""
+
+_LEAP = 1.0 - 1e-9
+"""Of an empty voxel: what is leapt of it, so that rounding leads into no other."""
+
 
 @compiled
 def touch_voxels(corners: FloatArray, words: AnyArray) -> None:
@@ -65,19 +71,18 @@ def touches(face: FloatArray, x: float, y: float, z: float) -> bool:
 
 
 @compiled
-def entered(eye: Three, way: Three, words: AnyArray) -> tuple[float, float]:
-    """From where to where a ray is in the lattice; from infinity where it is not.
+def entered(eye: Three, way: Three, sides: tuple[int, int, int]) -> tuple[float, float]:
+    """From where to where a ray is in a lattice of so many cubes; from infinity where it is not.
 
     A ray along a face of the box lies in it if its place does: nothing is multiplied by infinity.
     """
     begin, end = 0.0, np.inf
     for axis in range(3):
-        size = 4.0 * words.shape[axis]
         if way[axis] == 0.0:
-            if not 0.0 <= eye[axis] <= size:
+            if not 0.0 <= eye[axis] <= sides[axis]:
                 return np.inf, np.inf
         else:
-            a, b = -eye[axis] / way[axis], (size - eye[axis]) / way[axis]
+            a, b = -eye[axis] / way[axis], (sides[axis] - eye[axis]) / way[axis]
             begin, end = max(begin, min(a, b)), min(end, max(a, b))
     return (begin, end) if begin < end else (np.inf, np.inf)
 
@@ -90,88 +95,70 @@ def clamped(place: float, least: int, most: int) -> int:
 
 @compiled
 def walk(
-    eye: FloatArray, way: FloatArray, start: float, words: AnyArray, runs: FloatArray
+    eye: FloatArray, way: FloatArray, start: float, near: AnyArray, runs: FloatArray
 ) -> tuple[int, float]:
     """The stretches of a ray within marked voxels, from ``start`` on, in order.
 
-    Borders are computed from their own numbers, never summed up; cubes are entered by counting, so that a
-    ray along a face stays in one of its two cubes and no rounding leaves it in none. Stretches without a
-    length are left out: who goes on where one ended always gets farther.
+    What is empty is leapt over, as far as the nearest marked voxel is away in every direction. Beside marked
+    voxels borders are computed from their own numbers, never summed up, and voxels entered by counting, so
+    that a ray along a face stays in one of its two voxels and no rounding leaves it in none. Stretches
+    without a length are left out: who goes on where one ended always gets farther.
 
     Args:
         eye: ``(3,)`` in voxels.
         way: ``(3,)`` voxels for a unit of length, not zero; lengths are in that unit.
         start: length from which on.
-        words: of the shell.
+        near: ``Shell.near``.
         runs: ``(n, 2)`` from and to, written.
 
     Returns:
         How many stretches there are in ``runs``, and from where there may be more; inf for no more.
     """
-    begin, end = entered(eye, way, words)
-    t = max(begin, start)
-    if not t < end:
-        return 0, np.inf
     ex, ey, ez = eye[0], eye[1], eye[2]
     wx, wy, wz = way[0], way[1], way[2]
+    nx, ny, nz = near.shape[0] - 2, near.shape[1] - 2, near.shape[2] - 2
+    begin, end = entered((ex, ey, ez), (wx, wy, wz), (nx, ny, nz))
+    t, count = max(begin, start), 0
     # An infinity here is never multiplied: without a way along an axis its borders are at infinity.
     rx = 1.0 / wx if wx != 0.0 else np.inf
     ry = 1.0 / wy if wy != 0.0 else np.inf
     rz = 1.0 / wz if wz != 0.0 else np.inf
+    leap = _LEAP * min(abs(rx), min(abs(ry), abs(rz)))
     sx, sy, sz = (1 if wx > 0.0 else -1), (1 if wy > 0.0 else -1), (1 if wz > 0.0 else -1)
-    ux, uy, uz = (1 if wx > 0.0 else 0), (1 if wy > 0.0 else 0), (1 if wz > 0.0 else 0)
-    nx, ny, nz = words.shape
-    bx = clamped((ex + t * wx) * 0.25, 0, nx - 1)
-    by = clamped((ey + t * wy) * 0.25, 0, ny - 1)
-    bz = clamped((ez + t * wz) * 0.25, 0, nz - 1)
-    count, is_open = 0, False
+    # Voxels are counted from 1, what is before them from 0: the border ahead is at this less or more.
+    ux, uy, uz = (0 if wx > 0.0 else -1), (0 if wy > 0.0 else -1), (0 if wz > 0.0 else -1)
     while t < end:
-        tx = (4 * (bx + ux) - ex) * rx if wx != 0.0 else np.inf
-        ty = (4 * (by + uy) - ey) * ry if wy != 0.0 else np.inf
-        tz = (4 * (bz + uz) - ez) * rz if wz != 0.0 else np.inf
-        leave = min(tx, min(ty, tz))
-        word = words[np.uint64(bx), np.uint64(by), np.uint64(bz)]
-        if word == np.uint64(0):
-            if is_open:
-                is_open, count = False, count + (1 if runs[count, 1] > runs[count, 0] else 0)
-                if count == len(runs):
-                    return count, runs[count - 1, 1]
-        else:
-            vx = clamped(ex + t * wx, 4 * bx, 4 * bx + 3) - 4 * bx
-            vy = clamped(ey + t * wy, 4 * by, 4 * by + 3) - 4 * by
-            vz = clamped(ez + t * wz, 4 * bz, 4 * bz + 3) - 4 * bz
-            while 0 <= vx < 4 and 0 <= vy < 4 and 0 <= vz < 4:
-                px = (4 * bx + vx + ux - ex) * rx if wx != 0.0 else np.inf
-                py = (4 * by + vy + uy - ey) * ry if wy != 0.0 else np.inf
-                pz = (4 * bz + vz + uz - ez) * rz if wz != 0.0 else np.inf
-                out = min(px, min(py, pz))
-                if (word >> np.uint64((vx << 4) | (vy << 2) | vz)) & np.uint64(1):
-                    if not is_open:
-                        is_open = True
-                        runs[count, 0] = t
-                    t = max(t, out)
-                    runs[count, 1] = min(t, end)
-                else:
-                    if is_open:
-                        is_open, count = False, count + (1 if runs[count, 1] > runs[count, 0] else 0)
-                        if count == len(runs):
-                            return count, runs[count - 1, 1]
-                    t = max(t, out)
-                if px <= py and px <= pz:
-                    vx += sx
-                elif py <= pz:
-                    vy += sy
-                else:
-                    vz += sz
-        t = max(t, leave)
-        if tx <= ty and tx <= tz:
-            bx += sx
-        elif ty <= tz:
-            by += sy
-        else:
-            bz += sz
-        if not (0 <= bx < nx and 0 <= by < ny and 0 <= bz < nz):
+        vx = clamped(ex + t * wx, 0, nx - 1) + 1
+        vy = clamped(ey + t * wy, 0, ny - 1) + 1
+        vz = clamped(ez + t * wz, 0, nz - 1) + 1
+        px = (vx + ux - ex) * rx if wx != 0.0 else np.inf
+        py = (vy + uy - ey) * ry if wy != 0.0 else np.inf
+        pz = (vz + uz - ez) * rz if wz != 0.0 else np.inf
+        away, opened, is_open = int(near[np.uint64(vx), np.uint64(vy), np.uint64(vz)]), t, False
+        while away < 2:
+            if away == 0:
+                if not is_open:
+                    is_open, opened = True, t
+            elif is_open:
+                if min(t, end) > opened:
+                    break
+                is_open = False
+            if px <= py and px <= pz:
+                t, vx = max(t, px), vx + sx
+                px = (vx + ux - ex) * rx
+            elif py <= pz:
+                t, vy = max(t, py), vy + sy
+                py = (vy + uy - ey) * ry
+            else:
+                t, vz = max(t, pz), vz + sz
+                pz = (vz + uz - ez) * rz
+            away = int(near[np.uint64(vx), np.uint64(vy), np.uint64(vz)])
+        if is_open and min(t, end) > opened:
+            runs[count, 0], runs[count, 1] = opened, min(t, end)
+            count += 1
+            if count == len(runs):
+                return count, (t if t < end else np.inf)
+        if away == OUTSIDE:
             break
-    if is_open and runs[count, 1] > runs[count, 0]:
-        count += 1
+        t += max(away - 1, 0) * leap
     return count, np.inf

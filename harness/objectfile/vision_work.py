@@ -25,17 +25,37 @@ class Crew:
             raise WrongUse(f"{self.threads} threads compute nothing; say 1 or more")
         self._pool = ThreadPoolExecutor(self.threads, "vision") if self.threads > 1 else None
 
-    def share(self, work: Callable[[int, int], None], count: int, parts: int) -> None:
-        """Call ``work(first, last)`` for parts of ``range(count)``, and return when all are done."""
-        if self._pool is None or count < parts or parts < 2:
+    def share(self, work: Callable[[int, int], None], count: int, parts: int, least: int = 1) -> None:
+        """Call ``work(first, last)`` for parts of ``range(count)``, and return when all are done.
+
+        Args:
+            work: holds no lock while it computes.
+            count: of what is shared.
+            parts: to be made of it; threads take one after the other.
+            least: of a part: what is cheaper done than handed to another thread.
+        """
+        parts = min(parts, count // least)
+        if self._pool is None or parts < 2:
             if count:
                 work(0, count)
             return
         ends = np.linspace(0, count, parts + 1).astype(int).tolist()
-        jobs = [self._pool.submit(work, a, b) for a, b in pairwise(ends[1:])]
-        work(ends[0], ends[1])
+        left = list(pairwise(ends))[::-1]
+
+        def take() -> None:
+            while left:
+                try:
+                    first, last = left.pop()
+                except IndexError:  # another thread took the last one between the question and the answer
+                    return
+                work(first, last)
+
+        jobs = [self._pool.submit(take) for _ in range(self.threads - 1)]
+        take()
         for job in jobs:
-            job.result()
+            # A thread that woke too late has nothing left to do and is not waited for.
+            if not job.cancel():
+                job.result()
 
 
 class Room:

@@ -152,7 +152,7 @@ def test_rays_along_the_faces_of_voxels_are_taken_or_left_but_never_lost() -> No
             for other in np.arange(first[(axis + 1) % 3] + 1.0, last[(axis + 1) % 3] - 0.0):
                 eye = 0.5 * sides
                 eye[(axis + 1) % 3], eye[axis] = other, -7.0 if sign > 0.0 else sides[axis] + 7.0
-                count, after = walk(eye, way, 0.0, shell.words, runs)
+                count, after = walk(eye, way, 0.0, shell.near, runs)
                 ends = runs[:count]
                 assert after == np.inf
                 assert np.isfinite(ends).all()
@@ -160,9 +160,9 @@ def test_rays_along_the_faces_of_voxels_are_taken_or_left_but_never_lost() -> No
                 assert count >= 1
                 assert ends[0, 0] == pytest.approx(7.0 + (first if sign > 0.0 else sides - last)[axis])
     for corner in ((0.0, 0.0), (0.0, sides[2]), (sides[1], sides[2])):
-        count, _ = walk(np.array([-1.0, *corner]), np.array([1.0, 0.0, 0.0]), 0.0, shell.words, runs)
+        count, _ = walk(np.array([-1.0, *corner]), np.array([1.0, 0.0, 0.0]), 0.0, shell.near, runs)
         assert np.isfinite(runs[:count]).all()
-    assert walk(np.array([-1.0, -0.1, 5.0]), np.array([1.0, 0.0, 0.0]), 0.0, shell.words, runs)[0] == 0
+    assert walk(np.array([-1.0, -0.1, 5.0]), np.array([1.0, 0.0, 0.0]), 0.0, shell.near, runs)[0] == 0
 
 
 def test_the_greatest_corner_of_the_box_is_in_its_last_cell() -> None:

@@ -64,7 +64,7 @@ def marched(
         lengths, places = np.zeros(len(kind), np.float32), np.zeros(len(kind), np.float32)
         from_eye, size = (eye - shell.low) / shell.voxel, shell.voxel
         march(
-            *(going, ways, from_eye, size, 8, shell.words, grid.table, grid.cells, step, most),
+            *(going, ways, from_eye, size, 8, shell.near, grid.table, grid.cells, step, most),
             *(stretches, resume, counts, kind, local, lengths, places),
         )
         assert (np.abs(local) <= 1.0).all()
@@ -140,7 +140,7 @@ def test_stretches_are_where_the_voxels_are(kind: str) -> None:
             eye = shape * random.random(3)
         if kind == "diagonal":
             eye, way = np.floor(shape * random.random(3)) - 20.0, np.ones(3)
-        count, after = walk(eye, way, 0.0, shell.words, runs)
+        count, after = walk(eye, way, 0.0, shell.near, runs)
         assert after == np.inf
         ends = runs[:count]
         assert (ends[:, 1] >= ends[:, 0]).all()
