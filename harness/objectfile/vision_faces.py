@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only
 from harness.mesh import Mesh
-from harness.objectfile.vision_voxels import clamped, entered, touches
+from harness.objectfile.vision_voxels import OUTSIDE, clamped, distances, entered, prepared, touches
 from harness.sim.compiled import compiled
 from harness.sim.ray_kernels import Hit, nearest_of
 
@@ -23,8 +23,8 @@ _BESIDE = 1e-3
 _WIDER = 1e-6
 """Of a cube: by which it is enlarged, as in ``touches``."""
 
-Lists = tuple[FloatArray, float, AnyArray, AnyArray, AnyArray, FloatArray]
-"""Least corner (m), edge (m), bricks, starts, faces and triangles of ``FaceCubes``."""
+Lists = tuple[FloatArray, float, AnyArray, AnyArray, AnyArray, AnyArray, FloatArray]
+"""Least corner (m), edge (m), near, bricks, starts, faces and triangles of ``FaceCubes``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +34,7 @@ class FaceCubes:
     Attributes:
         low: ``(3,)`` m, least corner of the lattice, object frame.
         edge: m, of a cube.
+        near: ``(4 x + 2, 4 y + 2, 4 z + 2)`` as ``vision_voxels.distances`` of cubes that a face touches.
         bricks: ``(x, y, z)`` int32: number of each brick of 4 x 4 x 4 cubes that a face touches, else -1.
         starts: ``(64 bricks + 1,)`` int32: where each cube's list begins in ``faces``; cube (i, j, k) of a
             brick is its ``16 i + 4 j + k``-th.
@@ -43,6 +44,7 @@ class FaceCubes:
 
     low: FloatArray
     edge: float
+    near: AnyArray
     bricks: AnyArray
     starts: AnyArray
     faces: AnyArray
@@ -71,14 +73,23 @@ class FaceCubes:
         triangles = np.stack(
             [corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1
         )
-        for each in (low, bricks, starts, owners, triangles):
+        near = distances(_grid(cubes, sides))
+        for each in (low, near, bricks, starts, owners, triangles):
             read_only(each)
-        return cls(low, edge, bricks.reshape(sides), starts, owners, triangles)
+        return cls(low, edge, near, bricks.reshape(sides), starts, owners, triangles)
 
     @property
     def lists(self) -> Lists:
         """As the compiled loops take them."""
-        return self.low, self.edge, self.bricks, self.starts, self.faces, self.triangles
+        return self.low, self.edge, self.near, self.bricks, self.starts, self.faces, self.triangles
+
+
+def _grid(cubes: IntArray, bricks: IntArray) -> BoolArray:
+    """``(4 x, 4 y, 4 z)`` whether each cube is among some, which are counted brick by brick."""
+    there = np.zeros((int(bricks.prod()), 64), np.bool_)
+    there[cubes >> 6, cubes & 63] = True
+    parts = there.reshape(*bricks, 4, 4, 4).transpose(0, 3, 1, 4, 2, 5)
+    return np.ascontiguousarray(parts.reshape(4 * bricks))
 
 
 @compiled
@@ -167,57 +178,44 @@ def _meet(
 
     As ``vision_voxels.walk`` goes: borders from their own numbers, cubes by counting.
     """
-    low, edge, bricks, firsts, faces, triangles = lists
+    low, edge, near, bricks, firsts, faces, triangles = lists
     ex, ey, ez = (origin[0] - low[0]) / edge, (origin[1] - low[1]) / edge, (origin[2] - low[2]) / edge
     wx, wy, wz = way[0] / edge, way[1] / edge, way[2] / edge
     best: Hit = (np.inf, -1, 0.0, 0.0)
-    nx, ny, nz = bricks.shape
-    begin, end = entered((ex, ey, ez), (wx, wy, wz), (4 * nx, 4 * ny, 4 * nz))
+    nx, ny, nz = near.shape[0] - 2, near.shape[1] - 2, near.shape[2] - 2
+    begin, end = entered((ex, ey, ez), (wx, wy, wz), (nx, ny, nz))
+    (rx, ry, rz), (sx, sy, sz), (ux, uy, uz), leap = prepared((wx, wy, wz))
     t = max(begin, least)
-    if not t < end:
-        return best
-    # An infinity here is never multiplied: without a way along an axis its borders are at infinity.
-    rx = 1.0 / wx if wx != 0.0 else np.inf
-    ry = 1.0 / wy if wy != 0.0 else np.inf
-    rz = 1.0 / wz if wz != 0.0 else np.inf
-    sx, sy, sz = (1 if wx > 0.0 else -1), (1 if wy > 0.0 else -1), (1 if wz > 0.0 else -1)
-    ux, uy, uz = (1 if wx > 0.0 else 0), (1 if wy > 0.0 else 0), (1 if wz > 0.0 else 0)
-    bx = clamped((ex + t * wx) * 0.25, 0, nx - 1)
-    by = clamped((ey + t * wy) * 0.25, 0, ny - 1)
-    bz = clamped((ez + t * wz) * 0.25, 0, nz - 1)
     while t < end:
-        tx = (4 * (bx + ux) - ex) * rx if wx != 0.0 else np.inf
-        ty = (4 * (by + uy) - ey) * ry if wy != 0.0 else np.inf
-        tz = (4 * (bz + uz) - ez) * rz if wz != 0.0 else np.inf
-        brick = bricks[bx, by, bz]
-        if brick >= 0:
-            vx = clamped(ex + t * wx, 4 * bx, 4 * bx + 3) - 4 * bx
-            vy = clamped(ey + t * wy, 4 * by, 4 * by + 3) - 4 * by
-            vz = clamped(ez + t * wz, 4 * bz, 4 * bz + 3) - 4 * bz
-            while 0 <= vx < 4 and 0 <= vy < 4 and 0 <= vz < 4:
-                px = (4 * bx + vx + ux - ex) * rx if wx != 0.0 else np.inf
-                py = (4 * by + vy + uy - ey) * ry if wy != 0.0 else np.inf
-                pz = (4 * bz + vz + uz - ez) * rz if wz != 0.0 else np.inf
-                cube = 64 * brick + ((vx << 4) | (vy << 2) | vz)
+        vx = clamped(ex + t * wx, 0, nx - 1) + 1
+        vy = clamped(ey + t * wy, 0, ny - 1) + 1
+        vz = clamped(ez + t * wz, 0, nz - 1) + 1
+        px = (vx + ux - ex) * rx if wx != 0.0 else np.inf
+        py = (vy + uy - ey) * ry if wy != 0.0 else np.inf
+        pz = (vz + uz - ez) * rz if wz != 0.0 else np.inf
+        away = int(near[np.uint64(vx), np.uint64(vy), np.uint64(vz)])
+        while away < 2:
+            if away == 0:
+                x, y, z = np.uint64(vx - 1), np.uint64(vy - 1), np.uint64(vz - 1)
+                two, three = np.uint64(2), np.uint64(3)
+                cube = 64 * bricks[x >> two, y >> two, z >> two]
+                cube += int(((x & three) << np.uint64(4)) | ((y & three) << two) | (z & three))
                 first, last = firsts[cube], firsts[cube + 1]
-                if first < last:
-                    best = nearest_of(origin, way, least, without, first, last, faces, triangles, best)
-                    # A face may reach on into cubes farther on: what is met counts once none can be nearer.
-                    if best[1] >= 0 and (any_will_do or best[0] <= min(px, min(py, pz))):
-                        return best
-                if px <= py and px <= pz:
-                    vx += sx
-                elif py <= pz:
-                    vy += sy
-                else:
-                    vz += sz
-        t = max(t, min(tx, min(ty, tz)))
-        if tx <= ty and tx <= tz:
-            bx += sx
-        elif ty <= tz:
-            by += sy
-        else:
-            bz += sz
-        if not (0 <= bx < nx and 0 <= by < ny and 0 <= bz < nz):
+                best = nearest_of(origin, way, least, without, first, last, faces, triangles, best)
+                # A face may reach on into cubes farther on: what is met counts once none can be nearer.
+                if best[1] >= 0 and (any_will_do or best[0] <= min(px, min(py, pz))):
+                    return best
+            if px <= py and px <= pz:
+                t, vx = max(t, px), vx + sx
+                px = (vx + ux - ex) * rx
+            elif py <= pz:
+                t, vy = max(t, py), vy + sy
+                py = (vy + uy - ey) * ry
+            else:
+                t, vz = max(t, pz), vz + sz
+                pz = (vz + uz - ez) * rz
+            away = int(near[np.uint64(vx), np.uint64(vy), np.uint64(vz)])
+        if away == OUTSIDE:
             break
+        t += (away - 1) * leap
     return best

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import distance_transform_cdt
 
 from harness.arrays import AnyArray, FloatArray, read_only
 from harness.errors import DataRefused, MeshRefused, WrongUse
 from harness.mesh import Mesh
 from harness.objectfile.vision_network import CELLS, MOST_CELLS, VisionGrid
-from harness.objectfile.vision_voxels import OUTSIDE, touch_voxels
+from harness.objectfile.vision_voxels import distances, touch_voxels
 
 PER_CELL = 8
 """Voxels along a cell: 128 along the longest side of the object."""
@@ -70,16 +69,8 @@ class Shell:
 
     @cached_property
     def near(self) -> AnyArray:
-        """``(x + 2, y + 2, z + 2)`` uint8: voxels to the nearest that is not empty, in any direction.
-
-        0 is one that is not empty itself; ``OUTSIDE`` is a layer around the lattice.
-        """
-        occupied = self.occupied
-        if not occupied.any():
-            away = np.full(occupied.shape, OUTSIDE - 1, np.uint8)
-        else:
-            away = np.minimum(distance_transform_cdt(~occupied, "chessboard"), OUTSIDE - 1).astype(np.uint8)
-        return read_only(np.pad(away, 1, constant_values=OUTSIDE))
+        """``(x + 2, y + 2, z + 2)`` uint8, of ``distances``."""
+        return read_only(distances(self.occupied))
 
     def cells(self, per_cell: int) -> AnyArray:
         """``(n, 3)`` cells of so many voxels a side that hold some."""

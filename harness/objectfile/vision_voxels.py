@@ -1,21 +1,41 @@
 """Which small cubes a triangle touches, and the way of a ray through those that some triangle does."""
 
 import numpy as np
+from scipy.ndimage import distance_transform_cdt
 
-from harness.arrays import AnyArray, FloatArray
+from harness.arrays import AnyArray, BoolArray, FloatArray
 from harness.sim.compiled import compiled
 
 Three = FloatArray | tuple[float, float, float]
 """Numbers along x, y, z."""
 
+Whole = tuple[int, int, int]
+"""The same, whole."""
+
 _WIDER = 1e-6
 """Of a voxel: by which it is enlarged, so that rounding leaves out no triangle that it touches."""
 
 OUTSIDE = 255
-"""In ``Shell.near``: beyond the lattice."""
+"""In ``distances``: beyond the lattice."""
 
 _LEAP = 1.0 - 1e-9
 """Of an empty voxel: what is leapt of it, so that rounding leads into no other."""
+
+
+def distances(marked: BoolArray) -> AnyArray:
+    """How far marked cubes are from each of a lattice, for rays that leap over what is empty.
+
+    Args:
+        marked: ``(x, y, z)``.
+
+    Returns:
+        ``(x + 2, y + 2, z + 2)`` uint8: cubes to the nearest marked one, the greatest of the three axes; 0 of
+        a marked one, ``OUTSIDE`` in a layer around the lattice, 254 of what is as far or farther.
+    """
+    away = np.full(marked.shape, OUTSIDE - 1, np.uint8)
+    if marked.any():
+        away = np.minimum(distance_transform_cdt(~marked, "chessboard"), OUTSIDE - 1).astype(np.uint8)
+    return np.pad(away, 1, constant_values=OUTSIDE)
 
 
 @compiled
@@ -71,7 +91,7 @@ def touches(face: FloatArray, x: float, y: float, z: float) -> bool:
 
 
 @compiled
-def entered(eye: Three, way: Three, sides: tuple[int, int, int]) -> tuple[float, float]:
+def entered(eye: Three, way: Three, sides: Whole) -> tuple[float, float]:
     """From where to where a ray is in a lattice of so many cubes; from infinity where it is not.
 
     A ray along a face of the box lies in it if its place does: nothing is multiplied by infinity.
@@ -91,6 +111,23 @@ def entered(eye: Three, way: Three, sides: tuple[int, int, int]) -> tuple[float,
 def clamped(place: float, least: int, most: int) -> int:
     """The whole number below a place, from the least to the most."""
     return int(min(max(np.floor(place), least), most))
+
+
+@compiled
+def prepared(way: Three) -> tuple[tuple[float, float, float], Whole, Whole, float]:
+    """Of a ray through cubes counted from 1, as ``near`` has them.
+
+    Returns:
+        One over the way, an infinity (never to be multiplied) where there is none; the step to the next cube;
+        what the border ahead is at more than a cube's number; length of a leap over one empty cube.
+    """
+    wx, wy, wz = way
+    rx = 1.0 / wx if wx != 0.0 else np.inf
+    ry = 1.0 / wy if wy != 0.0 else np.inf
+    rz = 1.0 / wz if wz != 0.0 else np.inf
+    steps = ((1 if wx > 0.0 else -1), (1 if wy > 0.0 else -1), (1 if wz > 0.0 else -1))
+    ahead = ((0 if wx > 0.0 else -1), (0 if wy > 0.0 else -1), (0 if wz > 0.0 else -1))
+    return (rx, ry, rz), steps, ahead, _LEAP * min(abs(rx), min(abs(ry), abs(rz)))
 
 
 @compiled
@@ -118,15 +155,8 @@ def walk(
     wx, wy, wz = way[0], way[1], way[2]
     nx, ny, nz = near.shape[0] - 2, near.shape[1] - 2, near.shape[2] - 2
     begin, end = entered((ex, ey, ez), (wx, wy, wz), (nx, ny, nz))
+    (rx, ry, rz), (sx, sy, sz), (ux, uy, uz), leap = prepared((wx, wy, wz))
     t, count = max(begin, start), 0
-    # An infinity here is never multiplied: without a way along an axis its borders are at infinity.
-    rx = 1.0 / wx if wx != 0.0 else np.inf
-    ry = 1.0 / wy if wy != 0.0 else np.inf
-    rz = 1.0 / wz if wz != 0.0 else np.inf
-    leap = _LEAP * min(abs(rx), min(abs(ry), abs(rz)))
-    sx, sy, sz = (1 if wx > 0.0 else -1), (1 if wy > 0.0 else -1), (1 if wz > 0.0 else -1)
-    # Voxels are counted from 1, what is before them from 0: the border ahead is at this less or more.
-    ux, uy, uz = (0 if wx > 0.0 else -1), (0 if wy > 0.0 else -1), (0 if wz > 0.0 else -1)
     while t < end:
         vx = clamped(ex + t * wx, 0, nx - 1) + 1
         vy = clamped(ey + t * wy, 0, ny - 1) + 1
