@@ -40,6 +40,7 @@ def ask_blocks(
     order: AnyArray,
     local: AnyArray,
     rays: AnyArray,
+    most: int,
     views: AnyArray,
     extras: AnyArray,
     packed: AnyArray,
@@ -55,7 +56,8 @@ def ask_blocks(
         blocks: ``(m, 3)``: network, first place in ``order``, samples.
         order: of samples, so that those of a block are next to each other.
         local: ``(n, 3)`` float32, -1 to 1 in each sample's cell.
-        rays: ``(n,)`` of each sample.
+        rays: of each ``most`` samples.
+        most: places for samples of a ray.
         views: ``(r, 3)`` float32 unit, of each ray; ``(r, 0)`` where ``packed`` has no rows of them.
         extras: ``(r, 0)`` or ``(r, 4)`` float32.
         packed: ``(networks, numbers)`` float32, as ``vision_fold`` lays them out.
@@ -78,7 +80,7 @@ def ask_blocks(
         toward = scatter[wide * across :]
         for i in range(across):
             sample = order[first + min(i, count - 1)]
-            ray = rays[sample]
+            ray = rays[sample // most]
             for c in range(3):
                 encoding[c * across + i] = local[sample, c]
             for c in range(views.shape[1]):

@@ -1,7 +1,8 @@
 """Rays of a picture, a few samples each at a time, until none of them goes on."""
 
 import time
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +18,12 @@ from harness.objectfile.vision_work import Crew, Room
 _LEAST = 256
 """Rays that another thread is asked to follow: fewer are followed sooner than it wakes."""
 
+_BANDS = 2
+"""Of a picture of many rays, for each thread: who is done sooner takes another."""
+
+_MANY = 16_384
+"""Rays: of fewer, more bands would leave too few samples to a network."""
+
 
 class Watch:
     """Seconds of parts that follow each other."""
@@ -24,6 +31,19 @@ class Watch:
     def __init__(self) -> None:
         self.begun = self._last = time.perf_counter()
         self.seconds: dict[str, float] = {}
+
+    def restart(self) -> None:
+        """Nothing has passed yet."""
+        self._last = time.perf_counter()
+
+    def split(self, part: str, shares: Sequence[Mapping[str, float]]) -> None:
+        """Tell a part's seconds as finer ones, in proportion to what threads took for them side by side."""
+        whole, sums = self.seconds.pop(part), dict[str, float]()
+        for share in shares:
+            for name, seconds in share.items():
+                sums[name] = sums.get(name, 0.0) + seconds
+        every = max(sum(sums.values()), 1e-12)
+        self.seconds |= {name: whole * seconds / every for name, seconds in sums.items()}
 
     def lap(self, part: str) -> None:
         """What passed since the last lap belongs to ``part``."""
@@ -66,36 +86,70 @@ class Rays:
     surface: FloatArray
     scene: Scene
     resume: FloatArray
-    optical: FloatArray = field(init=False)
-    sums: FloatArray = field(init=False)
+    optical: FloatArray
+    sums: FloatArray
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "optical", np.zeros(len(self.ways)))
-        object.__setattr__(self, "sums", np.zeros((len(self.ways), 5)))
+    @classmethod
+    def begun(
+        cls, eye: FloatArray, ways: FloatArray, surface: FloatArray, scene: Scene, resume: FloatArray
+    ) -> "Rays":
+        """Rays that have met nothing so far."""
+        return cls(eye, ways, surface, scene, resume, np.zeros(len(ways)), np.zeros((len(ways), 5)))
+
+    def part(self, first: int, last: int) -> "Rays":
+        """Some of them, of the same arrays."""
+        at, scene = slice(first, last), self.scene
+        return Rays(
+            *(self.eye, self.ways[at], self.surface[at]),
+            Scene(scene.views[at], scene.extras[at], scene.light),
+            *(self.resume[at], self.optical[at], self.sums[at]),
+        )
 
 
 class Follower:
     """Follows the rays of one picture after another.
 
+    Every thread follows its own band of the picture from its first sample to its last: what it computes
+    stays in its own cache, and nobody waits for another before the end.
+
     Args:
         volume: that they go through.
-        crew: shares the work.
-        room: that arrays are taken from.
+        crew: shares the bands.
     """
 
-    def __init__(self, volume: Volume, crew: Crew, room: Room) -> None:
-        self._volume, self._crew, self._room = volume, crew, room
+    def __init__(self, volume: Volume, crew: Crew) -> None:
+        self._volume, self._crew = volume, crew
+        self._rooms = [Room() for _ in range(_BANDS * crew.threads)]
 
     def follow(self, rays: Rays, asker: Asker, chosen: RenderSettings, watch: Watch) -> int:
         """Fill in what rays see; the number of samples that were asked for is returned."""
+        asker.light(rays.scene.light)
+        count = len(rays.ways)
+        bands = self._crew.threads * (_BANDS if count >= _MANY else 1) if count >= 2 * _LEAST else 1
+        bands = 1 if self._crew.threads == 1 else bands
+        ends = np.linspace(0, count, bands + 1).astype(int).tolist()
+        totals, watches = [0] * bands, [Watch() for _ in range(bands)]
+
+        def work(first: int, last: int) -> None:
+            for band in range(first, last):
+                part = rays.part(ends[band], ends[band + 1])
+                watches[band].restart()
+                totals[band] = self._band(part, asker, chosen, watches[band], self._rooms[band])
+
+        self._crew.share(work, bands, bands)
+        watch.lap("follow")
+        watch.split("follow", [each.seconds for each in watches])
+        return sum(totals)
+
+    def _band(self, rays: Rays, asker: Asker, chosen: RenderSettings, watch: Watch, room: Room) -> int:
         going, total, is_first = np.arange(len(rays.ways), dtype=np.int32), 0, True
         while len(going):
-            samples = Samples.room_for(going, chosen.wave if chosen.marches else 1, self._room)
+            samples = Samples.room_for(going, chosen.wave if chosen.marches else 1, room)
             self._take(rays, samples, chosen, is_first)
             watch.lap("march")
-            order, blocks = self._sorted(samples, asker.block)
+            order, blocks = self._sorted(samples, asker.block, room)
             watch.lap("sort")
-            asker(samples, order, blocks, rays.scene, self._crew)
+            asker(samples, order, blocks, rays.scene)
             watch.lap("networks")
             self._composite(rays, samples, chosen)
             total, is_first = total + len(order), False
@@ -104,31 +158,26 @@ class Follower:
         return total
 
     def _take(self, rays: Rays, samples: Samples, chosen: RenderSettings, is_first: bool) -> None:
-        shell, grid, most = self._volume.shell, self._volume.model.grid, samples.most
+        shell, grid, most, going = self._volume.shell, self._volume.model.grid, samples.most, samples.rays
         eye, per_cell = (rays.eye - shell.low) / shell.voxel, self._volume.per_cell
         # The first stretch is the nearest wall, mostly; what is behind it is asked for if light is left.
         stretches, step = 1 if is_first else most, chosen.step * shell.voxel
+        filled = (samples.counts, samples.networks, samples.local, samples.lengths, samples.places)
+        if chosen.marches:
+            march(
+                *(going, rays.ways, eye, shell.voxel, per_cell, shell.near, grid.table, grid.cells),
+                *(step, most, stretches, rays.resume),
+                *filled,
+            )
+        else:
+            take_surface(
+                *(going, rays.ways, eye, shell.voxel, per_cell, grid.table, grid.cells, rays.surface),
+                *filled,
+            )
+            rays.resume[going] = np.inf
 
-        def work(first: int, last: int) -> None:
-            at, going = slice(first * most, last * most), samples.rays[first:last]
-            counts, networks, local = samples.counts[first:last], samples.networks[at], samples.local[at]
-            lengths, places, table, cells = samples.lengths[at], samples.places[at], grid.table, grid.cells
-            if chosen.marches:
-                march(
-                    *(going, rays.ways, eye, shell.voxel, per_cell, shell.near, table, cells, step, most),
-                    *(stretches, rays.resume, counts, networks, local, lengths, places),
-                )
-            else:
-                take_surface(
-                    *(going, rays.ways, eye, shell.voxel, per_cell, table, cells, rays.surface),
-                    *(counts, networks, local, lengths, places),
-                )
-                rays.resume[going] = np.inf
-
-        self._crew.share(work, len(samples.rays), 4 * self._crew.threads, _LEAST)
-
-    def _sorted(self, samples: Samples, block: int) -> tuple[AnyArray, AnyArray]:
-        every, room = len(self._volume.model.grid), self._room
+    def _sorted(self, samples: Samples, block: int, room: Room) -> tuple[AnyArray, AnyArray]:
+        every = len(self._volume.model.grid)
         order = room.take("order", (len(samples.networks),), np.int32)
         blocks = room.take("blocks", (len(samples.networks) // block + every + 1, 3), np.int32)
         total, made = sort_samples(
@@ -137,25 +186,8 @@ class Follower:
         return order[:total], blocks[:made]
 
     def _composite(self, rays: Rays, samples: Samples, chosen: RenderSettings) -> None:
-        most, scale = samples.most, self._volume.model.weights.density_scale
-
-        def work(first: int, last: int) -> None:
-            at = slice(first * most, last * most)
-            going, counts, networks = samples.rays[first:last], samples.counts[first:last], samples.networks
-            composite(
-                going,
-                counts,
-                most,
-                networks[at],
-                samples.density[at],
-                samples.scattered[at],
-                samples.lengths[at],
-                samples.places[at],
-                scale,
-                chosen.termination,
-                rays.resume,
-                rays.optical,
-                rays.sums,
-            )
-
-        self._crew.share(work, len(samples.rays), 2 * self._crew.threads, 4 * _LEAST)
+        composite(
+            *(samples.rays, samples.counts, samples.most, samples.networks, samples.density),
+            *(samples.scattered, samples.lengths, samples.places, self._volume.model.weights.density_scale),
+            *(chosen.termination, rays.resume, rays.optical, rays.sums),
+        )

@@ -58,7 +58,7 @@ class VisionRenderer:
         self.shell = shell_for(mesh, self.model.grid, per_cell, deep)
         self._closed = is_closed(mesh)
         self._crew, self._room = Crew(threads), Room()
-        self._follower = Follower(Volume(self.model, self.shell, per_cell), self._crew, self._room)
+        self._follower = Follower(Volume(self.model, self.shell, per_cell), self._crew)
         self._extras = SurfaceExtras(mesh, self.model.weights.size.extras, self._crew, self._room)
         self._askers: dict[str, Asker] = {}
 
@@ -111,7 +111,7 @@ class VisionRenderer:
         if len(outline.depth) and np.isfinite(chosen.lead):
             begin = np.maximum(surface - chosen.lead * self.shell.voxel, 0.0)
         extras = self._extras(camera.eye, ways, light.direction, surface)
-        return Rays(camera.eye, ways, surface, Scene(views, extras, light.direction), begin), slant
+        return Rays.begun(camera.eye, ways, surface, Scene(views, extras, light.direction), begin), slant
 
     def _aim(self, camera: Pinhole, outline: Outline) -> tuple[FloatArray, AnyArray, FloatArray]:
         count, (x, y) = len(outline.pixels), camera.centre_px

@@ -12,13 +12,10 @@ from harness.objectfile.vision_fold import FoldedWeights
 from harness.objectfile.vision_kernels import ask_blocks
 from harness.objectfile.vision_network import VisionGrid
 from harness.objectfile.vision_tiles import SAMPLES
-from harness.objectfile.vision_work import Crew, Room
+from harness.objectfile.vision_work import Room
 
 _AT_ONCE = 48
 """Blocks in a run of the graph: what it computes between then stays in the second cache."""
-
-_LEAST = 16
-"""Blocks that another thread is asked for: fewer are done sooner than it wakes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +79,10 @@ class Asker(Protocol):
 
     block: int
 
-    def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene, crew: Crew) -> None:
+    def light(self, light: FloatArray) -> None:
+        """Get ready for a lamp's direction, before samples are asked under it."""
+
+    def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene) -> None:
         """Fill in ``density`` and ``scattered`` of the samples in ``order``."""
 
 
@@ -100,24 +100,19 @@ class FusedAsker:
         self._light: FloatArray | None = None
         self._lit: AnyArray = weights.bias
 
-    def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene, crew: Crew) -> None:
+    def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene) -> None:
         """As ``Asker``."""
-        weights, lit = self._weights, self._under(scene.light)
-        rays, views = np.repeat(samples.rays, samples.most), weights.seen(scene.views)
+        weights = self._weights
+        ask_blocks(
+            *(blocks, order, samples.local, samples.rays, samples.most),
+            *(weights.seen(scene.views), scene.extras, weights.packed, self._lit),
+            *(weights.size.octaves, weights.size.turns, samples.density, samples.scattered),
+        )
 
-        def ask(first: int, last: int) -> None:
-            ask_blocks(
-                *(blocks[first:last], order, samples.local, rays, views, scene.extras),
-                *(weights.packed, lit, weights.size.octaves, weights.size.turns),
-                *(samples.density, samples.scattered),
-            )
-
-        crew.share(ask, len(blocks), 4 * crew.threads, _LEAST)
-
-    def _under(self, light: FloatArray) -> AnyArray:
+    def light(self, light: FloatArray) -> None:
+        """As ``Asker``: a bias of every network, if the lamp has moved."""
         if self._light is None or not np.array_equal(light, self._light):
             self._light, self._lit = light.copy(), self._weights.lit(light)
-        return self._lit
 
 
 class GraphAsker:
@@ -133,14 +128,13 @@ class GraphAsker:
     def __init__(self, network: Network, grid: VisionGrid, scale: float, block: int) -> None:
         self._network, self._grid, self._scale, self.block = network, grid, scale, block
 
-    def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene, crew: Crew) -> None:
+    def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene) -> None:
         """As ``Asker``."""
+        for begin in range(0, len(blocks), _AT_ONCE):
+            self._ask(samples, order, blocks[begin : begin + _AT_ONCE], scene)
 
-        def ask(first: int, last: int) -> None:
-            for begin in range(first, last, _AT_ONCE):
-                self._ask(samples, order, blocks[begin : min(begin + _AT_ONCE, last)], scene)
-
-        crew.share(ask, len(blocks), 4 * crew.threads, _AT_ONCE)
+    def light(self, light: FloatArray) -> None:
+        """As ``Asker``: the graph is told of it with every block."""
 
     def _ask(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene) -> None:
         grid, shape = self._grid, (len(blocks), self.block)

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from fitted_look import fitted_look
+from published_view import LIGHT, camera_of
 from rich.console import Console
 
 from harness.arrays import AnyArray, FloatArray
@@ -35,18 +36,8 @@ from harness.pinhole import DirectionalLight, Pinhole
 from harness.sim.compiled import compiled_fast
 
 CONSOLE = Console(width=220, highlight=False)
-LIGHT = DirectionalLight(np.array([0.5, -0.4, 0.8]))
 PLAIN_SAMPLES = 384
 """Of a ray in the paper, between 0.01 and 4 of its units: 1.2 units are the box."""
-
-
-def camera_of(mesh: Mesh, size: int) -> Pinhole:
-    """The published view: 2.5 away in a box of 1.2, 39.6 degrees across."""
-    centre, longest = mesh.bounds.mean(axis=0), float(np.ptp(mesh.bounds, axis=0).max())
-    way = np.array([0.3, -0.8, 0.5]) / np.linalg.norm([0.3, -0.8, 0.5])
-    return Pinhole.looking_at(
-        centre + 2.5 / 1.2 * longest * way, centre, (0, 0, 1), size, size, np.radians(39.6)
-    )
 
 
 @compiled_fast

@@ -94,6 +94,7 @@ def by_kernel(model: VisionModel, query: Asked, block: int) -> tuple[AnyArray, A
             order,
             local,
             np.arange(count),
+            1,
             folds.seen(query.views.astype(np.float32)),
         ),
         *(query.extras.astype(np.float32), folds.packed, folds.lit(query.light), size.octaves, size.turns),
