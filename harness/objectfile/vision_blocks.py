@@ -68,8 +68,8 @@ def composite(
 ) -> None:
     """Lay samples behind what their rays have met so far.
 
-    What is left of the light behind a sample is ``exp`` of a sum, and what a sample takes ``-expm1``: thin
-    ones are not lost. A ray with less than ``least`` left ends there, and what it saw counts as all.
+    What a sample takes of the light is ``-expm1``, so that thin ones are not lost. A ray with less than
+    ``least`` left ends there, and what it saw counts as all.
 
     Args:
         rays: ``(n,)``.
@@ -88,24 +88,30 @@ def composite(
     """
     for n in range(len(rays)):
         ray = rays[n]
-        passed = optical[ray]
+        passed, sum_ = optical[ray], sums[ray]
         light = math.exp(-passed)
+        red, green, blue, opacity, away = sum_[0], sum_[1], sum_[2], sum_[3], sum_[4]
         for at in range(n * most, n * most + counts[n]):
             if networks[at] < 0:
                 continue
             thick = np.inf if lengths[at] == np.inf else scale * density[at] * lengths[at]
-            weight = -light * math.expm1(-thick)
-            for c in range(3):
-                sums[ray, c] += weight * scattered[at, c]
-            sums[ray, 3] += weight
-            sums[ray, 4] += weight * places[at]
+            taken = -math.expm1(-thick)
+            weight = light * taken
+            red += weight * scattered[at, 0]
+            green += weight * scattered[at, 1]
+            blue += weight * scattered[at, 2]
+            opacity += weight
+            away += weight * places[at]
             passed += thick
-            light = math.exp(-passed)
+            light *= 1.0 - taken
             if light < least:
                 resume[ray] = np.inf
-                for c in range(5):
-                    sums[ray, c] /= 1.0 - light
+                whole = 1.0 / (1.0 - light)
+                red, green, blue, opacity, away = (
+                    red * whole, green * whole, blue * whole, opacity * whole, away * whole,
+                )  # fmt: skip
                 break
+        sum_[0], sum_[1], sum_[2], sum_[3], sum_[4] = red, green, blue, opacity, away
         optical[ray] = passed
 
 
