@@ -32,12 +32,17 @@ def egg(subdivisions: int = 3) -> Mesh:
 
 
 def perceptron(
-    seed: int, outputs: int, width: int = 32, depth: int = 3, skips: tuple[int, ...] = ()
+    seed: int,
+    outputs: int,
+    width: int = 32,
+    depth: int = 3,
+    skips: tuple[int, ...] = (),
+    encoding: Encoding = ENCODING,
 ) -> MlpWeights:
     """Random layers that keep the size of what passes."""
     random, layers, before = np.random.default_rng(seed), [], 0
     for layer in range(depth + 1):
-        taken = before + (ENCODING.width(3) if layer == 0 or layer in skips else 0)
+        taken = before + (encoding.width(3) if layer == 0 or layer in skips else 0)
         given = outputs if layer == depth else width
         weight = random.normal(size=(taken, given)) * np.sqrt(2.0 / taken)
         layers.append((weight, 0.1 * random.normal(size=given)))

@@ -22,6 +22,9 @@ Three = tuple[float, float, float]
 _ANY_TIP = "steel"
 """Whose mass a hammer has whose tip is given by its contact time."""
 
+_FIRST = 3.0
+"""s at most of the sound that is made before the one that is timed."""
+
 
 @dataclass(frozen=True)
 class _Pulse:
@@ -158,10 +161,10 @@ def _rendered(
     of = ObjectFile.open(folder)
     audio = open_audio(of, _level(level))
     place = _place(audio, at, vertex)
-    # The first query sorts the surface for all that follow.
-    audio.at(place.point[None])
-    loaded = time.perf_counter() - begun
     blow = _blow(of, audio.entry.mass_kg, place, force, given)
+    # The first sound sorts the surface and loads the compiled loops for all that follow.
+    strike(audio, place, blow, min(duration, _FIRST), rate)
+    loaded = time.perf_counter() - begun
     begun = time.perf_counter()
     loudness = None if distance is None else radiation(audio.as_modes(), distance)
     heard = {} if distance is None else {"radiation": time.perf_counter() - begun}
