@@ -6,8 +6,7 @@ the object's own are a basis for just such fields (Rahimi and Recht, Random Feat
 Kernel Machines, NeurIPS 2007). Only the linear layer has to be found.
 
 Vectors fill a ball evenly: a shape has few parts beyond the waves of its own frequency, and waves that
-no shape needs are waves that others lack. Normally distributed ones err a few per cent more
-(``docs/audionet.md``).
+no shape needs are waves that others lack. Normally distributed ones err a little more.
 """
 
 from dataclasses import dataclass
