@@ -126,7 +126,13 @@ def _touched(corners: FloatArray, sides: IntArray) -> tuple[AnyArray, AnyArray]:
 
 @compiled
 def first_met(
-    eye: FloatArray, ways: FloatArray, begin: FloatArray, lists: Lists, faces: IntArray, weights: FloatArray
+    eye: FloatArray,
+    ways: FloatArray,
+    begin: FloatArray,
+    likely: AnyArray,
+    lists: Lists,
+    faces: IntArray,
+    weights: FloatArray,
 ) -> None:
     """Fill in which face each ray meets first from ``begin`` on.
 
@@ -134,12 +140,19 @@ def first_met(
         eye: ``(3,)`` m, where all rays begin.
         ways: ``(n, 3)`` unit.
         begin: ``(n,)`` m along each.
+        likely: ``(n,)`` int32: the face that an outline knows each to meet; asked first. Or ``(0,)``.
         lists: of the mesh.
         faces: ``(n,)`` written; -1 where nothing is met.
         weights: ``(n, 2)`` of the face's second and third corner, 0 to 1, written.
     """
+    nothing: Hit = (np.inf, -1, 0.0, 0.0)
     for n in range(len(ways)):
-        _, faces[n], b, c = _meet(eye, ways[n], begin[n], -1, False, lists)
+        hit = nothing
+        if len(likely):
+            hit = nearest_of(eye, ways[n], begin[n], -1, n, n + 1, likely, lists[6], nothing)
+        if hit[1] < 0:
+            hit = _meet(eye, ways[n], begin[n], -1, False, lists)
+        _, faces[n], b, c = hit
         # Rays on an edge are met by faces a little wider than they are.
         weights[n, 0], weights[n, 1] = min(max(b, 0.0), 1.0), min(max(c, 0.0), 1.0)
 

@@ -20,12 +20,14 @@ class Outline:
         cover: ``(n,)`` float32: share of each that is covered.
         places: ``(n, 2)`` float32 x and y, pixels: the covered place that is nearest to its centre.
         depth: ``(n,)`` float32 m, there; empty where it was not asked for.
+        faces: ``(n,)`` int32, which face that is; empty where it was not asked for.
     """
 
     pixels: AnyArray
     cover: AnyArray
     places: AnyArray
     depth: AnyArray
+    faces: AnyArray
 
 
 def centre_out(side: int) -> AnyArray:
@@ -45,7 +47,9 @@ def is_closed(mesh: Mesh) -> bool:
     return bool(matched and np.einsum("nx,nx->", low, high) > 0.0)
 
 
-def mesh_outline(mesh: Mesh, closed: bool, camera: Pinhole, side: int, crew: Crew, room: Room) -> Outline:
+def mesh_outline(
+    mesh: Mesh, closed: bool, camera: Pinhole, side: int, crew: Crew, room: Room, is_told: bool = False
+) -> Outline:
     """What a mesh covers of a picture.
 
     Args:
@@ -55,6 +59,7 @@ def mesh_outline(mesh: Mesh, closed: bool, camera: Pinhole, side: int, crew: Cre
         side: sub-pixels along a pixel, odd.
         crew: shares the rows.
         room: that arrays are taken from.
+        is_told: whether faces are asked for.
     """
     rows, columns = camera.height, camera.width
     focal = side * camera.focal_px
@@ -62,6 +67,9 @@ def mesh_outline(mesh: Mesh, closed: bool, camera: Pinhole, side: int, crew: Cre
     seen = room.take("seen", (len(mesh.vertices), 6), np.float64)
     nearness = room.take("nearness", (rows * side, columns * side), np.float32)
     cover, depth = (room.take(name, (rows, columns), np.float32) for name in ("cover", "depth"))
+    each = int(is_told)
+    front = room.take("front", (each * rows * side, each * columns * side), np.int32)
+    faces = room.take("outline faces", (each * rows, each * columns), np.int32)
     outside = bool(((camera.eye < mesh.bounds[0]) | (camera.eye > mesh.bounds[1])).any())
     places, offsets = room.take("at", (rows, columns, 2), np.float32), centre_out(side)
 
@@ -71,13 +79,16 @@ def mesh_outline(mesh: Mesh, closed: bool, camera: Pinhole, side: int, crew: Cre
 
     def band(first: int, last: int) -> None:
         nearness[first * side : last * side] = 0.0
-        draw(seen, mesh.faces, focal, x, y, first * side, last * side, closed and outside, nearness)
-        look_through(nearness, side, offsets, first, last, cover, places, depth)
+        draw(seen, mesh.faces, focal, x, y, first * side, last * side, closed and outside, nearness, front)
+        look_through(nearness, front, side, offsets, first, last, cover, places, depth, faces)
 
     crew.share(project, len(mesh.vertices), crew.threads, 4096)
     crew.share(band, rows, 2 * crew.threads if crew.threads > 1 else 1)
     pixels = np.flatnonzero(cover)
-    return Outline(pixels, cover.ravel()[pixels], places.reshape(-1, 2)[pixels], depth.ravel()[pixels])
+    return Outline(
+        *(pixels, cover.ravel()[pixels], places.reshape(-1, 2)[pixels], depth.ravel()[pixels]),
+        faces.ravel()[pixels] if is_told else np.empty(0, np.int32),
+    )
 
 
 def whole_picture(camera: Pinhole) -> Outline:
@@ -85,4 +96,6 @@ def whole_picture(camera: Pinhole) -> Outline:
     count = camera.width * camera.height
     rows, columns = np.divmod(np.arange(count), camera.width)
     places = np.stack([columns + 0.5, rows + 0.5], axis=1).astype(np.float32)
-    return Outline(np.arange(count), np.ones(count, np.float32), places, np.empty(0, np.float32))
+    return Outline(
+        np.arange(count), np.ones(count, np.float32), places, np.empty(0, np.float32), np.empty(0, np.int32)
+    )

@@ -58,6 +58,7 @@ def draw(
     last: int,
     closed: bool,
     nearness: AnyArray,
+    front: AnyArray,
 ) -> None:
     """The greatest inverse depth of each sub-pixel in some rows; 0 stays where nothing is.
 
@@ -71,6 +72,7 @@ def draw(
         last: row, not drawn itself.
         closed: whether faces seen from behind are hidden by others, and left out.
         nearness: ``(rows, columns)`` float32 1/m, raised.
+        front: ``(rows, columns)`` int32, written: whose it is; ``(0, 0)`` where nobody asks.
     """
     cut, corner = np.empty((4, 3)), np.empty((3, 3))
     for m in range(len(faces)):
@@ -84,12 +86,12 @@ def draw(
                 continue
             for c in range(3):
                 corner[c] = seen[faces[m, c], :3]
-            _fill(corner, first, last, closed, nearness)
+            _fill(corner, m, first, last, closed, nearness, front)
         elif in_front > 0:
             count = _cut(seen, faces[m], focal, x, y, cut)
             for c in range(2, count):
                 corner[0], corner[1], corner[2] = cut[0], cut[c - 1], cut[c]
-                _fill(corner, first, last, closed, nearness)
+                _fill(corner, m, first, last, closed, nearness, front)
 
 
 @compiled
@@ -112,7 +114,9 @@ def _cut(seen: FloatArray, face: AnyArray, focal: float, x: float, y: float, out
 
 
 @compiled
-def _fill(p: FloatArray, first: int, last: int, closed: bool, nearness: AnyArray) -> None:
+def _fill(
+    p: FloatArray, face: int, first: int, last: int, closed: bool, nearness: AnyArray, front: AnyArray
+) -> None:
     """One triangle, row by row between its long edge and the two short ones."""
     columns = nearness.shape[1]
     x_low, x_high = min(p[0, 0], min(p[1, 0], p[2, 0])), max(p[0, 0], max(p[1, 0], p[2, 0]))
@@ -155,14 +159,21 @@ def _fill(p: FloatArray, first: int, last: int, closed: bool, nearness: AnyArray
         stop = int(np.floor(min(right, columns - 1.0) + _ON_EDGE))
         near = p[0, 2] + slope_y * (i - p[0, 1]) - slope_x * p[0, 0]
         row = nearness[i]
-        for j in range(max(start, 0), stop + 1):
-            value = np.float32(min(near + slope_x * j, most))
-            row[j] = max(row[j], value)
+        if len(front) == 0:
+            for j in range(max(start, 0), stop + 1):
+                value = np.float32(min(near + slope_x * j, most))
+                row[j] = max(row[j], value)
+        else:
+            for j in range(max(start, 0), stop + 1):
+                value = np.float32(min(near + slope_x * j, most))
+                if value > row[j]:
+                    row[j], front[i, j] = value, face
 
 
 @compiled
 def look_through(
     nearness: AnyArray,
+    front: AnyArray,
     side: int,
     offsets: AnyArray,
     first: int,
@@ -170,11 +181,13 @@ def look_through(
     cover: AnyArray,
     places: AnyArray,
     depth: AnyArray,
+    faces: AnyArray,
 ) -> None:
     """How much of each pixel in some rows is covered, and the covered sub-pixel nearest to its centre.
 
     Args:
         nearness: ``(rows * side, columns * side)`` 1/m.
+        front: of ``draw``.
         side: sub-pixels along a pixel, odd.
         offsets: ``(side * side, 2)`` row and column of each, from the centre outwards.
         first: row of pixels.
@@ -182,6 +195,7 @@ def look_through(
         cover: ``(rows, columns)`` float32 0 to 1, written.
         places: ``(rows, columns, 2)`` float32 x and y in pixels, written where something is.
         depth: ``(rows, columns)`` float32 m, written; 0 where nothing is.
+        faces: ``(rows, columns)`` int32, written where something is; ``(0, 0)`` where nobody asks.
     """
     middle = side // 2
     for i in range(first, last):
@@ -200,5 +214,7 @@ def look_through(
                 at += 1
             row, column = offsets[at, 0], offsets[at, 1]
             depth[i, j] = np.float32(1.0) / nearness[i * side + row, j * side + column]
+            if len(faces):
+                faces[i, j] = front[i * side + row, j * side + column]
             places[i, j, 0] = j + 0.5 + (column - middle) / side
             places[i, j, 1] = i + 0.5 + (row - middle) / side

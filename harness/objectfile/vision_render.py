@@ -99,7 +99,9 @@ class VisionRenderer:
     def _outline(self, camera: Pinhole, chosen: RenderSettings) -> Outline:
         if chosen.coverage == 1 and chosen.marches:
             return whole_picture(camera)
-        return mesh_outline(self._mesh, self._closed, camera, chosen.coverage, self._crew, self._room)
+        told = self.model.weights.size.extras > 0
+        side = chosen.coverage
+        return mesh_outline(self._mesh, self._closed, camera, side, self._crew, self._room, told)
 
     def _rays(
         self, camera: Pinhole, light: DirectionalLight, outline: Outline, chosen: RenderSettings
@@ -110,7 +112,7 @@ class VisionRenderer:
         begin = np.zeros(len(slant))
         if len(outline.depth) and np.isfinite(chosen.lead):
             begin = np.maximum(surface - chosen.lead * self.shell.voxel, 0.0)
-        extras = self._extras(camera.eye, ways, light.direction, surface)
+        extras = self._extras(camera.eye, ways, light.direction, surface, outline.faces)
         return Rays.begun(camera.eye, ways, surface, Scene(views, extras, light.direction), begin), slant
 
     def _aim(self, camera: Pinhole, outline: Outline) -> tuple[FloatArray, AnyArray, FloatArray]:

@@ -16,6 +16,8 @@ _EARLY = 0.25
 _LEAST = 128
 """Rays that another thread is asked to follow: fewer are followed sooner than it wakes."""
 
+_UNKNOWN = np.empty(0, np.int32)
+
 
 class SurfaceExtras:
     """Visibility and normal at the first place of a mesh that a ray meets.
@@ -32,7 +34,14 @@ class SurfaceExtras:
         if count:
             self._cubes, self._appearance = FaceCubes.of(mesh), plain(mesh, (1.0, 1.0, 1.0))
 
-    def __call__(self, eye: FloatArray, ways: FloatArray, light: FloatArray, depth: FloatArray) -> AnyArray:
+    def __call__(
+        self,
+        eye: FloatArray,
+        ways: FloatArray,
+        light: FloatArray,
+        depth: FloatArray,
+        likely: AnyArray = _UNKNOWN,
+    ) -> AnyArray:
         """``(n, 4)`` float32: 1 where the light is seen, else 0; unit normal on the side that is seen.
 
         All are 0 for a ray that meets nothing.
@@ -42,6 +51,7 @@ class SurfaceExtras:
             ways: ``(n, 3)`` unit.
             light: ``(3,)`` unit, towards the lamp.
             depth: ``(n,)`` m along each ray where the mesh is; infinite where that is not known.
+            likely: ``(n,)`` int32 faces that an outline knows them to meet; or ``(0,)``.
         """
         told = np.empty((len(ways), self._count), np.float32)
         if not told.size:
@@ -55,7 +65,9 @@ class SurfaceExtras:
         def work(first: int, last: int) -> None:
             part = slice(first, last)
             places = [each[part] for each in arrays]
-            first_met(eye, ways[part], begin[part], self._cubes.lists, faces[part], weights[part])
+            first_met(
+                eye, ways[part], begin[part], likely[part], self._cubes.lists, faces[part], weights[part]
+            )
             self._tell(ways[part], lamp, faces[part], weights[part], places, told[part])
 
         self._crew.share(work, len(ways), 4 * self._crew.threads, _LEAST)

@@ -49,7 +49,7 @@ def test_cubes_say_which_face_a_ray_meets_first(name: str, seed: int) -> None:
     hits = RayMesh(mesh).first_hits(eye, ways)
     cubes = FaceCubes.of(mesh)
     faces, weights = np.empty(len(ways), np.int64), np.empty((len(ways), 2))
-    first_met(eye, ways, np.zeros(len(ways)), cubes.lists, faces, weights)
+    first_met(eye, ways, np.zeros(len(ways)), np.empty(0, np.int32), cubes.lists, faces, weights)
     assert ((faces >= 0) == (hits.face >= 0)).all()
     # Of two faces that are met at once, on their edge, either is right; the place is one.
     met = faces >= 0
@@ -93,29 +93,31 @@ def told_by_all_faces(mesh: Mesh, eye: FloatArray, ways: FloatArray, light: Floa
     return told
 
 
-def seen_from(mesh: Mesh, camera: Pinhole) -> tuple[FloatArray, FloatArray]:
-    """Rays of a picture and the depth that its outline tells."""
-    outline = mesh_outline(mesh, is_closed(mesh), camera, 3, Crew(1), Room())
+def seen_from(mesh: Mesh, camera: Pinhole) -> tuple[FloatArray, FloatArray, AnyArray]:
+    """Rays of a picture, and the depth and faces that its outline tells."""
+    outline = mesh_outline(mesh, is_closed(mesh), camera, 3, Crew(1), Room(), True)
     (x, y), centres = camera.centre_px, outline.places.astype(np.float64)
     across = (centres - (x, y)) / camera.focal_px
     slant = 1.0 / np.sqrt((across**2).sum(axis=1) + 1.0)
     local = slant[:, None] * np.column_stack([across, np.ones(len(across))])
-    return np.ascontiguousarray(local @ camera.object_from_camera[:3, :3].T), outline.depth / slant
+    ways = np.ascontiguousarray(local @ camera.object_from_camera[:3, :3].T)
+    return ways, outline.depth / slant, outline.faces
 
 
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("name", ["mug", "box", "sheet"])
 def test_pictures_are_told_what_all_faces_say(name: str, threads: int) -> None:
-    """From near and far, by the depth of the outline and without it."""
+    """From near and far, by the depth of the outline, without it, and by its faces too."""
     mesh = MESHES[name]
     told = SurfaceExtras(mesh, 4, Crew(threads), Room())
     for away, light in ((1.2, (0.0, 0.6, 0.8)), (2.5, (0.48, -0.6, 0.64)), (25.0, (-0.8, -0.6, 0.0))):
         camera = looking(mesh, away, 96, 80)
-        ways, depth = seen_from(mesh, camera)
+        ways, depth, faces = seen_from(mesh, camera)
         exact = told_by_all_faces(mesh, camera.eye, ways, np.array(light))
         assert len(ways) > 0
-        for known in (depth, np.full(len(ways), np.inf)):
-            found = told(camera.eye, ways, np.array(light), known)
+        unknown, none = np.full(len(ways), np.inf), np.empty(0, np.int32)
+        for known, likely in ((depth, none), (unknown, none), (depth, faces)):
+            found = told(camera.eye, ways, np.array(light), known, likely)
             differ = (found != exact).any(axis=1)
             # On an edge between two faces either may be the one that is met.
             assert np.count_nonzero(differ) <= 0.001 * len(ways)
@@ -124,9 +126,9 @@ def test_pictures_are_told_what_all_faces_say(name: str, threads: int) -> None:
 
 def test_an_eye_within_is_told_of_the_wall_around_it() -> None:
     camera = Pinhole.looking_at((0.05, 0.03, 0.01), (0.09, 0.03, 0.012), (0, 0, 1), 40, 40, 1.2)
-    ways, depth = seen_from(BOX, camera)
+    ways, depth, faces = seen_from(BOX, camera)
     light = np.array([0.6, 0.0, 0.8])
-    found = SurfaceExtras(BOX, 4, Crew(1), Room())(camera.eye, ways, light, depth)
+    found = SurfaceExtras(BOX, 4, Crew(1), Room())(camera.eye, ways, light, depth, faces)
     np.testing.assert_array_equal(found, told_by_all_faces(BOX, camera.eye, ways, light))
     assert not found[:, 0].any()
     assert (np.einsum("nx,nx->n", found[:, 1:], ways) < 0.0).all()
