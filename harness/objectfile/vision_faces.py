@@ -1,7 +1,7 @@
 """A mesh's faces by the small cubes that they touch, for rays that know about where they meet it.
 
-Rays of a picture meet a surface where its depth says, and rays towards a lamp leave it again: cubes of about
-a face's size ask few faces, and bricks of 4 x 4 x 4 of them without a face are passed in one step.
+Rays of a picture meet a surface where its depth says: cubes of about a face's size ask few faces, and what is
+empty is leapt over.
 """
 
 from dataclasses import dataclass
@@ -151,42 +151,14 @@ def first_met(
         if len(likely):
             hit = nearest_of(eye, ways[n], begin[n], -1, n, n + 1, likely, lists[6], nothing)
         if hit[1] < 0:
-            hit = _meet(eye, ways[n], begin[n], -1, False, lists)
+            hit = _meet(eye, ways[n], begin[n], lists)
         _, faces[n], b, c = hit
         # Rays on an edge are met by faces a little wider than they are.
         weights[n, 0], weights[n, 1] = min(max(b, 0.0), 1.0), min(max(c, 0.0), 1.0)
 
 
 @compiled
-def lamp_seen(
-    starts: FloatArray,
-    lamp: FloatArray,
-    least: float,
-    faces: IntArray,
-    faced: FloatArray,
-    lists: Lists,
-    seen: BoolArray,
-) -> None:
-    """Fill in whether nothing is between places and a lamp that they face.
-
-    Args:
-        starts: ``(n, 3)`` m.
-        lamp: ``(3,)`` unit, towards it.
-        least: m, how far from its start a ray meets anything.
-        faces: ``(n,)`` that each begins on, which does not stop it; -1 where there is no place.
-        faced: ``(n,)`` cosine, 0 where a place looks away.
-        lists: of the mesh.
-        seen: ``(n,)`` written.
-    """
-    for n in range(len(starts)):
-        asked = faces[n] >= 0 and faced[n] > 0.0
-        seen[n] = asked and _meet(starts[n], lamp, least, faces[n], True, lists)[1] < 0
-
-
-@compiled
-def _meet(
-    origin: FloatArray, way: FloatArray, least: float, without: int, any_will_do: bool, lists: Lists
-) -> Hit:
+def _meet(origin: FloatArray, way: FloatArray, least: float, lists: Lists) -> Hit:
     """What one ray meets first farther than ``least`` m; the face -1 where that is nothing.
 
     As ``vision_voxels.walk`` goes: borders from their own numbers, cubes by counting.
@@ -214,9 +186,9 @@ def _meet(
                 cube = 64 * bricks[x >> two, y >> two, z >> two]
                 cube += int(((x & three) << np.uint64(4)) | ((y & three) << two) | (z & three))
                 first, last = firsts[cube], firsts[cube + 1]
-                best = nearest_of(origin, way, least, without, first, last, faces, triangles, best)
+                best = nearest_of(origin, way, least, -1, first, last, faces, triangles, best)
                 # A face may reach on into cubes farther on: what is met counts once none can be nearer.
-                if best[1] >= 0 and (any_will_do or best[0] <= min(px, min(py, pz))):
+                if best[1] >= 0 and best[0] <= min(px, min(py, pz)):
                     return best
             if px <= py and px <= pz:
                 t, vx = max(t, px), vx + sx

@@ -4,7 +4,8 @@ import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
 from harness.mesh import Mesh
-from harness.objectfile.vision_faces import FaceCubes, first_met, lamp_seen
+from harness.objectfile.vision_faces import FaceCubes, first_met
+from harness.objectfile.vision_lamp import LampGrid
 from harness.objectfile.vision_work import Crew, Room
 from harness.sim.appearance import plain
 from harness.sim.lambert_kernels import faced_places, lit_by
@@ -31,6 +32,7 @@ class SurfaceExtras:
 
     def __init__(self, mesh: Mesh, count: int, crew: Crew, room: Room) -> None:
         self._count, self._crew, self._room = count, crew, room
+        self._grid: LampGrid | None = None
         if count:
             self._cubes, self._appearance = FaceCubes.of(mesh), plain(mesh, (1.0, 1.0, 1.0))
 
@@ -61,6 +63,7 @@ class SurfaceExtras:
         weights = self._room.take("extras weights", (len(ways), 2), np.float64)
         faces = self._room.take("extras faces", (len(ways),), np.int64)
         lamp = np.array(light, np.float64)
+        grid = self._under(lamp)
 
         def work(first: int, last: int) -> None:
             part = slice(first, last)
@@ -68,15 +71,22 @@ class SurfaceExtras:
             first_met(
                 eye, ways[part], begin[part], likely[part], self._cubes.lists, faces[part], weights[part]
             )
-            self._tell(ways[part], lamp, faces[part], weights[part], places, told[part])
+            self._tell(ways[part], lamp, grid, faces[part], weights[part], places, told[part])
 
         self._crew.share(work, len(ways), 4 * self._crew.threads, _LEAST)
         return told
+
+    def _under(self, lamp: FloatArray) -> LampGrid:
+        """The faces as a lamp sees them, again if it has moved."""
+        if self._grid is None or not np.array_equal(self._grid.turn[:, 2], lamp):
+            self._grid = LampGrid.of(self._appearance.mesh, lamp)
+        return self._grid
 
     def _tell(
         self,
         ways: FloatArray,
         lamp: FloatArray,
+        grid: LampGrid,
         faces: AnyArray,
         weights: FloatArray,
         places: list[FloatArray],
@@ -91,6 +101,6 @@ class SurfaceExtras:
         )
         faced = lit_by(lamp[None], points, normals, flat, lifted, mesh.diagonal)
         seen = np.empty(len(ways), np.bool_)
-        lamp_seen(lifted, lamp, LEAST * mesh.diagonal, faces, faced, self._cubes.lists, seen)
+        grid.sees(lifted, LEAST * mesh.diagonal, faces, faced, seen)
         told[:, 0], told[:, 1:] = seen, normals
         told[faces < 0] = 0.0

@@ -6,7 +6,8 @@ from plain_look import looking
 
 from harness.arrays import AnyArray, FloatArray
 from harness.mesh import Mesh
-from harness.objectfile.vision_faces import FaceCubes, first_met, lamp_seen
+from harness.objectfile.vision_faces import FaceCubes, first_met
+from harness.objectfile.vision_lamp import LampGrid
 from harness.objectfile.vision_outline import is_closed, mesh_outline
 from harness.objectfile.vision_surface import SurfaceExtras
 from harness.objectfile.vision_work import Crew, Room
@@ -66,9 +67,9 @@ def at(mesh: Mesh, faces: AnyArray, weights: FloatArray) -> FloatArray:
 
 @pytest.mark.parametrize("along", [1, 5, 128])
 @pytest.mark.parametrize("name", MESHES)
-def test_cubes_of_any_size_say_what_a_lamp_sees(name: str, along: int) -> None:
+def test_cells_of_any_size_say_what_a_lamp_sees(name: str, along: int) -> None:
     mesh, random = MESHES[name], np.random.default_rng(1)
-    exact, cubes = RayMesh(mesh), FaceCubes.of(mesh, along)
+    exact = RayMesh(mesh)
     low, high = mesh.bounds
     starts = np.ascontiguousarray(random.uniform(low, high, (2000, 3)))
     on = np.full(len(starts), -1)
@@ -76,9 +77,10 @@ def test_cubes_of_any_size_say_what_a_lamp_sees(name: str, along: int) -> None:
     starts[::2] = at(mesh, on[::2], random.dirichlet(np.ones(3), len(on[::2]))[:, :2])
     for lamp in (np.array([0.0, 0.0, 1.0]), np.array([0.48, -0.6, 0.64]), np.array([-1.0, 0.0, 0.0])):
         seen = np.empty(len(starts), bool)
-        lamp_seen(starts, lamp, exact.least, np.maximum(on, 0), np.ones(len(on)), cubes.lists, seen)
+        grid = LampGrid.of(mesh, lamp, along)
+        grid.sees(starts, exact.least, np.maximum(on, 0), np.ones(len(on)), seen)
         np.testing.assert_array_equal(seen, exact.free(starts, lamp, np.maximum(on, 0)))
-        lamp_seen(starts, lamp, exact.least, on, np.where(on > 2, 0.0, 1.0), cubes.lists, seen)
+        grid.sees(starts, exact.least, on, np.where(on > 2, 0.0, 1.0), seen)
         assert not seen[(on < 0) | (on > 2)].any()
 
 
