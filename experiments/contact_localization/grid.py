@@ -72,7 +72,8 @@ def refine(
         seed: of the draws.
         heard: what the strikes said; None without.
     """
-    rng = np.random.default_rng(seed)
+    # Sound has chances of its own, so that one which says nothing leaves the answer of touch as it is.
+    rng, of_sound = np.random.default_rng(seed), np.random.default_rng((seed, 1))
     best = current = start
     most = start.effective if start.effective > _FILLS else 0.0
     for attempt in range(rounds):
@@ -81,7 +82,7 @@ def refine(
         touched = search.weigh(at, members, 2, 2, _DROPPED_AT)
         # Shared errors, less than a millimetre, do not show in sound: what its modes are wrong by would only
         # be taken for them. Nor may it move a place by so little.
-        current = touched if heard is None else touched.told(heard.nats_of_draws(search, touched, rng))
+        current = touched if heard is None else touched.told(heard.nats_of_draws(search, touched, of_sound))
         if current.effective < most and best is start:
             break
         if current.effective > most:

@@ -34,10 +34,10 @@ class Heard:
         return sound_nats(search, self.term, self.struck, at, between)
 
     def nats_of_draws(self, search: Search, at: Hypotheses, rng: np.random.Generator) -> FloatArray:
-        """``(n,)`` nats of hypotheses between samples, each with strikes that fell aside by a chance of its own.
+        """``(n,)`` nats of draws between samples, of which each also draws how far its strikes fell aside.
 
-        A draw so stands for a place and an ``aside``, drawn from its prior; whoever asks for the place has
-        summed over it.
+        Drawn from its prior, that takes no weight of its own, and whoever asks draws for their places alone
+        has summed over it.
         """
         aside = self.term.aside * rng.normal(size=(len(at.yaws), 3))
         return sound_nats(search, self.term, self.struck, at, between=True, aside=aside)
