@@ -1,4 +1,4 @@
-"""Array types, and the promise that a result is not written to by its readers."""
+"""Array types, the promise that a result is not written to by its readers, and means over blocks."""
 
 from typing import Any, TypeVar
 
@@ -18,3 +18,15 @@ def read_only(array: _A) -> _A:
     """The same array, refusing to be written to."""
     array.setflags(write=False)
     return array
+
+
+def block_means(picture: AnyArray, by: int) -> FloatArray:
+    """Means over squares of ``by`` pixels a side; rows and columns that fill no square are left out.
+
+    Args:
+        picture: ``(rows, columns, ...)``.
+        by: pixels, one or more.
+    """
+    rows, columns = picture.shape[0] // by, picture.shape[1] // by
+    blocks = picture[: rows * by, : columns * by].reshape(rows, by, columns, by, *picture.shape[2:])
+    return np.asarray(blocks.mean(axis=(1, 3)), dtype=np.float64)

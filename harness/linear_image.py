@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.arrays import ByteArray, FloatArray, read_only
+from harness.arrays import ByteArray, FloatArray, block_means, read_only
 from harness.errors import OutOfDomain
 from harness.srgb import bytes_from_linear
 
@@ -75,18 +75,12 @@ def binned(image: LinearImage, by: int) -> LinearImage:
     rows, columns = image.alpha.shape
     if by < 1 or rows % by or columns % by:
         raise OutOfDomain(f"a picture of {rows} x {columns} pixels is no whole number of {by} x {by}")
-    alpha = _means(image.alpha, by)
+    alpha = block_means(image.alpha, by)
     # What is not covered has no depth, and none of the weight.
-    seen = _means(image.alpha * np.where(image.alpha > 0.0, image.depth, 0.0), by)
+    seen = block_means(image.alpha * np.where(image.alpha > 0.0, image.depth, 0.0), by)
     depth = np.divide(seen, alpha, out=np.full_like(alpha, np.inf), where=alpha > 0.0)
-    colour = np.stack([_means(image.colour[..., c], by) for c in range(3)], axis=-1)
+    colour = block_means(image.colour, by)
     return LinearImage(colour, alpha, depth)
-
-
-def _means(values: FloatArray, by: int) -> FloatArray:
-    rows, columns = values.shape
-    blocks: FloatArray = values.reshape(rows // by, by, columns // by, by).mean(axis=(1, 3))
-    return blocks
 
 
 def root_mean_square(a: LinearImage, b: LinearImage) -> float:

@@ -9,11 +9,10 @@ import numpy as np
 from calibration.taxim.arm_channels import ARM, DESCENT, IMAGE, STATE, UNREST, UNTOUCHED
 from calibration.taxim.arm_moves import ArmScale, arm_scale
 from calibration.taxim.arm_plan import ball_on_gel
-from calibration.taxim.detect import shrunk
 from calibration.taxim.pictures import Pictures, Refused, set_digest
 from calibration.taxim.settled import look
 from calibration.taxim.touch_down import middles_at_depth, touch_downs
-from harness.arrays import ByteArray, FloatArray, read_only
+from harness.arrays import ByteArray, FloatArray, block_means, read_only
 from harness.errors import CalibrationRefused, RecordingDamaged
 from harness.geometry import rotation_from_quaternion, transform
 from harness.reading import Reading
@@ -237,7 +236,7 @@ def changed(first: FloatArray, later: FloatArray) -> tuple[float, float]:
     """Grey levels by which the untouched gel as a whole, and beside that any place of it, has changed."""
     apart = later - first
     whole = np.median(apart.reshape(-1, 3), axis=0)
-    left = np.abs(shrunk(apart - whole, 4))
+    left = np.abs(block_means(apart - whole, 4))
     return float(np.abs(whole).max()), float(np.percentile(left.max(axis=2), 99.5))
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import irfft2, next_fast_len, rfft2
 
-from harness.arrays import AnyArray, FloatArray
+from harness.arrays import AnyArray, FloatArray, block_means
 
 REACH = 0.85
 """Ball radii out to which the ramp is looked for."""
@@ -74,7 +74,7 @@ class Detector:
 
     def find(self, change: FloatArray) -> Found:
         """The disc that looks most like a ball in ``(rows, columns, 3)`` grey levels against rest."""
-        small = shrunk(change, self._block)
+        small = block_means(change, self._block)
         size = (small.shape[0], small.shape[1])
         explained = np.zeros(self._area.shape)
         for c in range(3):
@@ -108,13 +108,6 @@ class Detector:
         reach = self._pad
         rolled = np.roll(every, (reach, reach), axis=(0, 1))
         return np.asarray(rolled[: size[0] + 2 * reach, : size[1] + 2 * reach], dtype=np.float64)
-
-
-def shrunk(picture: FloatArray, block: int) -> FloatArray:
-    """Means over blocks of pixels; rows and columns that fill no block are left out."""
-    rows, columns = (size // block * block for size in picture.shape[:2])
-    blocks = picture[:rows, :columns].reshape(rows // block, block, columns // block, block, -1)
-    return np.asarray(blocks.mean(axis=(1, 3)), dtype=np.float64)
 
 
 def _vertex(three: FloatArray) -> float:

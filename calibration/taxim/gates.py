@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.taxim.detect import Detector, Found, shrunk
+from calibration.taxim.detect import Detector, Found
 from calibration.taxim.pictures import Pictures, Refused
-from harness.arrays import BoolArray, ByteArray, FloatArray
+from harness.arrays import BoolArray, ByteArray, FloatArray, block_means
 from harness.errors import CalibrationRefused
 
 CONTACT = 0.8
@@ -162,7 +162,7 @@ def _sighting(image: ByteArray, background: ByteArray, detector: Detector, ball:
         float(np.mean(clipped[loud])) if loud.any() else 0.0,
         float(loud.sum() / (np.pi * (CONTACT * ball) ** 2)),
         straight > _SWAP_LEAST and crossed < _SWAP * straight,
-        shrunk(change - drift, max(1, round(ball / 8.0))),
+        block_means(change - drift, max(1, round(ball / 8.0))),
     )
 
 

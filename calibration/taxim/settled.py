@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.taxim.detect import shrunk
-from harness.arrays import FloatArray
+from harness.arrays import FloatArray, block_means
 from harness.device import TactileCamera
 from harness.reading import Reading
 
@@ -85,4 +84,4 @@ def look(frames: Reading) -> FloatArray:
 
 def unrest_between(one: FloatArray, other: FloatArray) -> float:
     """Grey levels by which all but one in two hundred blocks of two looks agree."""
-    return float(np.percentile(np.abs(shrunk(other - one, _BLOCK)).max(axis=2), _SHARE))
+    return float(np.percentile(np.abs(block_means(other - one, _BLOCK)).max(axis=2), _SHARE))

@@ -40,7 +40,9 @@ def on_samples(search: Search, members: IntArray, anchor: int, heard: Heard | No
     looked = search.look(replace(start, log_weights=told), members, _DROPPED_AT)
     closer = looked.best(_WORTH_A_LOOK, _MOST_LOOKS)
     search.settle(closer.yaws)
-    return _weighed(search, replace(closer, log_weights=np.zeros(len(closer.yaws))), members, 2, 1, heard)
+    again = replace(closer, log_weights=np.zeros(len(closer.yaws)))
+    touched = search.weigh(again, members, 2, 1, _DROPPED_AT)
+    return touched if heard is None else touched.told(heard.nats(search, touched, between=True))
 
 
 def refine(
@@ -70,13 +72,17 @@ def refine(
         seed: of the draws.
         heard: what the strikes said; None without.
     """
-    rng = np.random.default_rng(seed)
+    # Sound has chances of its own, so that one which says nothing leaves the answer of touch as it is.
+    rng, of_sound = np.random.default_rng(seed), np.random.default_rng((seed, 1))
     best = current = start
     most = start.effective if start.effective > _FILLS else 0.0
     for attempt in range(rounds):
         draws = int(np.clip(_DRAWS_EACH * current.perplexity, samples, 5 * samples))
         at = drawn(search, members, current, draws, attempt, rng)
-        current = _weighed(search, at, members, 2, 2, heard)
+        touched = search.weigh(at, members, 2, 2, _DROPPED_AT)
+        # Shared errors, less than a millimetre, do not show in sound: what its modes are wrong by would only
+        # be taken for them. Nor may it move a place by so little.
+        current = touched if heard is None else touched.told(heard.nats_of_draws(search, touched, of_sound))
         if current.effective < most and best is start:
             break
         if current.effective > most:
@@ -84,15 +90,3 @@ def refine(
         if most > _ENOUGH * draws:
             break
     return best
-
-
-def _weighed(
-    search: Search, at: Hypotheses, members: IntArray, step: int, rings: int, heard: Heard | None
-) -> Hypotheses:
-    """Those worth a weight, with what images and sound say added to theirs."""
-    touched = search.weigh(at, members, step, rings, _DROPPED_AT)
-    if heard is None:
-        return touched
-    # A hammer strikes within a millimetre of where it is aimed: shared errors, less than that, do not show
-    # in sound, and what its modes are wrong by would only be taken for them.
-    return touched.told(heard.nats(search, touched, between=True))

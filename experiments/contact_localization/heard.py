@@ -1,7 +1,7 @@
 """What the strikes of a run's first contacts say, ready for the search."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from experiments.contact_localization.model import Model
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.sound_analysis import analyse
 from experiments.contact_localization.sound_likelihood import SoundTerm
+from experiments.contact_localization.sound_matching import SoundNoise
 from experiments.contact_localization.sound_places import sound_nats
 from harness.acquisition import Strike
 from harness.arrays import FloatArray, IntArray
@@ -32,14 +33,24 @@ class Heard:
         """``(n,)`` nats of hypotheses, see ``sound_nats``; 0 where sound says nothing."""
         return sound_nats(search, self.term, self.struck, at, between)
 
+    def nats_of_draws(self, search: Search, at: Hypotheses, rng: np.random.Generator) -> FloatArray:
+        """``(n,)`` nats of draws between samples, of which each also draws how far its strikes fell aside.
 
-def hear(strikes: Sequence[Strike | None], model: Model, spacing: float) -> Heard | None:
+        Drawn from its prior, that takes no weight of its own, and whoever asks draws for their places alone
+        has summed over it.
+        """
+        aside = self.term.aside * rng.normal(size=(len(at.yaws), 3))
+        return sound_nats(search, self.term, self.struck, at, between=True, aside=aside)
+
+
+def hear(strikes: Sequence[Strike | None], model: Model, spacing: float, alone: bool = False) -> Heard | None:
     """The strikes as a term; None where nothing was struck.
 
     Args:
         strikes: of the contacts in order; None for one that was not struck.
         model: with the object's modes.
         spacing: metres between the surface's samples.
+        alone: whether no image speaks beside them.
 
     Raises:
         WrongUse: there are strikes, and the model has no modes.
@@ -50,5 +61,7 @@ def hear(strikes: Sequence[Strike | None], model: Model, spacing: float) -> Hear
     if model.modes is None or model.material is None:
         raise WrongUse("the contacts were struck, and the model of the object has no modes to compare with")
     evidence = analyse([strike for strike in strikes if strike is not None])
-    term = SoundTerm(evidence, model.gains(spacing), model.modes, model.material)
+    noise = SoundNoise()
+    noise = replace(noise, weight=noise.alone) if alone else noise
+    term = SoundTerm(evidence, model.gains(spacing), model.modes, model.material, noise)
     return Heard(term, np.array(struck, dtype=np.int64))

@@ -122,7 +122,7 @@ class Noise:
     geometry: GeometryNoise = field(default_factory=GeometryNoise)
     unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3, angle=np.radians(4.0)))
     touch: TouchNoise = field(default_factory=TouchNoise)
-    temperature: float = 0.45
+    temperature: float = 0.8
     shared: SharedNoise = field(default_factory=SharedNoise)
 
 

@@ -118,6 +118,16 @@ class SoundTerm:
         self._gain_scales = self._unit_gains()
 
     @property
+    def weight(self) -> float:
+        """Factor on every peak's nats."""
+        return self._noise.weight
+
+    @property
+    def aside(self) -> float:
+        """Metres, one sigma along each axis: how far all strikes fell aside, by what they say."""
+        return self._noise.aside
+
+    @property
     def says_something(self) -> bool:
         """Whether any peak can set places apart."""
         return len(self._pairs.groups) > 0

@@ -31,7 +31,10 @@ class SoundNoise:
         scale_step: between the logarithms of the common scales that are weighed; as ``frequency`` or finer.
         scale_weight: factor on the nats by which two lists of frequencies prefer a scale.
         clutter: share of peaks that no mode explains.
-        weight: factor on a peak's nats: the model's errors are shared between peaks.
+        weight: factor on a peak's nats, beside images: the model's errors are shared between peaks.
+        aside: metres, one sigma along each axis of the object, beside images: by so much places that sound
+            tells are off together, as its modes, the hammer's mount and the object's attitude are.
+        alone: ``weight`` by sound alone, where nothing names the errors that contacts share.
         group: modes whose frequencies differ by less than this share mix freely.
         most: modes in one group at most; at most ``sound_kernels.MOST_RANK``.
     """
@@ -43,7 +46,9 @@ class SoundNoise:
     scale_step: float = 0.015
     scale_weight: float = 0.3
     clutter: float = 0.2
-    weight: float = 0.2
+    weight: float = 0.5
+    aside: float = 1.0e-3
+    alone: float = 0.2
     group: float = 0.01
     most: int = 3
 

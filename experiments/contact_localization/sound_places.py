@@ -8,13 +8,17 @@ from experiments.contact_localization.sound_likelihood import SoundTerm
 from harness.arrays import FloatArray, IntArray
 
 
-def strike_places(search: Search, struck: IntArray, at: Hypotheses) -> tuple[FloatArray, FloatArray]:
+def strike_places(
+    search: Search, struck: IntArray, at: Hypotheses, aside: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Where strikes fell and which way they went: the press's place, along the tool.
 
     Args:
         search: the run.
         struck: ``(K,)`` indices of the contacts that were struck.
         at: ``h`` hypotheses; errors that contacts share do not move a strike.
+        aside: ``(h, 3)`` metres, in the object's frame, by which all strikes of a hypothesis fell elsewhere
+            than its presses; what of it lies along a hammer's way moves none.
 
     Returns:
         ``(h, K, 3)`` metres and ``(h, K, 3)`` unit, in the object's frame. The places are as far off
@@ -25,6 +29,9 @@ def strike_places(search: Search, struck: IntArray, at: Hypotheses) -> tuple[Flo
     indentations = np.array([search.contacts[k].indentation for k in struck])
     moved = np.einsum("hij,kj->hki", rotations, search.positions[struck])
     points: FloatArray = at.gels[:, None] + moved - indentations[:, None] * directions
+    if aside is not None:
+        along = np.einsum("hki,hi->hk", directions, aside)
+        points = points + aside[:, None] - along[..., None] * directions
     return points, np.ascontiguousarray(directions)
 
 
@@ -34,6 +41,7 @@ def sound_nats(
     struck: IntArray,
     at: Hypotheses,
     between: bool = False,
+    aside: FloatArray | None = None,
 ) -> FloatArray:
     """``(h,)`` nats of hypotheses by a run's sounds, 0 for sounds that say nothing.
 
@@ -43,10 +51,11 @@ def sound_nats(
         struck: ``(K,)`` indices of the contacts that were struck.
         at: ``h`` hypotheses.
         between: whether the places lie between samples, see ``SoundTerm.log_likelihood``.
+        aside: ``(h, 3)`` metres, see ``strike_places``.
     """
     if not term.says_something:
         return np.zeros(len(at.yaws))
-    return term.log_likelihood(*strike_places(search, struck, at), between)
+    return term.log_likelihood(*strike_places(search, struck, at, aside), between)
 
 
 _WORTH_KEEPING = 18.0

@@ -10,7 +10,6 @@ from experiments.contact_localization.estimate import Estimate
 from experiments.contact_localization.heard import Heard, hear
 from experiments.contact_localization.result import Scored
 from experiments.contact_localization.sound_likelihood import ModeRow
-from experiments.contact_localization.sound_matching import SoundNoise
 from experiments.contact_localization.sound_pictures import sound_pair
 from harness.acquisition import Strike
 from harness.arrays import FloatArray
@@ -33,6 +32,7 @@ def sound_of(scored: Scored) -> Sound | Missing:
         [observation.strike for observation in found.observations],
         found.model,
         scored.accuracy[SPACING.name],
+        alone=not found.last.gates,
     )
     if heard is None:
         return Missing("no contact was struck")
@@ -163,10 +163,10 @@ def _peaks(found: Answer, heard: Heard) -> tuple[PeakLine, ...] | Missing:
     if not evidence.peaks:
         return Missing("the strikes have no resonance in common")
     rows = heard.term.mode_table(found.last.contacts[heard.struck], _directions(found, heard.struck.tolist()))
-    return tuple(_peak(row) for row in rows)
+    return tuple(_peak(row, heard.term.weight) for row in rows)
 
 
-def _peak(row: ModeRow) -> PeakLine:
+def _peak(row: ModeRow, weight: float) -> PeakLine:
     return PeakLine(
         frequency=row.frequency,
         damping=row.damping,
@@ -177,5 +177,5 @@ def _peak(row: ModeRow) -> PeakLine:
         mode_damping=row.model_damping if row.modes else None,
         probability=row.probability,
         nats=row.nats,
-        weight=SoundNoise().weight,
+        weight=weight,
     )

@@ -16,7 +16,7 @@ from experiments.contact_localization.touch_kernels import (
     similarities_at,
     terms_at,
 )
-from harness.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
 
 LEVEL_SLOPE = 0.06
 """Mean slope of a pixel below which it may be the gel at rest."""
@@ -122,7 +122,7 @@ def touch_map(
     rows, columns = heights.shape[0] // block, heights.shape[1] // block
     top, left = (heights.shape[0] - rows * block) // 2, (heights.shape[1] - columns * block) // 2
     cut = heights[top : top + rows * block, left : left + columns * block]
-    coarse = cut.reshape(rows, block, columns, block).mean(axis=(1, 3))
+    coarse = block_means(cut, block)
     peak = float(coarse.max())
     core = coarse > max(threshold, 0.4 * peak)
     touched = np.argwhere(core) if peak > threshold else np.empty((0, 2), dtype=np.int64)
@@ -146,9 +146,7 @@ def _half_kernel(sigma: float) -> FloatArray:
 def _level(heights: FloatArray, pitch: float, block: int) -> BoolArray:
     down, right = np.gradient(heights, pitch)
     steep = np.hypot(down, right)
-    rows, columns = heights.shape[0] // block, heights.shape[1] // block
-    mean = steep.reshape(rows, block, columns, block).mean(axis=(1, 3))
-    return np.asarray(mean < LEVEL_SLOPE)
+    return np.asarray(block_means(steep, block) < LEVEL_SLOPE)
 
 
 def view_scores(view: View, touch: TouchMap, noise: TouchNoise, pixels: IntArray) -> None:

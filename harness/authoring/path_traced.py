@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.arrays import FloatArray, read_only
+from harness.arrays import FloatArray, block_means, read_only
 from harness.authoring.mitsuba_scene import camera_of, lamps_of, surfaces_of
 from harness.authoring.mitsuba_variant import FAST, Variant, chosen_variant
 from harness.errors import OutOfDomain
@@ -166,10 +166,9 @@ class PathTraced:
         found[..., :3] = albedo * falling[..., None]
         # Without light Mitsuba calls every place empty; where there is a surface there is a normal.
         found[..., 3] = np.any(normal != 0.0, axis=2)
-        rows, columns = camera.height, camera.width
-        mean = found[..., :7].reshape(rows, side, columns, side, 7).mean(axis=(1, 3))
+        mean = block_means(found[..., :7], side)
         seconds["unshadowed"] += time.perf_counter() - begun
-        return np.asarray(mean)
+        return mean
 
     def _rendered(
         self,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
 
-from harness.arrays import BoolArray, FloatArray, IntArray
+from harness.arrays import BoolArray, FloatArray, IntArray, block_means
 from harness.geometry import apply, inverse, transform
 from harness.mesh import Mesh
 from harness.pinhole import Pinhole
@@ -64,9 +64,7 @@ class Shot:
                 albedo[own] += opaque[:, None] * (colour - albedo[own])
             shade = self._light[:, None] * albedo + self._shine[:, None]
             picture[self._filled] = np.clip(shade, 0.0, 1.0) * self._cue[:, None]
-        rows, columns = self.camera.height, self.camera.width
-        blocks = picture.reshape(rows, _OVERSAMPLING, columns, _OVERSAMPLING, 3)
-        return np.asarray(blocks.mean(axis=(1, 3)))
+        return block_means(picture, _OVERSAMPLING)
 
 
 def _normals(view: View, parts: tuple[Part, ...], points: FloatArray, filled: BoolArray) -> FloatArray:

@@ -6,7 +6,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.image import imsave
 
-from harness.arrays import AnyArray, ByteArray, FloatArray
+from harness.arrays import AnyArray, ByteArray, FloatArray, block_means
 
 DIFFERENCE_GAIN = 3.0
 """How much differences of images are amplified about middle grey."""
@@ -35,8 +35,6 @@ def height_picture(height: FloatArray, highest: float) -> ByteArray:
 def png(picture: AnyArray) -> bytes:
     """A PNG file of ``(rows, columns, 3)`` uint8 RGB, averaged down to at most 480 columns."""
     block = -(-picture.shape[1] // _LARGEST_WIDTH)
-    rows, columns = (size // block for size in picture.shape[:2])
-    blocks = picture[: rows * block, : columns * block].reshape(rows, block, columns, block, 3)
     file = BytesIO()
-    imsave(file, np.round(blocks.mean(axis=(1, 3))).astype(np.uint8), format="png")
+    imsave(file, np.round(block_means(picture, block)).astype(np.uint8), format="png")
     return file.getvalue()

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from scipy.ndimage import find_objects, label
 
-from harness.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
 from harness.errors import OutOfDomain
 from harness.sim.contact_pressure import SETTLED, Pressure, contact_pressure, spring_pressure
 from harness.sim.gel_elastic import GelElastic
@@ -175,8 +175,7 @@ def _merged(depth: FloatArray, cells: int) -> FloatArray:
         return depth
     rows, columns = depth.shape
     padded = np.pad(depth, ((0, -rows % cells), (0, -columns % cells)))
-    blocks = padded.reshape(padded.shape[0] // cells, cells, padded.shape[1] // cells, cells)
-    return np.asarray(blocks.mean(axis=(1, 3)))
+    return block_means(padded, cells)
 
 
 def _foundation(depth: FloatArray, side: float, thickness: float, gel: GelElastic) -> FloatArray:

@@ -37,17 +37,23 @@ class FaceClusters:
     groups: FloatArray
 
 
+def corners_to_raster(mesh: Mesh) -> FloatArray:
+    """``(faces, 3, 3)`` metres; ``MeshRefused`` for no face, or a corner that is not finite."""
+    corners = mesh.corners
+    if len(corners) == 0 or not np.isfinite(corners).all():
+        raise MeshRefused(
+            f"cannot raster a mesh of {len(corners)} faces with finite corners; repair it first"
+        )
+    return corners
+
+
 def cluster_faces(mesh: Mesh) -> FaceClusters:
     """Sort a mesh's faces along a curve through space (Morton's), and cut them into clusters.
 
     Raises:
         MeshRefused: no face, or a corner that is not finite.
     """
-    corners = mesh.corners
-    if len(corners) == 0 or not np.isfinite(corners).all():
-        raise MeshRefused(
-            f"cannot raster a mesh of {len(corners)} faces with finite corners; repair it first"
-        )
+    corners = corners_to_raster(mesh)
     order = np.argsort(_curve(corners.mean(axis=1)), kind="stable")
     count = -(-len(order) // CLUSTER)
     spread = np.full((count * CLUSTER, 9), np.nan)

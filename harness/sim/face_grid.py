@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.arrays import FloatArray, IntArray, read_only
-from harness.errors import MeshRefused
 from harness.mesh import Mesh
 from harness.sim.compiled import compiled
+from harness.sim.face_clusters import corners_to_raster
 
 _MOST_CELLS_A_SIDE = 64
 
@@ -37,11 +37,7 @@ def build_face_grid(mesh: Mesh) -> FaceGrid:
     Raises:
         MeshRefused: no face, or a corner that is not finite.
     """
-    corners = mesh.corners
-    if len(corners) == 0 or not np.isfinite(corners).all():
-        raise MeshRefused(
-            f"cannot raster a mesh of {len(corners)} faces with finite corners; repair it first"
-        )
+    corners = corners_to_raster(mesh)
     low, high = corners.min(axis=1), corners.max(axis=1)
     origin = low.min(axis=0)
     extent = high.max(axis=0) - origin

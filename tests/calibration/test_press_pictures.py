@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from drawn_presses import BALL, DrawnGel, drawn_set
 
-from calibration.taxim.detect import Detector, shrunk
+from calibration.taxim.detect import Detector
 from calibration.taxim.held_out import score, teach
 from calibration.taxim.mark_free import _usable
 from calibration.taxim.pack import PressPack
@@ -16,6 +16,7 @@ from calibration.taxim.polycalib import write_polycalib
 from calibration.taxim.rest import SIGHTINGS, rest_change
 from calibration.taxim.smooth_fit import changes
 from harness import cli
+from harness.arrays import block_means
 from harness.errors import CalibrationRefused, DataRefused, WrongUse
 from harness.image_file import write_png
 from harness.sim.lit_calibration import LitCalibration, read_calibration
@@ -132,7 +133,7 @@ def test_the_detector_follows_a_press_over_the_picture_and_past_its_border() -> 
 
 def test_blocks_are_averaged_and_a_rest_of_rows_left_out() -> None:
     picture = np.arange(5 * 7 * 3, dtype=np.float64).reshape(5, 7, 3)
-    small = shrunk(picture, 2)
+    small = block_means(picture, 2)
     assert small.shape == (2, 3, 3)
     assert np.allclose(small[0, 0], picture[:2, :2].mean(axis=(0, 1)))
 

@@ -146,9 +146,11 @@ def silenced(_: int, strike: Strike) -> Strike:
 def assert_says_how_sure_it_is(found: Estimate, whole: Estimate, run: Run) -> None:
     """A strike less moves the answer by no more than it says it may, and by a few millimetres at most."""
     moved = float(np.linalg.norm(found.position_in_object - whole.position_in_object))
-    assert moved < found.credible90
+    # One answer in ten is beyond its radius; this is that of 99 in a hundred of a Gaussian on a surface.
+    sure = np.sqrt(2.0) * found.credible90
+    assert moved < sure
     assert moved < 6e-3
-    assert found.region.contains(run.true)
+    assert run.error(found) < sure
 
 
 def assert_nothing_was_heard(

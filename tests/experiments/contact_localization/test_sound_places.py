@@ -1,10 +1,13 @@
 """Where strikes fall under a hypothesis, the posterior they make, and the arrays for the report."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sounding_plate as plate
 from scipy.signal import find_peaks
 
+from experiments.contact_localization.heard import Heard, hear
 from experiments.contact_localization.hypotheses import Contact, Hypotheses, Noise, anchors
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior import best_point
@@ -12,6 +15,7 @@ from experiments.contact_localization.search import MOST_HYPOTHESES, Search
 from experiments.contact_localization.sound_analysis import SoundEvidence, analyse
 from experiments.contact_localization.sound_gains import gain_table
 from experiments.contact_localization.sound_likelihood import SoundTerm
+from experiments.contact_localization.sound_matching import SoundNoise
 from experiments.contact_localization.sound_pictures import sound_pair, spectrogram
 from experiments.contact_localization.sound_places import ANCHORS, by_sound, sound_nats, strike_places
 from harness.arrays import FloatArray
@@ -57,6 +61,51 @@ def test_strikes_fall_where_the_gel_was_less_its_indentation() -> None:
     assert found[0] == pytest.approx(points, abs=1e-12)
     assert found[1] == pytest.approx(points + aside[1], abs=1e-12)
     assert directions == pytest.approx(np.tile([0.0, 0.0, -1.0], (3, K, 1)), abs=1e-12)
+
+
+def test_strikes_fall_aside_together_and_never_along_the_hammer() -> None:
+    points = plate.places(K, np.random.default_rng(6))
+    search = _search(points, Prior(np.eye(3)))
+    gels = np.tile(points[0] - np.array([0.0, 0.0, INDENTATION]), (2, 1))
+    aside = np.array([[1e-3, -2e-3, 3e-3], [0.0, 0.0, 1e-3]])
+    found, _ = strike_places(search, np.arange(K), at(gels, np.zeros(2)), aside)
+    assert found[0] == pytest.approx(points + np.array([1e-3, -2e-3, 0.0]), abs=1e-12)
+    assert found[1] == pytest.approx(points, abs=1e-12)
+
+
+def test_draws_that_fall_aside_have_summed_over_it() -> None:
+    """Weights of draws at two places, each heard somewhere about them, are the integrals over the prior."""
+    rng = np.random.default_rng(8)
+    points = plate.places(K, rng)
+    search = _search(points, Prior(np.eye(3)))
+    term = SoundTerm(
+        analyse(plate.strikes(MODES, points, rng)), TABLE, MODES, DAMPED, SoundNoise(weight=0.02)
+    )
+    here = points[0] - np.array([0.0, 0.0, INDENTATION])
+    both = np.array([here, here + np.array([4e-3, 0.0, 0.0])])
+    heard = Heard(term, np.arange(K))
+    many = at(np.repeat(both, 4000, axis=0), np.zeros(8000))
+    drawn = np.exp(heard.nats_of_draws(search, many, rng)).reshape(2, -1)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(15)
+    x, y = (1e-3 * each.ravel() for each in np.meshgrid(nodes, nodes, indexing="ij"))
+    steps = np.column_stack([x, y, np.zeros(len(x))])
+    share = np.outer(weights, weights).ravel() / (2.0 * np.pi)
+    for place, one in zip(both, drawn, strict=True):
+        beside = at(np.tile(place, (len(steps), 1)), np.zeros(len(steps)))
+        nats = sound_nats(search, term, np.arange(K), beside, between=True, aside=steps)
+        summed = share @ np.exp(nats)
+        assert abs(one.mean() - summed) < 4.0 * one.std() / np.sqrt(one.size)
+
+
+def test_sound_beside_images_is_weighed_as_such_and_alone_otherwise() -> None:
+    rng = np.random.default_rng(9)
+    strikes = plate.strikes(MODES, plate.places(K, rng), rng)
+    model = replace(MODEL, modes=MODES, material=DAMPED)
+    beside, alone = hear(strikes, model, SPACING), hear(strikes, model, SPACING, alone=True)
+    assert beside is not None
+    assert alone is not None
+    assert beside.term.weight == SoundNoise().weight
+    assert alone.term.weight == SoundNoise().alone
 
 
 def test_only_the_struck_contacts_are_asked_for_in_their_order() -> None:

@@ -8,10 +8,9 @@ import pytest
 from ball_depth import WITHIN, fit_ball, taught, usable
 from truemap import read_tmd
 
-from calibration.taxim.detect import shrunk
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pictures import Pictures, read_pictures
-from harness.arrays import ByteArray, FloatArray
+from harness.arrays import ByteArray, FloatArray, block_means
 from harness.errors import CalibrationRefused, DataRefused
 from harness.sim.contact_colour import contact_colour
 from harness.sim.contact_depth import drift_of, read_depth
@@ -134,7 +133,8 @@ def test_what_cannot_be_read_is_refused(dimmed: TactileCalibration) -> None:
 def _halved(pictures: Pictures) -> Pictures:
     """Every two by two pixels as their mean: a quarter of the work for the same contact."""
     small = [
-        _byte(shrunk(picture.astype(np.float64), 2)) for picture in (pictures.background, *pictures.images)
+        _byte(block_means(picture.astype(np.float64), 2))
+        for picture in (pictures.background, *pictures.images)
     ]
     return replace(pictures, background=small[0], images=np.stack(small[1:]))
 
