@@ -18,8 +18,11 @@ _ON_EDGE = 1e-9
 _WIDER = 1e-6
 """Cells by which a face is widened where it is listed."""
 
-_ALONG = 0.6
+_ALONG = 0.5
 """Cells along the grid for the root of the number of faces: more take longer to list, fewer to look up."""
+
+_MOST = 32
+"""Lists that a face is in, in the mean."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,18 +58,20 @@ class LampGrid:
             lamp: ``(3,)`` unit, towards it.
             along: cells along the longer side; None for a few faces in each.
         """
-        turn = _across(lamp)
-        turned, faces = mesh.vertices @ turn, mesh.faces
+        turn, count = _across(lamp), len(mesh.faces)
+        turned, corners = mesh.vertices @ turn, np.empty((count, 3, 3))
+        _cornered(turned, mesh.faces, corners)
         least, most = turned.min(axis=0)[:2], turned.max(axis=0)[:2]
-        side = max(1, int(_ALONG * np.sqrt(len(faces)))) if along is None else along
+        side = max(1, int(_ALONG * np.sqrt(count))) if along is None else along
         cell = max(float((most - least).max()) / side, np.finfo(np.float64).tiny)
+        # Slivers across the whole of it would be listed nearly everywhere.
+        while along is None and side > 1 and _listed(corners, least, cell) > _MOST * count:
+            side, cell = side // 2, cell * side / (side // 2)
         low = least - _WIDER * cell
         rows, columns = (np.floor((most - low) / cell).astype(np.int64) + 1).tolist()
-        corners = np.empty((len(faces), 3, 3))
         starts = np.zeros(rows * columns + 1, np.int32)
-        _count(turned, faces, low, cell, columns, corners, starts)
-        listed = np.empty(starts[-1], np.int32)
-        tops = np.empty(starts[-1])
+        _count(corners, low, cell, columns, starts)
+        listed, tops = np.empty(starts[-1], np.int32), np.empty(starts[-1])
         _list(corners, low, cell, columns, starts, listed, tops)
         return cls(turn, low, cell, starts, listed, tops, corners, columns)
 
@@ -108,23 +113,32 @@ def _span(face: FloatArray, low: FloatArray, cell: float, axis: int) -> tuple[in
 
 
 @compiled
-def _count(
-    turned: FloatArray,
-    faces: IntArray,
-    low: FloatArray,
-    cell: float,
-    columns: int,
-    corners: FloatArray,
-    starts: AnyArray,
-) -> None:
-    """Fill in ``corners``, and where each cell's list begins."""
-    rows = (len(starts) - 1) // columns
+def _cornered(turned: FloatArray, faces: IntArray, corners: FloatArray) -> None:
+    """Fill in ``corners``."""
     for m in range(len(faces)):
         a, b, c = faces[m, 0], faces[m, 1], faces[m, 2]
         for axis in range(3):
             corners[m, 0, axis] = turned[a, axis]
             corners[m, 1, axis] = turned[b, axis] - turned[a, axis]
             corners[m, 2, axis] = turned[c, axis] - turned[a, axis]
+
+
+@compiled
+def _listed(corners: FloatArray, low: FloatArray, cell: float) -> int:
+    """Places that the lists of all cells have together."""
+    total = 0
+    for m in range(len(corners)):
+        i0, i1 = _span(corners[m], low, cell, 0)
+        j0, j1 = _span(corners[m], low, cell, 1)
+        total += (i1 - i0 + 1) * (j1 - j0 + 1)
+    return total
+
+
+@compiled
+def _count(corners: FloatArray, low: FloatArray, cell: float, columns: int, starts: AnyArray) -> None:
+    """Fill in where each cell's list begins."""
+    rows = (len(starts) - 1) // columns
+    for m in range(len(corners)):
         i0, i1 = _span(corners[m], low, cell, 0)
         j0, j1 = _span(corners[m], low, cell, 1)
         for i in range(i0, min(i1, rows - 1) + 1):

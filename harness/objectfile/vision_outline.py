@@ -83,7 +83,8 @@ def mesh_outline(
         look_through(nearness, front, side, offsets, first, last, cover, places, depth, faces)
 
     crew.share(project, len(mesh.vertices), crew.threads, 4096)
-    crew.share(band, rows, 2 * crew.threads if crew.threads > 1 else 1)
+    # Every band looks at every face.
+    crew.share(band, rows, crew.threads)
     pixels = np.flatnonzero(cover)
     return Outline(
         *(pixels, cover.ravel()[pixels], places.reshape(-1, 2)[pixels], depth.ravel()[pixels]),

@@ -80,9 +80,11 @@ def draw(
         for c in range(3):
             in_front += 1 if seen[faces[m, c], 2] > 0.0 else 0
         if in_front == 3:
-            low = min(seen[faces[m, 0], 1], min(seen[faces[m, 1], 1], seen[faces[m, 2], 1]))
-            high = max(seen[faces[m, 0], 1], max(seen[faces[m, 1], 1], seen[faces[m, 2], 1]))
-            if high < first - _ON_EDGE or low > last - 1 + _ON_EDGE:
+            p, q, r = seen[faces[m, 0]], seen[faces[m, 1]], seen[faces[m, 2]]
+            # Most faces of a fine mesh lie between the sub-pixels' centres, and need no more than this.
+            if _lies_between(min(p[1], min(q[1], r[1])), max(p[1], max(q[1], r[1])), first, last):
+                continue
+            if _lies_between(min(p[0], min(q[0], r[0])), max(p[0], max(q[0], r[0])), 0, nearness.shape[1]):
                 continue
             for c in range(3):
                 corner[c] = seen[faces[m, c], :3]
@@ -92,6 +94,13 @@ def draw(
             for c in range(2, count):
                 corner[0], corner[1], corner[2] = cut[0], cut[c - 1], cut[c]
                 _fill(corner, m, first, last, closed, nearness, front)
+
+
+@compiled
+def _lies_between(low: float, high: float, first: int, last: int) -> bool:
+    """Whether no whole number from ``first`` to before ``last`` is between two, both widened a little."""
+    begin = max(np.ceil(max(low, first - 1.0) - _ON_EDGE), first)
+    return bool(begin > min(np.floor(min(high, last + 1.0) + _ON_EDGE), last - 1))
 
 
 @compiled

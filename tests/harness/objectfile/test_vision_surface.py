@@ -84,6 +84,23 @@ def test_cells_of_any_size_say_what_a_lamp_sees(name: str, along: int) -> None:
         assert not seen[(on < 0) | (on > 2)].any()
 
 
+def test_slivers_are_not_listed_everywhere() -> None:
+    """A disc of 20 000 faces that all meet in its middle, and a lid above half of it."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 20_001)
+    rim = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))])
+    lid = np.array([[0.0, -1.0, 0.1], [1.0, -1.0, 0.1], [1.0, 1.0, 0.1], [0.0, 1.0, 0.1]])
+    count = len(rim)
+    fan = np.column_stack([np.arange(count - 1), np.arange(1, count), np.full(count - 1, count)])
+    lids = count + 1 + np.array([[0, 1, 2], [0, 2, 3]])
+    mesh = Mesh(np.vstack([rim, [[0.0, 0.0, 0.0]], lid]), np.vstack([fan, lids]))
+    grid = LampGrid.of(mesh, np.array([0.0, 0.0, 1.0]))
+    assert len(grid.faces) <= 32 * len(mesh.faces)
+    places = np.random.default_rng(3).uniform((-0.9, -0.4, 0.0), (0.9, 0.4, 0.0), (500, 3))
+    seen = np.empty(len(places), bool)
+    grid.sees(places, 1e-9, np.full(len(places), len(mesh.faces)), np.ones(len(places)), seen)
+    np.testing.assert_array_equal(seen, places[:, 0] < 0.0)
+
+
 def told_by_all_faces(mesh: Mesh, eye: FloatArray, ways: FloatArray, light: FloatArray) -> AnyArray:
     """Visibility and normal as the reference's pictures have them."""
     told, look, exact = np.zeros((len(ways), 4), np.float32), plain(mesh, (1.0, 1.0, 1.0)), RayMesh(mesh)
