@@ -58,6 +58,14 @@ def modes(
         str | None,
         typer.Option(help="Longest edge of an element, as 3mm; chosen by the wave if left out.", metavar="L"),
     ] = None,
+    envelope: Annotated[
+        str | None,
+        typer.Option(
+            help="How far cells may leave the surface, as 0.1mm; by wall, edge and size if left out. Less "
+            "holds the volume better, of more cells.",
+            metavar="L",
+        ),
+    ] = None,
     fixed: Annotated[
         list[str] | None,
         typer.Option(
@@ -88,6 +96,7 @@ def modes(
         limit=_in_si("--up-to", up_to, FREQUENCY),
         count=count,
         edge=options.quantity("--edge", edge, LENGTH),
+        envelope=options.quantity("--envelope", envelope, LENGTH),
         fixed=fixed or (),
         store=Store(default_folder()),
     )

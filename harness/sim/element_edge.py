@@ -118,7 +118,12 @@ def weyl_frequency(surface: Mesh, material: Material, count: int, volume: float)
 
 
 def finely_filled(
-    surface: Mesh, material: Material, limit: float, count: int | None, store: Store | None
+    surface: Mesh,
+    material: Material,
+    limit: float,
+    count: int | None,
+    store: Store | None,
+    envelope: float | None = None,
 ) -> tuple[Tetrahedra, float, bool]:
     """A surface filled for the modes asked for: with ``fine_edge``, and cut at rims that it is long for.
 
@@ -128,6 +133,7 @@ def finely_filled(
         limit: Hz, the highest frequency asked for.
         count: modes asked for, the lowest; None for all up to the limit.
         store: where tetrahedra are kept; None to fill.
+        envelope: m, how far cells may leave the surface; None for ``tetrahedralize``'s own.
 
     Returns:
         The tetrahedra, the edge aimed at in m, and whether they were kept.
@@ -136,7 +142,7 @@ def finely_filled(
         MeshRefused: a surface that cannot be filled.
     """
     edge = fine_edge(surface, material, limit, count)
-    inside, kept = filled(surface, edge, store)
+    inside, kept = filled(surface, edge, store, envelope)
     wall = thin_wall(surface, 0.5)
     return (with_rim_layer(inside, wall) if edge > _RIM * wall else inside), edge, kept
 

@@ -24,37 +24,41 @@ _STRICTER = 10.0
 """fTetWild's own default of the energy at which it stops; it takes about twice as long."""
 
 
-def filled(mesh: Mesh, edge: float, store: Store | None) -> tuple[Tetrahedra, bool]:
+def filled(
+    mesh: Mesh, edge: float, store: Store | None, envelope: float | None = None
+) -> tuple[Tetrahedra, bool]:
     """The tetrahedra of ``tetrahedralize``, from the store if they are there.
 
     Args:
         mesh: closed, outward, in metres.
         edge: m, longest edge aimed at.
         store: where they are kept; None to fill.
+        envelope: m, how far cells may leave the surface, see ``tetrahedralize``; None for its own.
 
     Returns:
         The tetrahedra, and whether they were kept.
 
     Raises:
-        WrongUse: an edge that cannot be.
+        WrongUse: an edge or an envelope that cannot be.
         MeshRefused: a surface that cannot be filled.
     """
-    key = digest(["filled", VERSION, mesh.vertices, mesh.faces, float(edge)])
+    told = [] if envelope is None else [float(envelope)]
+    key = digest(["filled", VERSION, mesh.vertices, mesh.faces, float(edge), *told])
     kept = store.get(key) if store is not None else None
     if isinstance(kept, Mapping):
         return tetrahedra(kept["nodes"], kept["cells"]), True
-    found = _fine(mesh, edge)
+    found = _fine(mesh, edge, envelope)
     if store is not None:
         store.put(key, {"nodes": found.nodes, "cells": found.cells})
     return found, False
 
 
-def _fine(mesh: Mesh, edge: float) -> Tetrahedra:
+def _fine(mesh: Mesh, edge: float, envelope: float | None) -> Tetrahedra:
     """Filled, and once more where it stopped with edges much longer than asked for."""
-    found = tetrahedralize(mesh, edge)
+    found = tetrahedralize(mesh, edge, envelope)
     if _typical_edge(found) <= _LONGER * edge:
         return found
-    return tetrahedralize(mesh, edge, stop=_STRICTER)
+    return tetrahedralize(mesh, edge, envelope, _STRICTER)
 
 
 def _typical_edge(of: Tetrahedra) -> float:

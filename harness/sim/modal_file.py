@@ -81,6 +81,7 @@ def modes_of_file(
     edge: float | None = None,
     fixed: Sequence[str] = (),
     store: Store | None = None,
+    envelope: float | None = None,
 ) -> FileModes:
     """The modes of an object given by a file, or of one of our own.
 
@@ -95,6 +96,8 @@ def modes_of_file(
         fixed: sides of the object ("x-min", ..., "z-max") or sets of nodes that the file names,
             held in all axes or, as "z-min:z", in those after the colon.
         store: where the tetrahedra of a surface are kept; None to fill it.
+        envelope: m, how far cells may leave the surface; None for ``tetrahedralize``'s own; not for
+            tetrahedra.
 
     Raises:
         WrongUse: options that cannot be, or that do not go together.
@@ -104,10 +107,11 @@ def modes_of_file(
     check_elasticity(Elasticity.uniform(material, 1), 1)
     seconds = dict.fromkeys(("intake", "mesh"), 0.0)
     mesh = str(mesh)
-    taken = None if mesh.startswith(BUILTIN) else _volume(Path(mesh), units, wall, edge, seconds)
+    taken = None if mesh.startswith(BUILTIN) else _volume(Path(mesh), units, wall, edge, envelope, seconds)
     volume = taken is not None
     if taken is None:
-        taken = _surface(mesh, units, wall, edge, material, _highest(limit, count), count, seconds, store)
+        highest = _highest(limit, count)
+        taken = _surface(mesh, units, wall, edge, envelope, material, highest, count, seconds, store)
     held = _held(taken, fixed)
     highest = np.inf if limit is None and count is not None else _highest(limit, count)
     solution = solve_mesh(taken.mesh, material, highest, least=count, held=held)
@@ -131,13 +135,18 @@ def _highest(limit: float | None, count: int | None) -> float:
 
 
 def _volume(
-    path: Path, units: str | None, wall: float | None, edge: float | None, seconds: dict[str, float]
+    path: Path,
+    units: str | None,
+    wall: float | None,
+    edge: float | None,
+    envelope: float | None,
+    seconds: dict[str, float],
 ) -> _Taken | None:
     with _timed(seconds, "intake"):
         found = read_volume(path, units)
     if found is None:
         return None
-    for name, value in (("--wall", wall), ("--edge", edge)):
+    for name, value in (("--wall", wall), ("--edge", edge), ("--envelope", envelope)):
         if value is not None:
             raise WrongUse(f"{path.name} holds tetrahedra, which are solved as they are; leave {name} out")
     return _Taken(found.mesh, found.sets, found.units, found.bodies, None, found.said)
@@ -148,6 +157,7 @@ def _surface(
     units: str | None,
     wall: float | None,
     edge: float | None,
+    envelope: float | None,
     material: Material,
     limit: float,
     count: int | None,
@@ -160,9 +170,9 @@ def _surface(
         check_closed(surface)
     with _timed(seconds, "mesh"):
         if edge is None:
-            inside, edge, kept = finely_filled(surface, material, limit, count, store)
+            inside, edge, kept = finely_filled(surface, material, limit, count, store, envelope)
         else:
-            inside, kept = filled(surface, edge, store)
+            inside, kept = filled(surface, edge, store, envelope)
         snapped = curved(inside, surface, inside)
     said = (*given.said, *((_KEPT,) if kept else ()))
     return _Taken(snapped, {}, given.units, inside.bodies, edge, said)

@@ -91,7 +91,9 @@ def test_modes_of_a_thin_plate_are_within_a_thousandth_of_ritz_with_rims_cut(
     """On even cells of the edge asked for; those that fill a surface need not be even."""
     sides = (0.05, 0.04, 0.003)
 
-    def evenly(mesh: Mesh, edge: float, store: Store | None) -> tuple[Tetrahedra, bool]:
+    def evenly(
+        mesh: Mesh, edge: float, store: Store | None, envelope: float | None = None
+    ) -> tuple[Tetrahedra, bool]:
         counts = [int(np.ceil(side / edge)) for side in sides]
         return box(sides, (counts[0], counts[1], 2)), False
 
@@ -167,7 +169,7 @@ def test_a_bar_of_any_length_is_cut_across_its_section() -> None:
 def test_a_filling_whose_edges_stayed_long_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
     cube, asked = brick(CUBE), []
 
-    def coarse_at_first(mesh: Mesh, edge: float, stop: float | None = None) -> Tetrahedra:
+    def coarse_at_first(mesh: Mesh, edge: float, envelope: None, stop: float | None = None) -> Tetrahedra:
         asked.append(stop)
         return box(CUBE, (2, 2, 2)) if stop is None else box(CUBE, (6, 6, 6))
 
@@ -192,6 +194,10 @@ def test_a_surface_is_filled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert kept
     assert (again.nodes == first.nodes).all()
     assert (again.cells == first.cells).all()
-    for mesh, edge in ((cube, 0.029), (brick((0.06, 0.06, 0.05)), 0.03)):
+    for mesh, edge, envelope in (
+        (cube, 0.029, None),
+        (brick((0.06, 0.06, 0.05)), 0.03, None),
+        (cube, 0.03, 1e-5),
+    ):
         with pytest.raises(AssertionError, match="again"):
-            filling.filled(mesh, edge, store)
+            filling.filled(mesh, edge, store, envelope)

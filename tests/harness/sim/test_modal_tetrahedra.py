@@ -11,6 +11,7 @@ from harness.mesh import Mesh
 from harness.objects.solid import from_manifold, signed_volume
 from harness.sim.mesh_repair import boundary_edges
 from harness.sim.modal import default_edge, modes_of, solve_modes
+from harness.sim.modal_file import modes_of_file
 from harness.sim.surface_measure import enclosed_volume, nearest_on_surface, thin_wall, wall_thickness
 from harness.sim.tetrahedra import Tetrahedra, tetrahedralize
 from harness.sim.walls import walled
@@ -127,6 +128,21 @@ def test_edges_that_cannot_be_are_refused() -> None:
             tetrahedralize(sphere(0.03), edge)
 
 
+def test_cells_kept_nearer_to_the_surface_hold_its_volume_better() -> None:
+    ball = sphere(0.03, 128)
+    whole = enclosed_volume(ball)
+    off = [abs(tetrahedralize(ball, 0.02, reach).volumes.sum() / whole - 1.0) for reach in (1e-3, 1e-4)]
+    assert off[1] < 0.2 * off[0]
+
+
+@pytest.mark.parametrize("reach", [0.0, -1e-4, np.nan, 1e-3])
+def test_an_envelope_that_closes_a_wall_up_is_refused(reach: float) -> None:
+    """The plate's wall is 3.43 mm thick, and a quarter of it is left."""
+    for edge in (None, 0.02):
+        with pytest.raises(WrongUse, match=r"above 0 and up to 0\.858 mm"):
+            modes_of_file("builtin:plate", CERAMIC, count=3, edge=edge, envelope=reach)
+
+
 def test_the_default_edge_follows_the_wave() -> None:
     solid = sphere(0.03)
     low, high = (default_edge(shell(0.1, 2e-3), CERAMIC, limit) for limit in (5e3, 20e3))
@@ -160,7 +176,7 @@ def test_modes_are_those_of_a_filling_made_again_where_edges_stayed_too_long(
     sides, stops = (0.06, 0.05, 0.04), list[float | None]()
     cuboid = box(sides, (1, 1, 1)).surface
 
-    def coarse_at_first(_mesh: Mesh, _edge: float, stop: float | None = None) -> Tetrahedra:
+    def coarse_at_first(_mesh: Mesh, _edge: float, _envelope: None, stop: float | None = None) -> Tetrahedra:
         stops.append(stop)
         return box(sides, (1, 1, 1) if stop is None else (4, 4, 3))
 

@@ -252,6 +252,8 @@ def test_what_belongs_to_surfaces_is_refused_of_tetrahedra(tmp_path: Path) -> No
         modes_of_file(file, STEEL, "m", wall=1e-3)
     with pytest.raises(WrongUse, match="leave --edge out"):
         modes_of_file(file, STEEL, "m", edge=1e-3)
+    with pytest.raises(WrongUse, match="leave --envelope out"):
+        modes_of_file(file, STEEL, "m", envelope=1e-5)
     plain = box(SIDES, (8, 2, 2))
     with pytest.raises(WrongUse, match="too many"):
         modes_of_file(written(tmp_path / "fine.vtu", plain.nodes, plain.cells), STEEL, "m", count=500)
