@@ -12,6 +12,9 @@ from harness.report.marks import key, number_marks
 from harness.report.style import SOFT, blank, styled
 
 _COLOURS = ("#1b3fae", "#c2410c", "#0f766e", "#8a2d79", "#9d6b00")
+_DASHES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
+"""Line and mark of each round of the colours, so that no two of twenty curves look alike."""
+
 _DOMINATED = 0.45
 _TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
 
@@ -68,7 +71,9 @@ def contacts_chart(curves: Sequence[tuple[str, Sequence[tuple[int, Point]]]]) ->
         figure.set_layout_engine("constrained")
         left, right = figure.subplots(1, 2)
         for number, (name, points) in enumerate(curves):
-            colour, counts = _COLOURS[number % 5], [count for count, _ in points]
+            around, own = divmod(number, len(_COLOURS))
+            colour, counts = _COLOURS[own], [count for count, _ in points]
+            dash, mark = _DASHES[around % len(_DASHES)]
             for axes, values, scale in (
                 (left, [p.error for _, p in points], 1e3),
                 (right, [p.seconds for _, p in points], 1.0),
@@ -77,7 +82,14 @@ def contacts_chart(curves: Sequence[tuple[str, Sequence[tuple[int, Point]]]]) ->
                 below = [scale * (v.value - v.low) for v in values]
                 above = [scale * (v.high - v.value) for v in values]
                 axes.errorbar(
-                    counts, middle, yerr=(below, above), marker="o", color=colour, capsize=2, label=name
+                    counts,
+                    middle,
+                    yerr=(below, above),
+                    marker=mark,
+                    ls=dash,
+                    color=colour,
+                    capsize=2,
+                    label=name,
                 )
         for axes, said in ((left, "error in mm"), (right, "seconds of CPU time")):
             axes.set_yscale("log")
