@@ -109,12 +109,12 @@ def modes_of_file(
     mesh = str(mesh)
     taken = None if mesh.startswith(BUILTIN) else _volume(Path(mesh), units, wall, edge, envelope, seconds)
     volume = taken is not None
+    highest = _highest(limit, count)
     if taken is None:
-        highest = _highest(limit, count)
         taken = _surface(mesh, units, wall, edge, envelope, material, highest, count, seconds, store)
     held = _held(taken, fixed)
-    highest = np.inf if limit is None and count is not None else _highest(limit, count)
-    solution = solve_mesh(taken.mesh, material, highest, least=count, held=held)
+    below = np.inf if limit is None and count is not None else highest
+    solution = solve_mesh(taken.mesh, material, below, least=count, held=held)
     spent = solution.modes.seconds
     return FileModes(
         solution=solution,
