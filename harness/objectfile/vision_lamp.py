@@ -113,14 +113,6 @@ def _span(face: FloatArray, low: FloatArray, cell: float, axis: int) -> tuple[in
 
 
 @compiled
-def _square(face: FloatArray, low: FloatArray, cell: float) -> tuple[int, int, int, int]:
-    """First and last row, first and last column of the cells that a face may be in."""
-    i0, i1 = _span(face, low, cell, 0)
-    j0, j1 = _span(face, low, cell, 1)
-    return i0, i1, j0, j1
-
-
-@compiled
 def _cornered(turned: FloatArray, faces: IntArray, corners: FloatArray) -> None:
     """Fill in ``corners``."""
     for m in range(len(faces)):
@@ -136,7 +128,8 @@ def _listed(corners: FloatArray, low: FloatArray, cell: float) -> int:
     """Places that the lists of all cells have together."""
     total = 0
     for m in range(len(corners)):
-        i0, i1, j0, j1 = _square(corners[m], low, cell)
+        i0, i1 = _span(corners[m], low, cell, 0)
+        j0, j1 = _span(corners[m], low, cell, 1)
         total += (i1 - i0 + 1) * (j1 - j0 + 1)
     return total
 
@@ -146,7 +139,8 @@ def _count(corners: FloatArray, low: FloatArray, cell: float, columns: int, star
     """Fill in where each cell's list begins."""
     rows = (len(starts) - 1) // columns
     for m in range(len(corners)):
-        i0, i1, j0, j1 = _square(corners[m], low, cell)
+        i0, i1 = _span(corners[m], low, cell, 0)
+        j0, j1 = _span(corners[m], low, cell, 1)
         for i in range(i0, min(i1, rows - 1) + 1):
             for j in range(j0, min(j1, columns - 1) + 1):
                 starts[i * columns + j + 1] += 1
@@ -168,7 +162,8 @@ def _list(
     at, rows = starts.copy(), (len(starts) - 1) // columns
     for m in range(len(corners)):
         top = corners[m, 0, 2] + max(0.0, max(corners[m, 1, 2], corners[m, 2, 2]))
-        i0, i1, j0, j1 = _square(corners[m], low, cell)
+        i0, i1 = _span(corners[m], low, cell, 0)
+        j0, j1 = _span(corners[m], low, cell, 1)
         for i in range(i0, min(i1, rows - 1) + 1):
             for j in range(j0, min(j1, columns - 1) + 1):
                 n = at[i * columns + j]
