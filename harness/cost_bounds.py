@@ -12,12 +12,13 @@ from harness.errors import WrongUse
 KEPT = 0.975
 """Share of runs in which a budget is to be kept: above the 95 % promised, for what was not sampled."""
 
-MET = 0.965
-"""Share of runs in which a promised error is to be met, likewise: of 60 to 84 runs all but one."""
+MET = 0.95
+"""Share of runs in which a promised error is to be met. Nothing is put on top of it as on ``KEPT``: the rank
+of a promise is rounded up, which keeps 98 % on runs left out of the curve already (``docs/decisions/0004``)."""
 
 _ENOUGH = 4
 
-_GROUPS = (0.5, 0.75, 1.0)
+_GROUPS = (0.5, 0.75, 0.9, 1.0)
 """Shares of the measured runs, the surest, that promises are made by: few, as each that is looked at
 adds a chance to be taken in by luck."""
 

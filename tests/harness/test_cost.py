@@ -193,10 +193,10 @@ def test_the_surer_are_promised_no_more_error_and_the_least_sure_nothing() -> No
 def test_too_few_runs_promise_nothing() -> None:
     assert promise(claiming(np.full(18, 1e-3)), 1.0, 0.95) == math.inf
     assert promise(claiming(np.full(19, 0.5)), 1.0, 0.95) == 0.5
-    assert promise(claiming(np.full(27, 0.5)), 1.0) == math.inf
-    assert promise(claiming(np.full(28, 0.5)), 1.0) == 0.5
-    assert promise_share(claiming(np.full(27, 1e-3)), "mug", 1.0) == 0.0
-    assert promise_share(claiming(np.full(28, 1e-3)), "mug", 1.0) == 1.0
+    assert promise(claiming(np.full(18, 0.5)), 1.0) == math.inf
+    assert promise(claiming(np.full(19, 0.5)), 1.0) == 0.5
+    assert promise_share(claiming(np.full(18, 1e-3)), "mug", 1.0) == 0.0
+    assert promise_share(claiming(np.full(19, 1e-3)), "mug", 1.0) == 1.0
 
 
 def test_a_refused_answer_promises_nothing_and_counts_as_no_claim() -> None:
