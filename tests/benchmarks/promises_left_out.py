@@ -29,7 +29,7 @@ SHARE = 0.95
 
 @dataclass(frozen=True)
 class Answer:
-    """Of a run left out: whether its error was promised and whether it was met, and the CPU s of all tries."""
+    """Of a run left out: whether its error was promised, whether it was met, and the CPU s of all tries."""
 
     promised: bool
     met: bool
