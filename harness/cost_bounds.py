@@ -13,7 +13,7 @@ KEPT = 0.975
 """Share of runs in which a budget is to be kept: above the 95 % promised, for what was not sampled."""
 
 MET = 0.95
-"""Share of runs in which a promised error is to be met. Nothing is put on top of it as on ``KEPT``: its rank is
+"""Share of runs in which a promised error is to be met. Nothing is put on top, as on ``KEPT``: its rank is
 rounded up, which keeps 98 % on runs left out of the curve already (``docs/decisions/0004-cost.md``)."""
 
 _ENOUGH = 4
