@@ -13,6 +13,7 @@ from harness.output import ANSWERS
 
 if TYPE_CHECKING:
     from harness.authoring.object_audio import AudioRequest, BuiltAudio
+    from harness.authoring.vision import Teaching
 
 _ROWS = {
     "network": "network",
@@ -53,6 +54,12 @@ def build(
             min=1,
         ),
     ] = None,
+    teacher: Annotated[
+        bool, typer.Option("--teacher", help="Of vision: make one large network too, measured beside.")
+    ] = False,
+    distill: Annotated[
+        bool, typer.Option("--distill", help="Of vision: let the networks learn from that teacher.")
+    ] = False,
     json: options.Json = False,
 ) -> int:
     """Build an object's sound, touch or look: networks, and their errors where they never looked.
@@ -66,7 +73,8 @@ def build(
     --edge are of sound alone.
 
     Vision: tiny networks of the file's own colours, as the mesh's texture says them, measured on pictures
-    whose cameras and lights were kept back. A stopped training goes on when it is called again.
+    whose cameras and lights were kept back. A stopped training goes on when it is called again. --teacher
+    and --distill need the extra "author".
 
     Try: touchstone object build builtin:bowl --material ceramic --profile smoke --out objects/bowl
     """
@@ -77,6 +85,8 @@ def build(
 
     if only not in ("audio", "touch", "vision"):
         raise WrongUse(f"--only {only} cannot be built; there is audio, touch and vision")
+    if (teacher or distill) and only != "vision":
+        raise WrongUse(f"--teacher and --distill are of vision, and --only {only} was asked for")
     thick = options.quantity("--wall", wall, LENGTH)
     wanted = PartRequest(mesh, named(material), profile, units, thick, licence, seed)
     if only == "touch":
@@ -86,7 +96,8 @@ def build(
     if only == "vision":
         from experiments.commands.object_build_vision import build_vision_part
 
-        return build_vision_part(wanted, out, threads, json)
+        taught: Teaching = "distilled" if distill else "beside" if teacher else "none"
+        return build_vision_part(wanted, out, threads, json, taught)
     from harness.authoring.object_audio import AudioRequest
 
     limit, longest = options.quantity("--up-to", up_to, FREQUENCY), options.quantity("--edge", edge, LENGTH)

@@ -12,15 +12,18 @@ from harness.output import ANSWERS
 if TYPE_CHECKING:
     from harness.authoring.object_source import PartRequest
     from harness.authoring.object_vision import BuiltVision
+    from harness.authoring.vision import Teaching
     from harness.objectfile.vision_entry import VisionEntry
 
 
-def build_vision_part(wanted: "PartRequest", out: Path, threads: int | None, json: bool) -> int:
+def build_vision_part(
+    wanted: "PartRequest", out: Path, threads: int | None, json: bool, teaching: "Teaching" = "none"
+) -> int:
     """Build, measure and say."""
     from harness.authoring.object_vision import build_vision
 
     return build_and_say(
-        lambda report: build_vision(wanted, out, report, threads), as_json, print_built, json
+        lambda report: build_vision(wanted, out, report, threads, teaching), as_json, print_built, json
     )
 
 

@@ -46,9 +46,9 @@ def save_training(
         "losses": np.array(progress.losses),
     }
     for number, parameter in enumerate(network.parameters()):
-        arrays[f"weight.{number}"] = parameter.detach().numpy()
+        arrays[f"weight.{number}"] = parameter.detach().cpu().numpy()
         for name, value in adam.state[parameter].items():
-            arrays[f"{name}.{number}"] = value.numpy()
+            arrays[f"{name}.{number}"] = value.cpu().numpy()
     part = path.with_name(f".{path.name}.part")
     with part.open("wb") as stream:
         np.savez(stream, allow_pickle=False, **arrays)

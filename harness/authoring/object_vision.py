@@ -11,8 +11,9 @@ import numpy as np
 
 from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
 from harness.authoring.training import Report
-from harness.authoring.vision import CHECKPOINT, STRICT_CHECKPOINT, AuthoredVision, author_vision
+from harness.authoring.vision import CHECKPOINT, STRICT_CHECKPOINT, AuthoredVision, Teaching, author_vision
 from harness.authoring.vision_profiles import vision_profile
+from harness.authoring.vision_teacher import require_torch
 from harness.mesh import Mesh
 from harness.objectfile.entries import Source
 from harness.objectfile.file import ObjectFile
@@ -41,7 +42,9 @@ class BuiltVision:
     seconds: Mapping[str, float]
 
 
-def build_vision(wanted: PartRequest, out: Path, report: Report, threads: int | None = None) -> BuiltVision:
+def build_vision(
+    wanted: PartRequest, out: Path, report: Report, threads: int | None = None, teaching: Teaching = "none"
+) -> BuiltVision:
     """Build an object's look, or go on with a training that was stopped.
 
     Args:
@@ -49,13 +52,16 @@ def build_vision(wanted: PartRequest, out: Path, report: Report, threads: int | 
         out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
         report: told of progress.
         threads: of a training; None for as many as the process has cores.
+        teaching: whether a teacher is made and measured beside, or for the networks to learn from.
 
     Raises:
-        WrongUse: options that cannot be.
+        WrongUse: options that cannot be, a teacher without torch among them.
         MeshRefused: a mesh that cannot stand for an object.
         DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
     """
     chosen = vision_profile(wanted.profile)
+    if teaching != "none":
+        require_torch()
     begun = time.perf_counter()
     report("reading the mesh and its colours", 0.0)
     source = source_of(wanted.mesh, wanted.licence)
@@ -63,7 +69,7 @@ def build_vision(wanted: PartRequest, out: Path, report: Report, threads: int | 
     look = appearance_of(wanted.mesh, taken.units)
     created = created_object(wanted.mesh, wanted.licence, wanted.material, taken.mesh, out, source)
     read = time.perf_counter() - begun
-    vision = author_vision(look, chosen, wanted.seed, out, report, threads)
+    vision = author_vision(look, chosen, wanted.seed, out, report, threads, teaching)
     begun = time.perf_counter()
     report("writing", 1.0)
     part = VisionPart(

@@ -1,21 +1,25 @@
 """From a look to its tiny networks, and what they are worth in pictures that they never saw.
 
 Every network is trained on its own: regressed on what leaves places of the surface, without noise and
-without a picture being drawn (``vision_lessons``). Nothing is distilled: the surface itself answers sooner
-than any network that would stand for it.
+without a picture being drawn (``vision_lessons``). Nothing is distilled unless that is asked for: the surface
+itself answers sooner than any network that would stand for it, and exactly.
 """
 
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 from harness.authoring.training import Report, train
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
-from harness.authoring.vision_lessons import draw_lamps, draw_lessons
+from harness.authoring.vision_distilled import distilled, with_lamps
+from harness.authoring.vision_lessons import LAMPS, LAMPS_OF_A_PLACE, OPAQUE, draw_lamps, draw_lessons
 from harness.authoring.vision_metrics import network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision_profiles import CellsSpec, VisionProfile
+from harness.authoring.vision_teacher import MadeTeacher, made_teacher, require_torch, teacher_file
+from harness.authoring.vision_teacher_profiles import TeacherSpec
 from harness.linear_image import LinearImage
 from harness.objectfile.vision_graph import vision_graph
 from harness.objectfile.vision_network import VisionModel
@@ -27,19 +31,16 @@ from harness.sim.direct_image import LitObject
 CHECKPOINT = ".vision_training.npz"
 """Beside ``object.json`` until the training is over."""
 
-OPAQUE = 40.0
-"""Optical thickness of a voxel as deep behind the surface as a voxel is wide."""
-
 STRICT = "strict_"
 """Before the names of errors and times of networks that are told no more than the paper's."""
 
 STRICT_CHECKPOINT = ".vision_strict_training.npz"
 
-_LAMPS = 1 << 14
-"""That are drawn from."""
+TEACHER = "teacher_"
+"""Before the names of errors and times of a teacher."""
 
-_LAMPS_OF_A_PLACE = 4
-"""Of networks that are not told visibility: a ray for each."""
+Teaching = Literal["none", "beside", "distilled"]
+"""Whether a teacher is made: to be measured, or for networks to learn from it in the surface's stead."""
 
 Settings = dict[str, str | float | int | bool | None]
 
@@ -69,6 +70,7 @@ def author_vision(
     folder: Path,
     report: Report,
     threads: int | None = None,
+    teaching: Teaching = "none",
 ) -> AuthoredVision:
     """Make and measure the networks of one object's look.
 
@@ -76,26 +78,46 @@ def author_vision(
         look: of the object.
         profile: which networks.
         seed: of all that is drawn: pictures kept back, places, lamps, first weights.
-        folder: where a checkpoint is kept; a training that was killed goes on from it, to the same bits.
+        folder: where checkpoints are kept, a teacher's beside it (``teacher_file``); a training that was
+            killed goes on from them, to the same bits.
         report: told of progress.
         threads: None for as many as the process has cores; the networks are the same for any number.
+        teaching: whether a teacher of each kind is made and measured too; it needs torch.
 
     Raises:
         MeshRefused: a surface without extent.
         OutOfDomain: nothing of the surface can be seen from outside.
         DataRefused: a checkpoint in the folder that cannot be gone on from.
+        WrongUse: a teacher where torch is not installed, or of a kind that the profile has none of.
     """
+    if teaching != "none":
+        require_torch()
     clock, lit = _Clock(), LitObject(look)
     held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, seed)
-    made = _Making(lit, held_out, seed, report, threads, clock)
-    training = made.trained(profile.networks, folder / CHECKPOINT, "")
-    model = training.finish()
     references = reference_pictures(lit, held_out, profile.samples)
-    errors = made.judged(model, references, "")
-    if profile.strict is not None:
-        strict = made.trained(profile.strict, folder / STRICT_CHECKPOINT, STRICT)
-        errors |= made.judged(strict.finish(), references, STRICT)
-    return AuthoredVision(model, errors, _settings(profile.networks, training), clock.seconds)
+    clock.lap("references")
+    made = _Making(lit, held_out, seed, report, threads, clock)
+    errors: dict[str, float] = {}
+    settings: Settings = {"teaching": teaching}
+    models: list[VisionModel] = []
+    for spec, name, word in _asked(profile):
+        teacher = None
+        if teaching != "none":
+            wanted = profile.teacher(spec.size.kind)
+            teacher = made.teacher(wanted, teacher_file(folder, wanted.kind), word)
+            errors |= made.judged_teacher(teacher, references, word)
+            settings |= {f"{word}{TEACHER}{each}": value for each, value in teacher.settings.items()}
+        training = made.trained(spec, folder / name, word, teacher if teaching == "distilled" else None)
+        models.append(training.finish())
+        errors |= made.judged(models[-1], references, word)
+        settings |= {} if word else _settings(spec, training)
+    return AuthoredVision(models[0], errors, settings, clock.seconds)
+
+
+def _asked(profile: VisionProfile) -> list[tuple[CellsSpec, str, str]]:
+    """Networks, their checkpoints, and the words before their errors."""
+    strict = [] if profile.strict is None else [(profile.strict, STRICT_CHECKPOINT, STRICT)]
+    return [(profile.networks, CHECKPOINT, ""), *strict]
 
 
 def networks_alone(
@@ -132,14 +154,35 @@ class _Making:
     threads: int | None
     clock: "_Clock"
 
-    def trained(self, spec: CellsSpec, checkpoint: Path, word: str) -> CellTraining:
+    def teacher(self, spec: TeacherSpec, checkpoint: Path, word: str) -> MadeTeacher:
+        made = made_teacher(
+            *(self.lit, self.held_out, spec, self.seed, checkpoint, self.report, self.threads)
+        )
+        self.clock.lap(f"{word}{TEACHER}training")
+        return made
+
+    def judged_teacher(
+        self, teacher: MadeTeacher, references: list[LinearImage], word: str
+    ) -> dict[str, float]:
+        self.report("measuring the teacher", 0.0)
+        found = teacher.judged(self.lit, self.held_out, references, self.threads)
+        self.clock.lap(f"{word}{TEACHER}measure")
+        return {f"{word}{TEACHER}{name}": value for name, value in found.items()}
+
+    def trained(
+        self, spec: CellsSpec, checkpoint: Path, word: str, teacher: MadeTeacher | None = None
+    ) -> CellTraining:
         self.report(f"drawing places {word}".rstrip("_ "), 0.0)
         lattice, told = lattice_of(self.lit.appearance.mesh, spec.cells), spec.size.kind == "osf-v"
         shell = surface_shell(self.lit.appearance.mesh, lattice)
         lessons = draw_lessons(
-            *(self.lit, spec.places, shell.voxel, self.seed, self.held_out), 0 if told else _LAMPS_OF_A_PLACE
+            *(self.lit, spec.places, shell.voxel, self.seed, self.held_out), 0 if told else LAMPS_OF_A_PLACE
         )
-        lamps = draw_lamps(_LAMPS if told else 0, self.seed, self.held_out)
+        lamps = draw_lamps(LAMPS if told else 0, self.seed, self.held_out)
+        if teacher is not None:
+            if told:
+                lessons = with_lamps(lessons, lamps, LAMPS_OF_A_PLACE, spec.hidden, self.seed)
+            lessons, lamps = distilled(teacher.ask, lessons), lamps[:0]
         grid, scale = grid_of(shell, lattice), OPAQUE / shell.voxel
         training = CellTraining(spec, grid, lessons, lamps, scale, self.seed, self.threads)
         self.clock.lap(f"{word}places")

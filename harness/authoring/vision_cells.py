@@ -167,9 +167,14 @@ class CellTraining:
         size, lessons = self._spec.size, self._lessons
         if not lessons.lamps.shape[1]:
             return np.empty((len(at), 0), np.float32)
-        told, ones = np.empty((len(at), 2 * size.direction), np.float32), np.ones(size.turns, np.float32)
-        encode(lessons.views[at], ones, 0, told)
-        encode(lessons.lamps[at], ones, size.direction, told)
+        told = np.empty((len(at), layer_shapes(size).told[0]), np.float32)
+        ones, first = np.ones(size.turns, np.float32), 0
+        if size.kind == "osf":
+            encode(lessons.views[at], ones, first, told)
+            first = size.direction
+        encode(lessons.lamps[at], ones, first, told)
+        if size.extras:
+            told[:, first + size.direction :] = np.hstack([lessons.seen[at], lessons.normals[at]])
         return told
 
 

@@ -23,6 +23,15 @@ from harness.sim.lambert import Places, cosines, places_seen, radiance
 AHEAD = 0.25
 """Voxels before the surface at which the density begins, along the normal: what networks err by."""
 
+OPAQUE = 40.0
+"""Optical thickness of a voxel as deep behind the surface as a voxel is wide."""
+
+LAMPS = 1 << 14
+"""That are drawn from, for networks that are told visibility."""
+
+LAMPS_OF_A_PLACE = 4
+"""Of networks that are not: a ray for each."""
+
 _CHUNK = 1 << 16
 
 _NEAR, _BEHIND, _BEFORE = 0.75, 0.5, 4.0
@@ -44,6 +53,7 @@ class Lessons:
         weight: ``(n,)`` float32, of the colour; 0 where no ray takes it from.
         views: ``(n, 3)`` float32 unit, from the camera.
         lamps: ``(n, 3)`` float32 unit, towards a lamp of its own; ``(n, 0)`` without.
+        seen: ``(n, 1)`` float32, 1 where that lamp is said to be seen; ``(n, 0)`` where nothing is said.
     """
 
     points: FloatArray
@@ -53,6 +63,7 @@ class Lessons:
     weight: AnyArray
     views: AnyArray
     lamps: AnyArray
+    seen: AnyArray
 
     def __len__(self) -> int:
         return len(self.points)
@@ -126,7 +137,7 @@ def _chunk(
         np.clip(AHEAD + along * slope, -1.0, 1.0).astype(np.float32),
         weight.astype(np.float32),
         views[seen].astype(np.float32),
-        np.empty((len(seen), 0), np.float32),
+        *(np.empty((len(seen), 0), np.float32) for _ in range(2)),
     )
     return _lit(lit, places, lessons, random, held_out, lamps) if lamps else lessons
 

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from harness.authoring.vision_teacher_profiles import SMOKE_TEACHERS, STANDARD_TEACHERS, TeacherSpec
 from harness.errors import WrongUse
-from harness.objectfile.vision_network import CELLS, NetworkSize
+from harness.objectfile.vision_network import CELLS, Kind, NetworkSize
 from harness.toml_file import nearest
 
 
@@ -60,6 +61,7 @@ class VisionProfile:
         pictures: kept back, by which they are judged.
         side: pixels of those pictures.
         samples: a side of a pixel of the reference.
+        teachers: large networks that are made beside where that is asked for, one of a kind.
     """
 
     networks: CellsSpec
@@ -67,6 +69,7 @@ class VisionProfile:
     strict: CellsSpec | None = None
     side: int = 256
     samples: int = 4
+    teachers: tuple[TeacherSpec, ...] = SMOKE_TEACHERS
 
     def __post_init__(self) -> None:
         if self.strict is not None and self.strict.size.kind != "osf":
@@ -79,6 +82,17 @@ class VisionProfile:
                 "give 1 or more of each"
             )
 
+    def teacher(self, kind: Kind) -> TeacherSpec:
+        """The teacher of a kind.
+
+        Raises:
+            WrongUse: there is none.
+        """
+        for spec in self.teachers:
+            if spec.kind == kind:
+                return spec
+        raise WrongUse(f"this profile of vision has no teacher of kind {kind!r}; take another profile")
+
 
 _COMPACT = NetworkSize(width=32, octaves=6, turns=3, kind="osf-v")
 
@@ -88,9 +102,10 @@ VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
         CellsSpec(_COMPACT, places=4_000_000, steps=20_000, batch=128),
         pictures=12,
         strict=CellsSpec(replace(_COMPACT, kind="osf"), places=8_000_000),
+        teachers=STANDARD_TEACHERS,
     ),
 })  # fmt: skip
-"""None of them needs torch."""
+"""None of them needs torch, teachers aside."""
 
 
 def vision_profile(name: str) -> VisionProfile:

@@ -1,6 +1,7 @@
 """``touchstone object build --only vision`` on a small block: what it writes, says, keeps and refuses."""
 
 import json
+import sys
 from pathlib import Path
 from types import MappingProxyType
 
@@ -11,7 +12,7 @@ import trimesh
 from harness.authoring import object_vision, vision_profiles
 from harness.authoring.object_vision import drawn_surface, without_seams
 from harness.authoring.training import Report
-from harness.authoring.vision import CHECKPOINT, AuthoredVision, author_vision
+from harness.authoring.vision import CHECKPOINT, AuthoredVision, Teaching, author_vision
 from harness.authoring.vision_profiles import CellsSpec, VisionProfile
 from harness.cli import invoke
 from harness.mesh import Mesh
@@ -84,7 +85,13 @@ def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
     begun: list[Path] = []
 
     def killed(
-        look: Appearance, profile: VisionProfile, seed: int, folder: Path, report: Report, threads: int | None
+        look: Appearance,
+        profile: VisionProfile,
+        seed: int,
+        folder: Path,
+        report: Report,
+        threads: int | None,
+        teaching: Teaching,
     ) -> AuthoredVision:
         begun.append(folder)
         if len(begun) == 1:
@@ -92,7 +99,7 @@ def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
             raise KeyboardInterrupt
         assert (folder / CHECKPOINT).read_bytes() == b"half of it"
         (folder / CHECKPOINT).unlink()
-        return author_vision(look, profile, seed, folder, report, threads)
+        return author_vision(look, profile, seed, folder, report, threads, teaching)
 
     monkeypatch.setattr(object_vision, "author_vision", killed)
     assert built(block) == 130
@@ -113,6 +120,7 @@ def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
         (("--material", "cheese"), "no material"),
         (("--wall", "3"), "--wall"),
         (("--units", "ft"), "unknown unit 'ft'"),
+        (("--only", "touch", "--teacher"), "--teacher and --distill are of vision"),
     ],
 )
 def test_what_cannot_be_built_is_wrong_use(
@@ -120,6 +128,16 @@ def test_what_cannot_be_built_is_wrong_use(
 ) -> None:
     assert built(block, *more) == 2
     assert said in capsys.readouterr().err
+    assert not (block.parent / "object").exists()
+
+
+def test_without_torch_no_teacher_is_begun(
+    block: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    for option in ("--teacher", "--distill"):
+        assert built(block, option) == 2
+        assert "torch, which is not installed; install the extra 'author'" in capsys.readouterr().err
     assert not (block.parent / "object").exists()
 
 

@@ -8,7 +8,7 @@ import pytest
 from seen_shapes import ball
 
 from harness.arrays import AnyArray
-from harness.authoring.vision import CHECKPOINT, OPAQUE, STRICT_CHECKPOINT, author_vision
+from harness.authoring.vision import CHECKPOINT, STRICT_CHECKPOINT, author_vision
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
 from harness.authoring.vision_kernels import Lesson, _back, _forth, _wrong, batch_of, encode
@@ -20,7 +20,7 @@ from harness.authoring.vision_layers import (
     parameter_count,
     weights_of,
 )
-from harness.authoring.vision_lessons import AHEAD, Lessons, draw_lamps, draw_lessons
+from harness.authoring.vision_lessons import AHEAD, OPAQUE, Lessons, draw_lamps, draw_lessons
 from harness.authoring.vision_metrics import picture_errors
 from harness.authoring.vision_profiles import CellsSpec, VisionProfile, vision_profile
 from harness.errors import DataRefused, OutOfDomain, WrongUse
@@ -268,7 +268,10 @@ def test_a_look_becomes_networks_that_show_it(lit: LitObject, tmp_path: Path) ->
     assert (tmp_path / STRICT_CHECKPOINT).exists()
     assert {"drawing places", "measuring"} < set(said)
     stages = ("places", "networks", "measure")
-    assert set(made.seconds) == {f"{word}{stage}" for word in ("", "strict_") for stage in stages}
+    assert set(made.seconds) == {
+        "references",
+        *(f"{word}{stage}" for word in ("", "strict_") for stage in stages),
+    }
 
 
 def test_what_cannot_be_trained_says_so(lit: LitObject, tmp_path: Path) -> None:

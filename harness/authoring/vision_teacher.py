@@ -1,0 +1,145 @@
+"""A teacher: one network of an object's whole look, taught by the same answers as the tiny ones.
+
+It is made to be measured beside them, along the same rays and samples, on the same pictures kept back
+(``docs/decisions/0007-networks-of-a-look-have-no-teacher.md``). Networks are distilled from it where that is
+asked for.
+"""
+
+import importlib.util
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.authoring.training import Report, train
+from harness.authoring.vision_data import HeldOut
+from harness.authoring.vision_lessons import LAMPS, LAMPS_OF_A_PLACE, OPAQUE, draw_lamps, draw_lessons
+from harness.authoring.vision_metrics import network_pictures, picture_errors
+from harness.authoring.vision_teacher_pictures import Answers, TeacherRenderer
+from harness.authoring.vision_teacher_profiles import TeacherSpec
+from harness.cores import own_cores
+from harness.errors import WrongUse
+from harness.linear_image import LinearImage
+from harness.objectfile.vision_network import Kind, VisionGrid
+from harness.objectfile.vision_settings import RenderSettings
+from harness.objectfile.vision_shell import grid_of, lattice_of, surface_shell
+from harness.sim.direct_image import LitObject
+
+_WAYS = {
+    "": RenderSettings(),
+    "two_rays_": RenderSettings(rays=2),
+    "one_sample_": RenderSettings(level="one_sample"),
+}
+"""Of drawing its pictures, by what its errors' names begin with."""
+
+
+@dataclass(frozen=True, eq=False)
+class MadeTeacher:
+    """A network of an object's whole look.
+
+    Attributes:
+        spec: of it.
+        ask: what it answers.
+        grid: cells of the lattice that its renderer walks.
+        voxel: m, of the shell.
+        last_loss: root mean square of colours' errors, as roots of linear light.
+        seconds: of the processor that places and training took, in this run.
+    """
+
+    spec: TeacherSpec
+    ask: Answers
+    grid: VisionGrid
+    voxel: float
+    last_loss: float
+    seconds: Mapping[str, float]
+
+    def judged(
+        self, lit: LitObject, held_out: HeldOut, references: list[LinearImage], threads: int | None = None
+    ) -> dict[str, float]:
+        """Errors of its pictures, as of the tiny networks; and by two rays along a pixel, and by one sample.
+
+        Args:
+            lit: the object.
+            held_out: cameras and lights that nothing was learned from.
+            references: exact pictures of them.
+            threads: None for as many as the process has cores.
+        """
+        mesh, scale = lit.appearance.mesh, OPAQUE / self.voxel
+        renderer = TeacherRenderer(self.ask, mesh, self.grid, self.spec.kind, scale, threads)
+        errors: dict[str, float] = {}
+        for word, settings in _WAYS.items():
+            found = picture_errors(references, network_pictures(renderer, held_out, settings))
+            errors |= {f"{word}{name}": value for name, value in found.items()}
+        return errors
+
+    @property
+    def settings(self) -> dict[str, str | float | int | bool | None]:
+        """How it was made."""
+        return asdict(self.spec) | {"last_loss": self.last_loss}
+
+
+def teacher_file(folder: Path, kind: Kind) -> Path:
+    """Beside an object's folder, whose files are all of the object: the checkpoint, which is the teacher."""
+    return folder.with_name(f"{folder.name}.teacher-{kind}.npz")
+
+
+def require_torch() -> None:
+    """Refuse where a teacher cannot be trained.
+
+    Raises:
+        WrongUse: torch is not installed.
+    """
+    if importlib.util.find_spec("torch") is None:
+        raise WrongUse(
+            "a teacher is trained by torch, which is not installed; install the extra 'author', or leave "
+            "--teacher and --distill out: the networks of an object need neither"
+        )
+
+
+def made_teacher(
+    lit: LitObject,
+    held_out: HeldOut,
+    spec: TeacherSpec,
+    seed: int,
+    checkpoint: Path,
+    report: Report,
+    threads: int | None = None,
+) -> MadeTeacher:
+    """Train a teacher, or go on with one that was stopped; on one thread to the same bits.
+
+    Args:
+        lit: the object.
+        held_out: what nothing is learned from.
+        spec: of the network.
+        seed: of all that is drawn.
+        checkpoint: file that a killed training goes on from; it is left there.
+        report: told of progress.
+        threads: of torch, where there is no GPU; None for as many as the process has cores.
+
+    Raises:
+        WrongUse: torch is not installed.
+        DataRefused: a checkpoint that cannot be gone on from.
+    """
+    require_torch()
+    # Heavy, and only here: the tiny networks are made without it.
+    import torch
+
+    from harness.authoring.vision_teacher_training import TeacherTraining
+
+    torch.set_num_threads(threads or own_cores())
+    report("drawing places of a teacher", 0.0)
+    begun = time.process_time()
+    mesh, told = lit.appearance.mesh, spec.kind == "osf-v"
+    lattice = lattice_of(mesh)
+    shell = surface_shell(mesh, lattice)
+    lessons = draw_lessons(lit, spec.places, shell.voxel, seed, held_out, 0 if told else LAMPS_OF_A_PLACE)
+    lamps = draw_lamps(LAMPS if told else 0, seed, held_out)
+    drawn = time.process_time()
+    extent = lattice.cell * max(lattice.sides)
+    training = TeacherTraining(spec, np.array(lattice.low), extent, lessons, lamps, seed)
+    train(training, training.epochs, checkpoint, report)
+    seconds = {"places": drawn - begun, "training": time.process_time() - drawn}
+    grid = grid_of(shell, lattice)
+    return MadeTeacher(spec, training.ask, grid, shell.voxel, training.losses[-1], seconds)

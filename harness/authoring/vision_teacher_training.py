@@ -1,0 +1,201 @@
+"""A teacher's training: from the surface's own answers, resumed exactly."""
+
+from dataclasses import astuple
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from harness.arrays import AnyArray, FloatArray
+from harness.authoring.adam_state import Progress, load_training, save_training
+from harness.authoring.vision_lessons import Lessons
+from harness.authoring.vision_teacher_network import Teacher
+from harness.authoring.vision_teacher_profiles import TeacherSpec
+from harness.objectfile.vision_network import EXTRAS
+from harness.store import digest
+
+VERSION = 1
+"""Raised with every change of what training computes, so that no old checkpoint is gone on from."""
+
+_FAINT = 1e-3
+"""Linear light added under the root."""
+
+_AT_ONCE = 1 << 15
+"""Places that are asked together."""
+
+_WARM = 0.02
+"""Share of the steps over which the rate rises."""
+
+
+class TeacherTraining:
+    """A training that can stop after any epoch and go on from its checkpoint, bit for bit on one thread.
+
+    Nothing random has a state: places and lamps of an epoch are drawn from the seed and its number.
+
+    Args:
+        spec: of the network.
+        low: ``(3,)`` m, least corner of the lattice.
+        extent: m, its longest side.
+        lessons: what it learns from.
+        lamps: ``(m, 3)`` float32, drawn anew at every step for a teacher that is told visibility and
+            normal; ``(0, 3)`` where each lesson has a lamp of its own.
+        seed: of first weights, and of what is drawn.
+        device: of torch; None for a GPU where there is one.
+    """
+
+    def __init__(
+        self,
+        spec: TeacherSpec,
+        low: FloatArray,
+        extent: float,
+        lessons: Lessons,
+        lamps: AnyArray,
+        seed: int,
+        device: str | None = None,
+    ) -> None:
+        self._spec, self._seed, self._low, self._extent = spec, seed, low, extent
+        self.device = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
+        self._lessons = _Tensors(lessons, self._local(lessons.points), lamps, self.device)
+        self._network = Teacher(spec, seed).to(self.device)
+        tables = list(self._network.features.parameters())
+        layers = [each for name, each in self._network.named_parameters() if not name.startswith("features")]
+        self._rates = (spec.table_rate, spec.rate)
+        self._adam = torch.optim.Adam(
+            [{"params": tables}, {"params": layers}], betas=(0.9, 0.99), eps=1e-10, fused=True
+        )
+        self.epoch = 0
+        self.losses: list[float] = []
+        self._identity = digest(
+            [
+                *("vision teacher", VERSION, list(astuple(spec)), seed, low, extent, lessons.points),
+                *(lessons.normals, lessons.colours, lessons.lamps, lamps),
+            ]
+        )
+
+    @property
+    def epochs(self) -> int:
+        """That it takes."""
+        return self._spec.epochs
+
+    @property
+    def done(self) -> bool:
+        """Whether all epochs were trained."""
+        return self.epoch >= self._spec.epochs
+
+    def step_epoch(self) -> float:
+        """Train one epoch; root mean square of colours' errors on the way, as roots of linear light."""
+        spec, random = self._spec, np.random.default_rng([self._seed, 79, self.epoch])
+        first = self.epoch * spec.steps // spec.epochs
+        last = (self.epoch + 1) * spec.steps // spec.epochs
+        total = torch.zeros((), device=self.device)
+        for step in range(first, last):
+            self._set_rate(step / spec.steps)
+            total += self._step(random)
+        self.epoch += 1
+        self.losses.append(float((total / (last - first)).sqrt()))
+        return self.losses[-1]
+
+    def ask(
+        self, points: FloatArray, views: AnyArray, lights: AnyArray, extras: AnyArray
+    ) -> tuple[AnyArray, AnyArray]:
+        """What it answers: ``(n,)`` density, -1 to 1 as ``Lessons.depth``, and ``(n, 3)`` linear colour.
+
+        Args:
+            points: ``(n, 3)`` m, object frame.
+            views: ``(n, 3)`` unit, from the camera.
+            lights: ``(n, 3)`` unit, towards the lamp.
+            extras: ``(n, 4)`` visibility and normal; ``(n, 0)`` of a kind that is not told.
+        """
+        density, colour = np.empty(len(points), np.float32), np.empty((len(points), 3), np.float32)
+        places = self._local(points)
+        with torch.no_grad():
+            for begin in range(0, len(points), _AT_ONCE):
+                at = slice(begin, begin + _AT_ONCE)
+                told = [_tensor(each[at], self.device) for each in (places, views, lights, extras)]
+                raw, logits = self._network(*told)
+                density[at], colour[at] = raw.cpu().numpy(), torch.sigmoid(logits).cpu().numpy()
+        return density, colour
+
+    def save(self, path: Path) -> None:
+        """Write a checkpoint (``adam_state.save_training``)."""
+        save_training(path, self._identity, Progress(self.epoch, self.losses), self._network, self._adam)
+
+    def load(self, path: Path) -> None:
+        """Go on from a checkpoint.
+
+        Raises:
+            DataRefused: it cannot be read, or is of another network, object, data or seed.
+        """
+        progress = load_training(path, self._identity, self._network, self._adam)
+        self.epoch, self.losses = progress.epoch, progress.losses
+
+    def _local(self, points: FloatArray) -> AnyArray:
+        return np.asarray((points - self._low) / self._extent, np.float32)
+
+    def _set_rate(self, over: float) -> None:
+        now = 0.5 * (1.0 + np.cos(np.pi * over)) * min(1.0, (over + 1e-3) / _WARM)
+        for group, rate in zip(self._adam.param_groups, self._rates, strict=True):
+            group["lr"] = float(rate * now)
+
+    def _step(self, random: np.random.Generator) -> Tensor:
+        """One step; the mean square of the colours' errors before it."""
+        spec = self._spec
+        drawn = self._lessons.drawn(random, spec)
+        raw, logits = self._network(drawn.places, drawn.views, drawn.lights, drawn.extras)
+        root, wanted = (torch.sqrt(light + _FAINT) for light in (torch.sigmoid(logits), drawn.wanted))
+        of_colour = (drawn.weight[:, None] * (root - wanted) ** 2).mean()
+        loss = of_colour + spec.opacity * _depth_error(raw, drawn.depth).mean()
+        self._adam.zero_grad()
+        torch.autograd.backward(loss)
+        self._adam.step()
+        return of_colour.detach()
+
+
+class _Drawn:
+    """A batch: what is told, and what is to be answered."""
+
+    def __init__(self, *tensors: Tensor) -> None:
+        self.places, self.views, self.lights, self.extras, self.wanted, self.weight, self.depth = tensors
+
+
+class _Tensors:
+    """Lessons on a device."""
+
+    def __init__(self, lessons: Lessons, places: AnyArray, lamps: AnyArray, device: torch.device) -> None:
+        self._device, self._count = device, len(lessons)
+        self._places, self._lamps = _tensor(places, device), _tensor(lamps, device)
+        names = ("views", "normals", "colours", "weight", "depth", "lamps")
+        self._of = {name: _tensor(getattr(lessons, name), device) for name in names}
+
+    def drawn(self, random: np.random.Generator, spec: TeacherSpec) -> _Drawn:
+        at = _tensor(random.integers(self._count, size=spec.batch), self._device)
+        views, normals, wanted, weight, depth, lights = (each[at] for each in self._of.values())
+        extras = normals[:, :0]
+        if len(self._lamps):
+            lights, seen, cosine = self._lit_anew(random, spec, normals)
+            extras = torch.cat([seen[:, None], normals], dim=1) if EXTRAS[spec.kind] else extras
+            wanted = wanted * (seen * cosine)[:, None]
+        return _Drawn(self._places[at], views, lights, extras, wanted, weight, depth)
+
+    def _lit_anew(
+        self, random: np.random.Generator, spec: TeacherSpec, normals: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Lamps on the side of places, or hidden ones from anywhere; whether seen; cosines."""
+        which = _tensor(random.integers(len(self._lamps), size=spec.batch), self._device)
+        seen = _tensor(random.random(spec.batch) >= spec.hidden, self._device)
+        lamps = self._lamps[which]
+        cosine = (lamps * normals).sum(dim=1)
+        turned = torch.where(seen & (cosine < 0.0), -1.0, 1.0)
+        return turned[:, None] * lamps, seen.float(), (turned * cosine).clamp(min=0.0)
+
+
+def _depth_error(raw: Tensor, depth: Tensor) -> Tensor:
+    """Square of it; deeper than opaque and emptier than empty are no errors."""
+    error = raw - depth
+    done = ((depth >= 1.0) & (error > 0.0)) | ((depth <= -1.0) & (error < 0.0))
+    return torch.where(done, 0.0, error) ** 2
+
+
+def _tensor(array: AnyArray, device: torch.device) -> Tensor:
+    return torch.from_numpy(np.ascontiguousarray(array)).to(device)
