@@ -1,4 +1,4 @@
-"""What a next run will cost at most, and how far its answer may be off, from runs measured before."""
+"""What a next run will cost at most, and how far off it is likely to be, from runs measured before."""
 
 import numpy as np
 from scipy import stats
@@ -12,15 +12,7 @@ from harness.errors import WrongUse
 KEPT = 0.975
 """Share of runs in which a budget is to be kept: above the 95 % promised, for what was not sampled."""
 
-MET = 0.95
-"""Share of runs in which a promised error is to be met. Nothing is put on top, as on ``KEPT``: its rank is
-rounded up, which keeps 98 % on runs left out of the curve already (``docs/decisions/0004-cost.md``)."""
-
 _ENOUGH = 4
-
-_GROUPS = (0.5, 0.75, 0.9, 1.0)
-"""Shares of the measured runs, the surest, that promises are made by: few, as each that is looked at
-adds a chance to be taken in by luck."""
 
 _LENT = 4.0
 """Degrees of freedom that the usual spread counts for, beside those of an object's own runs."""
@@ -121,55 +113,3 @@ def _log_variance(logs: FloatArray) -> float:
     """Of the variance that few values were drawn with; the logarithm of theirs is lower on average."""
     half = 0.5 * (len(logs) - 1)
     return float(np.log(_variance(logs)) + np.log(half) - digamma(half))
-
-
-def promises(point: Point, share: float = MET) -> tuple[FloatArray, FloatArray]:
-    """What a setting can promise by how sure its answer says it is.
-
-    The ``n`` surest of the measured runs, by the radius they claimed, are exchangeable with a new run
-    that claims no more than the least sure of them: its error stays, with probability ``share``, below
-    the ``ceil((n + 1) share)``-th smallest of theirs (Vovk et al., Algorithmic Learning in a Random
-    World, 2005, section 2.2; as a choice of whom to answer: Geifman and El-Yaniv, Selective
-    classification for deep neural networks, 2017). Each group promises something; the least of what
-    the groups a run belongs to promise is taken. Nothing is assumed of the errors' distribution, and
-    answers that are wrong and sure of themselves are counted where they do harm: among the sure.
-
-    Args:
-        point: the setting; runs whose answer was refused claim nothing and promise nothing.
-        share: of runs in which a promise is to be met.
-
-    Returns:
-        ``(k,)`` m, ascending: claimed radii of groups large enough for any promise; ``(k,)`` m: the
-        error promised to an answer that claims no more.
-    """
-    pairs = sorted((s.radius, s.error) for s in point.samples if s.radius is not None)
-    radii, errors = np.array([pair[0] for pair in pairs]), [pair[1] for pair in pairs]
-    limits, promised = [], []
-    for part in _GROUPS if pairs else ():
-        limit = radii[int(np.ceil(part * len(pairs))) - 1]
-        count = int(np.searchsorted(radii, limit, side="right"))
-        rank = int(np.ceil((count + 1) * share - 1e-9))
-        if rank <= count:
-            limits.append(limit)
-            promised.append(sorted(errors[:count])[rank - 1])
-    least = np.minimum.accumulate(np.array(promised)[::-1])[::-1] if promised else np.zeros(0)
-    return np.array(limits), least
-
-
-def promise(point: Point, radius: float, share: float = MET) -> float:
-    """Metres within which the truth lies, in ``share`` of runs, given the radius that the answer claims.
-
-    Returns:
-        Infinity where too few runs were measured, or none that was so unsure.
-    """
-    limits, promised = promises(point, share)
-    group = int(np.searchsorted(limits, radius))
-    return float(promised[group]) if group < len(limits) else float("inf")
-
-
-def promise_share(point: Point, name: str | None, error: float) -> float:
-    """Share of runs like these in which the answer can promise an ``error`` in m."""
-    limits, promised = promises(point)
-    kept = limits[promised <= error]
-    reach = float(kept.max()) if len(kept) else -1.0
-    return float(np.mean([s.radius is not None and s.radius <= reach for s in like(point, name)]))

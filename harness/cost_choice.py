@@ -10,7 +10,8 @@ import numpy as np
 
 from harness.accuracy import Level
 from harness.cost import Point, best_within, front
-from harness.cost_bounds import like, likely_error, most_seconds, promise, promise_share
+from harness.cost_bounds import like, likely_error, most_seconds
+from harness.cost_promise import promise_share, typical_promise
 from harness.errors import WrongUse
 
 
@@ -73,7 +74,7 @@ def for_error(points: Sequence[Point], error: float, name: str | None) -> tuple[
     points = front(points)
     shares = {point.name: promise_share(point, name, error) for point in points}
     # Where none can promise it, the one that promises most; it is said that it does not.
-    last = min(points, key=lambda p: (-shares[p.name], _typical_promise(p, name), _price(p, name)))
+    last = min(points, key=lambda p: (-shares[p.name], typical_promise(p, name), _price(p, name)))
     price_of_last = _price(last, name)
 
     def expected(point: Point) -> float:
@@ -113,8 +114,3 @@ def nearest_condition(
 
 def _price(point: Point, name: str | None) -> float:
     return float(np.exp(np.mean([np.log(s.shared + s.cpu) for s in like(point, name)])))
-
-
-def _typical_promise(point: Point, name: str | None) -> float:
-    radii = [sample.radius for sample in like(point, name) if sample.radius is not None]
-    return promise(point, float(np.median(radii))) if radii else float("inf")

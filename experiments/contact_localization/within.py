@@ -32,8 +32,9 @@ from experiments.contact_localization.solving import (
     solve,
 )
 from harness.cost import Point
-from harness.cost_bounds import most_seconds, promise
+from harness.cost_bounds import most_seconds
 from harness.cost_choice import for_budget, for_error
+from harness.cost_promise import promise
 from harness.errors import WrongUse
 from harness.recording import Recording
 from harness.run_folder import RunFiles
@@ -159,7 +160,7 @@ def ask(run: Run, front: Front, target: Target, loaded: bool = False) -> Asked:
         assert target.error is not None
         point, solved, predicted, tried = _to_error(run, front, target.error, candidates)
     taken = time.process_time() - cpu, time.perf_counter() - wall
-    promised = _promise(front, point, solved)
+    promised = _promise(run, front, point, solved)
     kept = taken[1] <= target.seconds if target.seconds is not None else promised <= (target.error or 0.0)
     kept = kept and solved.estimate is not None
     return Asked(point, solved, taken[1], taken[0], predicted, promised, kept, tried)
@@ -236,7 +237,7 @@ def _to_error(
             spent = (spent or 0.0) + readings.shared[1]
         spent = most_seconds(point, run.object, front.scale, spent)
         solved = solve(readings.under(run.models.at(point.levels)), point.levels)
-        if _promise(front, point, solved) <= error:
+        if _promise(run, front, point, solved) <= error:
             break
     assert spent is not None
     return point, solved, spent, tuple(tried)
@@ -253,7 +254,7 @@ def _speed(readings: Readings, front: Front) -> float:
     return max(1.0, now) if front.trusted else now
 
 
-def _promise(front: Front, point: Point, solved: Solved) -> float:
+def _promise(run: Run, front: Front, point: Point, solved: Solved) -> float:
     if solved.estimate is None or not front.vouches:
         return float("inf")
-    return promise(point, solved.estimate.credible90)
+    return promise(point, solved.estimate.credible90, run.object)

@@ -8,7 +8,8 @@ import numpy as np
 
 from harness.accuracy import Level
 from harness.cost import Curve, Point, front
-from harness.cost_bounds import MET, predicted_at_most, promises
+from harness.cost_bounds import predicted_at_most
+from harness.cost_promise import MET, doubts, promises
 from harness.report.cost_chart import contacts_chart, cost_chart
 from harness.report.figures import Album, Picture
 from harness.report.template import rendered
@@ -118,11 +119,11 @@ def _cells(point: Point) -> tuple[str, ...]:
 
 def _promised(point: Point, share: float) -> str:
     """The error promised to the run that is as sure as this share of the measured ones."""
-    radii = sorted(s.radius for s in point.samples if s.radius is not None)
+    sure = np.sort(doubts(point, point.samples))
     limits, promised = promises(point, MET)
     if not len(limits):
         return "too few runs"
-    at = radii[max(1, int(np.ceil(share * len(radii)))) - 1]
+    at = sure[max(1, int(np.ceil(share * len(sure)))) - 1]
     return f"{1e3 * float(promised[np.searchsorted(limits, at)]):.1f} mm"
 
 

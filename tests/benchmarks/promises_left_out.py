@@ -18,9 +18,9 @@ import numpy as np
 
 from experiments.contact_localization.front import front_of
 from harness.cost import Point, Sample
-from harness.cost_bounds import promise
 from harness.cost_choice import for_error
 from harness.cost_file import load
+from harness.cost_promise import promise
 
 SHIPPED = Path(__file__).parents[2] / "experiments" / "contact_localization" / "data" / "cost.json"
 ERRORS = (2e-3, 3e-3, 5e-3, 8e-3, 12e-3, 20e-3)
@@ -69,7 +69,7 @@ def tried(candidates: Sequence[Point], own: dict[str, Sample], error: float) -> 
     for point in candidates:
         sample = own[point.name]
         seconds, shared = seconds + sample.cpu, max(shared, sample.shared)
-        is_promised = sample.radius is not None and promise(point, sample.radius) <= error
+        is_promised = sample.radius is not None and promise(point, sample.radius, sample.object) <= error
         if is_promised:
             break
     return Answer(is_promised, sample.error <= error, seconds + shared)

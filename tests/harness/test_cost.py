@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from harness.accuracy import Level
 from harness.code_version import closure, content_hash
 from harness.cost import Curve, Point, Sample, best_within, cheapest_within, front
-from harness.cost_bounds import KEPT, likely_error, most_seconds, predicted_at_most, promise, promise_share
+from harness.cost_bounds import KEPT, likely_error, most_seconds, predicted_at_most
 from harness.cost_choice import for_budget, for_error, nearest_condition
 from harness.cost_file import curve_path, from_json, load, save, to_json
+from harness.cost_promise import doubt, doubts, promise, promise_share
 from harness.cost_provenance import machine, stale
 from harness.errors import DataRefused, WrongUse
 
@@ -160,7 +161,7 @@ def test_a_promise_is_met_as_often_as_it_says_whatever_the_tail() -> None:
     met = []
     for _ in range(1500):
         errors_ = np.abs(rng.standard_cauchy(40)) + 1e-6
-        met.append(errors_[-1] <= promise(claiming(errors_[:-1]), 1.0, 0.95))
+        met.append(errors_[-1] <= promise(claiming(errors_[:-1]), 1.0, "mug", 0.95))
     assert np.mean(met) >= 0.95 - 0.02
     assert np.mean(met) <= 1.0 - 0.02
 
@@ -175,7 +176,7 @@ def test_a_promise_made_only_to_the_sure_is_met_by_them_though_some_are_wrong_an
         errors_ = np.where(wrong, 50.0, errors_) + 1e-6
         known, sure = claiming(errors_[:-1], radii[:-1]), float(radii[-1])
         for wanted in (1.0, 2.0, 4.0):
-            if promise(known, sure, 0.95) <= wanted:
+            if promise(known, sure, "mug", 0.95) <= wanted:
                 met.append(errors_[-1] <= wanted)
     assert len(met) > 200
     assert np.mean(met) >= 0.95 - 0.015
@@ -184,17 +185,61 @@ def test_a_promise_made_only_to_the_sure_is_met_by_them_though_some_are_wrong_an
 def test_the_surer_are_promised_no_more_error_and_the_least_sure_nothing() -> None:
     radii = np.linspace(1.0, 4.0, 60)
     known = claiming(radii**2, radii)
-    promised = [promise(known, float(radius), 0.95) for radius in np.linspace(0.5, 4.0, 30)]
+    promised = [promise(known, float(radius), "mug", 0.95) for radius in np.linspace(0.5, 4.0, 30)]
     assert promised == sorted(promised)
     assert promised[0] < 0.6 * promised[-1]
-    assert promise(known, 4.1, 0.95) == math.inf
+    assert promise(known, 4.1, "mug", 0.95) == math.inf
+
+
+def on_two_objects(of_mug: float, of_plate: float, runs: int = 30) -> Point:
+    """A setting that claims the same of both and errs on one."""
+    samples = [sample(f"mug {k}", of_mug * (1.0 + 0.01 * k)) for k in range(runs)]
+    samples += [sample(f"plate {k}", of_plate * (1.0 + 0.01 * k), of="plate") for k in range(runs)]
+    return Point("p", {}, CONDITION, tuple(samples))
+
+
+def test_what_errs_on_an_object_is_not_promised_there_though_it_claims_as_much_everywhere() -> None:
+    known = on_two_objects(1e-3, 8e-3)
+    assert promise(known, 2e-3, "mug") < 2e-3
+    assert promise(known, 2e-3, "plate") > 8e-3
+    assert promise_share(known, "mug", 2e-3) == 1.0
+    assert promise_share(known, "plate", 2e-3) == 0.0
+    assert doubt(known, 2e-3, "mug") < doubt(known, 2e-3, "a stranger") < doubt(known, 2e-3, "plate")
+
+
+def test_a_measured_run_does_not_vouch_for_itself() -> None:
+    known = on_two_objects(1e-3, 1e-3)
+    wrong = replace(known.samples[0], error=15e-3)
+    told = replace(known, samples=(wrong, *known.samples[1:]))
+    own, others = doubts(told, [wrong]), doubts(known, [known.samples[0]])
+    assert own == pytest.approx(others, rel=1e-9)
+    assert doubt(told, 2e-3, "mug") > doubt(known, 2e-3, "mug")
+
+
+def test_promises_by_an_object_s_record_are_met_as_often_as_they_say() -> None:
+    """Objects that a setting errs on more or less, and claims that say little of it."""
+    rng, met = np.random.default_rng(5), []
+    for _ in range(400):
+        hard = np.exp(rng.normal(0.0, 0.7, 6)) * 1e-3
+        which = np.append(np.repeat(np.arange(6), 10), rng.integers(6))
+        errors_ = hard[which] * np.abs(rng.standard_normal(61)) + 1e-6
+        radii = hard[which] ** 0.3 * np.exp(rng.normal(0.0, 0.3, 61))
+        runs = [
+            sample(str(k), float(errors_[k]), radius=float(radii[k]), of=str(which[k])) for k in range(60)
+        ]
+        known = Point("p", {}, CONDITION, tuple(runs))
+        for wanted in (1e-3, 2e-3, 4e-3):
+            if promise(known, float(radii[-1]), str(which[-1])) <= wanted:
+                met.append(errors_[-1] <= wanted)
+    assert len(met) > 200
+    assert np.mean(met) >= 0.95 - 0.02
 
 
 def test_too_few_runs_promise_nothing() -> None:
-    assert promise(claiming(np.full(18, 1e-3)), 1.0, 0.95) == math.inf
-    assert promise(claiming(np.full(19, 0.5)), 1.0, 0.95) == 0.5
-    assert promise(claiming(np.full(18, 0.5)), 1.0) == math.inf
-    assert promise(claiming(np.full(19, 0.5)), 1.0) == 0.5
+    assert promise(claiming(np.full(18, 1e-3)), 1.0, "mug", 0.95) == math.inf
+    assert promise(claiming(np.full(19, 0.5)), 1.0, "mug", 0.95) == 0.5
+    assert promise(claiming(np.full(18, 0.5)), 1.0, "mug") == math.inf
+    assert promise(claiming(np.full(19, 0.5)), 1.0, "mug") == 0.5
     assert promise_share(claiming(np.full(18, 1e-3)), "mug", 1.0) == 0.0
     assert promise_share(claiming(np.full(19, 1e-3)), "mug", 1.0) == 1.0
 
@@ -203,7 +248,7 @@ def test_a_refused_answer_promises_nothing_and_counts_as_no_claim() -> None:
     known = claiming(np.full(40, 0.5))
     refused = replace(known.samples[0], run="refused", radius=None)
     more = replace(known, samples=(*known.samples, refused))
-    assert promise(more, 1.0) == 0.5
+    assert promise(more, 1.0, "mug") == 0.5
     assert promise_share(more, "mug", 1.0) == pytest.approx(40 / 41)
 
 
