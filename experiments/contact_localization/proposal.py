@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.spatial.distance import cdist
 
-from experiments.contact_localization.hypotheses import Hypotheses
+from experiments.contact_localization.hypotheses import Hypotheses, normalised
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.shared_errors import UNKNOWNS, log_prior
-from harness.arrays import FloatArray, IntArray
+from harness.arrays import BoolArray, FloatArray, IntArray
 from harness.sim.compiled import compiled
 
 _PLACE = (0.8e-3, 0.8e-3, 0.6e-3)
@@ -38,6 +39,10 @@ _STEP = 0.75
 
 _BELIEVED = 20.0
 """Hypotheses that the shape known beforehand counts for."""
+
+_FLATTENED = (4.0, 2.0)
+"""Where the yaw is unknown, what the first rounds' nats are divided by before parents are chosen: a grid of
+2 mm and 2 degrees may have nothing of a mode but what is ten nats below its best."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +100,28 @@ class _Shape:
             width: units of a place, believed beforehand.
         """
         axes, points = places.shape[1], np.hstack([places, shared])
-        gaps = points[:, None] - points[None]
-        near = gaps[np.sum(gaps[..., :axes] ** 2, axis=2) < _NEIGHBOURS**2]
+        squares, pairs = of_pairs(points, cdist(places, places) < _NEIGHBOURS)
         believed = np.diag([(width / _SMOOTHING) ** 2] * axes + [1.0] * UNKNOWNS)
         counts = effective / (effective + _BELIEVED)
-        both = counts * 0.5 * near.T @ near / len(near) + (1.0 - counts) * believed
+        both: FloatArray = counts * (0.5 / pairs) * squares + (1.0 - counts) * believed
         carried = np.linalg.solve(both[axes:, axes:], both[axes:, :axes]).T
         left = both[:axes, :axes] - carried @ both[axes:, :axes]
         mean = counts * shared.mean(axis=0)
         return cls(carried, np.linalg.cholesky(left), np.linalg.cholesky(both[axes:, axes:]), mean)
+
+
+def of_pairs(points: FloatArray, near: BoolArray) -> tuple[FloatArray, int]:
+    """``(d, d)``: the sum of ``(a - b)(a - b)^T`` over ordered pairs of ``(n, d)`` points, and their number.
+
+    Args:
+        points: of which pairs are made.
+        near: ``(n, n)`` symmetric: which pairs count.
+    """
+    points = points - points.mean(axis=0)  # squares are subtracted
+    partners = near.sum(axis=1)
+    own = (points * partners[:, None]).T @ points
+    across = points.T @ (near.astype(np.float64) @ points)
+    return np.asarray(2.0 * (own - across), dtype=np.float64), int(partners.sum())
 
 
 def drawn(
@@ -112,8 +130,8 @@ def drawn(
     """Hypotheses, each weighed by one over the density it is drawn from.
 
     The density is that of the whole mixture, so that none is favoured for having many neighbours (Cappé et
-    al., Population Monte Carlo, JCGS 13(4), 2004). Shared errors that were not named before are drawn from
-    their prior, and what is drawn from the prior has the prior's density.
+    al., Population Monte Carlo, JCGS 13(4), 2004), nor for being chosen more often than it weighs. Shared
+    errors that were not named before are drawn from their prior, and have the prior's density.
 
     Args:
         search: the run.
@@ -125,7 +143,8 @@ def drawn(
     """
     axes = _Axes(search, search.positions[members].mean(axis=0))
     places, weights = axes.of(current), current.weights
-    parents, repeats = np.unique(systematic(weights, draws, rng), return_counts=True)
+    chosen = systematic(_chosen_by(search, current, attempt), draws, rng)
+    parents, repeats = np.unique(chosen, return_counts=True)
     steps = rng.normal(size=(draws, places.shape[1])), rng.normal(size=(draws, UNKNOWNS))
     if current.shared is None:
         points = np.repeat(places[parents], repeats, axis=0) + steps[0]
@@ -139,6 +158,13 @@ def drawn(
     points = np.repeat(centres, repeats, axis=0) + np.hstack(steps)
     log_density = _mixture(points, centres, repeats / draws)
     return axes.hypotheses(*_unwhitened(shape, points), -log_density)
+
+
+def _chosen_by(search: Search, current: Hypotheses, attempt: int) -> FloatArray:
+    """``(n,)`` shares of the draws: the weights, flatter in the first rounds where the yaw is unknown."""
+    if search.prior.yaw == "known" or attempt >= len(_FLATTENED):
+        return current.weights
+    return normalised(current.log_weights / _FLATTENED[attempt])
 
 
 def systematic(weights: FloatArray, count: int, rng: np.random.Generator) -> IntArray:

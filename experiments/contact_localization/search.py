@@ -252,6 +252,11 @@ class Search:
         return samples, yaws, log_weights
 
     @property
+    def yaw_step(self) -> float:
+        """Between the grid's yaws, in rad."""
+        return float(_KNOWN_YAWS[1] - _KNOWN_YAWS[0]) if self.turning is None else np.radians(_YAW_STEP)
+
+    @property
     def yaw_observable(self) -> bool:
         """Whether any reading can depend on the yaw."""
         return self.turning is None or self.turning.fold != 0

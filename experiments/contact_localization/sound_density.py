@@ -10,7 +10,7 @@ weighed as densities: products, and a logarithm only before a product might leav
 
 import numpy as np
 
-from experiments.contact_localization.sound_kernels import gains_at
+from experiments.contact_localization.sound_kernels import put_gains
 from harness.arrays import AnyArray, FloatArray, IntArray
 from harness.sim.compiled import compiled
 
@@ -169,6 +169,9 @@ def sound_scores(
     most -= counts * np.log(floors)
     factors = np.exp(offsets)
     result = np.empty(hypotheses)
+    flat = shapes.reshape(shapes.shape[0], -1)
+    blended = np.zeros(flat.shape[1])
+    first, last = _asked_for(pair_groups, group_starts)
     gains = np.zeros((shapes.shape[1], strikes, _SIDE_BY_SIDE))
     work = np.empty((MOST_RANK + 2, MOST_RANK, _SIDE_BY_SIDE))
     fits = np.empty((len(pair_groups), _SIDE_BY_SIDE))
@@ -178,8 +181,8 @@ def sound_scores(
         side = min(_SIDE_BY_SIDE, hypotheses - start)
         for h in range(side):
             at = start + h
-            struck = gains_at(shapes, samples[at], blend[at], directions[at if len(directions) > 1 else 0])
-            gains[:, :, h] = struck.T
+            towards = directions[at if len(directions) > 1 else 0]
+            put_gains(gains[:, :, h], flat, first, last, samples[at], blend[at], towards, blended)
         products[:] = 1.0
         nats[:] = 0.0
         room = _ROOM
@@ -208,6 +211,17 @@ def sound_scores(
         nats += np.log(products)
         result[start : start + side] = _mean_over_scales(nats[:, :side], weight, log_scale_shares)
     return result
+
+
+@compiled
+def _asked_for(groups: IntArray, group_starts: IntArray) -> tuple[IntArray, IntArray]:
+    """``(R,)`` and ``(R,)``: runs of modes that any pair asks for, from the first to behind the last."""
+    wanted = np.zeros(len(group_starts) + 1, np.bool_)
+    for group in groups:
+        wanted[group + 1] = True
+    # Between groups where what is wanted begins or ends.
+    edges = np.nonzero(wanted[1:] != wanted[:-1])[0]
+    return group_starts[edges[0::2]], group_starts[edges[1::2]]
 
 
 @compiled

@@ -69,23 +69,40 @@ def blend_of_samples(
 
 
 @compiled
-def gains_at(shapes: AnyArray, samples: IntArray, blend: FloatArray, directions: FloatArray) -> FloatArray:
-    """``(K, m)`` 1/sqrt(kg): how strongly each strike of one hypothesis moves each mode.
+def put_gains(
+    gains: AnyArray,
+    shapes: AnyArray,
+    first: IntArray,
+    last: IntArray,
+    samples: IntArray,
+    blend: FloatArray,
+    directions: FloatArray,
+    blended: FloatArray,
+) -> None:
+    """Set ``(m, K)`` gains, 1/sqrt(kg): how strongly strikes of one hypothesis move the modes asked for.
 
     Args:
-        shapes: ``(n, m, 3)`` modes at the surface's samples.
+        gains: written where a mode is asked for.
+        shapes: ``(n, 3 m)`` modes at the surface's samples: a mode's three axes side by side.
+        first: ``(R,)`` first mode of each run of modes that are asked for.
+        last: ``(R,)`` mode behind the run's last.
         samples: ``(K, J)`` samples about the place that each strike hit.
         blend: ``(K, J)`` their shares in it.
         directions: ``(K, 3)`` unit, of the strikes.
+        blended: ``(3 m,)``, written.
     """
     strikes, about = samples.shape
-    gains = np.zeros((strikes, shapes.shape[1]))
     for k in range(strikes):
-        x, y, z = directions[k, 0], directions[k, 1], directions[k, 2]
+        for r in range(len(first)):
+            blended[3 * first[r] : 3 * last[r]] = 0.0
         for j in range(about):
             share = blend[k, j]
             if share > _LITTLE:
-                for m in range(shapes.shape[1]):
-                    shape = shapes[samples[k, j], m]
-                    gains[k, m] += share * (shape[0] * x + shape[1] * y + shape[2] * z)
-    return gains
+                row = shapes[samples[k, j]]
+                for r in range(len(first)):
+                    for i in range(3 * first[r], 3 * last[r]):
+                        blended[i] += share * row[i]
+        x, y, z = directions[k, 0], directions[k, 1], directions[k, 2]
+        for r in range(len(first)):
+            for m in range(first[r], last[r]):
+                gains[m, k] = blended[3 * m] * x + blended[3 * m + 1] * y + blended[3 * m + 2] * z

@@ -8,7 +8,7 @@ import pytest
 from experiments.contact_localization.grid import refine
 from experiments.contact_localization.hypotheses import Hypotheses
 from experiments.contact_localization.model import Prior
-from experiments.contact_localization.proposal import drawn, systematic
+from experiments.contact_localization.proposal import drawn, of_pairs, systematic
 from experiments.contact_localization.search import Search
 from harness.arrays import FloatArray, IntArray
 
@@ -16,6 +16,8 @@ MEMBERS = np.array([0])
 THIN = np.array([0.15e-3, 0.15e-3, 0.1e-3])
 CARRIED = 0.6e-3
 FLOOR = 0.15
+AWAY = 80e-3
+AHEAD = 4.0
 
 
 class OneContact:
@@ -53,6 +55,23 @@ class Floor(OneContact):
         if at.shared is not None:
             nats = nats - 0.5 * np.sum(at.shared**2, axis=1)
         return at.told(nats).best(within, len(at.yaws))
+
+
+class TwoPlaces(OneContact):
+    """Two thin places 80 mm apart, the yaw unknown: the nearer weighs ``AHEAD`` nats more."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.prior = Prior(np.eye(3), "unknown")
+
+    def weigh(
+        self, at: Hypotheses, members: IntArray, step: int, rings: int, within: float = np.inf
+    ) -> Hypotheses:
+        nats = -0.5 * (at.yaws / np.radians(0.5)) ** 2
+        if at.shared is not None:
+            nats = nats - 0.5 * np.sum(at.shared**2, axis=1)
+        here, there = (-0.5 * np.sum(((at.gels - (x, 0.0, 0.0)) / 0.4e-3) ** 2, axis=1) for x in (0.0, AWAY))
+        return at.told(nats + np.logaddexp(here + AHEAD, there)).best(within, len(at.yaws))
 
 
 def samples_of_a_slab() -> Hypotheses:
@@ -104,6 +123,42 @@ def test_draws_are_weighed_by_one_over_their_own_density() -> None:
     )
     expected = 0.5 * np.sum(units**2, axis=1)
     assert found.log_weights - found.log_weights[0] == pytest.approx(expected - expected[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_a_grid_sees_only_from_aside_is_not_lost(seed: int) -> None:
+    """All that it holds of the better place is 1.9 mm aside, seven nats below what it has of the other."""
+    places = TwoPlaces()
+    ring = 1.9e-3 * np.exp(1j * np.radians(60.0 * np.arange(6)))
+    there = AWAY + 2e-5 * np.arange(-20, 21)
+    gels = np.column_stack([np.append(ring.real, there), np.append(ring.imag, 0.0 * there), np.zeros(47)])
+    start = places.weigh(Hypotheses(gels, np.zeros(47), np.zeros(47)), MEMBERS, 2, 1)
+    behind = start.log_weights[:6].max()
+    assert -8.0 < behind < -6.0
+    found = refine(cast(Search, places), start, MEMBERS, 3000, 5, seed)
+    near = float(found.weights[found.gels[:, 0] < 0.5 * AWAY].sum())
+    assert near == pytest.approx(1.0 / (1.0 + np.exp(-AHEAD)), abs=0.03)
+
+
+def test_how_parents_are_chosen_changes_no_sum() -> None:
+    """A place is drawn from more often than it weighs, and weighs what it weighs."""
+    places = TwoPlaces()
+    gels = np.array([[0.0, 0.0, 0.0], [AWAY, 0.0, 0.0]])
+    current = places.weigh(Hypotheses(gels, np.zeros(2), np.zeros(2)), MEMBERS, 2, 1)
+    at = drawn(cast(Search, places), MEMBERS, current, 40_000, 0, np.random.default_rng(2))
+    assert np.mean(at.gels[:, 0] > 0.5 * AWAY) > 3.0 * current.weights[1]
+    found = places.weigh(at, MEMBERS, 2, 2)
+    assert found.weights[found.gels[:, 0] > 0.5 * AWAY].sum() == pytest.approx(np.exp(-AHEAD), rel=0.25)
+
+
+def test_sums_over_pairs_are_those_of_every_pair() -> None:
+    rng = np.random.default_rng(7)
+    points = np.vstack([rng.normal(size=(40, 5)), rng.normal(size=(30, 5)) + 200.0])
+    near = np.linalg.norm(points[:, None] - points[None], axis=2) < 3.0
+    gaps = (points[:, None] - points[None])[near]
+    squares, pairs = of_pairs(points, near)
+    assert pairs == len(gaps)
+    assert squares == pytest.approx(gaps.T @ gaps, rel=1e-9, abs=1e-7)
 
 
 def test_a_far_mode_does_not_widen_the_draws() -> None:
