@@ -147,3 +147,38 @@ def aim(
             way = part * (rotation[axis, 0] * a + rotation[axis, 1] * b + rotation[axis, 2])
             ways[ray, axis], views[ray, axis] = way, way
         slant[ray] = part
+
+
+@compiled
+def lay_out(
+    pixels: AnyArray,
+    cover: AnyArray,
+    sums: FloatArray,
+    slant: FloatArray,
+    radiance: float,
+    colour: FloatArray,
+    alpha: FloatArray,
+    depth: FloatArray,
+) -> None:
+    """What rays have seen, in the pixels that they belong to.
+
+    Args:
+        pixels: ``(r,)`` of each ray.
+        cover: ``(r,)`` float32, share of each that is covered.
+        sums: of ``composite``.
+        slant: ``(r,)`` depth for a unit of length.
+        radiance: of white.
+        colour: ``(p, 3)`` written where rays are, and so are the next two.
+        alpha: ``(p,)``.
+        depth: ``(p,)`` m, where anything was seen.
+    """
+    for n in range(len(pixels)):
+        at, share = pixels[n], radiance * cover[n]
+        colour[at, 0], colour[at, 1], colour[at, 2] = (
+            sums[n, 0] * share,
+            sums[n, 1] * share,
+            sums[n, 2] * share,
+        )
+        alpha[at] = min(sums[n, 3], 1.0) * cover[n]
+        if sums[n, 3] > 0.0:
+            depth[at] = sums[n, 4] / sums[n, 3] * slant[n]

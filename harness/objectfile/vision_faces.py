@@ -151,14 +151,14 @@ def first_met(
         if len(likely):
             hit = nearest_of(eye, ways[n], begin[n], -1, n, n + 1, likely, lists[6], nothing)
         if hit[1] < 0:
-            hit = _meet(eye, ways[n], begin[n], lists)
+            hit = meet(eye, ways[n], begin[n], lists)
         _, faces[n], b, c = hit
         # Rays on an edge are met by faces a little wider than they are.
         weights[n, 0], weights[n, 1] = min(max(b, 0.0), 1.0), min(max(c, 0.0), 1.0)
 
 
 @compiled
-def _meet(origin: FloatArray, way: FloatArray, least: float, lists: Lists) -> Hit:
+def meet(origin: FloatArray, way: FloatArray, least: float, lists: Lists) -> Hit:
     """What one ray meets first farther than ``least`` m; the face -1 where that is nothing.
 
     As ``vision_voxels.walk`` goes: borders from their own numbers, cubes by counting.

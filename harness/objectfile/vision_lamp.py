@@ -2,6 +2,10 @@
 
 Faces are projected along the light once for a lamp, and listed by square cells of the plane across it. Of the
 faces of one cell those stop a place's light that cover it and are nearer to the lamp.
+
+Light that leaves a place outside of a closed surface and is stopped enters the surface first, through a face
+that looks away from the lamp: such are all that must be listed for it, and few places have one above them. A
+place's own face is one of them if the place was lifted from it: what enters there leaves through another.
 """
 
 from dataclasses import dataclass
@@ -18,11 +22,17 @@ _ON_EDGE = 1e-9
 _WIDER = 1e-6
 """Cells by which a face is widened where it is listed."""
 
-_ALONG = 0.5
+_ALONG = 0.35
 """Cells along the grid for the root of the number of faces: more take longer to list, fewer to look up."""
 
 _MOST = 32
 """Lists that a face is in, in the mean."""
+
+
+Lists = tuple[
+    FloatArray, FloatArray, float, int, AnyArray, FloatArray, AnyArray, FloatArray, FloatArray, AnyArray
+]
+"""Of a ``LampGrid``: turn, low, cell, columns, starts, most, listed, tops, turned and faces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,46 +44,70 @@ class LampGrid:
         low: ``(2,)`` m, least corner of the grid across the light.
         cell: m, edge of a cell.
         starts: ``(rows * columns + 1,)`` int32: where each cell's list begins.
-        faces: int32, listed.
-        tops: ``(faces,)`` m: how near to the lamp each listed one reaches.
-        corners: ``(m, 3, 3)`` m: of each face its first corner and the ways to the others, turned.
+        most: ``(rows * columns,)`` m: how near to the lamp any face of a cell reaches.
+        listed: int32 faces.
+        tops: ``(listed,)`` m: how near to the lamp each listed one reaches.
+        turned: ``(n, 3)`` m, the mesh's vertices.
+        faces: ``(m, 3)`` the mesh's.
         columns: cells along the second direction.
+        from_outside: whether only such faces are listed as look away from the lamp.
     """
 
     turn: FloatArray
     low: FloatArray
     cell: float
     starts: AnyArray
-    faces: AnyArray
+    most: FloatArray
+    listed: AnyArray
     tops: FloatArray
-    corners: FloatArray
+    turned: FloatArray
+    faces: AnyArray
     columns: int
+    from_outside: bool
 
     @classmethod
-    def of(cls, mesh: Mesh, lamp: FloatArray, along: int | None = None) -> "LampGrid":
+    def of(
+        cls, mesh: Mesh, lamp: FloatArray, along: int | None = None, from_outside: bool = False
+    ) -> "LampGrid":
         """A mesh under a lamp.
 
         Args:
             mesh: in metres.
             lamp: ``(3,)`` unit, towards it.
             along: cells along the longer side; None for a few faces in each.
+            from_outside: whether the mesh is closed and only places outside of it will be asked for.
         """
         turn, count = _across(lamp), len(mesh.faces)
-        turned, corners = mesh.vertices @ turn, np.empty((count, 3, 3))
-        _cornered(turned, mesh.faces, corners)
-        least, most = turned.min(axis=0)[:2], turned.max(axis=0)[:2]
+        turned = mesh.vertices @ turn
+        least, most = _reach(turned)
         side = max(1, int(_ALONG * np.sqrt(count))) if along is None else along
-        cell = max(float((most - least).max()) / side, np.finfo(np.float64).tiny)
-        # Slivers across the whole of it would be listed nearly everywhere.
-        while along is None and side > 1 and _listed(corners, least, cell) > _MOST * count:
-            side, cell = side // 2, cell * side / (side // 2)
-        low = least - _WIDER * cell
-        rows, columns = (np.floor((most - low) / cell).astype(np.int64) + 1).tolist()
-        starts = np.zeros(rows * columns + 1, np.int32)
-        _count(corners, low, cell, columns, starts)
-        listed, tops = np.empty(starts[-1], np.int32), np.empty(starts[-1])
-        _list(corners, low, cell, columns, starts, listed, tops)
-        return cls(turn, low, cell, starts, listed, tops, corners, columns)
+        spans = np.empty((count, 4), np.int32)
+        while True:
+            cell = max(float((most - least).max()) / side, np.finfo(np.float64).tiny)
+            low = least - _WIDER * cell
+            rows, columns = (np.floor((most - low) / cell).astype(np.int64) + 1).tolist()
+            starts = np.zeros(rows * columns + 1, np.int32)
+            _span(turned, mesh.faces, from_outside, low, cell, columns, starts, spans)
+            # Slivers across the whole of it would be listed nearly everywhere.
+            if along is not None or side == 1 or starts.sum() <= _MOST * count:
+                break
+            side //= 2
+        starts = np.cumsum(starts, dtype=np.int32)
+        highest, listed, tops = (
+            np.full(rows * columns, -np.inf),
+            np.empty(starts[-1], np.int32),
+            np.empty(starts[-1]),
+        )
+        _list(turned, mesh.faces, spans, columns, starts, listed, tops, highest)
+        return cls(turn, low, cell, starts, highest, listed, tops, turned, mesh.faces, columns, from_outside)
+
+    @property
+    def lists(self) -> Lists:
+        """As the compiled loops take them."""
+        return (
+            *(self.turn, self.low, self.cell, self.columns, self.starts, self.most, self.listed, self.tops),
+            *(self.turned, self.faces),
+        )
 
     def sees(
         self, places: FloatArray, least: float, own: IntArray, faced: FloatArray, seen: BoolArray
@@ -87,10 +121,7 @@ class LampGrid:
             faced: ``(n,)`` cosine, 0 where a place looks away.
             seen: ``(n,)`` written.
         """
-        _sees(
-            *(places, self.turn, least, own, faced, self.low, self.cell, self.columns, self.starts),
-            *(self.faces, self.tops, self.corners, seen),
-        )
+        _sees(places, least, own, faced, self.from_outside, self.lists, seen)
 
 
 def _across(lamp: FloatArray) -> FloatArray:
@@ -103,92 +134,98 @@ def _across(lamp: FloatArray) -> FloatArray:
 
 
 @compiled
-def _span(face: FloatArray, low: FloatArray, cell: float, axis: int) -> tuple[int, int]:
-    """First and last cell of a face along an axis."""
-    a = face[0, axis]
-    least = a + min(0.0, min(face[1, axis], face[2, axis]))
-    most = a + max(0.0, max(face[1, axis], face[2, axis]))
-    first = int(max(np.floor((least - low[axis]) / cell - _WIDER), 0.0))
-    return first, int(np.floor((most - low[axis]) / cell + _WIDER))
+def _reach(turned: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``(2,)`` least and greatest places across the light."""
+    least, most = np.full(2, np.inf), np.full(2, -np.inf)
+    for n in range(len(turned)):
+        for axis in range(2):
+            least[axis], most[axis] = min(least[axis], turned[n, axis]), max(most[axis], turned[n, axis])
+    return least, most
 
 
 @compiled
-def _cornered(turned: FloatArray, faces: IntArray, corners: FloatArray) -> None:
-    """Fill in ``corners``."""
+def _span(
+    turned: FloatArray,
+    faces: IntArray,
+    from_outside: bool,
+    low: FloatArray,
+    cell: float,
+    columns: int,
+    counts: AnyArray,
+    spans: AnyArray,
+) -> None:
+    """Which cells faces touch.
+
+    Args:
+        turned: of ``LampGrid``.
+        faces: of the mesh.
+        from_outside: whether faces that look towards the lamp touch none.
+        low: of the grid.
+        cell: of the grid.
+        columns: of the grid.
+        counts: ``(rows * columns + 1,)`` raised by the faces of each cell, from its second on.
+        spans: ``(m, 4)`` int32, written: first row and the one after the last, and so of columns.
+    """
+    share, rows = 1.0 / cell, (len(counts) - 1) // columns
     for m in range(len(faces)):
         a, b, c = faces[m, 0], faces[m, 1], faces[m, 2]
-        for axis in range(3):
-            corners[m, 0, axis] = turned[a, axis]
-            corners[m, 1, axis] = turned[b, axis] - turned[a, axis]
-            corners[m, 2, axis] = turned[c, axis] - turned[a, axis]
-
-
-@compiled
-def _listed(corners: FloatArray, low: FloatArray, cell: float) -> int:
-    """Places that the lists of all cells have together."""
-    total = 0
-    for m in range(len(corners)):
-        i0, i1 = _span(corners[m], low, cell, 0)
-        j0, j1 = _span(corners[m], low, cell, 1)
-        total += (i1 - i0 + 1) * (j1 - j0 + 1)
-    return total
-
-
-@compiled
-def _count(corners: FloatArray, low: FloatArray, cell: float, columns: int, starts: AnyArray) -> None:
-    """Fill in where each cell's list begins."""
-    rows = (len(starts) - 1) // columns
-    for m in range(len(corners)):
-        i0, i1 = _span(corners[m], low, cell, 0)
-        j0, j1 = _span(corners[m], low, cell, 1)
-        for i in range(i0, min(i1, rows - 1) + 1):
-            for j in range(j0, min(j1, columns - 1) + 1):
-                starts[i * columns + j + 1] += 1
-    for n in range(1, len(starts)):
-        starts[n] += starts[n - 1]
+        x0, x1, x2, y0, y1, y2 = (
+            turned[a, 0],
+            turned[b, 0],
+            turned[c, 0],
+            turned[a, 1],
+            turned[b, 1],
+            turned[c, 1],
+        )
+        spans[m, 0] = spans[m, 1] = 0
+        if from_outside and (x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0) >= 0.0:
+            continue
+        i0, j0 = (min(x0, min(x1, x2)) - low[0]) * share, (min(y0, min(y1, y2)) - low[1]) * share
+        i1, j1 = (max(x0, max(x1, x2)) - low[0]) * share, (max(y0, max(y1, y2)) - low[1]) * share
+        spans[m, 0], spans[m, 1] = max(int(i0 - _WIDER), 0), min(int(i1 + _WIDER) + 1, rows)
+        spans[m, 2], spans[m, 3] = max(int(j0 - _WIDER), 0), min(int(j1 + _WIDER) + 1, columns)
+        for i in range(spans[m, 0], spans[m, 1]):
+            for j in range(spans[m, 2], spans[m, 3]):
+                counts[i * columns + j + 1] += 1
 
 
 @compiled
 def _list(
-    corners: FloatArray,
-    low: FloatArray,
-    cell: float,
+    turned: FloatArray,
+    faces: IntArray,
+    spans: AnyArray,
     columns: int,
     starts: AnyArray,
     listed: AnyArray,
     tops: FloatArray,
+    most: FloatArray,
 ) -> None:
     """Fill in each cell's faces."""
-    at, rows = starts.copy(), (len(starts) - 1) // columns
-    for m in range(len(corners)):
-        top = corners[m, 0, 2] + max(0.0, max(corners[m, 1, 2], corners[m, 2, 2]))
-        i0, i1 = _span(corners[m], low, cell, 0)
-        j0, j1 = _span(corners[m], low, cell, 1)
-        for i in range(i0, min(i1, rows - 1) + 1):
-            for j in range(j0, min(j1, columns - 1) + 1):
+    at = starts.copy()
+    for m in range(len(faces)):
+        if spans[m, 0] == spans[m, 1]:
+            continue
+        top = max(turned[faces[m, 0], 2], max(turned[faces[m, 1], 2], turned[faces[m, 2], 2]))
+        for i in range(spans[m, 0], spans[m, 1]):
+            for j in range(spans[m, 2], spans[m, 3]):
                 n = at[i * columns + j]
                 listed[n], tops[n] = m, top
-                at[i * columns + j] = n + 1
+                at[i * columns + j], most[i * columns + j] = n + 1, max(most[i * columns + j], top)
 
 
 @compiled
 def _sees(
     places: FloatArray,
-    turn: FloatArray,
     least: float,
     own: IntArray,
     faced: FloatArray,
-    low: FloatArray,
-    cell: float,
-    columns: int,
-    starts: AnyArray,
-    listed: AnyArray,
-    tops: FloatArray,
-    corners: FloatArray,
+    from_outside: bool,
+    lists: Lists,
     seen: BoolArray,
 ) -> None:
     """See ``LampGrid.sees``."""
-    rows = (len(starts) - 1) // columns
+    turn, low, cell, columns, starts, most, listed, tops, turned, faces = lists
+    rows, share = len(most) // columns, 1.0 / cell
     for n in range(len(places)):
         seen[n] = own[n] >= 0 and faced[n] > 0.0
         if not seen[n]:
@@ -197,25 +234,29 @@ def _sees(
         x = a * turn[0, 0] + b * turn[1, 0] + c * turn[2, 0]
         y = a * turn[0, 1] + b * turn[1, 1] + c * turn[2, 1]
         above = a * turn[0, 2] + b * turn[1, 2] + c * turn[2, 2] + least
-        i, j = int(np.floor((x - low[0]) / cell)), int(np.floor((y - low[1]) / cell))
-        if not (0 <= i < rows and 0 <= j < columns):
+        i, j = int(np.floor((x - low[0]) * share)), int(np.floor((y - low[1]) * share))
+        if not (0 <= i < rows and 0 <= j < columns) or above >= most[i * columns + j]:
             continue
+        without = -1 if from_outside else own[n]
         for k in range(starts[i * columns + j], starts[i * columns + j + 1]):
-            if tops[k] > above and listed[k] != own[n] and _stops(corners[listed[k]], x, y, above):
+            if tops[k] > above and listed[k] != without and _stops(turned, faces, listed[k], x, y, above):
                 seen[n] = False
                 break
 
 
 @compiled
-def _stops(face: FloatArray, x: float, y: float, above: float) -> bool:
-    """Whether a turned face covers a place across the light, higher than ``above``."""
-    area = face[1, 0] * face[2, 1] - face[1, 1] * face[2, 0]
+def _stops(turned: FloatArray, faces: IntArray, m: int, x: float, y: float, above: float) -> bool:
+    """Whether a face covers a place across the light, higher than ``above``."""
+    p, q, r = faces[m, 0], faces[m, 1], faces[m, 2]
+    ax, ay = turned[q, 0] - turned[p, 0], turned[q, 1] - turned[p, 1]
+    bx, by = turned[r, 0] - turned[p, 0], turned[r, 1] - turned[p, 1]
+    area = ax * by - ay * bx
     if area == 0.0:
         return False
-    sx, sy = x - face[0, 0], y - face[0, 1]
-    u = (sx * face[2, 1] - sy * face[2, 0]) / area
-    v = (face[1, 0] * sy - face[1, 1] * sx) / area
+    sx, sy = x - turned[p, 0], y - turned[p, 1]
+    u, v = (sx * by - sy * bx) / area, (ax * sy - ay * sx) / area
     # Written so that a NaN of a face seen edge-on stops nothing.
     if not (u >= -_ON_EDGE and v >= -_ON_EDGE and u + v <= 1.0 + _ON_EDGE):
         return False
-    return bool(face[0, 2] + u * face[1, 2] + v * face[2, 2] > above)
+    z = turned[p, 2]
+    return bool(z + u * (turned[q, 2] - z) + v * (turned[r, 2] - z) > above)

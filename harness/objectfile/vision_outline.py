@@ -6,7 +6,9 @@ import numpy as np
 
 from harness.arrays import AnyArray
 from harness.mesh import Mesh
-from harness.objectfile.vision_raster import draw, look_through, projected
+from harness.objectfile.vision_contour import Contours, covered, crossed
+from harness.objectfile.vision_front import find_front, gathered, projected
+from harness.objectfile.vision_raster import NEAREST, draw, look_through, placed
 from harness.objectfile.vision_work import Crew, Room
 from harness.pinhole import Pinhole
 
@@ -48,7 +50,14 @@ def is_closed(mesh: Mesh) -> bool:
 
 
 def mesh_outline(
-    mesh: Mesh, closed: bool, camera: Pinhole, side: int, crew: Crew, room: Room, is_told: bool = False
+    mesh: Mesh,
+    closed: bool,
+    camera: Pinhole,
+    side: int,
+    crew: Crew,
+    room: Room,
+    is_told: bool = False,
+    contours: Contours | None = None,
 ) -> Outline:
     """What a mesh covers of a picture.
 
@@ -60,26 +69,58 @@ def mesh_outline(
         crew: shares the rows.
         room: that arrays are taken from.
         is_told: whether faces are asked for.
+        contours: of the mesh; None for such as are made for this picture alone.
     """
+    made = contours or Contours.of(mesh)
+    seen = room.take("seen", (len(mesh.vertices), 3), np.float64)
+    x, y = side * camera.centre_px[0] - 0.5, side * camera.centre_px[1] - 0.5
+    least = projected(mesh.vertices, camera.camera_from_object, side * camera.focal_px, x, y, seen)
+    hides = closed and bool(((camera.eye < made.bounds[0]) | (camera.eye > made.bounds[1])).any())
+    if not least >= NEAREST:
+        return drawn_outline(mesh, hides, camera, side, crew, room, is_told)
+    rows, columns = camera.height, camera.width
+    offsets = centre_out(side)
+    sides = room.take("sides", (len(mesh.faces),), np.int8)
+    made.turned(camera.eye, hides, sides)
+    count, looked = (room.take(name, (rows, columns), np.uint8) for name in ("count", "looked"))
+    begins, stretches = crossed(seen, made.edges, sides, rows * side, columns * side)
+    beside = room.take("beside", (rows, columns), np.bool_)
+    beside[:] = False
+    some = covered(begins, stretches, side, offsets, count, looked, beside)
+    nearness = room.take("nearness", (rows, columns), np.float32)
+    front = room.take("front", (rows, columns), np.int32)
+
+    def band(first: int, last: int) -> None:
+        nearness[first:last] = 0.0
+        find_front(seen, made.faces, sides, looked, beside, offsets, side, first, last, nearness, front)
+
+    crew.share(band, rows, crew.threads)
+    found = gathered(count, looked, nearness, front, side, offsets, some)
+    return Outline(*found) if is_told else Outline(*found[:-1], np.empty(0, np.int32))
+
+
+def drawn_outline(
+    mesh: Mesh, hides: bool, camera: Pinhole, side: int, crew: Crew, room: Room, is_told: bool
+) -> Outline:
+    """As ``mesh_outline``, face by face at every sub-pixel: of a mesh that reaches behind the camera."""
     rows, columns = camera.height, camera.width
     focal = side * camera.focal_px
     x, y = side * camera.centre_px[0] - 0.5, side * camera.centre_px[1] - 0.5
-    seen = room.take("seen", (len(mesh.vertices), 6), np.float64)
-    nearness = room.take("nearness", (rows * side, columns * side), np.float32)
+    seen = room.take("seen and placed", (len(mesh.vertices), 6), np.float64)
+    nearness = room.take("fine nearness", (rows * side, columns * side), np.float32)
     cover, depth = (room.take(name, (rows, columns), np.float32) for name in ("cover", "depth"))
     each = int(is_told)
-    front = room.take("front", (each * rows * side, each * columns * side), np.int32)
+    front = room.take("fine front", (each * rows * side, each * columns * side), np.int32)
     faces = room.take("outline faces", (each * rows, each * columns), np.int32)
-    outside = bool(((camera.eye < mesh.bounds[0]) | (camera.eye > mesh.bounds[1])).any())
     places, offsets = room.take("at", (rows, columns, 2), np.float32), centre_out(side)
 
     def project(first: int, last: int) -> None:
         part = mesh.vertices[first:last]
-        projected(part, camera.camera_from_object, focal, x, y, seen[first:last])
+        placed(part, camera.camera_from_object, focal, x, y, seen[first:last])
 
     def band(first: int, last: int) -> None:
         nearness[first * side : last * side] = 0.0
-        draw(seen, mesh.faces, focal, x, y, first * side, last * side, closed and outside, nearness, front)
+        draw(seen, mesh.faces, focal, x, y, first * side, last * side, hides, nearness, front)
         look_through(nearness, front, side, offsets, first, last, cover, places, depth, faces)
 
     crew.share(project, len(mesh.vertices), crew.threads, 4096)

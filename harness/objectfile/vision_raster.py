@@ -17,7 +17,7 @@ _ON_EDGE = 1e-7
 
 
 @compiled
-def projected(
+def placed(
     vertices: FloatArray, camera_from_object: FloatArray, focal: float, x: float, y: float, out: FloatArray
 ) -> None:
     """Vertices as places (x, y) with inverse depth; depth itself, negated, where they are not in front.
@@ -63,9 +63,9 @@ def draw(
     """The greatest inverse depth of each sub-pixel in some rows; 0 stays where nothing is.
 
     Args:
-        seen: of ``projected``.
+        seen: of ``placed``.
         faces: ``(m, 3)``.
-        focal: as in ``projected``, and so are ``x`` and ``y``.
+        focal: as in ``placed``, and so are ``x`` and ``y``.
         x: sub-pixels.
         y: sub-pixels.
         first: row of sub-pixels.

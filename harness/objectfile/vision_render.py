@@ -12,7 +12,8 @@ from harness.arrays import AnyArray, FloatArray
 from harness.linear_image import LinearImage, binned
 from harness.mesh import Mesh
 from harness.objectfile.runtime import Network
-from harness.objectfile.vision_blocks import aim
+from harness.objectfile.vision_blocks import aim, lay_out
+from harness.objectfile.vision_contour import Contours
 from harness.objectfile.vision_fold import folded
 from harness.objectfile.vision_graph import FILE, graph_block, vision_model
 from harness.objectfile.vision_outline import Outline, is_closed, mesh_outline, whole_picture
@@ -56,10 +57,11 @@ class VisionRenderer:
         self._data, self._mesh, self._name = data, mesh, name
         self.model = vision_model(data, name)
         self.shell = shell_for(mesh, self.model.grid, per_cell, deep)
-        self._closed = is_closed(mesh)
+        self._closed, self._contours = is_closed(mesh), Contours.of(mesh)
         self._crew, self._room = Crew(threads), Room()
         self._follower = Follower(Volume(self.model, self.shell, per_cell), self._crew)
-        self._extras = SurfaceExtras(mesh, self.model.weights.size.extras, self._crew, self._room)
+        extras = self.model.weights.size.extras
+        self._extras = SurfaceExtras(mesh, extras, self._crew, self._room, self._closed)
         self._askers: dict[str, Asker] = {}
 
     def render(
@@ -101,7 +103,8 @@ class VisionRenderer:
             return whole_picture(camera)
         told = self.model.weights.size.extras > 0
         side = chosen.coverage
-        return mesh_outline(self._mesh, self._closed, camera, side, self._crew, self._room, told)
+        ready = self._contours
+        return mesh_outline(self._mesh, self._closed, camera, side, self._crew, self._room, told, ready)
 
     def _rays(
         self, camera: Pinhole, light: DirectionalLight, outline: Outline, chosen: RenderSettings
@@ -146,10 +149,7 @@ def _picture(
     rows, columns = camera.height, camera.width
     colour, alpha = np.zeros((rows * columns, 3)), np.zeros(rows * columns)
     depth = np.full(rows * columns, np.inf)
-    colour[outline.pixels] = sums[:, :3] * (radiance * outline.cover[:, None])
-    alpha[outline.pixels] = np.minimum(sums[:, 3], 1.0) * outline.cover
-    seen = sums[:, 3] > 0.0
-    depth[outline.pixels[seen]] = sums[seen, 4] / sums[seen, 3] * slant[seen]
+    lay_out(outline.pixels, outline.cover, sums, slant, radiance, colour, alpha, depth)
     return LinearImage(
         colour.reshape(rows, columns, 3), alpha.reshape(rows, columns), depth.reshape(rows, columns)
     )

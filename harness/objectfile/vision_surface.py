@@ -4,11 +4,11 @@ import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
 from harness.mesh import Mesh
-from harness.objectfile.vision_faces import FaceCubes, first_met
+from harness.objectfile.vision_faces import FaceCubes
 from harness.objectfile.vision_lamp import LampGrid
+from harness.objectfile.vision_told import tell
 from harness.objectfile.vision_work import Crew, Room
 from harness.sim.appearance import plain
-from harness.sim.lambert_kernels import faced_places, lit_by
 from harness.sim.ray_mesh import LEAST
 
 _EARLY = 0.25
@@ -28,13 +28,16 @@ class SurfaceExtras:
         count: of further inputs: 4, or 0 for networks that are told nothing more.
         crew: shares the rays.
         room: that arrays are taken from.
+        closed: of ``is_closed``.
     """
 
-    def __init__(self, mesh: Mesh, count: int, crew: Crew, room: Room) -> None:
-        self._count, self._crew, self._room = count, crew, room
+    def __init__(self, mesh: Mesh, count: int, crew: Crew, room: Room, closed: bool = False) -> None:
+        self._count, self._crew, self._room, self._closed = count, crew, room, closed
         self._grid: LampGrid | None = None
+        self._from_outside = False
         if count:
-            self._cubes, self._appearance = FaceCubes.of(mesh), plain(mesh, (1.0, 1.0, 1.0))
+            self._cubes, self._mesh = FaceCubes.of(mesh), mesh
+            self._surface = (mesh.corners, mesh.face_normals, plain(mesh, (1.0, 1.0, 1.0)).normals)
 
     def __call__(
         self,
@@ -59,48 +62,31 @@ class SurfaceExtras:
         if not told.size:
             return told
         begin = np.where(np.isfinite(depth), np.maximum(depth - _EARLY * self._cubes.edge, 0.0), 0.0)
-        arrays = [self._room.take(f"extras {k}", (len(ways), 3), np.float64) for k in range(4)]
-        weights = self._room.take("extras weights", (len(ways), 2), np.float64)
-        faces = self._room.take("extras faces", (len(ways),), np.int64)
-        lamp = np.array(light, np.float64)
-        grid = self._under(lamp)
+        lamp, size, count = np.array(light, np.float64), self._mesh.diagonal, len(ways)
+        low, high = self._mesh.bounds
+        grid = self._under(lamp, self._closed and bool(((eye < low) | (eye > high)).any()))
+        faces, faced = (self._room.take(f"told {kind}", (count,), kind) for kind in ("int64", "float64"))
+        lifted = self._room.take("lifted", (count, 3), np.float64)
 
         def work(first: int, last: int) -> None:
-            part = slice(first, last)
-            places = [each[part] for each in arrays]
-            first_met(
-                eye, ways[part], begin[part], likely[part], self._cubes.lists, faces[part], weights[part]
+            at, seen = slice(first, last), np.empty(last - first, np.bool_)
+            tell(
+                *(eye, ways[at], begin[at], likely[at], self._cubes.lists, self._surface, lamp, size),
+                *(faces[at], lifted[at], faced[at], told[at]),
             )
-            self._tell(ways[part], lamp, grid, faces[part], weights[part], places, told[part])
+            grid.sees(lifted[at], LEAST * size, faces[at], faced[at], seen)
+            told[at, 0] = seen
 
-        self._crew.share(work, len(ways), 4 * self._crew.threads, _LEAST)
+        self._crew.share(work, count, 4 * self._crew.threads, _LEAST)
         return told
 
-    def _under(self, lamp: FloatArray) -> LampGrid:
-        """The faces as a lamp sees them, again if it has moved."""
-        if self._grid is None or not np.array_equal(self._grid.turn[:, 2], lamp):
-            self._grid = LampGrid.of(self._appearance.mesh, lamp)
-        return self._grid
+    def _under(self, lamp: FloatArray, from_outside: bool) -> LampGrid:
+        """The faces as a lamp sees them, again if it has moved, or the eye from outside of the mesh into it.
 
-    def _tell(
-        self,
-        ways: FloatArray,
-        lamp: FloatArray,
-        grid: LampGrid,
-        faces: AnyArray,
-        weights: FloatArray,
-        places: list[FloatArray],
-        told: AnyArray,
-    ) -> None:
-        """Fill in what is told of the places that rays met; ``places`` is room for them."""
-        mesh, (points, normals, flat, lifted) = self._appearance.mesh, places
-        # Of a ray that meets nothing the last face is looked at, and nothing of it is told.
-        faced_places(
-            *(faces, weights, ways, mesh.corners, mesh.face_normals, self._appearance.normals),
-            *(points, normals, flat, lifted),
-        )
-        faced = lit_by(lamp[None], points, normals, flat, lifted, mesh.diagonal)
-        seen = np.empty(len(ways), np.bool_)
-        grid.sees(lifted, LEAST * mesh.diagonal, faces, faced, seen)
-        told[:, 0], told[:, 1:] = seen, normals
-        told[faces < 0] = 0.0
+        What is seen from outside of a closed surface is seen on its outside.
+        """
+        same = self._grid is not None and np.array_equal(self._grid.turn[:, 2], lamp)
+        if self._grid is None or not same or from_outside != self._from_outside:
+            self._grid = LampGrid.of(self._mesh, lamp, from_outside=from_outside)
+            self._from_outside = from_outside
+        return self._grid

@@ -18,6 +18,7 @@ from harness.image_metrics import psnr
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision import ObjectVision, open_vision
 from harness.objectfile.vision_faces import FaceCubes
+from harness.objectfile.vision_outline import is_closed
 from harness.objectfile.vision_settings import RenderSettings
 from harness.objectfile.vision_surface import SurfaceExtras
 from harness.objectfile.vision_view import camera_for, light_for, turned
@@ -79,7 +80,11 @@ def told(vision: ObjectVision, views: list[View]) -> None:
     """Visibility and normals by rays through all faces, as networks are taught, and as the renderer asks."""
     mesh = vision.surface
     cubes, took = timed(partial(FaceCubes.of, mesh))
-    exact, look, asked = RayMesh(mesh), plain(mesh, (1.0, 1.0, 1.0)), SurfaceExtras(mesh, 4, Crew(1), Room())
+    exact, look, asked = (
+        RayMesh(mesh),
+        plain(mesh, (1.0, 1.0, 1.0)),
+        SurfaceExtras(mesh, 4, Crew(1), Room(), is_closed(mesh)),
+    )
 
     def by_all_faces(eye: FloatArray, ways: FloatArray, light: DirectionalLight) -> AnyArray:
         row, hits = np.zeros((len(ways), 4), np.float32), exact.first_hits(eye, ways)

@@ -7,7 +7,7 @@ from seen_shapes import cuboid, square
 
 from harness.arrays import AnyArray
 from harness.mesh import Mesh
-from harness.objectfile.vision_outline import centre_out, is_closed, mesh_outline
+from harness.objectfile.vision_outline import centre_out, drawn_outline, is_closed, mesh_outline
 from harness.objectfile.vision_work import Crew, Room
 from harness.objects.household import build
 from harness.pinhole import Pinhole
@@ -83,6 +83,40 @@ def test_two_threads_see_what_one_sees() -> None:
     assert np.array_equal(one.pixels, two.pixels)
     assert np.array_equal(one.cover, two.cover)
     assert np.array_equal(one.depth, two.depth)
+
+
+def soup() -> Mesh:
+    """Faces that share corners and edges as it happens, some of no area."""
+    random = np.random.default_rng(0)
+    return Mesh(0.05 * random.normal(size=(40, 3)), random.integers(0, 40, (60, 3)))
+
+
+def turned_about() -> Mesh:
+    """A mug without its rim, every third of its faces the other way around."""
+    kept = MUG.faces[MUG.corners[:, :, 2].max(axis=1) < 0.8 * MUG.bounds[1, 2]].copy()
+    kept[::3] = kept[::3, ::-1]
+    return Mesh(MUG.vertices, kept)
+
+
+@pytest.mark.parametrize("side", [1, 3, 7])
+@pytest.mark.parametrize(
+    "mesh", [MUG, turned_about(), soup(), square(0.1)], ids=["mug", "open", "soup", "square"]
+)
+def test_going_around_says_what_every_face_drawn_says(mesh: Mesh, side: int) -> None:
+    """Pixels, cover, places, depth and faces; on an edge either of two sub-pixels or faces is right."""
+    closed, middle = is_closed(mesh), mesh.bounds.mean(axis=0)
+    for away, width in ((np.array([0.4, 0.5, 0.3]), 90), (np.array([0.0, 0.1, 2.0]), 31)):
+        camera = Pinhole.looking_at(middle + away, middle, (0, 1, 0), width, 40, 12.0 / (width + 40))
+        one = mesh_outline(mesh, closed, camera, side, Crew(1), Room(), True)
+        other = drawn_outline(mesh, closed, camera, side, Crew(1), Room(), True)
+        assert len(one.pixels) > 50
+        assert len(np.setxor1d(one.pixels, other.pixels)) <= 1
+        _, a, b = np.intersect1d(one.pixels, other.pixels, return_indices=True)
+        assert np.count_nonzero(one.cover[a] != other.cover[b]) <= 2
+        same = (one.places[a] == other.places[b]).all(axis=1)
+        assert np.count_nonzero(~same) <= 2
+        np.testing.assert_allclose(one.depth[a][same], other.depth[b][same], rtol=3e-6)
+        assert np.count_nonzero(one.faces[a] != other.faces[b]) <= 0.005 * len(a) + 2
 
 
 def test_what_is_behind_the_camera_is_not_seen() -> None:
