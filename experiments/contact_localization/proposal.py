@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 from experiments.contact_localization.hypotheses import Hypotheses, normalised
 from experiments.contact_localization.search import Search
 from experiments.contact_localization.shared_errors import UNKNOWNS, log_prior
-from harness.arrays import BoolArray, FloatArray, IntArray
+from harness.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from harness.sim.compiled import compiled
 
 _PLACE = (0.8e-3, 0.8e-3, 0.6e-3)
@@ -103,7 +103,7 @@ class _Shape:
         squares, pairs = of_pairs(points, cdist(places, places) < _NEIGHBOURS)
         believed = np.diag([(width / _SMOOTHING) ** 2] * axes + [1.0] * UNKNOWNS)
         counts = effective / (effective + _BELIEVED)
-        both: FloatArray = counts * (0.5 / pairs) * squares + (1.0 - counts) * believed
+        both: AnyArray = counts * (0.5 / pairs) * squares + (1.0 - counts) * believed
         carried = np.linalg.solve(both[axes:, axes:], both[axes:, :axes]).T
         left = both[:axes, :axes] - carried @ both[axes:, :axes]
         mean = counts * shared.mean(axis=0)
