@@ -151,9 +151,9 @@ def locate(
     for k in range(count if first is None else first, count + 1):
         seconds = {"images": image_seconds * k / count}
         start = time.perf_counter()
-        alone = len(search.members(k)) == 0
+        alone = levels.senses == "audio"
         heard = None if levels.senses == "touch" else hear(strikes[:k], model, levels.spacing, alone)
-        if levels.senses == "audio" and heard is None:
+        if alone and heard is None:
             raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
         if heard is not None:
             lap(seconds, "sounds", start)

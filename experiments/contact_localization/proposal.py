@@ -105,7 +105,7 @@ class _Shape:
         counts = effective / (effective + _BELIEVED)
         both: AnyArray = counts * (0.5 / pairs) * squares + (1.0 - counts) * believed
         carried = np.linalg.solve(both[axes:, axes:], both[axes:, :axes]).T
-        left = both[:axes, :axes] - carried @ both[axes:, :axes]
+        left: AnyArray = both[:axes, :axes] - carried @ both[axes:, :axes]
         mean = counts * shared.mean(axis=0)
         return cls(carried, np.linalg.cholesky(left), np.linalg.cholesky(both[axes:, axes:]), mean)
 
