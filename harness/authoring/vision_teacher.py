@@ -1,8 +1,8 @@
 """A teacher: one network of an object's whole look, taught by the same answers as the tiny ones.
 
 It is made to be measured beside them, along the same rays and samples, on the same pictures kept back
-(``docs/decisions/0007-networks-of-a-look-have-no-teacher.md``). Networks are distilled from it where that is
-asked for.
+(``docs/decisions/0007-networks-of-a-look-learn-from-the-surface.md``). Networks are distilled from it where
+that is asked for.
 """
 
 import importlib.util

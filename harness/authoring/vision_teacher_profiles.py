@@ -40,7 +40,7 @@ class TeacherSpec:
     features: int = 4
     slots: int = 17
     places: int = 1_000_000
-    steps: int = 1500
+    steps: int = 3000
     epochs: int = 25
     batch: int = 2048
     rate: float = 1e-2
@@ -73,7 +73,7 @@ class TeacherSpec:
 
 
 _TOLD = TeacherSpec()
-_STRICT = replace(_TOLD, kind="osf", deep=2, steps=3000)
+_STRICT = replace(_TOLD, kind="osf", deep=2)
 
 SMOKE_TEACHERS = (replace(_TOLD, places=500_000, steps=500, epochs=5),)
 STANDARD_TEACHERS = (_TOLD, _STRICT)

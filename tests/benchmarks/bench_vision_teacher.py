@@ -33,6 +33,7 @@ def main() -> None:
     parser.add_argument("--profile", default="standard")
     parser.add_argument("--kind", default="osf-v", choices=("osf-v", "osf"))
     parser.add_argument("--pictures", type=int)
+    parser.add_argument("--steps", type=int, help="of the teacher, in place of the profile's")
     parser.add_argument("--threads", type=int)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--distill", action="store_true", help="and networks, taught by it and directly")
@@ -59,12 +60,14 @@ def measured(name: str, given: argparse.Namespace) -> Mapping[str, Mapping[str, 
     """The teacher alone, by three ways of drawing its pictures."""
     profile = chosen(given)
     kept = given.folder / f"{Path(name).stem.removeprefix('builtin:')}-{given.kind}-{given.profile}"
+    kept = kept.with_name(f"{kept.name}-{given.steps}") if given.steps else kept
     told = kept.with_suffix(".json")
     if not told.exists():
         look = appearance_of(name, given.units)
         lit = LitObject(look)
         held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, given.seed)
         spec, checkpoint = profile.teacher(given.kind), kept.with_suffix(".npz")
+        spec = replace(spec, steps=given.steps or spec.steps)
         made = made_teacher(lit, held_out, spec, given.seed, checkpoint, unsaid, given.threads)
         references = reference_pictures(lit, held_out, profile.samples)
         errors = made.judged(lit, held_out, references, given.threads)
