@@ -25,6 +25,13 @@ _MANY = 16_384
 """Rays: of fewer, more bands would leave too few samples to a network."""
 
 
+_FEW = 64
+"""Rays of a band that take more samples at once: to go around once more costs more than some for nothing."""
+
+_LAST = 4
+"""Waves that they take at once."""
+
+
 class Watch:
     """Seconds of parts that follow each other."""
 
@@ -144,7 +151,8 @@ class Follower:
     def _band(self, rays: Rays, asker: Asker, chosen: RenderSettings, watch: Watch, room: Room) -> int:
         going, total, is_first = np.arange(len(rays.ways), dtype=np.int32), 0, True
         while len(going):
-            samples = Samples.room_for(going, chosen.wave if chosen.marches else 1, room)
+            wave = chosen.wave if len(going) > _FEW else _LAST * chosen.wave
+            samples = Samples.room_for(going, wave if chosen.marches else 1, room)
             self._take(rays, samples, chosen, is_first)
             watch.lap("march")
             order, blocks = self._sorted(samples, asker.block, room)
