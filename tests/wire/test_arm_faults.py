@@ -45,6 +45,7 @@ class InFlight:
         self._thread = threading.Thread(target=self._move, args=(arm,))
         self._thread.start()
         while np.abs(arm.state().joint_speeds).max() < 0.1:
+            assert self._thread.is_alive(), f"the motion ended before it was seen to begin: {self.error!r}"
             time.sleep(0.005)
 
     def _move(self, arm: UrArm) -> None:
