@@ -29,13 +29,18 @@ def dense_layers(
     for index in range(depth + 1):
         taken = given + (encoded if index and index == skip else 0)
         given = width if index < depth else outputs
-        layer = nn.Linear(taken, given)
-        weight = random.standard_normal((given, taken)) * np.sqrt(2.0 / taken)
-        with torch.no_grad():
-            layer.weight.copy_(torch.from_numpy(np.float32(weight)))
-            layer.bias.zero_()
-        layers.append(layer)
+        layers.append(dense_layer(taken, given, random))
     return layers
+
+
+def dense_layer(taken: int, given: int, random: np.random.Generator) -> nn.Linear:
+    """Weights normal of variance ``2 / taken`` (He et al., ICCV 2015), biases zero."""
+    layer = nn.Linear(taken, given)
+    weight = random.standard_normal((given, taken)) * np.sqrt(2.0 / taken)
+    with torch.no_grad():
+        layer.weight.copy_(torch.from_numpy(np.float32(weight)))
+        layer.bias.zero_()
+    return layer
 
 
 def encode(points: FloatArray, normaliser: Normaliser, encoding: Encoding) -> Tensor:

@@ -15,7 +15,7 @@ from harness.authoring.training import Report, train
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
 from harness.authoring.vision_distilled import distilled, with_lamps
-from harness.authoring.vision_lessons import LAMPS, LAMPS_OF_A_PLACE, OPAQUE, draw_lamps, draw_lessons
+from harness.authoring.vision_lessons import LAMPS_OF_A_PLACE, OPAQUE, draw_for
 from harness.authoring.vision_metrics import network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision_profiles import CellsSpec, VisionProfile
 from harness.authoring.vision_teacher import MadeTeacher, made_teacher, require_torch, teacher_file
@@ -173,14 +173,11 @@ class _Making:
         self, spec: CellsSpec, checkpoint: Path, word: str, teacher: MadeTeacher | None = None
     ) -> CellTraining:
         self.report(f"drawing places {word}".rstrip("_ "), 0.0)
-        lattice, told = lattice_of(self.lit.appearance.mesh, spec.cells), spec.size.kind == "osf-v"
+        kind, lattice = spec.size.kind, lattice_of(self.lit.appearance.mesh, spec.cells)
         shell = surface_shell(self.lit.appearance.mesh, lattice)
-        lessons = draw_lessons(
-            *(self.lit, spec.places, shell.voxel, self.seed, self.held_out), 0 if told else LAMPS_OF_A_PLACE
-        )
-        lamps = draw_lamps(LAMPS if told else 0, self.seed, self.held_out)
+        lessons, lamps = draw_for(kind, self.lit, spec.places, shell.voxel, self.seed, self.held_out)
         if teacher is not None:
-            if told:
+            if kind == "osf-v":
                 lessons = with_lamps(lessons, lamps, LAMPS_OF_A_PLACE, spec.hidden, self.seed)
             lessons, lamps = distilled(teacher.ask, lessons), lamps[:0]
         grid, scale = grid_of(shell, lattice), OPAQUE / shell.voxel

@@ -17,6 +17,7 @@ from harness.authoring.vision_data import FACING, LEAST_YIELD, HeldOut
 from harness.authoring.vision_places import cosine_about, is_closed, sphere, surface_places, uniform_about
 from harness.errors import OutOfDomain
 from harness.mesh import Mesh
+from harness.objectfile.vision_network import Kind
 from harness.sim.direct_image import LitObject
 from harness.sim.lambert import Places, cosines, places_seen, radiance
 
@@ -26,7 +27,7 @@ AHEAD = 0.25
 OPAQUE = 40.0
 """Optical thickness of a voxel as deep behind the surface as a voxel is wide."""
 
-LAMPS = 1 << 14
+_LAMPS = 1 << 14
 """That are drawn from, for networks that are told visibility."""
 
 LAMPS_OF_A_PLACE = 4
@@ -67,6 +68,19 @@ class Lessons:
 
     def __len__(self) -> int:
         return len(self.points)
+
+
+def draw_for(
+    kind: Kind, lit: LitObject, count: int, voxel: float, seed: int, held_out: HeldOut
+) -> tuple[Lessons, AnyArray]:
+    """Lessons of so many places for networks of a kind, and the ``(m, 3)`` lamps that they are lit by anew.
+
+    A kind that is told no visibility has lamps with its lessons, and none besides; see ``draw_lessons`` and
+    ``draw_lamps`` for the rest.
+    """
+    told = kind == "osf-v"
+    lessons = draw_lessons(lit, count, voxel, seed, held_out, 0 if told else LAMPS_OF_A_PLACE)
+    return lessons, draw_lamps(_LAMPS if told else 0, seed, held_out)
 
 
 def draw_lessons(

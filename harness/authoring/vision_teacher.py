@@ -15,7 +15,7 @@ import numpy as np
 
 from harness.authoring.training import Report, train
 from harness.authoring.vision_data import HeldOut
-from harness.authoring.vision_lessons import LAMPS, LAMPS_OF_A_PLACE, OPAQUE, draw_lamps, draw_lessons
+from harness.authoring.vision_lessons import OPAQUE, draw_for
 from harness.authoring.vision_metrics import network_pictures, picture_errors
 from harness.authoring.vision_teacher_pictures import Answers, TeacherRenderer
 from harness.authoring.vision_teacher_profiles import TeacherSpec
@@ -131,11 +131,10 @@ def made_teacher(
     torch.set_num_threads(threads or own_cores())
     report("drawing places of a teacher", 0.0)
     begun = time.process_time()
-    mesh, told = lit.appearance.mesh, spec.kind == "osf-v"
+    mesh = lit.appearance.mesh
     lattice = lattice_of(mesh)
     shell = surface_shell(mesh, lattice)
-    lessons = draw_lessons(lit, spec.places, shell.voxel, seed, held_out, 0 if told else LAMPS_OF_A_PLACE)
-    lamps = draw_lamps(LAMPS if told else 0, seed, held_out)
+    lessons, lamps = draw_for(spec.kind, lit, spec.places, shell.voxel, seed, held_out)
     drawn = time.process_time()
     extent = lattice.cell * max(lattice.sides)
     training = TeacherTraining(spec, np.array(lattice.low), extent, lessons, lamps, seed)

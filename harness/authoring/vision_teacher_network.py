@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from harness.authoring.perceptron import dense_layer
 from harness.authoring.vision_teacher_profiles import TeacherSpec
 from harness.objectfile.vision_network import EXTRAS
 
@@ -119,16 +120,7 @@ class Teacher(nn.Module):
 
 
 def _layers(sizes: tuple[int, ...], random: np.random.Generator) -> nn.ModuleList:
-    """Weights normal of variance ``2 / inputs`` (He et al., ICCV 2015), biases zero."""
-    layers = nn.ModuleList()
-    for taken, given in pairwise(sizes):
-        layer = nn.Linear(taken, given)
-        weight = random.standard_normal((given, taken)) * np.sqrt(2.0 / taken)
-        with torch.no_grad():
-            layer.weight.copy_(torch.from_numpy(np.float32(weight)))
-            layer.bias.zero_()
-        layers.append(layer)
-    return layers
+    return nn.ModuleList([dense_layer(taken, given, random) for taken, given in pairwise(sizes)])
 
 
 def _waves(directions: Tensor, turns: int) -> Tensor:
