@@ -59,6 +59,20 @@ class FileModes:
     said: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """What is asked of a mesh; as in ``modes_of_file``, but for ``highest``, Hz, which is never None."""
+
+    mesh: str
+    material: Material
+    units: str | None
+    wall: float | None
+    highest: float
+    count: int | None
+    edge: float | None
+    envelope: float | None
+
+
 @dataclass(frozen=True, eq=False)
 class _Taken:
     """A mesh that can be solved."""
@@ -106,12 +120,12 @@ def modes_of_file(
     check_limit(HEARING if limit is None else limit, count)
     check_elasticity(Elasticity.uniform(material, 1), 1)
     seconds = dict.fromkeys(("intake", "mesh"), 0.0)
-    mesh = str(mesh)
-    taken = None if mesh.startswith(BUILTIN) else _volume(Path(mesh), units, wall, edge, envelope, seconds)
-    volume = taken is not None
     highest = _highest(limit, count)
+    asked = _Asked(str(mesh), material, units, wall, highest, count, edge, envelope)
+    taken = _volume(asked, seconds)
+    volume = taken is not None
     if taken is None:
-        taken = _surface(mesh, units, wall, edge, envelope, material, highest, count, seconds, store)
+        taken = _surface(asked, seconds, store)
     held = _held(taken, fixed)
     below = np.inf if limit is None and count is not None else highest
     solution = solve_mesh(taken.mesh, material, below, least=count, held=held)
@@ -134,45 +148,34 @@ def _highest(limit: float | None, count: int | None) -> float:
     return HEARING if count is None else _UNLIMITED
 
 
-def _volume(
-    path: Path,
-    units: str | None,
-    wall: float | None,
-    edge: float | None,
-    envelope: float | None,
-    seconds: dict[str, float],
-) -> _Taken | None:
+def _volume(asked: _Asked, seconds: dict[str, float]) -> _Taken | None:
+    """The tetrahedra of a file; None if what is asked for is a surface."""
+    if asked.mesh.startswith(BUILTIN):
+        return None
+    path = Path(asked.mesh)
     with _timed(seconds, "intake"):
-        found = read_volume(path, units)
+        found = read_volume(path, asked.units)
     if found is None:
         return None
-    for name, value in (("--wall", wall), ("--edge", edge), ("--envelope", envelope)):
+    for name, value in (("--wall", asked.wall), ("--edge", asked.edge), ("--envelope", asked.envelope)):
         if value is not None:
             raise WrongUse(f"{path.name} holds tetrahedra, which are solved as they are; leave {name} out")
     return _Taken(found.mesh, found.sets, found.units, found.bodies, None, found.said)
 
 
-def _surface(
-    mesh: str,
-    units: str | None,
-    wall: float | None,
-    edge: float | None,
-    envelope: float | None,
-    material: Material,
-    limit: float,
-    count: int | None,
-    seconds: dict[str, float],
-    store: Store | None,
-) -> _Taken:
+def _surface(asked: _Asked, seconds: dict[str, float], store: Store | None) -> _Taken:
     with _timed(seconds, "intake"):
-        given = surface_of(mesh, units, wall)
+        given = surface_of(asked.mesh, asked.units, asked.wall)
         surface = given.mesh
         check_closed(surface)
     with _timed(seconds, "mesh"):
+        edge = asked.edge
         if edge is None:
-            inside, edge, kept = finely_filled(surface, material, limit, count, store, envelope)
+            inside, edge, kept = finely_filled(
+                surface, asked.material, asked.highest, asked.count, store, asked.envelope
+            )
         else:
-            inside, kept = filled(surface, edge, store, envelope)
+            inside, kept = filled(surface, edge, store, asked.envelope)
         snapped = curved(inside, surface, inside)
     said = (*given.said, *((_KEPT,) if kept else ()))
     return _Taken(snapped, {}, given.units, inside.bodies, edge, said)
