@@ -53,15 +53,19 @@ class Contours:
             read_only(each)
         return cls(mesh.bounds, *made)
 
-    def turned(self, eye: FloatArray, closed: bool, sides: AnyArray) -> None:
+    def turned(self, eye: FloatArray, closed: bool, sides: AnyArray, some: AnyArray) -> int:
         """Fill in ``(faces,)`` int8: 1 of faces turned towards an eye, else -1; or 0 where they are hidden.
 
         Args:
             eye: ``(3,)`` m.
             closed: whether faces seen from behind are hidden by others.
             sides: written.
+            some: ``(faces,)`` int32, which are not hidden, in their order; written.
+
+        Returns:
+            How many are not hidden.
         """
-        _turned(self.planes, eye[0], eye[1], eye[2], 0 if closed else -1, sides)
+        return int(_turned(self.planes, eye[0], eye[1], eye[2], 0 if closed else -1, sides, some))
 
 
 def _paired(faces: IntArray) -> AnyArray:
@@ -89,11 +93,19 @@ def _named(key: IntArray, some: IntArray, most: int) -> tuple[IntArray, IntArray
 
 
 @compiled
-def _turned(planes: FloatArray, x: float, y: float, z: float, hidden: int, sides: AnyArray) -> None:
+def _turned(
+    planes: FloatArray, x: float, y: float, z: float, hidden: int, sides: AnyArray, some: AnyArray
+) -> int:
     """See ``Contours.turned``."""
+    count = 0
     for m in range(planes.shape[1]):
         above = planes[0, m] * x + planes[1, m] * y + planes[2, m] * z - planes[3, m]
         sides[m] = 1 if above > 0.0 else hidden
+    for m in range(planes.shape[1]):
+        # Written first and counted after: a branch would be guessed wrong along every outline.
+        some[count] = m
+        count += 1 if sides[m] != 0 else 0
+    return count
 
 
 @compiled

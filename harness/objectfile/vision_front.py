@@ -46,51 +46,46 @@ def projected(
 def find_front(
     seen: FloatArray,
     faces: AnyArray,
-    sides: AnyArray,
+    some: AnyArray,
     places: AnyArray,
     beside: AnyArray,
     offsets: AnyArray,
     side: int,
-    first: int,
-    last: int,
     nearness: AnyArray,
     front: AnyArray,
 ) -> None:
-    """The greatest inverse depth at the chosen places of some rows of pixels, and whose it is.
+    """The greatest inverse depth of some faces at the chosen places of pixels, and whose it is.
 
     Args:
         seen: ``(n, 3)`` x and y of vertices in sub-pixels, whose centres are whole numbers, and 1/m.
         faces: ``(m, 3)`` uint32.
-        sides: ``(m,)`` 0 of faces that are left out.
+        some: ``(k,)`` int32, of the faces; the first of any that are equally near is taken.
         places: ``(rows, columns)`` which of ``offsets`` is looked at; ``EMPTY`` for none.
         beside: ``(rows, columns)`` whether within ``NEIGHBOURS`` any pixel is looked at beside its centre.
         offsets: ``(k, 2)`` row and column of sub-pixels in a pixel.
         side: sub-pixels along a pixel.
-        first: row.
-        last: row, not looked at itself.
         nearness: ``(rows, columns)`` float32 1/m, raised; 0 where there is nothing.
         front: ``(rows, columns)`` int32, written.
     """
-    columns, scale, share = places.shape[1], float(side), 1.0 / side
-    middle, small, top, bottom = float(side // 2), float(side * NEIGHBOURS), first * scale, last * scale - 1.0
-    right = columns * scale - 1.0
-    for m in range(len(faces)):
-        if sides[m] == 0:
-            continue
+    rows, columns = places.shape
+    scale, share = float(side), 1.0 / side
+    middle, small = float(side // 2), float(side * NEIGHBOURS)
+    bottom, right = rows * scale - 1.0, columns * scale - 1.0
+    for m in some:
         a, b, c = faces[m, 0], faces[m, 1], faces[m, 2]
         x0, x1, x2, y0, y1, y2 = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
         y_low, y_high = min(y0, min(y1, y2)), max(y0, max(y1, y2))
-        if y_low > bottom + _ON_EDGE or y_high < top - _ON_EDGE:
+        if y_low > bottom + _ON_EDGE or y_high < -_ON_EDGE:
             continue
         x_low, x_high = min(x0, min(x1, x2)), max(x0, max(x1, x2))
-        is_plain = x_low >= 0.0 and y_low >= top and x_high < right and y_high < bottom
+        is_plain = x_low >= 0.0 and y_low >= 0.0 and x_high < right and y_high < bottom
         is_plain = is_plain and x_high - x_low < small and y_high - y_low < small
         if is_plain and not beside[np.uint64(y0 * share), np.uint64(x0 * share)]:
             # Most faces of a fine mesh lie between the centres, and need no more than this.
             i0, i1 = _centres(y_low - middle, y_high - middle, share)
             j0, j1 = _centres(x_low - middle, x_high - middle, share)
         else:
-            i0, i1 = _pixels(y_low, y_high, scale, first, last)
+            i0, i1 = _pixels(y_low, y_high, scale, 0, rows)
             j0, j1 = _pixels(x_low, x_high, scale, 0, columns)
         if i0 > i1 or j0 > j1:
             continue
@@ -120,6 +115,22 @@ def find_front(
                     value = np.float32(min(z0 + u * az + v * bz, most))
                     if value > nearness[i, j]:
                         nearness[i, j], front[i, j] = value, m
+
+
+@compiled
+def nearest_of(nearness: AnyArray, front: AnyArray) -> None:
+    """Put what further parts of the faces left into the first: as if all had gone there in their order.
+
+    Args:
+        nearness: ``(parts, rows, columns)`` of ``find_front``; parts in the faces' order.
+        front: of the same shape.
+    """
+    parts, rows, columns = nearness.shape
+    for k in range(1, parts):
+        for i in range(rows):
+            for j in range(columns):
+                if nearness[k, i, j] > nearness[0, i, j]:
+                    nearness[0, i, j], front[0, i, j] = nearness[k, i, j], front[k, i, j]
 
 
 @compiled

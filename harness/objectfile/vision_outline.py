@@ -1,16 +1,20 @@
 """Which pixels a mesh covers and how much of each, and how deep it is there."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from harness.arrays import AnyArray
+from harness.arrays import AnyArray, FloatArray, read_only
 from harness.mesh import Mesh
 from harness.objectfile.vision_contour import Contours, covered, crossed
-from harness.objectfile.vision_front import find_front, gathered, projected
+from harness.objectfile.vision_front import find_front, gathered, nearest_of, projected
 from harness.objectfile.vision_raster import NEAREST, draw, look_through, placed
 from harness.objectfile.vision_work import Crew, Room
 from harness.pinhole import Pinhole
+
+_LEAST = 512
+"""Faces that another thread is asked to draw: fewer are drawn sooner than their pixels are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +36,13 @@ class Outline:
     faces: AnyArray
 
 
+@cache
 def centre_out(side: int) -> AnyArray:
     """``(side * side, 2)`` int64 sub-pixels of a pixel, row and column, from its centre outwards."""
     rows, columns = np.divmod(np.arange(side * side), side)
     away = (rows - side // 2) ** 2 + (columns - side // 2) ** 2
     chosen = np.argsort(away, kind="stable")
-    return np.stack([rows[chosen], columns[chosen]], axis=1)
+    return read_only(np.stack([rows[chosen], columns[chosen]], axis=1))
 
 
 def is_closed(mesh: Mesh) -> bool:
@@ -80,23 +85,44 @@ def mesh_outline(
         return drawn_outline(mesh, hides, camera, side, crew, room, is_told)
     rows, columns = camera.height, camera.width
     offsets = centre_out(side)
-    sides = room.take("sides", (len(mesh.faces),), np.int8)
-    made.turned(camera.eye, hides, sides)
+    sides, some = (room.take(f"faces {kind}", (len(mesh.faces),), kind) for kind in ("int8", "int32"))
+    shown = some[: made.turned(camera.eye, hides, sides, some)]
     count, looked = (room.take(name, (rows, columns), np.uint8) for name in ("count", "looked"))
     begins, stretches = crossed(seen, made.edges, sides, rows * side, columns * side)
     beside = room.take("beside", (rows, columns), np.bool_)
     beside[:] = False
-    some = covered(begins, stretches, side, offsets, count, looked, beside)
-    nearness = room.take("nearness", (rows, columns), np.float32)
-    front = room.take("front", (rows, columns), np.int32)
-
-    def band(first: int, last: int) -> None:
-        nearness[first:last] = 0.0
-        find_front(seen, made.faces, sides, looked, beside, offsets, side, first, last, nearness, front)
-
-    crew.share(band, rows, crew.threads)
-    found = gathered(count, looked, nearness, front, side, offsets, some)
+    most = covered(begins, stretches, side, offsets, count, looked, beside)
+    nearness, front = _fronts(seen, made.faces, shown, looked, beside, offsets, side, crew, room)
+    found = gathered(count, looked, nearness, front, side, offsets, most)
     return Outline(*found) if is_told else Outline(*found[:-1], np.empty(0, np.int32))
+
+
+def _fronts(
+    seen: FloatArray,
+    faces: AnyArray,
+    shown: AnyArray,
+    looked: AnyArray,
+    beside: AnyArray,
+    offsets: AnyArray,
+    side: int,
+    crew: Crew,
+    room: Room,
+) -> tuple[AnyArray, AnyArray]:
+    """Inverse depth and face in front: each thread draws some faces, then the nearer ones are taken."""
+    parts = min(crew.threads, max(len(shown) // _LEAST, 1))
+    nearness = room.take("nearness", (parts, *looked.shape), np.float32)
+    front = room.take("front", (parts, *looked.shape), np.int32)
+    ends = np.linspace(0, len(shown), parts + 1).astype(int).tolist()
+
+    def draw_some(first: int, last: int) -> None:
+        for k in range(first, last):
+            nearness[k] = 0.0
+            some = shown[ends[k] : ends[k + 1]]
+            find_front(seen, faces, some, looked, beside, offsets, side, nearness[k], front[k])
+
+    crew.share(draw_some, parts, parts)
+    nearest_of(nearness, front)
+    return nearness[0], front[0]
 
 
 def drawn_outline(

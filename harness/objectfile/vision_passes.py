@@ -1,7 +1,7 @@
 """Rays of a picture, a few samples each at a time, until none of them goes on."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +31,9 @@ _FEW = 64
 _LAST = 4
 """Waves that they take at once."""
 
+Aim = Callable[[int, int, Room], None]
+"""Fills in the rays from one to before another, with a room that arrays may be taken from."""
+
 
 class Watch:
     """Seconds of parts that follow each other."""
@@ -50,7 +53,8 @@ class Watch:
             for name, seconds in share.items():
                 sums[name] = sums.get(name, 0.0) + seconds
         every = max(sum(sums.values()), 1e-12)
-        self.seconds |= {name: whole * seconds / every for name, seconds in sums.items()}
+        for name, seconds in sums.items():
+            self.seconds[name] = self.seconds.get(name, 0.0) + whole * seconds / every
 
     def lap(self, part: str) -> None:
         """What passed since the last lap belongs to ``part``."""
@@ -128,8 +132,16 @@ class Follower:
         self._volume, self._crew = volume, crew
         self._rooms = [Room() for _ in range(_BANDS * crew.threads)]
 
-    def follow(self, rays: Rays, asker: Asker, chosen: RenderSettings, watch: Watch) -> int:
-        """Fill in what rays see; the number of samples that were asked for is returned."""
+    def follow(self, rays: Rays, aim: Aim, asker: Asker, chosen: RenderSettings, watch: Watch) -> int:
+        """Fill in what rays see; the number of samples that were asked for is returned.
+
+        Args:
+            rays: to be followed.
+            aim: fills in some of them before they are.
+            asker: of the networks.
+            chosen: for the picture.
+            watch: that is told what parts took.
+        """
         asker.light(rays.scene.light)
         count = len(rays.ways)
         bands = self._crew.threads * (_BANDS if count >= _MANY else 1) if count >= 2 * _LEAST else 1
@@ -139,8 +151,10 @@ class Follower:
 
         def work(first: int, last: int) -> None:
             for band in range(first, last):
-                part = rays.part(ends[band], ends[band + 1])
                 watches[band].restart()
+                aim(ends[band], ends[band + 1], self._rooms[band])
+                watches[band].lap("rays")
+                part = rays.part(ends[band], ends[band + 1])
                 totals[band] = self._band(part, asker, chosen, watches[band], self._rooms[band])
 
         self._crew.share(work, bands, bands)

@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from harness.arrays import AnyArray, FloatArray
+from harness.arrays import FloatArray
 from harness.linear_image import LinearImage, binned
 from harness.mesh import Mesh
 from harness.objectfile.runtime import Network
@@ -17,7 +17,7 @@ from harness.objectfile.vision_contour import Contours
 from harness.objectfile.vision_fold import folded
 from harness.objectfile.vision_graph import FILE, graph_block, vision_model
 from harness.objectfile.vision_outline import Outline, is_closed, mesh_outline, whole_picture
-from harness.objectfile.vision_passes import Follower, Rays, Volume, Watch
+from harness.objectfile.vision_passes import Aim, Follower, Rays, Volume, Watch
 from harness.objectfile.vision_samples import Asker, FusedAsker, GraphAsker, Scene
 from harness.objectfile.vision_settings import Rendered, RenderSettings, VisionLevel
 from harness.objectfile.vision_shell import DEEP, PER_CELL, shell_for
@@ -25,9 +25,6 @@ from harness.objectfile.vision_surface import SurfaceExtras
 from harness.objectfile.vision_tensors import vision_tensors
 from harness.objectfile.vision_work import Crew, Room
 from harness.pinhole import DirectionalLight, Pinhole
-
-_LEAST = 4096
-"""Rays that another thread is asked to aim: fewer are aimed sooner than it wakes."""
 
 
 class VisionRenderer:
@@ -61,7 +58,7 @@ class VisionRenderer:
         self._crew, self._room = Crew(threads), Room()
         self._follower = Follower(Volume(self.model, self.shell, per_cell), self._crew)
         extras = self.model.weights.size.extras
-        self._extras = SurfaceExtras(mesh, extras, self._crew, self._room, self._closed)
+        self._extras = SurfaceExtras(mesh, extras, self._closed)
         self._askers: dict[str, Asker] = {}
 
     def render(
@@ -90,9 +87,9 @@ class VisionRenderer:
         watch.lap("open")
         outline = self._outline(camera, chosen)
         watch.lap("outline")
-        rays, slant = self._rays(camera, light, outline, chosen)
+        rays, slant, aimed = self._rays(camera, light, outline, chosen)
         watch.lap("rays")
-        samples = self._follower.follow(rays, asker, chosen, watch)
+        samples = self._follower.follow(rays, aimed, asker, chosen, watch)
         image = _picture(camera, outline, rays.sums, slant, light.irradiance / np.pi)
         watch.lap("picture")
         watch.seconds["render"] = time.perf_counter() - watch.begun
@@ -108,27 +105,28 @@ class VisionRenderer:
 
     def _rays(
         self, camera: Pinhole, light: DirectionalLight, outline: Outline, chosen: RenderSettings
-    ) -> tuple[Rays, FloatArray]:
-        """The rays, and depth for a unit of length along each."""
-        ways, views, slant = self._aim(camera, outline)
-        surface = outline.depth / slant if len(outline.depth) else np.full(len(slant), np.inf)
-        begin = np.zeros(len(slant))
-        if len(outline.depth) and np.isfinite(chosen.lead):
-            begin = np.maximum(surface - chosen.lead * self.shell.voxel, 0.0)
-        extras = self._extras(camera.eye, ways, light.direction, surface, outline.faces)
-        return Rays.begun(camera.eye, ways, surface, Scene(views, extras, light.direction), begin), slant
-
-    def _aim(self, camera: Pinhole, outline: Outline) -> tuple[FloatArray, AnyArray, FloatArray]:
+    ) -> tuple[Rays, FloatArray, Aim]:
+        """The rays, depth for a unit of length along each, and what fills in both for some of them."""
         count, (x, y) = len(outline.pixels), camera.centre_px
-        ways, slant = self._room.take("ways", (count, 3), np.float64), np.empty(count)
-        views, rays = self._room.take("views", (count, 3), np.float32), np.arange(count)
+        ways, surface = self._room.take("ways", (count, 3), np.float64), np.full(count, np.inf)
+        slant, begin, every = np.empty(count), np.zeros(count), np.arange(count)
+        views = self._room.take("views", (count, 3), np.float32)
+        extras = self._room.take("extras", (count, self._extras.count), np.float32)
+        lit = self._extras.under(camera.eye, light.direction)
         rotation = np.ascontiguousarray(camera.object_from_camera[:3, :3])
 
-        def work(first: int, last: int) -> None:
-            aim(rays[first:last], outline.places, camera.focal_px, x, y, rotation, ways, views, slant)
+        def aimed(first: int, last: int, room: Room) -> None:
+            at = slice(first, last)
+            aim(every[at], outline.places, camera.focal_px, x, y, rotation, ways, views, slant)
+            if len(outline.depth):
+                surface[at] = outline.depth[at] / slant[at]
+                if np.isfinite(chosen.lead):
+                    begin[at] = np.maximum(surface[at] - chosen.lead * self.shell.voxel, 0.0)
+            if lit is not None:
+                lit.tell(ways[at], surface[at], outline.faces[at], extras[at], room)
 
-        self._crew.share(work, count, self._crew.threads, _LEAST)
-        return ways, views, slant
+        rays = Rays.begun(camera.eye, ways, surface, Scene(views, extras, light.direction), begin)
+        return rays, slant, aimed
 
     def _asker(self, level: VisionLevel) -> Asker:
         """The way to ask that a level has, made when it is first used."""

@@ -1,23 +1,66 @@
 """What ``osf-v`` networks are told too: whether the light reaches a ray's surface, and its normal."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
 from harness.mesh import Mesh
 from harness.objectfile.vision_faces import FaceCubes
 from harness.objectfile.vision_lamp import LampGrid
-from harness.objectfile.vision_told import tell
-from harness.objectfile.vision_work import Crew, Room
+from harness.objectfile.vision_told import Surface, tell
+from harness.objectfile.vision_work import Room
 from harness.sim.appearance import plain
 from harness.sim.ray_mesh import LEAST
 
 _EARLY = 0.25
 """Cubes before the known depth from which on a ray is followed: depth is kept as float32."""
 
-_LEAST = 128
-"""Rays that another thread is asked to follow: fewer are followed sooner than it wakes."""
-
 _UNKNOWN = np.empty(0, np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class LitSurface:
+    """A mesh under a lamp, as an eye sees it.
+
+    Attributes:
+        eye: ``(3,)`` m, where rays begin.
+        lamp: ``(3,)`` unit, towards it.
+        size: m, of the mesh.
+        cubes: of the mesh.
+        surface: corners and normals of the mesh.
+        grid: of the mesh, across the light.
+    """
+
+    eye: FloatArray
+    lamp: FloatArray
+    size: float
+    cubes: FaceCubes
+    surface: Surface
+    grid: LampGrid
+
+    def tell(self, ways: FloatArray, depth: FloatArray, likely: AnyArray, told: AnyArray, room: Room) -> None:
+        """Fill in what is told of some rays; see ``SurfaceExtras``.
+
+        Args:
+            ways: ``(n, 3)`` unit.
+            depth: ``(n,)`` m along each where the mesh is; infinite where that is not known.
+            likely: ``(n,)`` int32 faces that an outline knows them to meet; or ``(0,)``.
+            told: ``(n, 4)`` float32, written.
+            room: that arrays are taken from.
+        """
+        count = len(ways)
+        begin = np.where(np.isfinite(depth), np.maximum(depth - _EARLY * self.cubes.edge, 0.0), 0.0)
+        faces, faced, seen = (
+            room.take(f"told {kind}", (count,), kind) for kind in ("int64", "float64", "bool")
+        )
+        lifted = room.take("lifted", (count, 3), np.float64)
+        tell(
+            *(self.eye, ways, begin, likely, self.cubes.lists, self.surface, self.lamp, self.size),
+            *(faces, lifted, faced, told),
+        )
+        self.grid.sees(lifted, LEAST * self.size, faces, faced, seen)
+        told[:, 0] = seen
 
 
 class SurfaceExtras:
@@ -26,13 +69,11 @@ class SurfaceExtras:
     Args:
         mesh: in metres.
         count: of further inputs: 4, or 0 for networks that are told nothing more.
-        crew: shares the rays.
-        room: that arrays are taken from.
         closed: of ``is_closed``.
     """
 
-    def __init__(self, mesh: Mesh, count: int, crew: Crew, room: Room, closed: bool = False) -> None:
-        self._count, self._crew, self._room, self._closed = count, crew, room, closed
+    def __init__(self, mesh: Mesh, count: int, closed: bool = False) -> None:
+        self.count, self._closed = count, closed
         self._grid: LampGrid | None = None
         self._from_outside = False
         if count:
@@ -58,29 +99,25 @@ class SurfaceExtras:
             depth: ``(n,)`` m along each ray where the mesh is; infinite where that is not known.
             likely: ``(n,)`` int32 faces that an outline knows them to meet; or ``(0,)``.
         """
-        told = np.empty((len(ways), self._count), np.float32)
-        if not told.size:
-            return told
-        begin = np.where(np.isfinite(depth), np.maximum(depth - _EARLY * self._cubes.edge, 0.0), 0.0)
-        lamp, size, count = np.array(light, np.float64), self._mesh.diagonal, len(ways)
-        low, high = self._mesh.bounds
-        grid = self._under(lamp, self._closed and bool(((eye < low) | (eye > high)).any()))
-        faces, faced = (self._room.take(f"told {kind}", (count,), kind) for kind in ("int64", "float64"))
-        lifted = self._room.take("lifted", (count, 3), np.float64)
-
-        def work(first: int, last: int) -> None:
-            at, seen = slice(first, last), np.empty(last - first, np.bool_)
-            tell(
-                *(eye, ways[at], begin[at], likely[at], self._cubes.lists, self._surface, lamp, size),
-                *(faces[at], lifted[at], faced[at], told[at]),
-            )
-            grid.sees(lifted[at], LEAST * size, faces[at], faced[at], seen)
-            told[at, 0] = seen
-
-        self._crew.share(work, count, 4 * self._crew.threads, _LEAST)
+        told, lit = np.empty((len(ways), self.count), np.float32), self.under(eye, light)
+        if lit is not None and told.size:
+            lit.tell(ways, depth, likely, told, Room())
         return told
 
-    def _under(self, lamp: FloatArray, from_outside: bool) -> LampGrid:
+    def under(self, eye: FloatArray, light: FloatArray) -> LitSurface | None:
+        """The mesh under a lamp; None for networks that are told nothing.
+
+        Args:
+            eye: ``(3,)`` m, where rays will begin.
+            light: ``(3,)`` unit, towards the lamp.
+        """
+        if not self.count:
+            return None
+        lamp, (low, high) = np.array(light, np.float64), self._mesh.bounds
+        grid = self._listed(lamp, self._closed and bool(((eye < low) | (eye > high)).any()))
+        return LitSurface(eye, lamp, self._mesh.diagonal, self._cubes, self._surface, grid)
+
+    def _listed(self, lamp: FloatArray, from_outside: bool) -> LampGrid:
         """The faces as a lamp sees them, again if it has moved, or the eye from outside of the mesh into it.
 
         What is seen from outside of a closed surface is seen on its outside.

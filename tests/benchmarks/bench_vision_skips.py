@@ -22,7 +22,6 @@ from harness.objectfile.vision_outline import is_closed
 from harness.objectfile.vision_settings import RenderSettings
 from harness.objectfile.vision_surface import SurfaceExtras
 from harness.objectfile.vision_view import camera_for, light_for, turned
-from harness.objectfile.vision_work import Crew, Room
 from harness.output import ANSWERS
 from harness.pinhole import DirectionalLight, Pinhole
 from harness.sim.appearance import plain
@@ -83,7 +82,7 @@ def told(vision: ObjectVision, views: list[View]) -> None:
     exact, look, asked = (
         RayMesh(mesh),
         plain(mesh, (1.0, 1.0, 1.0)),
-        SurfaceExtras(mesh, 4, Crew(1), Room(), is_closed(mesh)),
+        SurfaceExtras(mesh, 4, is_closed(mesh)),
     )
 
     def by_all_faces(eye: FloatArray, ways: FloatArray, light: DirectionalLight) -> AnyArray:

@@ -123,13 +123,12 @@ def seen_from(mesh: Mesh, camera: Pinhole) -> tuple[FloatArray, FloatArray, AnyA
     return ways, outline.depth / slant, outline.faces
 
 
-@pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("name", ["mug", "box", "sheet"])
 @pytest.mark.parametrize("is_known", [False, True], ids=["taken for open", "known to be closed or not"])
-def test_pictures_are_told_what_all_faces_say(name: str, threads: int, is_known: bool) -> None:
+def test_pictures_are_told_what_all_faces_say(name: str, is_known: bool) -> None:
     """From near and far, by the depth of the outline, without it, and by its faces too."""
     mesh = MESHES[name]
-    told = SurfaceExtras(mesh, 4, Crew(threads), Room(), is_known and is_closed(mesh))
+    told = SurfaceExtras(mesh, 4, is_known and is_closed(mesh))
     for away, light in ((1.2, (0.0, 0.6, 0.8)), (2.5, (0.48, -0.6, 0.64)), (25.0, (-0.8, -0.6, 0.0))):
         camera = looking(mesh, away, 96, 80)
         ways, depth, faces = seen_from(mesh, camera)
@@ -148,7 +147,7 @@ def test_an_eye_within_is_told_of_the_wall_around_it() -> None:
     camera = Pinhole.looking_at((0.05, 0.03, 0.01), (0.09, 0.03, 0.012), (0, 0, 1), 40, 40, 1.2)
     ways, depth, faces = seen_from(BOX, camera)
     light = np.array([0.6, 0.0, 0.8])
-    told = SurfaceExtras(BOX, 4, Crew(1), Room(), True)
+    told = SurfaceExtras(BOX, 4, True)
     # An eye outside before it: what is listed under the lamp is not the same.
     told(np.array([1.0, 1.0, 1.0]), ways, light, np.full(len(ways), np.inf))
     found = told(camera.eye, ways, light, depth, faces)
@@ -161,7 +160,7 @@ def test_an_eye_within_is_told_of_the_wall_around_it() -> None:
 def test_places_lifted_from_faces_that_look_away_are_told_the_same(name: str) -> None:
     """Lamps all around, low ones too, and eyes all around: every ray is told what all faces say."""
     mesh, random = build(name), np.random.default_rng(7)
-    told = SurfaceExtras(mesh, 4, Crew(1), Room(), is_closed(mesh))
+    told = SurfaceExtras(mesh, 4, is_closed(mesh))
     middle = mesh.bounds.mean(axis=0)
     differ = rays = 0
     for _ in range(6):
@@ -182,6 +181,6 @@ def test_who_meets_nothing_and_who_asks_nothing_is_told_nothing() -> None:
     away = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     eye, light = np.array([0.5, 0.5, 0.5]), np.array([0.0, 0.0, 1.0])
     nowhere = np.full(2, np.inf)
-    assert not SurfaceExtras(BOX, 4, Crew(1), Room())(eye, away, light, nowhere).any()
-    assert SurfaceExtras(BOX, 0, Crew(1), Room())(eye, away, light, nowhere).shape == (2, 0)
-    assert SurfaceExtras(BOX, 4, Crew(1), Room())(eye, away[:0], light, nowhere[:0]).shape == (0, 4)
+    assert not SurfaceExtras(BOX, 4)(eye, away, light, nowhere).any()
+    assert SurfaceExtras(BOX, 0)(eye, away, light, nowhere).shape == (2, 0)
+    assert SurfaceExtras(BOX, 4)(eye, away[:0], light, nowhere[:0]).shape == (0, 4)
