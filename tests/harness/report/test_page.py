@@ -73,6 +73,10 @@ def test_the_page_holds_everything_it_shows(written: Path, page: Page) -> None:
     assert written.stat().st_size <= 3_000_000
 
 
+def test_no_tag_of_ours_is_shown_as_words(page: Page) -> None:
+    assert not re.search(r"</?(a|b|br|code|em|i|p|span|sub|sup)\b", page.text)
+
+
 def test_its_table_of_contents_leads_to_every_section(page: Page) -> None:
     assert {f"#{name}" for name in SECTIONS} == {a for a in page.addresses if a.startswith("#")}
     assert set(SECTIONS) <= page.ids
