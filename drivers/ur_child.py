@@ -7,10 +7,8 @@ parent dies, its end of the pipe closes, and this process stops the arm and ends
 import argparse
 import contextlib
 import os
-import queue
 import signal
 import sys
-import threading
 import time
 from typing import Final
 
@@ -18,9 +16,9 @@ from drivers import dashboard, pipe, ur_state
 from drivers.safety import require_loopback
 from drivers.ur_link import PATIENCE, Link
 from drivers.ur_motion import Motion, Outcome
+from drivers.ur_parent import Parent
 from drivers.ur_stream import Stream
 from drivers.ur_watchdog import Watchdog
-from harness.arrays import FloatArray
 from harness.clock import now
 from harness.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
 
@@ -31,7 +29,6 @@ STALE: Final = 0.5  # without a packet: nothing is commanded, the watchdog is no
 LOST_MOVING: Final = 5.0  # without a packet during a motion: give up
 LOST_AT_REST: Final = 20.0
 BEAT_LATE: Final = 3.0  # without a heartbeat during a motion: stop
-LAST_WORDS: Final = 1.5  # s that this process may take to stop the arm when its parent is gone
 
 
 class Child:
@@ -39,32 +36,27 @@ class Child:
 
     def __init__(self, link: Link, requests: int, replies: int) -> None:
         self._link = link
-        self._requests = requests
-        self._replies = replies
-        self._inbox: queue.SimpleQueue[pipe.Message | None] = queue.SimpleQueue()
-        self._stream = Stream(link, self._send_packet, lambda: self._inbox.put(None))
+        self._parent = Parent(requests, replies, self._stop_hard)
+        self._stream = Stream(link, self._parent.send_packet, self._parent.wake)
         self._motion: Motion | None = None
         self._latched: TouchstoneError | None = None
-        self._closed = False
-        self._epoch = 0
-        self._beat = now()
         self._watchdog = Watchdog(link)
         self._patience = link.patience
 
     def run(self, model: str) -> None:
         """Connect, then serve until the parent closes the pipe or the link is lost."""
-        threading.Thread(target=self._read, name="requests", daemon=True).start()
+        self._parent.listen()
         try:
             controller = self._link.connect(model)
             self._stream.start()
             self._link.arm()
         except TouchstoneError as error:
-            self._refuse(0, error)
+            self._parent.refuse(0, error)
             return
         self._watchdog.start()
-        self._answer(0, [controller.model, controller.serial, controller.version])
+        self._parent.answer(0, [controller.model, controller.serial, controller.version])
         try:
-            while not self._closed:
+            while not self._parent.closed:
                 self._tick()
         except (TouchstoneError, RuntimeError) as error:
             self._give_up(error)
@@ -72,7 +64,7 @@ class Child:
             self._leave()
 
     def _tick(self) -> None:
-        message = self._next()
+        message = self._parent.next(TICK if self._motion else REST_TICK)
         if message is not None:
             self._serve(message)
         self._check_link()
@@ -81,11 +73,6 @@ class Child:
         if self._motion is not None:
             self._watch(self._motion)
         self._kick()
-
-    def _next(self) -> pipe.Message | None:
-        with contextlib.suppress(queue.Empty):
-            return self._inbox.get(timeout=TICK if self._motion else REST_TICK)
-        return None
 
     # Requests
 
@@ -98,24 +85,24 @@ class Child:
                     self._start(message)
                 case "zero_force":
                     self._zero_force()
-                    self._answer(message["id"], True)
+                    self._parent.answer(message["id"], True)
                 case "tool_output":
                     self._link.set_tool_output(message["index"], message["on"])
-                    self._answer(message["id"], True)
+                    self._parent.answer(message["id"], True)
                 case unknown:
                     raise BenchFault(f"the arm's process was asked to '{unknown}', which it does not know")
         except TouchstoneError as error:
-            self._refuse(message["id"], error)
+            self._parent.refuse(message["id"], error)
 
     def _stop(self, message: pipe.Message) -> None:
         if self._motion is not None:
             self._motion.stop(
                 self._link, Outcome(error=SafetyStop(f"{self._motion.what} was stopped by request"))
             )
-        self._answer(message["id"], True)
+        self._parent.answer(message["id"], True)
 
     def _start(self, message: pipe.Message) -> None:
-        if message["epoch"] < self._epoch:
+        if message["epoch"] < self._parent.epoch:
             raise SafetyStop("a stop was requested before this motion began; it was not sent")
         self._require_calm("move")
         motion = Motion.from_message(message, self._stream.force)
@@ -123,7 +110,7 @@ class Child:
             raise BenchFault(
                 f"{motion.what}: the controller finds no joints for the target; nothing was moved"
             )
-        self._beat = now()
+        self._parent.expect_beats()
         self._stream.watch(motion.guard)
         self._stream.moving = True
         self._motion = motion
@@ -184,7 +171,7 @@ class Child:
     # What goes on meanwhile
 
     def _watch(self, motion: Motion) -> None:
-        late = now() - self._beat
+        late = self._parent.late
         if late > BEAT_LATE * self._patience and not motion.stopping:
             text = (
                 f"{motion.what} was stopped: the program that asked for it fell behind by {1e3 * late:.0f} ms"
@@ -197,9 +184,9 @@ class Child:
         if outcome.latch:
             self._latched = outcome.error
         if outcome.error is not None:
-            self._refuse(motion.id, outcome.error)
+            self._parent.refuse(motion.id, outcome.error)
         else:
-            self._answer(motion.id, outcome.value)
+            self._parent.answer(motion.id, outcome.value)
 
     def _end_motion(self) -> None:
         self._motion = None
@@ -214,7 +201,7 @@ class Child:
         during = f"during {self._motion.what}" if self._motion is not None else "at rest"
         self._latched = ProtectiveStop(ur_state.stopped_by_controller(self._stream.newest, during))
         if self._motion is not None:
-            self._refuse(self._motion.id, self._latched)
+            self._parent.refuse(self._motion.id, self._latched)
             self._end_motion()
         with contextlib.suppress(BenchFault):
             self._link.halt()
@@ -244,41 +231,6 @@ class Child:
         if self._is_fresh():
             self._watchdog.kick()
 
-    # The pipe
-
-    def _read(self) -> None:
-        with contextlib.suppress(OSError):
-            for _, payload in pipe.read_frames(self._requests):
-                message = pipe.unpack_message(payload)
-                if message["do"] == "beat":
-                    self._beat = now()
-                    continue
-                if message["do"] == "stop":
-                    self._epoch = max(self._epoch, message["epoch"])
-                self._inbox.put(message)
-        self._closed = True
-        self._inbox.put(None)
-        threading.Timer(LAST_WORDS, self._stop_hard).start()
-
-    def _stop_hard(self) -> None:
-        """The main thread is stuck in the library, and nobody is left to kill it."""
-        with contextlib.suppress(BenchFault):
-            dashboard.stop(self._link.address)
-        os._exit(1)
-
-    def _send_packet(self, packet: FloatArray) -> None:
-        pipe.write_now(self._replies, pipe.packet_frame(packet))
-
-    def _answer(self, request: int, value: object) -> None:
-        self._reply({"id": request, "ok": True, "value": value})
-
-    def _refuse(self, request: int, error: TouchstoneError) -> None:
-        self._reply({"id": request, "ok": False, "error": type(error).__name__, "text": str(error)[:2000]})
-
-    def _reply(self, message: pipe.Message) -> None:
-        with contextlib.suppress(pipe.PipeBroken):
-            pipe.write_within(self._replies, pipe.message_frame(message), 0.5)
-
     # The end
 
     def _give_up(self, error: Exception) -> None:
@@ -289,12 +241,18 @@ class Child:
             # Nothing that words may run into keeps the arm from being halted.
             with contextlib.suppress(BenchFault):
                 self._link.halt()
-        self._reply({"id": -1, "ok": False, "error": type(fault).__name__, "text": str(fault)[:2000]})
+        self._parent.refuse(-1, fault)
 
     def _named(self, error: Exception) -> TouchstoneError:
         """What the controller's state says about a call of the library that failed."""
         cause = self._link.why()
         return type(cause)(f"ur_rtde failed ({error}); {cause}")
+
+    def _stop_hard(self) -> None:
+        """The main thread is stuck in the library, and nobody is left to kill it."""
+        with contextlib.suppress(BenchFault):
+            dashboard.stop(self._link.address)
+        os._exit(1)
 
     def _leave(self) -> None:
         """Stop, end the script. Sockets are closed by the exit: disconnecting takes 0.5 s an interface."""
