@@ -117,7 +117,6 @@ def composite(
 
 @compiled
 def aim(
-    rays: AnyArray,
     places: AnyArray,
     focal: float,
     x: float,
@@ -130,7 +129,6 @@ def aim(
     """Where rays look.
 
     Args:
-        rays: ``(n,)`` to be filled in.
         places: ``(r, 2)`` x and y in the picture, pixels.
         focal: pixels.
         x: pixels, of the axis.
@@ -140,7 +138,7 @@ def aim(
         views: ``(r, 3)`` the same as float32, written.
         slant: ``(r,)`` depth for a unit of length, written.
     """
-    for ray in rays:
+    for ray in range(len(places)):
         a, b = (places[ray, 0] - x) / focal, (places[ray, 1] - y) / focal
         part = 1.0 / math.sqrt(a * a + b * b + 1.0)
         for axis in range(3):

@@ -85,8 +85,8 @@ def find_front(
             i0, i1 = _centres(y_low - middle, y_high - middle, share)
             j0, j1 = _centres(x_low - middle, x_high - middle, share)
         else:
-            i0, i1 = _pixels(y_low, y_high, scale, 0, rows)
-            j0, j1 = _pixels(x_low, x_high, scale, 0, columns)
+            i0, i1 = _pixels(y_low, y_high, scale, rows)
+            j0, j1 = _pixels(x_low, x_high, scale, columns)
         if i0 > i1 or j0 > j1:
             continue
         ax, ay, bx, by = x1 - x0, y1 - y0, x2 - x0, y2 - y0
@@ -140,10 +140,10 @@ def _centres(low: float, high: float, share: float) -> tuple[int, int]:
 
 
 @compiled
-def _pixels(low: float, high: float, scale: float, first: int, last: int) -> tuple[int, int]:
-    """First and last pixel of a range that have a sub-pixel from ``low`` to ``high``."""
-    begin = np.ceil(max(low, first * scale) - _ON_EDGE)
-    end = np.floor(min(high, last * scale - 1.0) + _ON_EDGE)
+def _pixels(low: float, high: float, scale: float, count: int) -> tuple[int, int]:
+    """First and last of so many pixels that have a sub-pixel from ``low`` to ``high``."""
+    begin = np.ceil(max(low, 0.0) - _ON_EDGE)
+    end = np.floor(min(high, count * scale - 1.0) + _ON_EDGE)
     if begin > end:
         return 0, -1
     return int((begin + 0.5) / scale), int((end + 0.5) / scale)

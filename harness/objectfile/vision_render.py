@@ -109,7 +109,7 @@ class VisionRenderer:
         """The rays, depth for a unit of length along each, and what fills in both for some of them."""
         count, (x, y) = len(outline.pixels), camera.centre_px
         ways, surface = self._room.take("ways", (count, 3), np.float64), np.full(count, np.inf)
-        slant, begin, every = np.empty(count), np.zeros(count), np.arange(count)
+        slant, begin = np.empty(count), np.zeros(count)
         views = self._room.take("views", (count, 3), np.float32)
         extras = self._room.take("extras", (count, self._extras.count), np.float32)
         lit = self._extras.under(camera.eye, light.direction)
@@ -117,7 +117,8 @@ class VisionRenderer:
 
         def aimed(first: int, last: int, room: Room) -> None:
             at = slice(first, last)
-            aim(every[at], outline.places, camera.focal_px, x, y, rotation, ways, views, slant)
+            places, drawn = outline.places[at], (ways[at], views[at], slant[at])
+            aim(places, camera.focal_px, x, y, rotation, *drawn)
             if len(outline.depth):
                 surface[at] = outline.depth[at] / slant[at]
                 if np.isfinite(chosen.lead):

@@ -16,8 +16,6 @@ from harness.sim.ray_mesh import LEAST
 _EARLY = 0.25
 """Cubes before the known depth from which on a ray is followed: depth is kept as float32."""
 
-_UNKNOWN = np.empty(0, np.int32)
-
 
 @dataclass(frozen=True, eq=False)
 class LitSurface:
@@ -40,7 +38,9 @@ class LitSurface:
     grid: LampGrid
 
     def tell(self, ways: FloatArray, depth: FloatArray, likely: AnyArray, told: AnyArray, room: Room) -> None:
-        """Fill in what is told of some rays; see ``SurfaceExtras``.
+        """Fill in what is told of some rays: 1 where the light is seen, else 0; the unit normal that is seen.
+
+        All four are 0 for a ray that meets nothing.
 
         Args:
             ways: ``(n, 3)`` unit.
@@ -79,30 +79,6 @@ class SurfaceExtras:
         if count:
             self._cubes, self._mesh = FaceCubes.of(mesh), mesh
             self._surface = (mesh.corners, mesh.face_normals, plain(mesh, (1.0, 1.0, 1.0)).normals)
-
-    def __call__(
-        self,
-        eye: FloatArray,
-        ways: FloatArray,
-        light: FloatArray,
-        depth: FloatArray,
-        likely: AnyArray = _UNKNOWN,
-    ) -> AnyArray:
-        """``(n, 4)`` float32: 1 where the light is seen, else 0; unit normal on the side that is seen.
-
-        All are 0 for a ray that meets nothing.
-
-        Args:
-            eye: ``(3,)`` m, where rays begin.
-            ways: ``(n, 3)`` unit.
-            light: ``(3,)`` unit, towards the lamp.
-            depth: ``(n,)`` m along each ray where the mesh is; infinite where that is not known.
-            likely: ``(n,)`` int32 faces that an outline knows them to meet; or ``(0,)``.
-        """
-        told, lit = np.empty((len(ways), self.count), np.float32), self.under(eye, light)
-        if lit is not None and told.size:
-            lit.tell(ways, depth, likely, told, Room())
-        return told
 
     def under(self, eye: FloatArray, light: FloatArray) -> LitSurface | None:
         """The mesh under a lamp; None for networks that are told nothing.

@@ -6,15 +6,14 @@ page has decoded it and shows it.
 """
 
 import argparse
-import threading
 from pathlib import Path
 
 import browser
 import numpy as np
+from served_look import served
 
 from harness.clock import now
 from harness.live_view.frames import LiveFrames
-from harness.live_view.server import LiveServer
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision import open_vision
 from harness.output import ANSWERS
@@ -31,9 +30,8 @@ def main() -> None:
     parser.add_argument("--drags", type=int, default=5, help="of 40 steps, each there and back")
     asked = parser.parse_args()
     of = ObjectFile.open(asked.folder)
-    server = LiveServer(LiveFrames(of.description.name, open_vision(of)))
-    threading.Thread(target=server.run, daemon=True).start()
-    with browser.shown(server.url) as page:
+    frames = LiveFrames(of.description.name, open_vision(of))
+    with served(frames) as server, browser.shown(server.url) as page:
         page.wait("by('samples').textContent")
         page.tell(_COUNT)
         for level, size in _CASES:
@@ -51,7 +49,6 @@ def main() -> None:
                 f"{level}, {size} a side: {middle:.0f} ({low:.0f} to {high:.0f}) pictures a second; "
                 f"the last of each drag took {np.median(took):.0f} ms from asked for to shown"
             )
-    server.shutdown()
 
 
 if __name__ == "__main__":

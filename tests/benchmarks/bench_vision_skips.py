@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from asked_surface import told_of
 
 from harness.arrays import AnyArray, FloatArray
 from harness.image_metrics import psnr
@@ -100,7 +101,7 @@ def told(vision: ObjectVision, views: list[View]) -> None:
         depth = exact.first_hits(camera.eye, ways).distance
         ways, depth = ways[np.isfinite(depth)], depth[np.isfinite(depth)].astype(np.float32)
         one, by_faces = timed(partial(by_all_faces, camera.eye, ways, light))
-        ask = partial(asked, camera.eye, ways, light.direction, depth)
+        ask = partial(told_of, asked, camera.eye, ways, light.direction, depth)
         (other, relit), (_, again) = timed(ask), timed(ask)
         seconds.append((by_faces, relit, again))
         differ, rays = differ + int((one != other).any(axis=1).sum()), rays + len(ways)

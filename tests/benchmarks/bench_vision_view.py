@@ -1,19 +1,18 @@
 """What a frame of the page that turns an object takes, asked for over its own wire, one after another.
 
-``python tests/benchmarks/bench_vision_view.py OBJECT --frames 40``; CPU is of server and client together, so
+``PYTHONPATH=tests python tests/benchmarks/bench_vision_view.py OBJECT --frames 40``; CPU is of server and client together, so
 that it says something on a busy machine, where the clock says nothing.
 """
 
 import argparse
-import threading
 import time
 from http.client import HTTPConnection
 from pathlib import Path
 
 import numpy as np
+from served_look import served
 
 from harness.live_view.frames import LiveFrames
-from harness.live_view.server import LiveServer
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision import open_vision
 from harness.output import ANSWERS
@@ -29,18 +28,20 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1)
     asked = parser.parse_args()
     of = ObjectFile.open(asked.folder)
-    server = LiveServer(LiveFrames(of.description.name, open_vision(of, asked.threads)))
-    threading.Thread(target=server.run, daemon=True).start()
-    wire = HTTPConnection("127.0.0.1", server.server_port)
+    with served(LiveFrames(of.description.name, open_vision(of, asked.threads))) as server:
+        wire = HTTPConnection("127.0.0.1", server.server_port)
+        _measure(wire, asked.frames)
+        wire.close()
+
+
+def _measure(wire: HTTPConnection, frames: int) -> None:
     for level, size in _CASES:
         _turn(wire, level, size, 2)
         begun, clock = time.process_time(), time.perf_counter()
-        _turn(wire, level, size, asked.frames)
+        _turn(wire, level, size, frames)
         cpu, took = time.process_time() - begun, time.perf_counter() - clock
-        each = 1e3 / asked.frames
+        each = 1e3 / frames
         ANSWERS.print(f"{level}, {size} a side: {cpu * each:.1f} ms of CPU, {took * each:.1f} on the clock")
-    wire.close()
-    server.shutdown()
 
 
 def _turn(wire: HTTPConnection, level: str, size: int, frames: int) -> None:

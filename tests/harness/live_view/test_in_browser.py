@@ -1,16 +1,15 @@
 """The page that turns an object, in a real browser where one is installed."""
 
-import threading
 from collections.abc import Iterator
 
 import browser
 import numpy as np
 import pytest
 from look_bench import box_file, told_look
+from served_look import served
 
 from harness.arrays import FloatArray
 from harness.live_view.frames import LiveFrames
-from harness.live_view.server import LiveServer
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.vision import open_vision
 
@@ -22,13 +21,9 @@ MIDDLE = (300, 300)
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[browser.Page]:
     folder = box_file(tmp_path_factory.mktemp("objects") / "box", told_look()).folder
-    server = LiveServer(LiveFrames("box", open_vision(ObjectFile.open(folder), 1)))
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    with browser.shown(server.url) as shown:
+    frames = LiveFrames("box", open_vision(ObjectFile.open(folder), 1))
+    with served(frames) as server, browser.shown(server.url) as shown:
         yield shown
-    server.shutdown()
-    thread.join()
 
 
 @pytest.fixture(autouse=True)

@@ -11,6 +11,7 @@ from urllib.parse import urlencode
 
 import pytest
 from look_bench import box_file, told_look
+from served_look import served
 
 from harness.cli import invoke
 from harness.errors import WrongUse
@@ -28,12 +29,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def server(folder: Path) -> Iterator[LiveServer]:
-    running = LiveServer(LiveFrames("box", open_vision(ObjectFile.open(folder), 1)))
-    thread = threading.Thread(target=running.run)
-    thread.start()
-    yield running
-    running.shutdown()
-    thread.join()
+    with served(LiveFrames("box", open_vision(ObjectFile.open(folder), 1))) as running:
+        yield running
 
 
 class Answer:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from asked_surface import told_of
 from plain_look import looking
 
 from harness.arrays import AnyArray, FloatArray
@@ -136,7 +137,7 @@ def test_pictures_are_told_what_all_faces_say(name: str, is_known: bool) -> None
         assert len(ways) > 0
         unknown, none = np.full(len(ways), np.inf), np.empty(0, np.int32)
         for known, likely in ((depth, none), (unknown, none), (depth, faces)):
-            found = told(camera.eye, ways, np.array(light), known, likely)
+            found = told_of(told, camera.eye, ways, np.array(light), known, likely)
             differ = (found != exact).any(axis=1)
             # On an edge between two faces either may be the one that is met.
             assert np.count_nonzero(differ) <= 0.001 * len(ways)
@@ -149,8 +150,8 @@ def test_an_eye_within_is_told_of_the_wall_around_it() -> None:
     light = np.array([0.6, 0.0, 0.8])
     told = SurfaceExtras(BOX, 4, True)
     # An eye outside before it: what is listed under the lamp is not the same.
-    told(np.array([1.0, 1.0, 1.0]), ways, light, np.full(len(ways), np.inf))
-    found = told(camera.eye, ways, light, depth, faces)
+    told_of(told, np.array([1.0, 1.0, 1.0]), ways, light, np.full(len(ways), np.inf))
+    found = told_of(told, camera.eye, ways, light, depth, faces)
     np.testing.assert_array_equal(found, told_by_all_faces(BOX, camera.eye, ways, light))
     assert not found[:, 0].any()
     assert (np.einsum("nx,nx->n", found[:, 1:], ways) < 0.0).all()
@@ -169,7 +170,7 @@ def test_places_lifted_from_faces_that_look_away_are_told_the_same(name: str) ->
         camera = Pinhole.looking_at(eye, middle, (0, 0, 1), 120, 120, 0.5)
         ways, depth, faces = seen_from(mesh, camera)
         exact = told_by_all_faces(mesh, camera.eye, ways, light)
-        found = told(camera.eye, ways, light, depth, faces)
+        found = told_of(told, camera.eye, ways, light, depth, faces)
         differ += int(np.count_nonzero(found[:, 0] != exact[:, 0]))
         rays += len(ways)
     # On an edge between two faces either may be the one that is met.
@@ -181,6 +182,6 @@ def test_who_meets_nothing_and_who_asks_nothing_is_told_nothing() -> None:
     away = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     eye, light = np.array([0.5, 0.5, 0.5]), np.array([0.0, 0.0, 1.0])
     nowhere = np.full(2, np.inf)
-    assert not SurfaceExtras(BOX, 4)(eye, away, light, nowhere).any()
-    assert SurfaceExtras(BOX, 0)(eye, away, light, nowhere).shape == (2, 0)
-    assert SurfaceExtras(BOX, 4)(eye, away[:0], light, nowhere[:0]).shape == (0, 4)
+    assert not told_of(SurfaceExtras(BOX, 4), eye, away, light, nowhere).any()
+    assert SurfaceExtras(BOX, 0).under(eye, light) is None
+    assert told_of(SurfaceExtras(BOX, 4), eye, away[:0], light, nowhere[:0]).shape == (0, 4)
