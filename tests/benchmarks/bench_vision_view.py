@@ -1,7 +1,7 @@
 """What a frame of the page that turns an object takes, asked for over its own wire, one after another.
 
-``PYTHONPATH=tests python tests/benchmarks/bench_vision_view.py OBJECT --frames 40``; CPU is of server and client together, so
-that it says something on a busy machine, where the clock says nothing.
+``PYTHONPATH=tests python tests/benchmarks/bench_vision_view.py OBJECT --frames 40``; CPU is of server and
+client together, so that it says something on a busy machine, where the clock says nothing.
 """
 
 import argparse
