@@ -29,7 +29,8 @@ def build(
     material: Annotated[str, typer.Option(help="What it is made of.", metavar="M")],
     only: Annotated[str, typer.Option(help="Which modality: audio, touch or vision.")] = "audio",
     profile: Annotated[
-        str, typer.Option(help="smoke or standard (no torch), small (of audio), or paper: its perceptrons.")
+        str,
+        typer.Option(help="smoke or standard (no torch), small (of audio), or paper: networks of its size."),
     ] = "standard",
     units: Annotated[
         str | None, typer.Option(help="Of the file's numbers: m, cm, mm or in.", metavar="U")

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from harness.authoring.vision_teacher_profiles import SMOKE_TEACHERS, STANDARD_TEACHERS, TeacherSpec
 from harness.errors import WrongUse
-from harness.objectfile.vision_network import CELLS, Kind, NetworkSize
+from harness.objectfile.vision_network import CELLS, PAPER, Kind, NetworkSize
 from harness.toml_file import nearest
 
 
@@ -104,8 +104,15 @@ VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
         strict=CellsSpec(replace(_COMPACT, kind="osf"), places=8_000_000),
         teachers=STANDARD_TEACHERS,
     ),
+    "paper": VisionProfile(
+        CellsSpec(replace(PAPER, kind="osf-v"), places=4_000_000, steps=10_000, batch=128),
+        pictures=12,
+        strict=CellsSpec(PAPER, places=8_000_000),
+        teachers=STANDARD_TEACHERS,
+    ),
 })  # fmt: skip
-"""None of them needs torch, teachers aside."""
+"""``paper`` has networks of ObjectFolder 2.0's size; its strict ones are those, told no more. None of them
+needs torch, teachers aside."""
 
 
 def vision_profile(name: str) -> VisionProfile:

@@ -25,7 +25,7 @@ from harness.authoring.vision_metrics import picture_errors
 from harness.authoring.vision_profiles import CellsSpec, VisionProfile, vision_profile
 from harness.errors import DataRefused, OutOfDomain, WrongUse
 from harness.linear_image import LinearImage
-from harness.objectfile.vision_network import NetworkSize, VisionGrid, VisionModel
+from harness.objectfile.vision_network import COMPACT, PAPER, NetworkSize, VisionGrid, VisionModel
 from harness.objectfile.vision_plain import Asked, evaluate
 from harness.objectfile.vision_shell import grid_of, lattice_of, surface_shell
 from harness.sim.appearance import plain
@@ -272,6 +272,31 @@ def test_a_look_becomes_networks_that_show_it(lit: LitObject, tmp_path: Path) ->
         "references",
         *(f"{word}{stage}" for word in ("", "strict_") for stage in stages),
     }
+
+
+def test_profiles_are_as_large_as_they_are_named() -> None:
+    compact, paper = vision_profile("standard"), vision_profile("paper")
+    assert replace(paper.networks.size, kind="osf") == PAPER
+    assert replace(compact.networks.size, kind="osf") == COMPACT
+    assert paper.strict is not None
+    # The paper's very network, of 20 292 parameters.
+    assert paper.strict.size == PAPER
+    assert paper.strict.size.parameters == 20_292
+
+
+def test_networks_of_the_papers_size_learn_too(lit: LitObject, tmp_path: Path) -> None:
+    """Ten octaves, of which the highest turn 160 times in a cell, do not spoil what lies between places."""
+    wide = replace(vision_profile("paper").networks, cells=4, places=6000, steps=100, batch=64)
+    profile = VisionProfile(wide, pictures=2, side=48, samples=3)
+    errors = {}
+    for name, size in (("paper", wide.size), ("compact", vision_profile("standard").networks.size)):
+        chosen = replace(profile, networks=replace(wide, size=size))
+        folder = tmp_path / name
+        folder.mkdir()
+        errors[name] = author_vision(lit.appearance, chosen, 0, folder, lambda *_: None, threads=1).errors
+    # Nearly as good as of six octaves, on a ball of one colour that needs none of them.
+    assert errors["paper"]["psnr_db"] > errors["compact"]["psnr_db"] - 1.0
+    assert errors["paper"]["bytes"] > 2.0 * errors["compact"]["bytes"]
 
 
 def test_what_cannot_be_trained_says_so(lit: LitObject, tmp_path: Path) -> None:
