@@ -50,6 +50,26 @@ def train(training: Resumable, epochs: int, checkpoint: Path, report: Report) ->
         training.save(checkpoint)
 
 
+class Laps:
+    """Seconds of parts that follow each other.
+
+    Args:
+        now: s, on the clock or of the processor.
+
+    Attributes:
+        seconds: of each part.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.perf_counter) -> None:
+        self.seconds: dict[str, float] = {}
+        self._now, self._since = now, now()
+
+    def lap(self, part: str) -> None:
+        """What passed since the last lap belongs to ``part``."""
+        now = self._now()
+        self.seconds[part], self._since = now - self._since, now
+
+
 def median_seconds(call: Callable[[], Any], times: int) -> float:
     """S of the processor (all threads of this program) that one of so many calls takes, in the median.
 

@@ -5,13 +5,12 @@ without a picture being drawn (``vision_lessons``). Nothing is distilled unless 
 itself answers sooner than any network that would stand for it, and exactly.
 """
 
-import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
-from harness.authoring.training import Report, train
+from harness.authoring.training import Laps, Report, train
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
 from harness.authoring.vision_distilled import distilled, with_lamps
@@ -92,7 +91,7 @@ def author_vision(
     """
     if teaching != "none":
         require_torch()
-    clock, lit = _Clock(), LitObject(look)
+    clock, lit = Laps(), LitObject(look)
     held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, seed)
     references = reference_pictures(lit, held_out, profile.samples)
     clock.lap("references")
@@ -140,7 +139,7 @@ def networks_alone(
         report: told of progress.
         threads: None for as many as the process has cores.
     """
-    return _Making(lit, held_out, seed, report, threads, _Clock()).trained(spec, checkpoint, "").finish()
+    return _Making(lit, held_out, seed, report, threads, Laps()).trained(spec, checkpoint, "").finish()
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +151,7 @@ class _Making:
     seed: int
     report: Report
     threads: int | None
-    clock: "_Clock"
+    clock: Laps
 
     def teacher(self, spec: TeacherSpec, checkpoint: Path, word: str) -> MadeTeacher:
         made = made_teacher(
@@ -200,16 +199,3 @@ class _Making:
 def _settings(spec: CellsSpec, training: CellTraining) -> Settings:
     told = {key: value for key, value in asdict(spec).items() if key != "size"}
     return asdict(spec.size) | told | {"last_loss": sum(training.losses) / len(training.losses)}
-
-
-class _Clock:
-    """Seconds on the clock of parts that follow each other."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._since = time.perf_counter()
-
-    def lap(self, part: str) -> None:
-        """What passed since the last lap belongs to ``part``."""
-        now = time.perf_counter()
-        self.seconds[part], self._since = now - self._since, now

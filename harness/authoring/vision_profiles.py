@@ -4,7 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from harness.authoring.vision_teacher_profiles import SMOKE_TEACHERS, STANDARD_TEACHERS, TeacherSpec
+from harness.authoring.vision_teacher_profiles import (
+    PAPER_TEACHERS,
+    SMOKE_TEACHERS,
+    STANDARD_TEACHERS,
+    TeacherSpec,
+)
 from harness.errors import WrongUse
 from harness.objectfile.vision_network import CELLS, PAPER, Kind, NetworkSize
 from harness.toml_file import nearest
@@ -108,7 +113,7 @@ VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
         CellsSpec(replace(PAPER, kind="osf-v"), places=4_000_000, steps=10_000, batch=128),
         pictures=12,
         strict=CellsSpec(PAPER, places=8_000_000),
-        teachers=STANDARD_TEACHERS,
+        teachers=PAPER_TEACHERS,
     ),
 })  # fmt: skip
 """``paper`` has networks of ObjectFolder 2.0's size; its strict ones are those, told no more. None of them

@@ -10,22 +10,28 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.authoring.training import Report, train
-from harness.authoring.vision_data import HeldOut
+from harness.authoring.training import Laps, Report, train
+from harness.authoring.vision_data import HeldOut, draw_views
 from harness.authoring.vision_lessons import OPAQUE, draw_for
 from harness.authoring.vision_metrics import network_pictures, picture_errors
+from harness.authoring.vision_seen import RayRecorder, SeenRays, together
 from harness.authoring.vision_teacher_pictures import Answers, TeacherRenderer
-from harness.authoring.vision_teacher_profiles import TeacherSpec
+from harness.authoring.vision_teacher_profiles import FinishSpec, TeacherSpec
 from harness.cores import own_cores
 from harness.errors import WrongUse
 from harness.linear_image import LinearImage
+from harness.mesh import Mesh
 from harness.objectfile.vision_network import Kind, VisionGrid
 from harness.objectfile.vision_settings import RenderSettings
-from harness.objectfile.vision_shell import grid_of, lattice_of, surface_shell
+from harness.objectfile.vision_shell import Lattice, grid_of, lattice_of, surface_shell
 from harness.sim.direct_image import LitObject
+
+if TYPE_CHECKING:
+    from harness.authoring.vision_teacher_training import TeacherTraining
 
 _WAYS = {
     "": RenderSettings(),
@@ -44,8 +50,9 @@ class MadeTeacher:
         ask: what it answers.
         grid: cells of the lattice that its renderer walks.
         voxel: m, of the shell.
-        last_loss: root mean square of colours' errors, as roots of linear light.
-        seconds: of the processor that places and training took, in this run.
+        last_loss: root mean square of colours' errors, as roots of linear light; of pixels' where it was
+            finished on pictures.
+        seconds: of the processor that its stages took, in this run.
     """
 
     spec: TeacherSpec
@@ -77,7 +84,10 @@ class MadeTeacher:
     @property
     def settings(self) -> dict[str, str | float | int | bool | None]:
         """How it was made."""
-        return asdict(self.spec) | {"last_loss": self.last_loss}
+        told = {name: value for name, value in asdict(self.spec).items() if name != "finish"}
+        later = {} if self.spec.finish is None else asdict(self.spec.finish)
+        finish = {f"finish_{name}": value for name, value in later.items()}
+        return told | finish | {"last_loss": self.last_loss}
 
 
 def teacher_file(folder: Path, kind: Kind) -> Path:
@@ -126,19 +136,94 @@ def made_teacher(
     # Heavy, and only here: the tiny networks are made without it.
     import torch
 
-    from harness.authoring.vision_teacher_training import TeacherTraining
-
     torch.set_num_threads(threads or own_cores())
-    report("drawing places of a teacher", 0.0)
-    begun = time.process_time()
-    mesh = lit.appearance.mesh
-    lattice = lattice_of(mesh)
-    shell = surface_shell(mesh, lattice)
-    lessons, lamps = draw_for(spec.kind, lit, spec.places, shell.voxel, seed, held_out)
-    drawn = time.process_time()
-    extent = lattice.cell * max(lattice.sides)
-    training = TeacherTraining(spec, np.array(lattice.low), extent, lessons, lamps, seed)
-    train(training, training.epochs, checkpoint, report)
-    seconds = {"places": drawn - begun, "training": time.process_time() - drawn}
-    grid = grid_of(shell, lattice)
-    return MadeTeacher(spec, training.ask, grid, shell.voxel, training.losses[-1], seconds)
+    laps, walked = Laps(time.process_time), _Walked.of(lit.appearance.mesh)
+    making = _Making(lit, held_out, spec, seed, walked, report, laps)
+    training = making.taught(checkpoint)
+    loss = training.losses[-1]
+    if spec.finish is not None:
+        loss = making.finished(training, spec.finish, finished_file(checkpoint))
+    return MadeTeacher(spec, training.ask, walked.grid, walked.voxel, loss, laps.seconds)
+
+
+@dataclass(frozen=True, eq=False)
+class _Walked:
+    """What its rays go through: a lattice, its cells with some surface, m of a voxel of their shell."""
+
+    lattice: Lattice
+    grid: VisionGrid
+    voxel: float
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> "_Walked":
+        lattice = lattice_of(mesh)
+        shell = surface_shell(mesh, lattice)
+        return cls(lattice, grid_of(shell, lattice), shell.voxel)
+
+
+@dataclass(frozen=True, eq=False)
+class _Making:
+    """What both stages of a teacher have in common."""
+
+    lit: LitObject
+    held_out: HeldOut
+    spec: TeacherSpec
+    seed: int
+    walked: _Walked
+    report: Report
+    laps: Laps
+
+    def taught(self, checkpoint: Path) -> "TeacherTraining":
+        """By the surface."""
+        from harness.authoring.vision_teacher_training import TeacherTraining
+
+        spec, lattice = self.spec, self.walked.lattice
+        self.report("drawing places of a teacher", 0.0)
+        drawn = draw_for(spec.kind, self.lit, spec.places, self.walked.voxel, self.seed, self.held_out)
+        self.laps.lap("places")
+        extent = lattice.cell * max(lattice.sides)
+        training = TeacherTraining(spec, np.array(lattice.low), extent, *drawn, self.seed)
+        train(training, training.epochs, checkpoint, self.report)
+        self.laps.lap("training")
+        return training
+
+    def finished(self, training: "TeacherTraining", finish: FinishSpec, checkpoint: Path) -> float:
+        """On pictures; the last loss."""
+        from harness.authoring.vision_teacher_finish import Finishing
+
+        self.report("drawing pictures of a teacher", 0.0)
+        mesh, scale = self.lit.appearance.mesh, OPAQUE / self.walked.voxel
+        recorder = RayRecorder(training.ask, mesh, self.walked.grid, self.spec.kind, scale)
+        rays = rays_to_learn(recorder, self.lit, finish, self.seed, self.held_out)
+        self.laps.lap("pictures")
+        finishing = Finishing(training, self.spec, finish, rays, scale, self.seed)
+        train(finishing, finishing.epochs, checkpoint, self.report)
+        self.laps.lap("finishing")
+        return finishing.losses[-1]
+
+
+def rays_to_learn(
+    recorder: RayRecorder, lit: LitObject, finish: FinishSpec, seed: int, held_out: HeldOut
+) -> SeenRays:
+    """Rays of exact pictures, clear of those kept back.
+
+    Args:
+        recorder: of the teacher that has learned from the surface.
+        lit: the object.
+        finish: how many pictures.
+        seed: of their cameras and lights.
+        held_out: what nothing is learned from.
+
+    Raises:
+        OutOfDomain: too few views are clear of those kept back.
+    """
+    views = draw_views(lit.appearance.mesh, finish.pictures, finish.side, finish.side, seed, held_out)
+    return together([
+        recorder.seen(camera, light, lit.render(camera, [light], finish.samples).image)
+        for camera, light in views
+    ])  # fmt: skip
+
+
+def finished_file(checkpoint: Path) -> Path:
+    """Beside a teacher's checkpoint: of what it learned from pictures then."""
+    return checkpoint.with_name(f"{checkpoint.stem}-pictures{checkpoint.suffix}")

@@ -28,6 +28,9 @@ class TeacherRenderer(VisionRenderer):
         kind: what the network is told.
         density_scale: 1/m of a density of 1.
         threads: None for as many as the process has cores.
+
+    Attributes:
+        teacher: asks the network.
     """
 
     def __init__(
@@ -41,14 +44,19 @@ class TeacherRenderer(VisionRenderer):
     ) -> None:
         stand_in = vision_graph(_without_weights(grid, kind, density_scale))
         super().__init__(stand_in.SerializeToString(), mesh, threads)
-        self._teacher = _TeacherAsker(ask, grid)
+        self.teacher = TeacherAsker(ask, grid)
 
     def _asker(self, level: VisionLevel) -> Asker:  # noqa: ARG002
-        return self._teacher
+        return self.teacher
 
 
-class _TeacherAsker:
-    """As ``vision_samples.Asker``."""
+class TeacherAsker:
+    """As ``vision_samples.Asker``.
+
+    Args:
+        ask: the network.
+        grid: of cells that samples are placed in.
+    """
 
     block = _BLOCK
 
@@ -60,12 +68,18 @@ class _TeacherAsker:
 
     def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene) -> None:  # noqa: ARG002
         """As ``Asker``; samples need no order."""
-        grid, rays = self._grid, samples.rays[order // samples.most]
-        cells = grid.cells[samples.networks[order]]
-        points = grid.low + grid.cell * (cells + 0.5 * (samples.local[order].astype(np.float64) + 1.0))
+        rays, points = samples.rays[order // samples.most], self.points(samples, order)
         lights = np.tile(scene.light.astype(np.float32), (len(order), 1))
         density, colour = self._ask(points, scene.views[rays], lights, scene.extras[rays])
         samples.density[order], samples.scattered[order] = np.maximum(density, 0.0), colour
+
+    def points(self, samples: Samples, order: AnyArray) -> FloatArray:
+        """``(n, 3)`` m, object frame, of the samples in ``order``."""
+        grid, local = self._grid, samples.local[order].astype(np.float64)
+        points: FloatArray = grid.low + grid.cell * (
+            grid.cells[samples.networks[order]] + 0.5 * (local + 1.0)
+        )
+        return points
 
 
 def _without_weights(grid: VisionGrid, kind: Kind, density_scale: float) -> VisionModel:

@@ -19,6 +19,7 @@ from harness.authoring.vision_data import held_out_pictures
 from harness.authoring.vision_metrics import reference_pictures
 from harness.authoring.vision_profiles import VisionProfile, vision_profile
 from harness.authoring.vision_teacher import made_teacher, teacher_file
+from harness.authoring.vision_teacher_profiles import FinishSpec
 from harness.sim.appearance_source import appearance_of
 from harness.sim.direct_image import LitObject
 
@@ -34,6 +35,10 @@ def main() -> None:
     parser.add_argument("--kind", default="osf-v", choices=("osf-v", "osf"))
     parser.add_argument("--pictures", type=int)
     parser.add_argument("--steps", type=int, help="of the teacher, in place of the profile's")
+    parser.add_argument("--finish", type=int, metavar="STEPS", help="of pictures, after the teacher's own")
+    parser.add_argument("--slower", type=float, default=FinishSpec.slower, help="share of rates meanwhile")
+    parser.add_argument("--weight", type=float, default=FinishSpec.weight, help="of what pictures say")
+    parser.add_argument("--from-pictures", type=int, default=FinishSpec.pictures)
     parser.add_argument("--threads", type=int)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--distill", action="store_true", help="and networks, taught by it and directly")
@@ -61,13 +66,14 @@ def measured(name: str, given: argparse.Namespace) -> Mapping[str, Mapping[str, 
     profile = chosen(given)
     kept = given.folder / f"{Path(name).stem.removeprefix('builtin:')}-{given.kind}-{given.profile}"
     kept = kept.with_name(f"{kept.name}-{given.steps}") if given.steps else kept
-    told = kept.with_suffix(".json")
+    later = f"-{given.finish}-{given.slower:g}-{given.from_pictures}" if given.finish else ""
+    told = kept.with_name(f"{kept.name}{later}.json")
     if not told.exists():
         look = appearance_of(name, given.units)
         lit = LitObject(look)
         held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, given.seed)
         spec, checkpoint = profile.teacher(given.kind), kept.with_suffix(".npz")
-        spec = replace(spec, steps=given.steps or spec.steps)
+        spec = replace(spec, steps=given.steps or spec.steps, finish=finish_of(given))
         made = made_teacher(lit, held_out, spec, given.seed, checkpoint, unsaid, given.threads)
         references = reference_pictures(lit, held_out, profile.samples)
         errors = made.judged(lit, held_out, references, given.threads)
@@ -75,6 +81,13 @@ def measured(name: str, given: argparse.Namespace) -> Mapping[str, Mapping[str, 
     errors = json.loads(told.read_text())
     ways = {"default": "", "rays 2": "two_rays_", "one sample": "one_sample_"}
     return {way: errors | under(errors, word) for way, word in ways.items()}
+
+
+def finish_of(given: argparse.Namespace) -> FinishSpec | None:
+    """What the teacher learns from pictures, where that is asked for."""
+    if not given.finish:
+        return None
+    return FinishSpec(given.from_pictures, steps=given.finish, slower=given.slower, weight=given.weight)
 
 
 def compared(name: str, given: argparse.Namespace) -> Mapping[str, Mapping[str, float]]:
@@ -111,7 +124,8 @@ def line(errors: Mapping[str, float]) -> str:
     """Errors as they are printed, and CPU seconds where a teacher was trained in one go."""
     names = ("psnr_db", "psnr_db_worst", "psnr_db_object", "ssim")
     whole, worst, alone, alike = (errors[name] for name in names)
-    took = [f", {name} {errors[name]:.0f} s of a core" for name in ("places", "training") if name in errors]
+    stages = ("places", "training", "pictures", "finishing")
+    took = [f", {name} {errors[name]:.0f} s of a core" for name in stages if name in errors]
     return f"{whole:6.2f} dB, worst {worst:6.2f}, object alone {alone:6.2f}, ssim {alike:.4f}{''.join(took)}"
 
 
