@@ -28,7 +28,7 @@ from harness.errors import DataRefused
 from harness.objectfile.vision_network import VisionGrid, VisionModel
 from harness.store import digest
 
-VERSION = 1
+VERSION = 2
 """Raised with every change of what training computes, so that no old checkpoint is gone on from."""
 
 _AT_ONCE = 32

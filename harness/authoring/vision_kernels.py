@@ -25,6 +25,10 @@ _MEAN, _SQUARE = np.float32(0.9), np.float32(0.99)
 
 _ONE, _HALF, _TWO, _NONE, _TINY = _F(1.0), _F(0.5), _F(2.0), _F(0.0), _F(1e-9)
 
+_GONE = _F(1e-36)
+"""Moments below it are none: they move no weight, and a core takes a hundred times as long for numbers below
+1.2e-38. A unit that ReLU has cut off for good would keep them for ever: 0.9 of the least number is again that."""
+
 _WARM = 50
 """Steps over which the rate rises."""
 
@@ -232,8 +236,10 @@ def _adam(
     """One step; ``rate`` and ``of`` have the corrections of first steps in them."""
     by, scale = _F(rate), _F(of)
     for p in range(len(flat)):
-        means[p] = _MEAN * means[p] + (_ONE - _MEAN) * slope[p]
-        squares[p] = _SQUARE * squares[p] + (_ONE - _SQUARE) * slope[p] * slope[p]
+        mean = _MEAN * means[p] + (_ONE - _MEAN) * slope[p]
+        square = _SQUARE * squares[p] + (_ONE - _SQUARE) * slope[p] * slope[p]
+        means[p] = mean if abs(mean) > _GONE else _NONE
+        squares[p] = square if square > _GONE else _NONE
         flat[p] -= by * means[p] / (np.sqrt(squares[p] * scale) + _TINY)
 
 

@@ -11,7 +11,7 @@ from harness.arrays import AnyArray
 from harness.authoring.vision import CHECKPOINT, STRICT_CHECKPOINT, author_vision
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
-from harness.authoring.vision_kernels import Lesson, _back, _forth, _wrong, batch_of, encode
+from harness.authoring.vision_kernels import Lesson, _adam, _back, _forth, _wrong, batch_of, encode
 from harness.authoring.vision_layers import (
     first_weights,
     layer_shapes,
@@ -272,6 +272,25 @@ def test_a_look_becomes_networks_that_show_it(lit: LitObject, tmp_path: Path) ->
         "references",
         *(f"{word}{stage}" for word in ("", "strict_") for stage in stages),
     }
+
+
+def test_moments_of_what_learns_no_more_end_at_zero_and_not_below_what_numbers_can_be() -> None:
+    """Against Adam in float64: weights whose slopes stop go on as there, and their moments vanish."""
+    random, steps = np.random.default_rng(5), 12_000
+    slopes = random.normal(size=(40, 64)) * 10.0 ** random.uniform(-12, 0, 64)
+    flat, means, squares = (np.zeros(64, np.float32) for _ in range(3))
+    weights, mean, square = np.zeros((3, 64))
+    least = np.finfo(np.float32).tiny
+    for step in range(steps):
+        slope = slopes[step] if step < len(slopes) else np.zeros(64)
+        _adam(flat, slope.astype(np.float32), means, squares, 1e-3, 1.0)
+        mean, square = 0.9 * mean + 0.1 * slope, 0.99 * square + 0.01 * slope**2
+        weights -= 1e-3 * mean / (np.sqrt(square) + 1e-9)
+        for moment in (means, squares):
+            assert not np.any((moment != 0.0) & (np.abs(moment) < least))
+    assert not means.any()
+    assert not squares.any()
+    assert flat == pytest.approx(weights, rel=1e-4, abs=1e-7)
 
 
 def test_profiles_are_as_large_as_they_are_named() -> None:
