@@ -27,7 +27,7 @@ _ONE, _HALF, _TWO, _NONE, _TINY = _F(1.0), _F(0.5), _F(2.0), _F(0.0), _F(1e-9)
 
 _GONE = _F(1e-36)
 """Moments below it are none: they move no weight, and a core takes a hundred times as long for numbers below
-1.2e-38. A unit that ReLU has cut off for good would keep them for ever: 0.9 of the least number is again that."""
+1.2e-38. A unit that ReLU has cut off would keep them for ever: 0.9 of the least number is again that."""
 
 _WARM = 50
 """Steps over which the rate rises."""
