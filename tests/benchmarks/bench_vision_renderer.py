@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 from fitted_look import fitted_look
+from fma_peak import peak
+from paper_march import PLAIN_SAMPLES, paper_seconds
 from published_view import LIGHT, camera_of
 from rich.console import Console
 
@@ -24,39 +26,16 @@ from harness.arrays import AnyArray, FloatArray
 from harness.image_file import write_png
 from harness.mesh import Mesh
 from harness.objectfile.vision_graph import vision_graph
-from harness.objectfile.vision_network import SIZES, VisionModel
+from harness.objectfile.vision_network import SIZES
 from harness.objectfile.vision_outline import mesh_outline
-from harness.objectfile.vision_plain import Asked, evaluate
 from harness.objectfile.vision_render import VisionRenderer
 from harness.objectfile.vision_settings import COVERS, RenderSettings, VisionLevel
-from harness.objectfile.vision_tiles import LANES, OUTPUTS, SAMPLES, relu_tile
+from harness.objectfile.vision_tiles import LANES
 from harness.objectfile.vision_work import Crew, Room
 from harness.objects.household import build
 from harness.pinhole import DirectionalLight, Pinhole
-from harness.sim.compiled import compiled_fast
 
 CONSOLE = Console(width=220, highlight=False)
-PLAIN_SAMPLES = 384
-"""Of a ray in the paper, between 0.01 and 4 of its units: 1.2 units are the box."""
-
-
-@compiled_fast
-def _tiles(given: AnyArray, weight: AnyArray, bias: AnyArray, out: AnyArray, count: int) -> None:
-    for _ in range(count):
-        relu_tile(given.ctypes.data, weight.ctypes.data, bias.ctypes.data, out.ctypes.data, len(given))
-
-
-def peak() -> float:
-    """FLOP/s of one core multiplying and adding in registers and the first cache, by CPU seconds."""
-    given, weight = np.zeros((64, SAMPLES), np.float32), np.zeros((64, OUTPUTS), np.float32)
-    bias, out = np.zeros(OUTPUTS, np.float32), np.zeros((OUTPUTS, SAMPLES), np.float32)
-    _tiles(given, weight, bias, out, 10)
-    rates = []
-    for _ in range(5):
-        begun = time.process_time()
-        _tiles(given, weight, bias, out, 20_000)
-        rates.append(20_000 * 2.0 * 64 * OUTPUTS * SAMPLES / (time.process_time() - begun))
-    return max(rates)
 
 
 def quartiles(took: list[float]) -> str:
@@ -75,40 +54,6 @@ def measured(draw: Callable[[], object], repeat: int) -> tuple[list[float], list
         wall.append(time.perf_counter() - begun)
         cpu.append(time.process_time() - used)
     return wall, cpu
-
-
-def plain_seconds(model: VisionModel, mesh: Mesh, size: int, crop: int) -> float:
-    """Of the paper's arithmetic: every sample of every ray that is in a cell with a network, in numpy.
-
-    A crop in the middle is measured and the whole extrapolated by the samples there are.
-    """
-    camera, grid = camera_of(mesh, size), model.grid
-    longest = float(np.ptp(mesh.bounds, axis=0).max())
-    places = np.linspace(0.01, 4.0, PLAIN_SAMPLES) * longest / 1.2
-    ways = camera.directions().reshape(-1, 3)
-    inside = np.zeros(size, int)
-
-    def samples(rows: FloatArray) -> tuple[FloatArray, AnyArray]:
-        points = camera.eye + places[None, :, None] * rows[:, None]
-        return points.reshape(-1, 3), grid.networks(points.reshape(-1, 3))
-
-    for row in range(size):
-        inside[row] = np.count_nonzero(samples(ways[row * size : (row + 1) * size])[1] >= 0)
-    middle = slice((size - crop) // 2, (size + crop) // 2)
-    rows = ways.reshape(size, size, 3)[middle, middle].reshape(-1, 3)
-    begun = time.process_time()
-    points, networks = samples(rows)
-    met = np.flatnonzero(networks >= 0)
-    views = np.repeat(rows, PLAIN_SAMPLES, axis=0)[met]
-    density, colour = evaluate(
-        model, Asked(networks[met], points[met], views, LIGHT.direction, np.zeros((len(met), 0)))
-    )
-    thick = np.zeros(len(networks))
-    thick[met] = density * (places[1] - places[0])
-    behind = np.cumsum(thick.reshape(-1, PLAIN_SAMPLES), axis=1)
-    weights = np.exp(-(behind - thick.reshape(behind.shape))) * -np.expm1(-thick.reshape(behind.shape))
-    np.add.at(np.zeros((len(rows), 3)), met // PLAIN_SAMPLES, weights.ravel()[met, None] * colour)
-    return (time.process_time() - begun) * float(inside.sum()) / max(len(met), 1)
 
 
 def errors(data: bytes, mesh: Mesh) -> None:
@@ -165,7 +110,7 @@ def main() -> None:
         seen = [measure(name, data, mesh, cores, given, most) for cores in given.cores]
         rows.append(np.hstack(seen[0]))
         if given.plain:
-            seconds = plain_seconds(model, mesh, 256, 16)
+            seconds = paper_seconds(model, mesh, 256, 16)
             CONSOLE.print(
                 f"  the paper's arithmetic plainly, {PLAIN_SAMPLES} samples a ray, numpy float64, one core: "
                 f"{seconds:.1f} s CPU at 256 (extrapolated from 16 x 16 pixels)"
