@@ -1,6 +1,7 @@
 """The shell and the march: no place of a surface outside, no ray's way through it without a sample."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from harness.objectfile.vision_march import march, network_at
 from harness.objectfile.vision_network import VisionGrid
 from harness.objectfile.vision_shell import Shell, grid_of, lattice_of, shell_for, surface_shell
 from harness.objectfile.vision_voxels import walk
-from harness.objects.household import build
+from harness.objects.household import MATERIALS, build
+from harness.sim.appearance_source import appearance_of
 from harness.sim.ray_mesh import RayMesh
 
 
@@ -36,6 +38,12 @@ SHAPES: dict[str, Callable[[], Mesh]] = {
     "sheet": lambda: square(0.2),
     "box": lambda: cuboid(0.1, 0.05, 0.2),
 }
+
+SCANS = (
+    ("ycb_sim/006_mustard_bottle/006_mustard_bottle.obj", "m"),
+    ("ycb_sim/035_power_drill/035_power_drill.obj", "m"),
+    ("ycb_isaac/025_mug/textured.obj", "cm"),
+)
 
 
 def drawn_on(mesh: Mesh, count: int, seed: int) -> FloatArray:
@@ -157,28 +165,44 @@ def test_stretches_are_where_the_voxels_are(kind: str) -> None:
     assert met > 10 or kind == "diagonal"
 
 
-@pytest.mark.parametrize("away", [0.5, 2.0, 25.0])
-@pytest.mark.parametrize("name", SHAPES)
-def test_the_march_misses_no_surface(name: str, away: float) -> None:
-    """Exact ray casting of the mesh: its first hit lies within what some sample stands for."""
-    mesh = SHAPES[name]()
-    lattice = lattice_of(mesh)
+def never_missed(mesh: Mesh, away: float) -> int:
+    """The first hit of exact ray casting lies within what some sample stands for; hits are counted."""
+    lattice, hits = lattice_of(mesh), 0
     shell = surface_shell(mesh, lattice)
-    grid = grid_of(shell, lattice)
+    grid, exact = grid_of(shell, lattice), RayMesh(mesh)
     for along in ((0.3, -0.8, 0.5), (1.0, 0.0, 0.0), (0.01, 0.02, 1.0)):
         camera = looking(mesh, away, 48, along=along)
         ways = camera.directions().reshape(-1, 3)
         if along == (1.0, 0.0, 0.0):
             ways[:] = -np.eye(3)[0]
-        exact = RayMesh(mesh).first_hits(camera.eye, ways).distance
+        distance = exact.first_hits(camera.eye, ways).distance
         samples, networks = marched(shell, grid, camera.eye, ways, 0.5 * shell.voxel, 4)
         assert (networks >= 0).all()
         # Places are kept as float32.
         near = 4e-7 * (away + 2.0) * float(np.ptp(mesh.bounds, axis=0).max())
-        for ray in np.flatnonzero(np.isfinite(exact)):
+        met = np.flatnonzero(np.isfinite(distance))
+        for ray in met:
             ends = samples[ray]
-            held = (ends[:, 0] - near <= exact[ray]) & (exact[ray] <= ends[:, 1] + near)
-            assert held.any(), (ray, exact[ray], ends)
+            held = (ends[:, 0] - near <= distance[ray]) & (distance[ray] <= ends[:, 1] + near)
+            assert held.any(), (ray, distance[ray], ends)
+        hits += len(met)
+    return hits
+
+
+@pytest.mark.parametrize("away", [0.5, 2.0, 25.0])
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_march_misses_no_surface(name: str, away: float) -> None:
+    never_missed(SHAPES[name](), away)
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_the_march_misses_nothing_of_built_in_objects(name: str) -> None:
+    assert never_missed(build(name), 2.0) > 100
+
+
+@pytest.mark.parametrize(("name", "units"), SCANS)
+def test_the_march_misses_nothing_of_scans(shared_data: Path, name: str, units: str) -> None:
+    assert never_missed(appearance_of(str(shared_data / "meshes" / name), units).mesh, 2.0) > 100
 
 
 @pytest.mark.parametrize("most", [1, 2, 3, 7])
