@@ -6,25 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from seen_shapes import ball
+from taught_ball import COLOUR, NOTHING, RADIUS, grid_for, lit_ball
 
 from harness.arrays import AnyArray
-from harness.authoring.vision_data import HeldOut, held_out_pictures
+from harness.authoring.vision_data import held_out_pictures
 from harness.authoring.vision_lessons import OPAQUE
 from harness.authoring.vision_seen import RayRecorder, SeenRays, together
 from harness.authoring.vision_teacher import finished_file, made_teacher, rays_to_learn
 from harness.authoring.vision_teacher_profiles import FinishSpec, TeacherSpec
 from harness.errors import DataRefused, WrongUse
-from harness.objectfile.vision_network import VisionGrid
 from harness.objectfile.vision_settings import RenderSettings
-from harness.objectfile.vision_shell import grid_of, lattice_of, surface_shell
 from harness.pinhole import DirectionalLight
-from harness.sim.appearance import plain
 from harness.sim.direct_image import LitObject
 
-NOTHING = HeldOut((), ())
-COLOUR = np.array([0.7, 0.4, 0.1])
-RADIUS = 0.05
 FINISH = FinishSpec(pictures=2, side=24, samples=2, steps=6, epochs=3, rays=64)
 TINY = TeacherSpec(
     width=16, turns=1, coarsest=4, finest=8, levels=2, features=2, slots=8, places=6000, steps=60, epochs=2,
@@ -37,13 +31,7 @@ needs_torch = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def lit() -> LitObject:
-    return LitObject(plain(ball(RADIUS, 3), tuple(COLOUR)))
-
-
-def shelled(lit: LitObject) -> tuple[VisionGrid, float]:
-    lattice = lattice_of(lit.appearance.mesh, 4)
-    shell = surface_shell(lit.appearance.mesh, lattice)
-    return grid_of(shell, lattice), shell.voxel
+    return lit_ball()
 
 
 def thin(points: AnyArray, _views: AnyArray, lights: AnyArray, extras: AnyArray) -> tuple[AnyArray, AnyArray]:
@@ -54,7 +42,7 @@ def thin(points: AnyArray, _views: AnyArray, lights: AnyArray, extras: AnyArray)
 
 
 def seen_by(lit: LitObject, ask=thin, irradiance: float = np.pi) -> tuple[RayRecorder, SeenRays, AnyArray]:  # type: ignore[no-untyped-def]
-    grid, voxel = shelled(lit)
+    grid, voxel = grid_for(lit)
     mesh = lit.appearance.mesh
     recorder = RayRecorder(ask, mesh, grid, "osf-v", OPAQUE / voxel)
     camera = held_out_pictures(mesh, 1, 32, 32, 5).cameras[0]
@@ -82,7 +70,7 @@ def composited(rays: SeenRays, ask, scale: float) -> tuple[AnyArray, AnyArray]: 
 
 def test_what_is_kept_of_rays_is_what_the_picture_was_made_of(lit: LitObject) -> None:
     """Rays composited plainly are the renderer's pixels, in their order, whatever the lamp's strength."""
-    _, voxel = shelled(lit)
+    _, voxel = grid_for(lit)
     _, rays, pixels = seen_by(lit)
     found, through = composited(rays, thin, OPAQUE / voxel)
     assert len(rays) == len(pixels) > 100
@@ -101,7 +89,7 @@ def test_what_is_wanted_of_rays_is_the_exact_colour_whatever_the_lamp(lit: LitOb
         cosine = np.clip(np.einsum("nx,nx->n", rays.lights, rays.extras[:, 1:]), 0.0, None)
         inside = (rays.weight == 1.0) & (rays.extras[:, 0] == 1.0) & (cosine > 0.2)
         assert inside.sum() > 50
-        assert rays.wanted[inside] == pytest.approx(cosine[inside, None] * COLOUR, abs=0.05)
+        assert rays.wanted[inside] == pytest.approx(cosine[inside, None] * np.array(COLOUR), abs=0.05)
 
 
 def test_rays_of_pictures_keep_their_own_samples_together(lit: LitObject) -> None:
@@ -179,7 +167,7 @@ def test_a_stopped_finish_ends_in_the_same_bits(
 @needs_torch
 def test_pictures_bring_a_teacher_nearer_to_them(lit: LitObject, tmp_path: Path) -> None:
     """Of pictures that it learned from, errors are less than half of what they were, plainly composited."""
-    grid, voxel = shelled(lit)
+    grid, voxel = grid_for(lit)
     short = replace(TINY, places=2000, steps=8, finish=None)
     finish = replace(FINISH, steps=150, rays=256, slower=1.0)
     (tmp_path / "a").mkdir()

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from seen_shapes import ball
+from taught_ball import COLOUR, NOTHING, RADIUS, grid_for, lit_ball
 
 from harness.arrays import AnyArray
 from harness.authoring.vision import STRICT, TEACHER, Teaching, author_vision
 from harness.authoring.vision_cells import CellTraining
-from harness.authoring.vision_data import HeldOut
 from harness.authoring.vision_distilled import distilled, with_lamps
 from harness.authoring.vision_lessons import OPAQUE, Lessons, draw_lamps, draw_lessons
 from harness.authoring.vision_profiles import CellsSpec, VisionProfile, vision_profile
@@ -20,15 +19,10 @@ from harness.authoring.vision_teacher import require_torch, teacher_file
 from harness.authoring.vision_teacher_pictures import TeacherRenderer
 from harness.authoring.vision_teacher_profiles import TeacherSpec
 from harness.errors import DataRefused, WrongUse
-from harness.objectfile.vision_network import Kind, NetworkSize, VisionGrid
+from harness.objectfile.vision_network import Kind, NetworkSize
 from harness.objectfile.vision_plain import Asked, evaluate
-from harness.objectfile.vision_shell import grid_of, lattice_of, surface_shell
-from harness.sim.appearance import plain
 from harness.sim.direct_image import LitObject
 
-NOTHING = HeldOut((), ())
-COLOUR = (0.7, 0.4, 0.1)
-RADIUS = 0.05
 TINY = TeacherSpec(
     width=16, turns=1, coarsest=4, finest=8, levels=2, features=2, slots=8, places=6000, steps=60, epochs=4,
     batch=256, rate=1e-2,
@@ -43,17 +37,11 @@ needs_torch = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def lit() -> LitObject:
-    return LitObject(plain(ball(RADIUS, 3), COLOUR))
-
-
-def shelled(lit: LitObject) -> tuple[VisionGrid, float]:
-    lattice = lattice_of(lit.appearance.mesh, STUDENTS.cells)
-    shell = surface_shell(lit.appearance.mesh, lattice)
-    return grid_of(shell, lattice), shell.voxel
+    return lit_ball()
 
 
 def lessons_of(lit: LitObject, kind: Kind) -> tuple[Lessons, AnyArray]:
-    _, voxel = shelled(lit)
+    _, voxel = grid_for(lit)
     told = kind == "osf-v"
     lessons = draw_lessons(lit, TINY.places, voxel, 3, NOTHING, 0 if told else 2)
     return lessons, draw_lamps(256 if told else 0, 3, NOTHING)
@@ -65,7 +53,7 @@ def training_of(lit: LitObject, spec: TeacherSpec = TINY, seed: int = 3):  # typ
     from harness.authoring.vision_teacher_training import TeacherTraining
 
     torch.set_num_threads(1)
-    grid, _ = shelled(lit)
+    grid, _ = grid_for(lit)
     extent = float(grid.cell * grid.shape.max())
     return TeacherTraining(spec, grid.low, extent, *lessons_of(lit, spec.kind), seed, "cpu")
 
@@ -123,7 +111,7 @@ def test_of_the_papers_inputs_none_is_visibility_or_normal(lit: LitObject) -> No
     from harness.authoring.vision_teacher_training import TeacherTraining
 
     torch.set_num_threads(1)
-    grid, _ = shelled(lit)
+    grid, _ = grid_for(lit)
     lessons, lamps = lessons_of(lit, "osf")
     other = replace(lessons, normals=-lessons.normals, seen=1.0 - lessons.seen)
     found = []
@@ -140,7 +128,7 @@ def test_density_begins_at_the_surface(lit: LitObject) -> None:
     training = training_of(lit, replace(TINY, steps=200, opacity=1.0))
     while not training.done:
         training.step_epoch()
-    _, voxel = shelled(lit)
+    _, voxel = grid_for(lit)
     ways = np.random.default_rng(1).normal(size=(200, 3))
     ways = (ways / np.linalg.norm(ways, axis=1, keepdims=True)).astype(np.float32)
     extras = np.hstack([np.ones((200, 1), np.float32), ways])
@@ -158,7 +146,7 @@ def test_the_renderer_asks_a_large_network_what_it_asks_tiny_ones(lit: LitObject
     from harness.objectfile.vision_graph import vision_graph
     from harness.objectfile.vision_render import VisionRenderer
 
-    grid, voxel = shelled(lit)
+    grid, voxel = grid_for(lit)
     lessons = draw_lessons(lit, STUDENTS.places, voxel, 3, NOTHING)
     spec = replace(STUDENTS, steps=20)
     training = CellTraining(spec, grid, lessons, draw_lamps(256, 3, NOTHING), OPAQUE / voxel, 3, 1)
@@ -183,7 +171,7 @@ def test_the_renderer_asks_a_large_network_what_it_asks_tiny_ones(lit: LitObject
 
 def test_networks_distilled_from_the_surface_itself_learn_its_colour(lit: LitObject) -> None:
     """A teacher without error: what is left is what lamps that are not drawn anew cost."""
-    grid, voxel = shelled(lit)
+    grid, voxel = grid_for(lit)
     lamps = draw_lamps(256, 3, NOTHING)
     lessons = with_lamps(draw_lessons(lit, STUDENTS.places, voxel, 3, NOTHING), lamps, 2, 0.2, 3)
     depth = {tuple(point): each for point, each in zip(lessons.points, lessons.depth, strict=True)}
