@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
-from inspect import signature
+from inspect import cleandoc, signature
 from typing import Any
 
 import typer
@@ -183,9 +183,8 @@ def _app(chosen: str | None) -> typer.Typer:
         group, _, last = name.rpartition(" ")
         parent = groups[group] if group else app
         body = _interruptible(load(command.target)) if name == chosen else _stub
-        parent.command(last, help=None if name == chosen else command.summary, short_help=command.summary)(
-            body
-        )
+        told = _paragraphs(body.__doc__ or "") if name == chosen else command.summary
+        parent.command(last, help=told, short_help=command.summary)(body)
     for name, group_app in groups.items():
         group, _, last = name.rpartition(" ")
         (groups[group] if group else app).add_typer(group_app, name=last)
@@ -197,6 +196,11 @@ def load(target: str) -> Callable[..., Any]:
     module, _, name = target.partition(":")
     loaded: Callable[..., Any] = vars(importlib.import_module(module))[name]
     return loaded
+
+
+def _paragraphs(said: str) -> str:
+    """A docstring whose lines end only with its paragraphs: how wide a screen is decides the rest."""
+    return "\n\n".join(" ".join(each.split()) for each in cleandoc(said).split("\n\n"))
 
 
 def _interruptible(body: Callable[..., Any]) -> Callable[..., Any]:

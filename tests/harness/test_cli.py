@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from itertools import pairwise
 
 import pytest
 
@@ -22,6 +23,20 @@ def test_every_command_resolves_and_teaches(name: str) -> None:
 def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert invoke([*name.split(), "--help"]) == 0
     assert "Usage" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_is_as_wide_as_the_screen(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No line ends where the next one's first word had room: an author's own line ends are not shown."""
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 70)
+    assert invoke([*name.split(), "--help"]) == 0
+    told = capsys.readouterr().out.partition("\u256d")[0].splitlines()
+    usage = next(n for n, line in enumerate(told) if line.strip() == "" and n > 1)
+    for line, after in pairwise(told[usage:]):
+        if line.strip() and after.strip():
+            assert len(line.rstrip()) + 1 + len(after.split()[0]) > 69, line
 
 
 def test_help_imports_no_command_and_no_heavy_library() -> None:
