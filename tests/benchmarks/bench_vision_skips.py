@@ -1,7 +1,8 @@
 """What a picture leaves out and what that changes, and what asking for shadows costs, of trained networks.
 
-``python tests/benchmarks/bench_vision_skips.py OBJECT builtin:mug --views 8``: an ObjectFile's own networks
-from around, one thread. *Apart* is from every sample of the shell with no ray ended, as shown before white.
+``PYTHONPATH=tests python tests/benchmarks/bench_vision_skips.py OBJECT builtin:mug --views 8``: an
+ObjectFile's own networks from around, one thread. *Apart* is from every sample of the shell with no ray ended,
+as shown before white.
 """
 
 import argparse
@@ -36,6 +37,7 @@ WAYS = {
     "default": RenderSettings(),
     "lead 1": RenderSettings(lead=1.0),
     "one sample": RenderSettings(level="one_sample"),
+    "graph alone": RenderSettings(level="onnx"),
 }
 View = tuple[Pinhole, DirectionalLight]
 T = TypeVar("T")
@@ -48,13 +50,15 @@ def main() -> None:
     parser.add_argument("mesh", help="of its look, for exact pictures")
     parser.add_argument("--views", type=int, default=8)
     parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--units", help="of a mesh file's numbers")
     given = parser.parse_args()
     of = ObjectFile.open(given.folder)
     vision = open_vision(of, 1)
     first = camera_for(vision.surface, given.size, given.size)
     about, each = vision.surface.bounds.mean(axis=0), 2.0 * np.pi / given.views
     views = [turned(first, light_for(first), about, k * each) for k in range(given.views)]
-    pictures(vision, LitObject(appearance_of(given.mesh, None)), views)
+    pictures(vision, LitObject(appearance_of(given.mesh, given.units)), views)
+    agreement(vision, views)
     told(vision, views)
 
 
@@ -74,6 +78,15 @@ def pictures(vision: ObjectVision, lit: LitObject, views: list[View]) -> None:
             f"{middle([cpu for _, cpu in found])}, apart {np.sqrt(np.mean(apart**2)):.2f}/255, at most "
             f"{np.abs(apart).max():.0f}; from exact {near:.2f} dB"
         )
+
+
+def agreement(vision: ObjectVision, views: list[View]) -> None:
+    """How far the kernel's pictures are from the graph's, in linear light and coverage."""
+    apart = []
+    for camera, light in views:
+        one, other = (vision.picture(camera, light, WAYS[way]).image for way in ("default", "graph alone"))
+        apart.append(max(np.abs(one.colour - other.colour).max(), np.abs(one.alpha - other.alpha).max()))
+    ANSWERS.print(f"kernel and graph differ by {max(apart):.1e} of linear light or coverage at most")
 
 
 def told(vision: ObjectVision, views: list[View]) -> None:
