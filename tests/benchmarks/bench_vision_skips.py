@@ -1,8 +1,8 @@
 """What a picture leaves out and what that changes, and what asking for shadows costs, of trained networks.
 
 ``PYTHONPATH=tests python tests/benchmarks/bench_vision_skips.py OBJECT builtin:mug --views 8``: an
-ObjectFile's own networks from around, one thread. *Apart* is from every sample of the shell with no ray ended,
-as shown before white.
+ObjectFile's own networks from around, one thread. *Apart* is from every sample of the shell with no ray
+ended, as shown before white.
 """
 
 import argparse
