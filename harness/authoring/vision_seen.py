@@ -98,8 +98,8 @@ class RayRecorder(TeacherRenderer):
         colour = exact.colour.reshape(-1, 3)[pixels[use]] * (np.pi / light.irradiance)
         return SeenRays(
             *(points[order], lengths[order], first),
-            *(scene.views[use].copy(), np.tile(np.float32(scene.light), (len(use), 1))),
-            scene.extras[use].copy(),
+            *(scene.views[use], np.tile(np.float32(scene.light), (len(use), 1))),
+            scene.extras[use],
             *((colour / cover[use, None]).astype(np.float32), cover[use].astype(np.float32)),
         )
 
