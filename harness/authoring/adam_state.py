@@ -1,31 +1,13 @@
-"""A training's state in one file, so that it goes on where it was killed, bit for bit."""
+"""A network, its Adam and how far both are, in one file, to go on from bit for bit."""
 
-import os
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
-import numpy as np
 import torch
 
 from harness.arrays import AnyArray
-from harness.errors import DataRefused
+from harness.authoring.checkpoint import Progress, read_checkpoint, write_checkpoint
 
 _MOMENTS = ("step", "exp_avg", "exp_avg_sq")
-
-
-@dataclass(frozen=True, eq=False)
-class Progress:
-    """How far a training has come.
-
-    Attributes:
-        epoch: that were trained.
-        losses: of each.
-    """
-
-    epoch: int
-    losses: list[float]
 
 
 def save_training(
@@ -40,21 +22,12 @@ def save_training(
         network: that is trained.
         adam: that trains it.
     """
-    arrays: dict[str, AnyArray] = {
-        "identity": np.array(identity),
-        "epoch": np.array(progress.epoch),
-        "losses": np.array(progress.losses),
-    }
+    arrays: dict[str, AnyArray] = {}
     for number, parameter in enumerate(network.parameters()):
         arrays[f"weight.{number}"] = parameter.detach().cpu().numpy()
         for name, value in adam.state[parameter].items():
             arrays[f"{name}.{number}"] = value.cpu().numpy()
-    part = path.with_name(f".{path.name}.part")
-    with part.open("wb") as stream:
-        np.savez(stream, allow_pickle=False, **arrays)
-        stream.flush()
-        os.fsync(stream.fileno())
-    part.replace(path)
+    write_checkpoint(path, identity, progress, arrays)
 
 
 def load_training(path: Path, identity: str, network: torch.nn.Module, adam: torch.optim.Adam) -> Progress:
@@ -63,12 +36,7 @@ def load_training(path: Path, identity: str, network: torch.nn.Module, adam: tor
     Raises:
         DataRefused: the file cannot be read, or is of another training.
     """
-    arrays = _read(path)
-    if str(arrays.get("identity")) != identity:
-        raise DataRefused(
-            f"checkpoint {path} is of another network, object, data or seed; "
-            "delete it to begin anew, or build into another folder"
-        )
+    progress, arrays = read_checkpoint(path, identity)
     state = adam.state_dict()
     moments = {}
     for number, parameter in enumerate(network.parameters()):
@@ -78,12 +46,4 @@ def load_training(path: Path, identity: str, network: torch.nn.Module, adam: tor
         moments[number] = {name: torch.from_numpy(arrays[f"{name}.{number}"]) for name in names}
     state["state"] = {number: values for number, values in moments.items() if values}
     adam.load_state_dict(state)
-    return Progress(int(arrays["epoch"]), arrays["losses"].tolist())
-
-
-def _read(path: Path) -> Mapping[str, AnyArray]:
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, BadZipFile, EOFError, KeyError) as error:
-        raise DataRefused(f"checkpoint {path} cannot be read ({error}); delete it to begin anew") from error
+    return progress

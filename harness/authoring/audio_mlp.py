@@ -9,10 +9,11 @@ import torch
 from torch import Tensor, nn
 
 from harness.arrays import AnyArray, FloatArray, IntArray
-from harness.authoring.adam_state import Progress, load_training, save_training
+from harness.authoring.adam_state import load_training, save_training
 from harness.authoring.audio_data import between_nodes
 from harness.authoring.audio_profiles import PerceptronSpec
 from harness.authoring.audio_readout import error_shares, solve_readout
+from harness.authoring.checkpoint import Progress
 from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_rate
 from harness.errors import WrongUse
 from harness.objectfile.audio_graph import OutputScales

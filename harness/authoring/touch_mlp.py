@@ -8,7 +8,8 @@ import torch
 from torch import Tensor, nn
 
 from harness.arrays import AnyArray, FloatArray
-from harness.authoring.adam_state import Progress, load_training, save_training
+from harness.authoring.adam_state import load_training, save_training
+from harness.authoring.checkpoint import Progress
 from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_rate
 from harness.authoring.touch_data import DEPTHS, MOST_TILT, pressed, reference_maps, smooth_normals
 from harness.authoring.touch_metrics import Bench

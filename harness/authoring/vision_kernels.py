@@ -58,6 +58,28 @@ class Lesson(NamedTuple):
     lamps: AnyArray
 
 
+class Pixels(NamedTuple):
+    """What one network learns from pictures beside; n samples of their rays, none where it learns from none.
+
+    Attributes:
+        encoded: ``(n, 3 + 6 octaves)``.
+        told: ``(n, directions)`` what the later layer is told.
+        colours: ``(n, 3)`` linear.
+        weight: ``(n,)`` of the colours' errors; of density nothing is learned.
+    """
+
+    encoded: AnyArray
+    told: AnyArray
+    colours: AnyArray
+    weight: AnyArray
+
+
+def no_pixels(place: int, directions: int) -> Pixels:
+    """Of a network that learns from no picture."""
+    encoded, told, colours = (np.empty((0, size), _F) for size in (place, directions, 3))
+    return Pixels(encoded, told, colours, np.empty(0, _F))
+
+
 class Batch(NamedTuple):
     """Room for a batch: inputs, what layers give, what their errors are."""
 
@@ -107,10 +129,10 @@ def encode(values: AnyArray, factors: AnyArray, first: int, out: AnyArray) -> No
 
 
 @compiled_fast
-def _gather(lesson: Lesson, state: AnyArray, batch: Batch) -> None:
+def _gather(lesson: Lesson, places: int, state: AnyArray, batch: Batch) -> None:
     """Draw places, with the light that each has."""
-    count, place, directions = len(batch.at), lesson.encoded.shape[1], lesson.told.shape[1]
-    for i in range(count):
+    place, directions = lesson.encoded.shape[1], lesson.told.shape[1]
+    for i in range(places):
         n = int(_drawn(state) % np.uint64(len(lesson.encoded)))
         batch.at[i] = n
         for j in range(place):
@@ -123,10 +145,23 @@ def _gather(lesson: Lesson, state: AnyArray, batch: Batch) -> None:
 
 
 @compiled_fast
-def _light(lesson: Lesson, hidden: float, turns: AnyArray, state: AnyArray, batch: Batch) -> None:
+def _look(pixels: Pixels, places: int, state: AnyArray, batch: Batch) -> None:
+    """Draw samples of pictures for the rows that no place of the surface has."""
+    for i in range(places, len(batch.at)):
+        n = int(_drawn(state) % np.uint64(len(pixels.encoded)))
+        batch.at[i] = n
+        batch.encoded[i] = pixels.encoded[n]
+        batch.told[i] = pixels.told[n]
+        batch.wanted[i] = pixels.colours[n]
+
+
+@compiled_fast
+def _light(
+    lesson: Lesson, places: int, hidden: float, turns: AnyArray, state: AnyArray, batch: Batch
+) -> None:
     """Light the batch's places anew: by a lamp on their side, or by a hidden one from anywhere."""
     last = batch.told.shape[1] - _EXTRAS
-    for i in range(len(batch.at)):
+    for i in range(places):
         n, bits = batch.at[i], _drawn(state)
         k = int(bits % np.uint64(len(lesson.lamps)))
         cosine = _NONE
@@ -139,7 +174,7 @@ def _light(lesson: Lesson, hidden: float, turns: AnyArray, state: AnyArray, batc
         for c in range(3):
             batch.lamps[i, c] = turned * lesson.lamps[k, c]
             batch.wanted[i, c] = lesson.colours[n, c] * turned * cosine if seen else _NONE
-    encode(batch.lamps, turns, 0, batch.told)
+    encode(batch.lamps[:places], turns, 0, batch.told)
 
 
 @compiled_fast
@@ -166,12 +201,14 @@ def _forth(layers: Layers, encoded: AnyArray, told: AnyArray, batch: Batch) -> N
 
 
 @compiled_fast
-def _wrong(layers: Layers, lesson: Lesson, opacity: float, batch: Batch) -> float:
+def _wrong(
+    layers: Layers, lesson: Lesson, pixels: Pixels, places: int, opacity: float, batch: Batch
+) -> float:
     """Put errors in place of what came out; the sum of squares of the colours' is returned."""
     share, loss, of_depth = _ONE / _F(len(batch.at)), 0.0, _F(opacity)
     for i in range(len(batch.at)):
         n = batch.at[i]
-        weight = lesson.weight[n]
+        weight = lesson.weight[n] if i < places else pixels.weight[n]
         for c in range(3):
             colour = _ONE / (_ONE + np.exp(-(batch.logits[i, c] + layers.colour_bias[c])))
             root = np.sqrt(colour + _FAINT)
@@ -179,6 +216,9 @@ def _wrong(layers: Layers, lesson: Lesson, opacity: float, batch: Batch) -> floa
             slope = max(_HALF * colour * (_ONE - colour) / root, _LEAST_SLOPE)
             loss += weight * error * error
             batch.logits[i, c] = weight * share * error * slope
+        if i >= places:
+            batch.raw[i, 0] = _NONE
+            continue
         depth = lesson.depth[n]
         error = batch.raw[i, 0] + layers.density_bias[0] - depth
         # Deeper than opaque and emptier than empty are no errors.
@@ -250,6 +290,8 @@ def teach(
     slope: AnyArray,
     slopes: Layers,
     lesson: Lesson,
+    pixels: Pixels,
+    places: int,
     batch: Batch,
     turns: AnyArray,
     steps: int,
@@ -266,6 +308,8 @@ def teach(
         slope: ``(parameters,)`` float32, room.
         slopes: views into it.
         lesson: what it learns from.
+        pixels: what it learns from beside.
+        places: of each batch that are ``lesson``'s; the others are ``pixels``'.
         batch: room; as many samples a step as it has.
         turns: ``(turns,)`` float32 ones, octaves of directions.
         steps: of Adam.
@@ -282,11 +326,12 @@ def teach(
     mean: Any = 1.0
     square: Any = 1.0
     for step in range(steps):
-        _gather(lesson, state, batch)
+        _gather(lesson, places, state, batch)
         if len(lesson.lamps):
-            _light(lesson, hidden, turns, state, batch)
+            _light(lesson, places, hidden, turns, state, batch)
+        _look(pixels, places, state, batch)
         _forth(layers, batch.encoded, batch.told, batch)
-        wrong = _wrong(layers, lesson, opacity, batch)
+        wrong = _wrong(layers, lesson, pixels, places, opacity, batch)
         _back(layers, slopes, batch)
         mean, square = mean * _MEAN, square * _SQUARE
         now = 0.5 * rate * (1.0 + np.cos(np.pi * step / steps)) * min(1.0, (step + 1) / _WARM)

@@ -1,19 +1,25 @@
 """What the rays of a picture asked a network, kept, so that the network may learn from the picture itself."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
-from harness.authoring.vision_teacher_pictures import Answers, TeacherAsker, TeacherRenderer
+from harness.authoring.vision_data import HeldOut, draw_views
+from harness.authoring.vision_teacher_pictures import Answers, TeacherRenderer
 from harness.linear_image import LinearImage
 from harness.mesh import Mesh
 from harness.objectfile.vision_network import Kind, VisionGrid
 from harness.objectfile.vision_outline import Outline
+from harness.objectfile.vision_render import VisionRenderer
 from harness.objectfile.vision_samples import Asker, Samples, Scene
 from harness.objectfile.vision_settings import RenderSettings, VisionLevel
 from harness.pinhole import DirectionalLight, Pinhole
+from harness.sim.direct_image import LitObject
+
+Exact = tuple[Pinhole, DirectionalLight, LinearImage]
+"""A camera, its light, and the picture that it should see."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +35,8 @@ class SeenRays:
         extras: ``(r, 4)`` float32 visibility and normal; ``(r, 0)`` of a kind that is not told.
         wanted: ``(r, 3)`` float32 linear light of what the pixel shows of the object, under irradiance pi.
         weight: ``(r,)`` float32, share of the pixel that shows it.
+        density: ``(s,)`` float32 that the networks answered, zero or more.
+        scattered: ``(s, 3)`` float32 linear colours that they answered.
     """
 
     points: FloatArray
@@ -39,6 +47,8 @@ class SeenRays:
     extras: AnyArray
     wanted: AnyArray
     weight: AnyArray
+    density: AnyArray
+    scattered: AnyArray
 
     def __len__(self) -> int:
         return len(self.views)
@@ -50,32 +60,43 @@ def together(parts: Sequence[SeenRays]) -> SeenRays:
     starts = [part.first[:-1] + at for part, at in zip(parts, begin, strict=False)]
     joined = {
         name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("points", "lengths", "views", "lights", "extras", "wanted", "weight")
+        for name in (field.name for field in fields(SeenRays) if field.name != "first")
     }
     return SeenRays(first=np.append(np.concatenate(starts), begin[-1]), **joined)
 
 
-class RayRecorder(TeacherRenderer):
-    """Draws as ``TeacherRenderer``, by one thread, and keeps what it asked.
+def pictures_to_learn(
+    lit: LitObject, count: int, side: int, samples: int, seed: int, held_out: HeldOut
+) -> list[Exact]:
+    """Exact pictures, clear of those kept back.
 
     Args:
-        ask: the network.
-        mesh: of the object, in metres.
-        grid: cells that its lattice has.
-        kind: what the network is told.
-        density_scale: 1/m of a density of 1.
-    """
+        lit: the object.
+        count: of pictures.
+        side: pixels of each.
+        samples: a side of a pixel.
+        seed: of their cameras and lights.
+        held_out: what nothing is learned from.
 
-    def __init__(self, ask: Answers, mesh: Mesh, grid: VisionGrid, kind: Kind, density_scale: float) -> None:
-        super().__init__(ask, mesh, grid, kind, density_scale, threads=1)
-        self._keeper, self._outlines = _Keeper(self.teacher), list[Outline]()
+    Raises:
+        OutOfDomain: too few views are clear of those kept back.
+    """
+    views = draw_views(lit.appearance.mesh, count, side, side, seed, held_out)
+    return [(camera, light, lit.render(camera, [light], samples).image) for camera, light in views]
+
+
+class Recording(VisionRenderer):
+    """Draws, and keeps what it asked; of one thread."""
+
+    _keeper: "_Keeper | None" = None
+    _drawn: Outline | None = None
 
     def _outline(self, camera: Pinhole, chosen: RenderSettings) -> Outline:
-        self._outlines = [super()._outline(camera, chosen)]
-        return self._outlines[0]
+        self._drawn = super()._outline(camera, chosen)
+        return self._drawn
 
-    def _asker(self, level: VisionLevel) -> Asker:  # noqa: ARG002
-        return self._keeper
+    def _asker(self, level: VisionLevel) -> Asker:
+        return self._keeper or super()._asker(level)
 
     def seen(self, camera: Pinhole, light: DirectionalLight, exact: LinearImage) -> SeenRays:
         """The rays of one picture, of pixels that the exact one covers at all.
@@ -85,31 +106,40 @@ class RayRecorder(TeacherRenderer):
             light: from far away.
             exact: the picture that it should have been.
         """
-        self._keeper = _Keeper(self.teacher)
+        keeper = _Keeper(super()._asker("fused"), self.model.grid)
+        self._keeper = keeper
         self.render(camera, light)
-        rays, places, points, lengths = self._keeper.kept()
-        scene, pixels = self._keeper.scenes[-1], self._outlines[0].pixels
-        cover = exact.alpha.reshape(-1)[pixels]
-        # A ray without samples asked nothing, and a network can do nothing about it.
-        use = np.flatnonzero((cover > 0.0) & (np.bincount(rays, minlength=len(pixels)) > 0))
-        order = np.lexsort((places, rays))
-        order = order[np.isin(rays[order], use)]
-        first = np.concatenate([[0], np.cumsum(np.bincount(rays[order], minlength=len(pixels))[use])])
-        colour = exact.colour.reshape(-1, 3)[pixels[use]] * (np.pi / light.irradiance)
-        return SeenRays(
-            *(points[order], lengths[order], first),
-            *(scene.views[use], np.tile(np.float32(scene.light), (len(use), 1))),
-            scene.extras[use],
-            *((colour / cover[use, None]).astype(np.float32), cover[use].astype(np.float32)),
-        )
+        self._keeper = None
+        assert self._drawn is not None
+        return _of_pixels(keeper, self._drawn.pixels, light, exact)
+
+
+class RayRecorder(Recording):
+    """Of tiny networks.
+
+    Args:
+        data: of ``vision.onnx``.
+        mesh: of the object, in metres.
+    """
+
+    def __init__(self, data: bytes, mesh: Mesh) -> None:
+        super().__init__(data, mesh, threads=1)
+
+
+class TeacherRecorder(Recording, TeacherRenderer):
+    """Of one large network; arguments as of ``TeacherRenderer``."""
+
+    def __init__(self, ask: Answers, mesh: Mesh, grid: VisionGrid, kind: Kind, density_scale: float) -> None:
+        super().__init__(ask, mesh, grid, kind, density_scale, threads=1)
 
 
 class _Keeper:
-    """As ``vision_samples.Asker``: asks another one, and keeps what was asked."""
+    """As ``vision_samples.Asker``: asks another one, and keeps what was asked and answered."""
 
-    def __init__(self, asker: TeacherAsker) -> None:
-        self._asker, self.block, self.scenes = asker, asker.block, list[Scene]()
-        self._waves: list[tuple[AnyArray, AnyArray, FloatArray, AnyArray]] = []
+    def __init__(self, asker: Asker, grid: VisionGrid) -> None:
+        self._asker, self._grid, self.block = asker, grid, asker.block
+        self.scenes = list[Scene]()
+        self._waves: list[tuple[AnyArray, ...]] = []
 
     def light(self, light: FloatArray) -> None:
         """As ``Asker``."""
@@ -119,9 +149,28 @@ class _Keeper:
         """As ``Asker``."""
         self._asker(samples, order, blocks, scene)
         self.scenes.append(scene)
-        rays, points = samples.rays[order // samples.most], self._asker.points(samples, order)
-        self._waves.append((rays.copy(), samples.places[order].copy(), points, samples.lengths[order].copy()))
+        points = samples.points(order, self._grid)
+        told = (samples.places, samples.lengths, samples.density, samples.scattered)
+        self._waves.append((samples.rays[order // samples.most], points, *(each[order] for each in told)))
 
     def kept(self) -> tuple[AnyArray, ...]:
-        """Of all samples: ray, m along it, place and length."""
-        return tuple(np.concatenate(each) for each in zip(*self._waves, strict=True))
+        """Of all samples ray, place, m along it, length, density and colour; by rays, from near to far."""
+        told = [np.concatenate(each) for each in zip(*self._waves, strict=True)]
+        order = np.lexsort((told[2], told[0]))
+        return tuple(each[order] for each in told)
+
+
+def _of_pixels(keeper: _Keeper, pixels: AnyArray, light: DirectionalLight, exact: LinearImage) -> SeenRays:
+    rays, points, _, lengths, density, scattered = keeper.kept()
+    scene, cover = keeper.scenes[-1], exact.alpha.reshape(-1)[pixels]
+    every = np.bincount(rays, minlength=len(pixels))
+    # A ray without samples asked nothing, and a network can do nothing about it.
+    use = (cover > 0.0) & (every > 0)
+    own, at = use[rays], np.flatnonzero(use)
+    colour = exact.colour.reshape(-1, 3)[pixels[at]] * (np.pi / light.irradiance)
+    return SeenRays(
+        *(points[own], lengths[own], np.concatenate([[0], np.cumsum(every[at])])),
+        *(scene.views[at], np.tile(np.float32(scene.light), (len(at), 1)), scene.extras[at]),
+        *((colour / cover[at, None]).astype(np.float32), cover[at].astype(np.float32)),
+        *(density[own], scattered[own]),
+    )

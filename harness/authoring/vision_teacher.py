@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.authoring.training import Laps, Report, train
-from harness.authoring.vision_data import HeldOut, draw_views
+from harness.authoring.vision_data import HeldOut
 from harness.authoring.vision_lessons import OPAQUE, draw_for
 from harness.authoring.vision_metrics import network_pictures, picture_errors
-from harness.authoring.vision_seen import RayRecorder, SeenRays, together
+from harness.authoring.vision_seen import TeacherRecorder, pictures_to_learn, together
 from harness.authoring.vision_teacher_pictures import Answers, TeacherRenderer
 from harness.authoring.vision_teacher_profiles import FinishSpec, TeacherSpec
 from harness.cores import own_cores
@@ -193,35 +193,15 @@ class _Making:
 
         self.report("drawing pictures of a teacher", 0.0)
         mesh, scale = self.lit.appearance.mesh, OPAQUE / self.walked.voxel
-        recorder = RayRecorder(training.ask, mesh, self.walked.grid, self.spec.kind, scale)
-        rays = rays_to_learn(recorder, self.lit, finish, self.seed, self.held_out)
+        wanted = (finish.pictures, finish.side, finish.samples)
+        pictures = pictures_to_learn(self.lit, *wanted, self.seed, self.held_out)
+        recorder = TeacherRecorder(training.ask, mesh, self.walked.grid, self.spec.kind, scale)
+        rays = together([recorder.seen(*each) for each in pictures])
         self.laps.lap("pictures")
         finishing = Finishing(training, self.spec, finish, rays, scale, self.seed)
         train(finishing, finishing.epochs, checkpoint, self.report)
         self.laps.lap("finishing")
         return finishing.losses[-1]
-
-
-def rays_to_learn(
-    recorder: RayRecorder, lit: LitObject, finish: FinishSpec, seed: int, held_out: HeldOut
-) -> SeenRays:
-    """Rays of exact pictures, clear of those kept back.
-
-    Args:
-        recorder: of the teacher that has learned from the surface.
-        lit: the object.
-        finish: how many pictures.
-        seed: of their cameras and lights.
-        held_out: what nothing is learned from.
-
-    Raises:
-        OutOfDomain: too few views are clear of those kept back.
-    """
-    views = draw_views(lit.appearance.mesh, finish.pictures, finish.side, finish.side, seed, held_out)
-    return together([
-        recorder.seen(camera, light, lit.render(camera, [light], finish.samples).image)
-        for camera, light in views
-    ])  # fmt: skip
 
 
 def finished_file(checkpoint: Path) -> Path:

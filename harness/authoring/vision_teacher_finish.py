@@ -12,7 +12,8 @@ import torch
 from torch import Tensor
 
 from harness.arrays import AnyArray
-from harness.authoring.adam_state import Progress, load_training, save_training
+from harness.authoring.adam_state import load_training, save_training
+from harness.authoring.checkpoint import Progress
 from harness.authoring.vision_seen import SeenRays
 from harness.authoring.vision_teacher_profiles import FinishSpec, TeacherSpec
 from harness.authoring.vision_teacher_training import (

@@ -68,18 +68,10 @@ class TeacherAsker:
 
     def __call__(self, samples: Samples, order: AnyArray, blocks: AnyArray, scene: Scene) -> None:  # noqa: ARG002
         """As ``Asker``; samples need no order."""
-        rays, points = samples.rays[order // samples.most], self.points(samples, order)
+        rays, points = samples.rays[order // samples.most], samples.points(order, self._grid)
         lights = np.tile(scene.light.astype(np.float32), (len(order), 1))
         density, colour = self._ask(points, scene.views[rays], lights, scene.extras[rays])
         samples.density[order], samples.scattered[order] = np.maximum(density, 0.0), colour
-
-    def points(self, samples: Samples, order: AnyArray) -> FloatArray:
-        """``(n, 3)`` m, object frame, of the samples in ``order``."""
-        grid, local = self._grid, samples.local[order].astype(np.float64)
-        points: FloatArray = grid.low + grid.cell * (
-            grid.cells[samples.networks[order]] + 0.5 * (local + 1.0)
-        )
-        return points
 
 
 def _without_weights(grid: VisionGrid, kind: Kind, density_scale: float) -> VisionModel:

@@ -8,7 +8,8 @@ import torch
 from torch import Tensor
 
 from harness.arrays import AnyArray, FloatArray
-from harness.authoring.adam_state import Progress, load_training, save_training
+from harness.authoring.adam_state import load_training, save_training
+from harness.authoring.checkpoint import Progress
 from harness.authoring.vision_lessons import Lessons
 from harness.authoring.vision_teacher_network import Teacher
 from harness.authoring.vision_teacher_profiles import TeacherSpec

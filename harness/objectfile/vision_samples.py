@@ -58,6 +58,12 @@ class Samples:
         wide = {name: room.take(name, (count, 3), np.float32) for name in ("local", "scattered")}
         return cls(rays, most, room.take("counts", (len(rays),), np.int32), **flat, **wide)
 
+    def points(self, order: AnyArray, grid: VisionGrid) -> FloatArray:
+        """``(n, 3)`` m, object frame, of the samples in ``order``, each in the cell that answers it."""
+        local = self.local[order].astype(np.float64)
+        points: FloatArray = grid.low + grid.cell * (grid.cells[self.networks[order]] + 0.5 * (local + 1.0))
+        return points
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:

@@ -7,7 +7,16 @@ import pytest
 from taught_ball import SIZE, lit_ball
 
 from harness.arrays import AnyArray
-from harness.authoring.vision_kernels import Lesson, _adam, _back, _forth, _wrong, batch_of, encode
+from harness.authoring.vision_kernels import (
+    Lesson,
+    Pixels,
+    _adam,
+    _back,
+    _forth,
+    _wrong,
+    batch_of,
+    encode,
+)
 from harness.authoring.vision_layers import (
     first_weights,
     layer_shapes,
@@ -26,9 +35,12 @@ def lit() -> LitObject:
 
 
 def test_slopes_are_those_of_the_error(lit: LitObject) -> None:
-    """Against differences of the loss, in the middle of the range, where no slope is raised."""
+    """Against differences of the loss, in the middle of the range, where no slope is raised.
+
+    Of a batch of places and of samples of pictures, whose density is no error.
+    """
     random = np.random.default_rng(5)
-    count, shapes = 64, layer_shapes(SIZE)
+    count, places, shapes = 64, 40, layer_shapes(SIZE)
     flat = first_weights(SIZE, 1)
     layers_of(flat, SIZE).colour_bias[:] = 0.0
     slope = np.zeros_like(flat)
@@ -42,6 +54,12 @@ def test_slopes_are_those_of_the_error(lit: LitObject) -> None:
         random.random(count).astype(np.float32),
         np.empty((0, 3), np.float32),
     )
+    pixels = Pixels(
+        np.empty((count, SIZE.place), np.float32),
+        np.empty((count, shapes.told[0]), np.float32),
+        np.empty((count, 3), np.float32),
+        random.random(count).astype(np.float32),
+    )
     batch.at[:] = np.arange(count)
     encode(random.uniform(-1, 1, (count, 3)).astype(np.float32), octave_factors(SIZE), 0, batch.encoded)
     batch.told[:] = random.standard_normal(batch.told.shape)
@@ -51,8 +69,9 @@ def test_slopes_are_those_of_the_error(lit: LitObject) -> None:
     def loss(at: AnyArray) -> float:
         layers = layers_of(at, SIZE)
         _forth(layers, batch.encoded, batch.told, batch)
-        raw = batch.raw[:, 0].astype(np.float64) + layers.density_bias[0] - lesson.depth
-        return 0.5 * float(_wrong(layers, lesson, opacity, batch) + opacity * (raw**2).sum()) / count
+        raw = (batch.raw[:, 0].astype(np.float64) + layers.density_bias[0] - lesson.depth)[:places]
+        wrong = _wrong(layers, lesson, pixels, places, opacity, batch)
+        return 0.5 * float(wrong + opacity * (raw**2).sum()) / count
 
     loss(flat)
     _back(layers_of(flat, SIZE), layers_of(slope, SIZE), batch)

@@ -1,0 +1,70 @@
+"""A training's state in one file, whole on disk or not at all; none of it needs torch."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from harness.arrays import AnyArray
+from harness.errors import DataRefused
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """How far a training has come.
+
+    Attributes:
+        epoch: that were trained.
+        losses: of what was trained.
+    """
+
+    epoch: int
+    losses: list[float]
+
+
+def write_checkpoint(path: Path, identity: str, progress: Progress, arrays: Mapping[str, AnyArray]) -> None:
+    """Write a checkpoint; one that was there is replaced when the new one is on disk.
+
+    Args:
+        path: a ``.npz`` file.
+        identity: a digest of all that the training depends on.
+        progress: of the training.
+        arrays: what it goes on from.
+    """
+    part = path.with_name(f".{path.name}.part")
+    with part.open("wb") as stream:
+        np.savez(
+            stream,
+            allow_pickle=False,
+            identity=np.array(identity),
+            epoch=np.array(progress.epoch),
+            losses=np.array(progress.losses),
+            **arrays,
+        )
+        stream.flush()
+        os.fsync(stream.fileno())
+    part.replace(path)
+
+
+def read_checkpoint(path: Path, identity: str) -> tuple[Progress, Mapping[str, AnyArray]]:
+    """What ``write_checkpoint`` wrote.
+
+    Raises:
+        DataRefused: the file cannot be read, or is of another training.
+    """
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        found = str(arrays.pop("identity"))
+        progress = Progress(int(arrays.pop("epoch")), arrays.pop("losses").tolist())
+    except (OSError, ValueError, BadZipFile, EOFError, KeyError, TypeError, AttributeError) as error:
+        raise DataRefused(f"checkpoint {path} cannot be read ({error}); delete it to begin anew") from error
+    if found != identity:
+        raise DataRefused(
+            f"checkpoint {path} is of another network, object, data or seed; "
+            "delete it to begin anew, or build into another folder"
+        )
+    return progress, arrays
