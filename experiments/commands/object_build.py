@@ -61,6 +61,9 @@ def build(
     distill: Annotated[
         bool, typer.Option("--distill", help="Of vision: let the networks learn from that teacher.")
     ] = False,
+    finish: Annotated[
+        bool, typer.Option("--finish", help="Of vision: let all learn from pictures last; paper does anyway.")
+    ] = False,
     json: options.Json = False,
 ) -> int:
     """Build an object's sound, touch or look: networks, and their errors where they never looked.
@@ -75,7 +78,8 @@ def build(
 
     Vision: tiny networks of the file's own colours, as the mesh's texture says them, measured on pictures
     whose cameras and lights were kept back. A stopped training goes on when it is called again. --teacher
-    and --distill need the extra "author".
+    and --distill need the extra "author". --finish is for what no place of the surface tells by itself,
+    as shadows to networks that are told no visibility.
 
     Try: touchstone object build builtin:bowl --material ceramic --profile smoke --out objects/bowl
     """
@@ -86,8 +90,8 @@ def build(
 
     if only not in ("audio", "touch", "vision"):
         raise WrongUse(f"--only {only} cannot be built; there is audio, touch and vision")
-    if (teacher or distill) and only != "vision":
-        raise WrongUse(f"--teacher and --distill are of vision, and --only {only} was asked for")
+    if (teacher or distill or finish) and only != "vision":
+        raise WrongUse(f"--teacher, --distill and --finish are of vision, and --only {only} was asked for")
     thick = options.quantity("--wall", wall, LENGTH)
     wanted = PartRequest(mesh, named(material), profile, units, thick, licence, seed)
     if only == "touch":
@@ -98,7 +102,7 @@ def build(
         from experiments.commands.object_build_vision import build_vision_part
 
         taught: Teaching = "distilled" if distill else "beside" if teacher else "none"
-        return build_vision_part(wanted, out, threads, json, taught)
+        return build_vision_part(wanted, out, threads, json, taught, finish)
     from harness.authoring.object_audio import AudioRequest
 
     limit, longest = options.quantity("--up-to", up_to, FREQUENCY), options.quantity("--edge", edge, LENGTH)

@@ -17,13 +17,19 @@ if TYPE_CHECKING:
 
 
 def build_vision_part(
-    wanted: "PartRequest", out: Path, threads: int | None, json: bool, teaching: "Teaching" = "none"
+    wanted: "PartRequest",
+    out: Path,
+    threads: int | None,
+    json: bool,
+    teaching: "Teaching" = "none",
+    finish: bool = False,
 ) -> int:
     """Build, measure and say."""
     from harness.authoring.object_vision import build_vision
 
     return build_and_say(
-        lambda report: build_vision(wanted, out, report, threads, teaching), as_json, print_built, json
+        lambda report: build_vision(wanted, out, report, threads, teaching, finish),
+        *(as_json, print_built, json),
     )
 
 

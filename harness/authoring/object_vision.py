@@ -11,7 +11,7 @@ import numpy as np
 
 from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
 from harness.authoring.training import Report
-from harness.authoring.vision import CHECKPOINT, STRICT_CHECKPOINT, AuthoredVision, Teaching, author_vision
+from harness.authoring.vision import AuthoredVision, Teaching, author_vision, checkpoints
 from harness.authoring.vision_profiles import vision_profile
 from harness.authoring.vision_teacher import require_torch
 from harness.mesh import Mesh
@@ -43,7 +43,12 @@ class BuiltVision:
 
 
 def build_vision(
-    wanted: PartRequest, out: Path, report: Report, threads: int | None = None, teaching: Teaching = "none"
+    wanted: PartRequest,
+    out: Path,
+    report: Report,
+    threads: int | None = None,
+    teaching: Teaching = "none",
+    finish: bool = False,
 ) -> BuiltVision:
     """Build an object's look, or go on with a training that was stopped.
 
@@ -53,13 +58,15 @@ def build_vision(
         report: told of progress.
         threads: of a training; None for as many as the process has cores.
         teaching: whether a teacher is made and measured beside, or for the networks to learn from.
+        finish: whether all learn from pictures then, in a profile that does not say so itself.
 
     Raises:
         WrongUse: options that cannot be, a teacher without torch among them.
         MeshRefused: a mesh that cannot stand for an object.
         DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
     """
-    chosen = vision_profile(wanted.profile)
+    named = vision_profile(wanted.profile)
+    chosen = named.finished() if finish else named
     if teaching != "none":
         require_torch()
     begun = time.perf_counter()
@@ -80,8 +87,8 @@ def build_vision(
         surface=drawn_surface(taken.mesh, look.mesh),
     )
     made = with_vision(created, part)
-    for checkpoint in (CHECKPOINT, STRICT_CHECKPOINT):
-        (out / checkpoint).unlink(missing_ok=True)
+    for checkpoint in checkpoints(out):
+        checkpoint.unlink(missing_ok=True)
     seconds = {"mesh": read, **vision.seconds, "write": time.perf_counter() - begun}
     return BuiltVision(made, vision, (*taken.said, *look.remarks), seconds)
 

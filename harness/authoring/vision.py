@@ -2,7 +2,8 @@
 
 Every network is trained on its own: regressed on what leaves places of the surface, without noise and
 without a picture being drawn (``vision_lessons``). Nothing is distilled unless that is asked for: the surface
-itself answers sooner than any network that would stand for it, and exactly.
+itself answers sooner than any network that would stand for it, and exactly. Pictures come last, where the
+profile has them (``vision_finish``).
 """
 
 from collections.abc import Mapping
@@ -14,10 +15,18 @@ from harness.authoring.training import Laps, Report, train
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
 from harness.authoring.vision_distilled import distilled, with_lamps
+from harness.authoring.vision_finish import CellFinishing
 from harness.authoring.vision_lessons import LAMPS_OF_A_PLACE, OPAQUE, draw_for
 from harness.authoring.vision_metrics import network_pictures, picture_errors, reference_pictures
-from harness.authoring.vision_profiles import CellsSpec, VisionProfile
-from harness.authoring.vision_teacher import MadeTeacher, made_teacher, require_torch, teacher_file
+from harness.authoring.vision_profiles import CellsFinish, CellsSpec, VisionProfile
+from harness.authoring.vision_seen import Exact, pictures_to_learn
+from harness.authoring.vision_teacher import (
+    MadeTeacher,
+    finished_file,
+    made_teacher,
+    require_torch,
+    teacher_file,
+)
 from harness.authoring.vision_teacher_profiles import TeacherSpec
 from harness.linear_image import LinearImage
 from harness.objectfile.vision_graph import vision_graph
@@ -38,6 +47,9 @@ STRICT_CHECKPOINT = ".vision_strict_training.npz"
 TEACHER = "teacher_"
 """Before the names of errors and times of a teacher."""
 
+UNFINISHED = "unfinished_"
+"""Before the names of errors that networks had before they were finished on pictures."""
+
 Teaching = Literal["none", "beside", "distilled"]
 """Whether a teacher is made: to be measured, or for networks to learn from it in the surface's stead."""
 
@@ -51,7 +63,8 @@ class AuthoredVision:
     Attributes:
         model: in float16, to be written; for the look's mesh.
         errors: of pictures kept back, by a name with its unit (``vision_metrics.picture_errors``); those of
-            networks told no more than the paper's begin with ``strict_``.
+            networks told no more than the paper's begin with ``strict_``, then those that networks had before
+            they were finished on pictures with ``unfinished_``.
         settings: how they were made.
         seconds: s on the clock of each stage.
     """
@@ -96,6 +109,7 @@ def author_vision(
     references = reference_pictures(lit, held_out, profile.samples)
     clock.lap("references")
     made = _Making(lit, held_out, seed, report, threads, clock)
+    pictures = [] if profile.finish is None else made.pictures(profile.finish)
     errors: dict[str, float] = {}
     settings: Settings = {"teaching": teaching}
     models: list[VisionModel] = []
@@ -107,10 +121,19 @@ def author_vision(
             errors |= made.judged_teacher(teacher, references, word)
             settings |= {f"{word}{TEACHER}{each}": value for each, value in teacher.settings.items()}
         training = made.trained(spec, folder / name, word, teacher if teaching == "distilled" else None)
+        if profile.finish is not None:
+            errors |= made.judged(training.finish(), references, f"{word}{UNFINISHED}")
+            made.finish(training, profile.finish, pictures, finished_file(folder / name), word)
         models.append(training.finish())
         errors |= made.judged(models[-1], references, word)
-        settings |= {} if word else _settings(spec, training)
+        settings |= {} if word else _settings(spec, training, profile.finish)
     return AuthoredVision(models[0], errors, settings, clock.seconds)
+
+
+def checkpoints(folder: Path) -> list[Path]:
+    """Files that a stopped training goes on from, there or not; a teacher's are not among them."""
+    kept = [folder / name for name in (CHECKPOINT, STRICT_CHECKPOINT)]
+    return kept + [finished_file(each) for each in kept]
 
 
 def _asked(profile: VisionProfile) -> list[tuple[CellsSpec, str, str]]:
@@ -186,6 +209,21 @@ class _Making:
         self.clock.lap(f"{word}networks")
         return training
 
+    def pictures(self, finish: CellsFinish) -> list[Exact]:
+        self.report("drawing pictures to learn from", 0.0)
+        wanted = (finish.pictures, finish.side, finish.samples)
+        found = pictures_to_learn(self.lit, *wanted, self.seed, self.held_out)
+        self.clock.lap("pictures")
+        return found
+
+    def finish(
+        self, training: CellTraining, finish: CellsFinish, pictures: list[Exact], checkpoint: Path, word: str
+    ) -> None:
+        """The training's networks are changed."""
+        finishing = CellFinishing(training, finish, self.lit.appearance.mesh, pictures)
+        train(finishing, finishing.epochs, checkpoint, self.report)
+        self.clock.lap(f"{word}finish")
+
     def judged(self, model: VisionModel, references: list[LinearImage], word: str) -> dict[str, float]:
         self.report("measuring", 0.0)
         data = vision_graph(model).SerializeToString()
@@ -196,6 +234,7 @@ class _Making:
         return {f"{word}{name}": value for name, value in errors.items()}
 
 
-def _settings(spec: CellsSpec, training: CellTraining) -> Settings:
+def _settings(spec: CellsSpec, training: CellTraining, finish: CellsFinish | None) -> Settings:
+    later = {} if finish is None else {f"finish_{key}": value for key, value in asdict(finish).items()}
     told = {key: value for key, value in asdict(spec).items() if key != "size"}
-    return asdict(spec.size) | told | {"last_loss": sum(training.losses) / len(training.losses)}
+    return asdict(spec.size) | told | later | {"last_loss": sum(training.losses) / len(training.losses)}

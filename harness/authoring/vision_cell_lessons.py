@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from harness.arrays import AnyArray, FloatArray, IntArray
-from harness.authoring.vision_kernels import Lesson, Pixels, encode
+from harness.authoring.vision_batch import Lesson, Pixels, encode
 from harness.authoring.vision_layers import layer_shapes, octave_factors
 from harness.authoring.vision_lessons import Lessons
 from harness.objectfile.vision_network import NetworkSize, VisionGrid

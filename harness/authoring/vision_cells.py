@@ -10,8 +10,9 @@ from threadpoolctl import threadpool_limits
 
 from harness.arrays import AnyArray
 from harness.authoring.checkpoint import Progress, read_checkpoint, write_checkpoint
+from harness.authoring.vision_batch import Lesson, Pixels, batch_of, no_pixels
 from harness.authoring.vision_cell_lessons import CellLessons
-from harness.authoring.vision_kernels import Lesson, Pixels, batch_of, no_pixels, teach
+from harness.authoring.vision_kernels import teach
 from harness.authoring.vision_layers import (
     first_weights,
     layer_shapes,

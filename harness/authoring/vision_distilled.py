@@ -24,7 +24,7 @@ def distilled(ask: Answers, lessons: Lessons) -> Lessons:
 def with_lamps(lessons: Lessons, lamps: AnyArray, each: int, hidden: float, seed: int) -> Lessons:
     """Each place so many times, with a lamp of its own on its side that is said to be seen, or a hidden one.
 
-    As ``vision_kernels`` draws them at every step where nobody is asked for the light; colours are left.
+    As ``vision_batch`` draws them at every step where nobody is asked for the light; colours are left.
 
     Args:
         lessons: without lamps.

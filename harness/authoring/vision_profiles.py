@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from harness.authoring.vision_teacher_profiles import (
-    PAPER_TEACHERS,
     SMOKE_TEACHERS,
     STANDARD_TEACHERS,
+    FinishSpec,
     TeacherSpec,
 )
 from harness.errors import WrongUse
@@ -99,6 +99,7 @@ class VisionProfile:
         side: pixels of those pictures.
         samples: a side of a pixel of the reference.
         teachers: large networks that are made beside where that is asked for, one of a kind.
+        finish: what all learn from pictures then; None for nothing.
     """
 
     networks: CellsSpec
@@ -107,6 +108,7 @@ class VisionProfile:
     side: int = 256
     samples: int = 4
     teachers: tuple[TeacherSpec, ...] = SMOKE_TEACHERS
+    finish: CellsFinish | None = None
 
     def __post_init__(self) -> None:
         if self.strict is not None and self.strict.size.kind != "osf":
@@ -118,6 +120,11 @@ class VisionProfile:
                 f"{self.pictures} pictures of {self.side} pixels with {self.samples} samples judge nothing; "
                 "give 1 or more of each"
             )
+
+    def finished(self) -> "VisionProfile":
+        """The same, with what learns from the surface alone finished on pictures."""
+        teachers = tuple(replace(each, finish=each.finish or FinishSpec()) for each in self.teachers)
+        return replace(self, finish=self.finish or CellsFinish(), teachers=teachers)
 
     def teacher(self, kind: Kind) -> TeacherSpec:
         """The teacher of a kind.
@@ -145,11 +152,11 @@ VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
         CellsSpec(replace(PAPER, kind="osf-v"), places=4_000_000, steps=10_000, batch=128),
         pictures=12,
         strict=CellsSpec(PAPER, places=8_000_000),
-        teachers=PAPER_TEACHERS,
-    ),
+        teachers=STANDARD_TEACHERS,
+    ).finished(),
 })  # fmt: skip
-"""``paper`` has networks of ObjectFolder 2.0's size; its strict ones are those, told no more. None of them
-needs torch, teachers aside."""
+"""``paper`` has networks of ObjectFolder 2.0's size, finished on pictures as those are; its strict ones are
+those, told no more. None of them needs torch, teachers aside."""
 
 
 def vision_profile(name: str) -> VisionProfile:

@@ -116,6 +116,3 @@ _STRICT = replace(_TOLD, kind="osf", deep=2)
 SMOKE_TEACHERS = (replace(_TOLD, places=500_000, steps=500, epochs=5),)
 STANDARD_TEACHERS = (_TOLD, _STRICT)
 """One that is told visibility and normal, and one that is told no more than the paper's."""
-
-PAPER_TEACHERS = tuple(replace(teacher, finish=FinishSpec()) for teacher in STANDARD_TEACHERS)
-"""The same, finished on pictures as ObjectFolder 2.0's networks are."""

@@ -12,8 +12,8 @@ import trimesh
 from harness.authoring import object_vision, vision_profiles
 from harness.authoring.object_vision import drawn_surface, without_seams
 from harness.authoring.training import Report
-from harness.authoring.vision import CHECKPOINT, AuthoredVision, Teaching, author_vision
-from harness.authoring.vision_profiles import CellsSpec, VisionProfile
+from harness.authoring.vision import CHECKPOINT, AuthoredVision, Teaching, author_vision, checkpoints
+from harness.authoring.vision_profiles import CellsFinish, CellsSpec, VisionProfile
 from harness.cli import invoke
 from harness.mesh import Mesh
 from harness.objectfile.file import ObjectFile
@@ -33,6 +33,8 @@ TINY = VisionProfile(
     side=24,
     samples=2,
 )
+
+FINISH = CellsFinish(pictures=2, side=24, samples=2, rounds=1, steps=20)
 
 
 @pytest.fixture
@@ -79,6 +81,21 @@ def test_a_block_becomes_an_object_file_that_can_be_looked_at(
     assert (of.folder / "object.json").read_bytes() == first
 
 
+def test_networks_are_finished_on_pictures_where_that_is_asked_for(
+    block: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(vision_profiles, "CellsFinish", lambda: FINISH)
+    assert built(block, "--finish", "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["settings"]["finish_pictures"] == FINISH.pictures
+    assert {"psnr_db", "unfinished_psnr_db", "unfinished_ssim"} <= set(answer["errors"])
+    assert answer["errors"]["psnr_db"] != answer["errors"]["unfinished_psnr_db"]
+    assert {"pictures", "finish", "unfinished_measure"} <= set(answer["seconds"])
+    of = ObjectFile.open(block.parent / "object")
+    assert all(check.passed for check in verify(of)), verify(of)
+    assert not [each for each in checkpoints(of.folder) if each.exists()]
+
+
 def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
     block: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -120,7 +137,8 @@ def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
         (("--material", "cheese"), "no material"),
         (("--wall", "3"), "--wall"),
         (("--units", "ft"), "unknown unit 'ft'"),
-        (("--only", "touch", "--teacher"), "--teacher and --distill are of vision"),
+        (("--only", "touch", "--teacher"), "--teacher, --distill and --finish are of vision"),
+        (("--only", "audio", "--finish"), "--teacher, --distill and --finish are of vision"),
     ],
 )
 def test_what_cannot_be_built_is_wrong_use(

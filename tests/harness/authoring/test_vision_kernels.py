@@ -7,16 +7,8 @@ import pytest
 from taught_ball import SIZE, lit_ball
 
 from harness.arrays import AnyArray
-from harness.authoring.vision_kernels import (
-    Lesson,
-    Pixels,
-    _adam,
-    _back,
-    _forth,
-    _wrong,
-    batch_of,
-    encode,
-)
+from harness.authoring.vision_batch import Lesson, Pixels, batch_of, encode
+from harness.authoring.vision_kernels import _adam, _back, _forth, _wrong
 from harness.authoring.vision_layers import (
     first_weights,
     layer_shapes,

@@ -32,6 +32,17 @@ def test_profiles_are_as_large_as_they_are_named() -> None:
     assert paper.strict.size.parameters == 20_292
 
 
+def test_what_is_finished_is_so_once_and_all_of_it() -> None:
+    standard, paper = vision_profile("standard"), vision_profile("paper")
+    assert standard.finish is None
+    finished = standard.finished()
+    assert finished.finish == paper.finish is not None
+    assert finished.teachers == paper.teachers
+    assert all(teacher.finish is not None for teacher in finished.teachers)
+    assert (finished.networks, finished.strict) == (standard.networks, standard.strict)
+    assert finished.finished() == finished
+
+
 def test_networks_of_the_papers_size_learn_too(lit: LitObject, tmp_path: Path) -> None:
     """Ten octaves, of which the highest turn 160 times in a cell, do not spoil what lies between places."""
     wide = replace(vision_profile("paper").networks, cells=4, places=6000, steps=100, batch=64)
