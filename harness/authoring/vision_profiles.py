@@ -70,7 +70,7 @@ class CellsFinish:
         share: of each batch that is of pictures.
     """
 
-    pictures: int = 24
+    pictures: int = 96
     side: int = 256
     samples: int = 4
     rounds: int = 3
