@@ -16,9 +16,10 @@ from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
 from harness.authoring.vision_distilled import distilled, with_lamps
 from harness.authoring.vision_finish import CellFinishing
+from harness.authoring.vision_finish_profiles import CellsFinish
 from harness.authoring.vision_lessons import LAMPS_OF_A_PLACE, OPAQUE, draw_for
 from harness.authoring.vision_metrics import network_pictures, picture_errors, reference_pictures
-from harness.authoring.vision_profiles import CellsFinish, CellsSpec, VisionProfile
+from harness.authoring.vision_profiles import CellsSpec, VisionProfile
 from harness.authoring.vision_seen import Exact, pictures_to_learn
 from harness.authoring.vision_teacher import (
     MadeTeacher,
@@ -210,9 +211,7 @@ class _Making:
         return training
 
     def pictures(self, finish: CellsFinish) -> list[Exact]:
-        self.report("drawing pictures to learn from", 0.0)
-        wanted = (finish.pictures, finish.side, finish.samples)
-        found = pictures_to_learn(self.lit, *wanted, self.seed, self.held_out)
+        found = pictures_to_learn(self.lit, finish, self.seed, self.held_out, self.report)
         self.clock.lap("pictures")
         return found
 

@@ -13,8 +13,8 @@ import numpy as np
 from harness.authoring.checkpoint import Progress, read_checkpoint, write_checkpoint
 from harness.authoring.vision_cell_lessons import CellLessons
 from harness.authoring.vision_cells import CellTraining, by_threads, seed_of, teach_cell
+from harness.authoring.vision_finish_profiles import CellsFinish
 from harness.authoring.vision_pixels import pixel_lessons
-from harness.authoring.vision_profiles import CellsFinish
 from harness.authoring.vision_seen import Exact, RayRecorder, SeenRays, together
 from harness.mesh import Mesh
 from harness.objectfile.vision_graph import vision_graph

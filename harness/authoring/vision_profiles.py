@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from harness.authoring.vision_finish_profiles import CellsFinish, TeacherFinish
 from harness.authoring.vision_teacher_profiles import (
     SMOKE_TEACHERS,
     STANDARD_TEACHERS,
-    FinishSpec,
     TeacherSpec,
 )
 from harness.errors import WrongUse
@@ -57,38 +57,6 @@ class CellsSpec:
 
 
 @dataclass(frozen=True)
-class CellsFinish:
-    """What tiny networks learn from pictures when they have learned from the surface.
-
-    Attributes:
-        pictures: to learn from, clear of those kept back.
-        side: pixels of each.
-        samples: a side of a pixel.
-        rounds: of drawing them anew.
-        steps: of Adam, of each network, a round.
-        slower: share of the rate that they learned from the surface by.
-        share: of each batch that is of pictures.
-    """
-
-    pictures: int = 96
-    side: int = 256
-    samples: int = 4
-    rounds: int = 3
-    steps: int = 1000
-    slower: float = 0.3
-    share: float = 0.5
-
-    def __post_init__(self) -> None:
-        if min(self.pictures, self.side, self.samples, self.rounds, self.steps) < 1:
-            raise WrongUse(f"no networks are finished by {self}; counts are 1 or more")
-        if not (self.slower > 0.0 and 0.0 <= self.share < 1.0):
-            raise WrongUse(
-                f"a rate {self.slower} times as fast, a share of {self.share} of pictures; "
-                "give one above 0, and 0 to below 1"
-            )
-
-
-@dataclass(frozen=True)
 class VisionProfile:
     """One trade of time for accuracy.
 
@@ -123,7 +91,7 @@ class VisionProfile:
 
     def finished(self) -> "VisionProfile":
         """The same, with what learns from the surface alone finished on pictures."""
-        teachers = tuple(replace(each, finish=each.finish or FinishSpec()) for each in self.teachers)
+        teachers = tuple(replace(each, finish=each.finish or TeacherFinish()) for each in self.teachers)
         return replace(self, finish=self.finish or CellsFinish(), teachers=teachers)
 
     def teacher(self, kind: Kind) -> TeacherSpec:

@@ -6,7 +6,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
+from harness.authoring.training import Report
 from harness.authoring.vision_data import HeldOut, draw_views
+from harness.authoring.vision_finish_profiles import PictureSet
 from harness.authoring.vision_teacher_pictures import Answers, TeacherRenderer
 from harness.linear_image import LinearImage
 from harness.mesh import Mesh
@@ -66,23 +68,26 @@ def together(parts: Sequence[SeenRays]) -> SeenRays:
 
 
 def pictures_to_learn(
-    lit: LitObject, count: int, side: int, samples: int, seed: int, held_out: HeldOut
+    lit: LitObject, wanted: PictureSet, seed: int, held_out: HeldOut, report: Report
 ) -> list[Exact]:
     """Exact pictures, clear of those kept back.
 
     Args:
         lit: the object.
-        count: of pictures.
-        side: pixels of each.
-        samples: a side of a pixel.
+        wanted: how many, and how fine.
         seed: of their cameras and lights.
         held_out: what nothing is learned from.
+        report: told of progress.
 
     Raises:
         OutOfDomain: too few views are clear of those kept back.
     """
-    views = draw_views(lit.appearance.mesh, count, side, side, seed, held_out)
-    return [(camera, light, lit.render(camera, [light], samples).image) for camera, light in views]
+    count, side = wanted.pictures, wanted.side
+    found: list[Exact] = []
+    for camera, light in draw_views(lit.appearance.mesh, count, side, side, seed, held_out):
+        report(f"drawing picture {len(found) + 1} of {count} to learn from", len(found) / count)
+        found.append((camera, light, lit.render(camera, [light], wanted.samples).image))
+    return found
 
 
 class Recording(VisionRenderer):
@@ -111,6 +116,8 @@ class Recording(VisionRenderer):
         self.render(camera, light)
         self._keeper = None
         assert self._drawn is not None
+        if not keeper.scenes:
+            return _none_of(self.model.weights.size.extras)
         return _of_pixels(keeper, self._drawn.pixels, light, exact)
 
 
@@ -158,6 +165,13 @@ class _Keeper:
         told = [np.concatenate(each) for each in zip(*self._waves, strict=True)]
         order = np.lexsort((told[2], told[0]))
         return tuple(each[order] for each in told)
+
+
+def _none_of(extras: int) -> SeenRays:
+    """Of a picture in which no ray asked anything, as of a sheet from its edge."""
+    numbers, ways, told = (np.empty((0, *wide), np.float32) for wide in ((), (3,), (extras,)))
+    first = np.zeros(1, np.int64)
+    return SeenRays(np.empty((0, 3)), numbers, first, ways, ways, told, ways, numbers, numbers, ways)
 
 
 def _of_pixels(keeper: _Keeper, pixels: AnyArray, light: DirectionalLight, exact: LinearImage) -> SeenRays:

@@ -16,11 +16,12 @@ import numpy as np
 
 from harness.authoring.training import Laps, Report, train
 from harness.authoring.vision_data import HeldOut
+from harness.authoring.vision_finish_profiles import TeacherFinish
 from harness.authoring.vision_lessons import OPAQUE, draw_for
 from harness.authoring.vision_metrics import network_pictures, picture_errors
 from harness.authoring.vision_seen import TeacherRecorder, pictures_to_learn, together
 from harness.authoring.vision_teacher_pictures import Answers, TeacherRenderer
-from harness.authoring.vision_teacher_profiles import FinishSpec, TeacherSpec
+from harness.authoring.vision_teacher_profiles import TeacherSpec
 from harness.cores import own_cores
 from harness.errors import WrongUse
 from harness.linear_image import LinearImage
@@ -187,14 +188,12 @@ class _Making:
         self.laps.lap("training")
         return training
 
-    def finished(self, training: "TeacherTraining", finish: FinishSpec, checkpoint: Path) -> float:
+    def finished(self, training: "TeacherTraining", finish: TeacherFinish, checkpoint: Path) -> float:
         """On pictures; the last loss."""
         from harness.authoring.vision_teacher_finish import Finishing
 
-        self.report("drawing pictures of a teacher", 0.0)
         mesh, scale = self.lit.appearance.mesh, OPAQUE / self.walked.voxel
-        wanted = (finish.pictures, finish.side, finish.samples)
-        pictures = pictures_to_learn(self.lit, *wanted, self.seed, self.held_out)
+        pictures = pictures_to_learn(self.lit, finish, self.seed, self.held_out, self.report)
         recorder = TeacherRecorder(training.ask, mesh, self.walked.grid, self.spec.kind, scale)
         rays = together([recorder.seen(*each) for each in pictures])
         self.laps.lap("pictures")

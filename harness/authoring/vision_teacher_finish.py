@@ -14,8 +14,9 @@ from torch import Tensor
 from harness.arrays import AnyArray
 from harness.authoring.adam_state import load_training, save_training
 from harness.authoring.checkpoint import Progress
+from harness.authoring.vision_finish_profiles import TeacherFinish
 from harness.authoring.vision_seen import SeenRays
-from harness.authoring.vision_teacher_profiles import FinishSpec, TeacherSpec
+from harness.authoring.vision_teacher_profiles import TeacherSpec
 from harness.authoring.vision_teacher_training import (
     TeacherTraining,
     adam_of,
@@ -46,7 +47,7 @@ class Finishing:
         self,
         taught: TeacherTraining,
         spec: TeacherSpec,
-        finish: FinishSpec,
+        finish: TeacherFinish,
         rays: SeenRays,
         density_scale: float,
         seed: int,

@@ -2,44 +2,9 @@
 
 from dataclasses import dataclass, replace
 
+from harness.authoring.vision_finish_profiles import TeacherFinish
 from harness.errors import WrongUse
 from harness.objectfile.vision_network import EXTRAS, Kind
-
-
-@dataclass(frozen=True)
-class FinishSpec:
-    """What a teacher learns from pictures when it has learned from the surface.
-
-    Attributes:
-        pictures: to learn from, clear of those kept back.
-        side: pixels of each.
-        samples: a side of a pixel.
-        steps: of Adam in all.
-        epochs: after each the state is kept.
-        rays: in a step, beside a batch of places.
-        slower: share of the rates that it learned from the surface by.
-        weight: of what pictures say beside what the surface says.
-    """
-
-    pictures: int = 24
-    side: int = 256
-    samples: int = 4
-    steps: int = 1000
-    epochs: int = 10
-    rays: int = 1024
-    slower: float = 0.3
-    weight: float = 1.0
-
-    def __post_init__(self) -> None:
-        if (
-            min(self.pictures, self.side, self.samples, self.epochs, self.rays) < 1
-            or self.steps < self.epochs
-        ):
-            raise WrongUse(
-                f"no teacher is finished by {self}; counts are 1 or more, and there is a step an epoch"
-            )
-        if not (self.slower > 0.0 and self.weight > 0.0):
-            raise WrongUse(f"rates {self.slower} times as fast, a weight of {self.weight}; give two above 0")
 
 
 @dataclass(frozen=True)
@@ -84,7 +49,7 @@ class TeacherSpec:
     table_rate: float = 2e-2
     hidden: float = 0.2
     opacity: float = 0.02
-    finish: FinishSpec | None = None
+    finish: TeacherFinish | None = None
 
     def __post_init__(self) -> None:
         sizes = (self.width, self.deep, self.coarsest, self.levels, self.features, self.places, self.batch)

@@ -16,10 +16,10 @@ from rich.console import Console
 
 from harness.authoring.vision import Teaching, author_vision
 from harness.authoring.vision_data import held_out_pictures
+from harness.authoring.vision_finish_profiles import TeacherFinish
 from harness.authoring.vision_metrics import reference_pictures
 from harness.authoring.vision_profiles import VisionProfile, vision_profile
 from harness.authoring.vision_teacher import made_teacher, teacher_file
-from harness.authoring.vision_teacher_profiles import FinishSpec
 from harness.sim.appearance_source import appearance_of
 from harness.sim.direct_image import LitObject
 
@@ -36,9 +36,9 @@ def main() -> None:
     parser.add_argument("--pictures", type=int)
     parser.add_argument("--steps", type=int, help="of the teacher, in place of the profile's")
     parser.add_argument("--finish", type=int, metavar="STEPS", help="of pictures, after the teacher's own")
-    parser.add_argument("--slower", type=float, default=FinishSpec.slower, help="share of rates meanwhile")
-    parser.add_argument("--weight", type=float, default=FinishSpec.weight, help="of what pictures say")
-    parser.add_argument("--from-pictures", type=int, default=FinishSpec.pictures)
+    parser.add_argument("--slower", type=float, default=TeacherFinish.slower, help="share of rates meanwhile")
+    parser.add_argument("--weight", type=float, default=TeacherFinish.weight, help="of what pictures say")
+    parser.add_argument("--from-pictures", type=int, default=TeacherFinish.pictures)
     parser.add_argument("--threads", type=int)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--distill", action="store_true", help="and networks, taught by it and directly")
@@ -83,11 +83,11 @@ def measured(name: str, given: argparse.Namespace) -> Mapping[str, Mapping[str, 
     return {way: errors | under(errors, word) for way, word in ways.items()}
 
 
-def finish_of(given: argparse.Namespace) -> FinishSpec | None:
+def finish_of(given: argparse.Namespace) -> TeacherFinish | None:
     """What the teacher learns from pictures, where that is asked for."""
     if not given.finish:
         return None
-    return FinishSpec(given.from_pictures, steps=given.finish, slower=given.slower, weight=given.weight)
+    return TeacherFinish(given.from_pictures, steps=given.finish, slower=given.slower, weight=given.weight)
 
 
 def compared(name: str, given: argparse.Namespace) -> Mapping[str, Mapping[str, float]]:

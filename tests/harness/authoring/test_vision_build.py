@@ -13,7 +13,8 @@ from harness.authoring import object_vision, vision_profiles
 from harness.authoring.object_vision import drawn_surface, without_seams
 from harness.authoring.training import Report
 from harness.authoring.vision import CHECKPOINT, AuthoredVision, Teaching, author_vision, checkpoints
-from harness.authoring.vision_profiles import CellsFinish, CellsSpec, VisionProfile
+from harness.authoring.vision_finish_profiles import CellsFinish
+from harness.authoring.vision_profiles import CellsSpec, VisionProfile
 from harness.cli import invoke
 from harness.mesh import Mesh
 from harness.objectfile.file import ObjectFile

@@ -10,15 +10,18 @@ from taught_ball import COLOUR, NOTHING, SIZE, TINY, grid_for, lit_ball
 
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_finish import CellFinishing
+from harness.authoring.vision_finish_profiles import CellsFinish
 from harness.authoring.vision_lessons import OPAQUE, draw_lamps, draw_lessons
 from harness.authoring.vision_pixels import shares_along
-from harness.authoring.vision_profiles import CellsFinish, CellsSpec
+from harness.authoring.vision_profiles import CellsSpec
 from harness.authoring.vision_seen import Exact, RayRecorder, pictures_to_learn
 from harness.errors import DataRefused, WrongUse
+from harness.linear_image import LinearImage
 from harness.objectfile.vision_graph import vision_graph
 from harness.objectfile.vision_network import Kind, VisionModel
 from harness.objectfile.vision_render import VisionRenderer
 from harness.objectfile.vision_settings import RenderSettings
+from harness.pinhole import Pinhole
 from harness.sim.direct_image import LitObject
 
 FINISH = CellsFinish(pictures=3, side=40, samples=2, rounds=2, steps=150, slower=1.0)
@@ -31,7 +34,10 @@ def lit() -> LitObject:
 
 @pytest.fixture(scope="module")
 def pictures(lit: LitObject) -> list[Exact]:
-    return pictures_to_learn(lit, FINISH.pictures, FINISH.side, FINISH.samples, 3, NOTHING)
+    said: list[float] = []
+    found = pictures_to_learn(lit, FINISH, 3, NOTHING, lambda _what, share: said.append(share))
+    assert said == [0.0, 1 / 3, 2 / 3]
+    return found
 
 
 def of_kind(kind: Kind) -> CellsSpec:
@@ -131,6 +137,20 @@ def test_cells_that_no_picture_shows_go_on_from_the_surface(lit: LitObject, pict
     finishing = finished(training, lit, pictures[:1])
     finishing.step_epoch()
     assert np.isfinite(training.flats).all()
+    assert apart(finishing.finish(), lit, pictures) < 1.5 * before
+
+
+def test_of_a_picture_that_shows_nothing_nothing_is_learned(lit: LitObject, pictures: list[Exact]) -> None:
+    """Of a camera that looks away no ray asks anything; what is learned is what the surface says."""
+    camera, light, exact = pictures[0]
+    away = Pinhole.looking_at(camera.eye, 2.0 * camera.eye, (0.0, 0.0, 1.0), 40, 40, 0.5)
+    nothing = LinearImage(*(np.zeros_like(each) for each in (exact.colour, exact.alpha, exact.depth)))
+    training = taught(lit)
+    before = apart(training.finish(), lit, pictures)
+    rays = RayRecorder(data_of(training.finish()), lit.appearance.mesh).seen(away, light, nothing)
+    assert len(rays) == len(rays.points) == 0
+    finishing = finished(training, lit, [(away, light, nothing)])
+    finishing.step_epoch()
     assert apart(finishing.finish(), lit, pictures) < 1.5 * before
 
 

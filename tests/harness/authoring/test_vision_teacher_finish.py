@@ -10,16 +10,17 @@ from taught_ball import COLOUR, NOTHING, RADIUS, grid_for, lit_ball
 
 from harness.arrays import AnyArray
 from harness.authoring.vision_data import held_out_pictures
+from harness.authoring.vision_finish_profiles import TeacherFinish
 from harness.authoring.vision_lessons import OPAQUE
 from harness.authoring.vision_seen import SeenRays, TeacherRecorder, pictures_to_learn, together
 from harness.authoring.vision_teacher import finished_file, made_teacher
-from harness.authoring.vision_teacher_profiles import FinishSpec, TeacherSpec
+from harness.authoring.vision_teacher_profiles import TeacherSpec
 from harness.errors import DataRefused, WrongUse
 from harness.objectfile.vision_settings import RenderSettings
 from harness.pinhole import DirectionalLight
 from harness.sim.direct_image import LitObject
 
-FINISH = FinishSpec(pictures=2, side=24, samples=2, steps=6, epochs=3, rays=64)
+FINISH = TeacherFinish(pictures=2, side=24, samples=2, steps=6, epochs=3, rays=64)
 TINY = TeacherSpec(
     width=16, turns=1, coarsest=4, finest=8, levels=2, features=2, slots=8, places=6000, steps=60, epochs=2,
     batch=256, finish=FINISH,
@@ -176,7 +177,7 @@ def test_pictures_bring_a_teacher_nearer_to_them(lit: LitObject, tmp_path: Path)
     errors = []
     for made in (before, after):
         recorder = TeacherRecorder(made.ask, lit.appearance.mesh, grid, "osf-v", OPAQUE / voxel)
-        pictures = pictures_to_learn(lit, finish.pictures, finish.side, finish.samples, 3, NOTHING)
+        pictures = pictures_to_learn(lit, finish, 3, NOTHING, lambda _what, _share: None)
         rays = together([recorder.seen(*each) for each in pictures])
         found, _ = composited(rays, made.ask, OPAQUE / voxel)
         errors.append(np.sqrt(np.mean((found - rays.wanted) ** 2)))
