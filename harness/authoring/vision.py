@@ -28,6 +28,7 @@ from harness.authoring.vision_teacher import (
     require_torch,
     teacher_file,
 )
+from harness.authoring.vision_teacher_pictures import Answers
 from harness.authoring.vision_teacher_profiles import TeacherSpec
 from harness.linear_image import LinearImage
 from harness.objectfile.vision_graph import vision_graph
@@ -166,6 +167,35 @@ def networks_alone(
     return _Making(lit, held_out, seed, report, threads, Laps()).trained(spec, checkpoint, "").finish()
 
 
+def cells_to_train(
+    lit: LitObject,
+    held_out: HeldOut,
+    spec: CellsSpec,
+    seed: int,
+    threads: int | None = None,
+    ask: Answers | None = None,
+) -> CellTraining:
+    """An object's networks with what they are to learn, not trained yet.
+
+    Args:
+        lit: the object.
+        held_out: what nothing is learned from.
+        spec: of the networks.
+        seed: of all that is drawn.
+        threads: None for as many as the process has cores.
+        ask: a teacher whose answers they learn; None for the surface's.
+    """
+    kind, lattice = spec.size.kind, lattice_of(lit.appearance.mesh, spec.cells)
+    shell = surface_shell(lit.appearance.mesh, lattice)
+    lessons, lamps = draw_for(kind, lit, spec.places, shell.voxel, seed, held_out)
+    if ask is not None:
+        if kind == "osf-v":
+            lessons = with_lamps(lessons, lamps, LAMPS_OF_A_PLACE, spec.hidden, seed)
+        lessons, lamps = distilled(ask, lessons), lamps[:0]
+    grid, scale = grid_of(shell, lattice), OPAQUE / shell.voxel
+    return CellTraining(spec, grid, lessons, lamps, scale, seed, threads)
+
+
 @dataclass(frozen=True, eq=False)
 class _Making:
     """What all networks of an object have in common; names of their times and errors begin with a word."""
@@ -196,15 +226,8 @@ class _Making:
         self, spec: CellsSpec, checkpoint: Path, word: str, teacher: MadeTeacher | None = None
     ) -> CellTraining:
         self.report(f"drawing places {word}".rstrip("_ "), 0.0)
-        kind, lattice = spec.size.kind, lattice_of(self.lit.appearance.mesh, spec.cells)
-        shell = surface_shell(self.lit.appearance.mesh, lattice)
-        lessons, lamps = draw_for(kind, self.lit, spec.places, shell.voxel, self.seed, self.held_out)
-        if teacher is not None:
-            if kind == "osf-v":
-                lessons = with_lamps(lessons, lamps, LAMPS_OF_A_PLACE, spec.hidden, self.seed)
-            lessons, lamps = distilled(teacher.ask, lessons), lamps[:0]
-        grid, scale = grid_of(shell, lattice), OPAQUE / shell.voxel
-        training = CellTraining(spec, grid, lessons, lamps, scale, self.seed, self.threads)
+        ask = None if teacher is None else teacher.ask
+        training = cells_to_train(self.lit, self.held_out, spec, self.seed, self.threads, ask)
         self.clock.lap(f"{word}places")
         train(training, training.epochs, checkpoint, self.report)
         self.clock.lap(f"{word}networks")

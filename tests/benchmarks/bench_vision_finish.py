@@ -15,11 +15,11 @@ from pathlib import Path
 from rich.console import Console
 
 from harness.authoring.training import train
+from harness.authoring.vision import cells_to_train
 from harness.authoring.vision_cells import CellTraining
 from harness.authoring.vision_data import HeldOut, held_out_pictures
 from harness.authoring.vision_finish import CellFinishing
 from harness.authoring.vision_finish_profiles import CellsFinish
-from harness.authoring.vision_lessons import OPAQUE, draw_for
 from harness.authoring.vision_metrics import network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision_profiles import CellsSpec, vision_profile
 from harness.authoring.vision_seen import Exact, pictures_to_learn
@@ -28,7 +28,6 @@ from harness.objectfile.vision_graph import vision_graph
 from harness.objectfile.vision_network import VisionModel
 from harness.objectfile.vision_render import VisionRenderer
 from harness.objectfile.vision_settings import RenderSettings
-from harness.objectfile.vision_shell import grid_of, lattice_of, surface_shell
 from harness.sim.appearance_source import appearance_of
 from harness.sim.direct_image import LitObject
 
@@ -91,12 +90,8 @@ def taught(
     lit: LitObject, held_out: HeldOut, name: str, given: argparse.Namespace
 ) -> tuple[CellTraining, float]:
     """By the surface, to its end, as ``author_vision`` does; CPU seconds."""
-    spec, since = spec_of(given), time.process_time()
-    lattice = lattice_of(lit.appearance.mesh, spec.cells)
-    shell = surface_shell(lit.appearance.mesh, lattice)
-    drawn = draw_for(spec.size.kind, lit, spec.places, shell.voxel, given.seed, held_out)
-    grid, scale = grid_of(shell, lattice), OPAQUE / shell.voxel
-    training = CellTraining(spec, grid, *drawn, scale, given.seed, given.threads)
+    since = time.process_time()
+    training = cells_to_train(lit, held_out, spec_of(given), given.seed, given.threads)
     stem = Path(name).stem.removeprefix("builtin:")
     train(training, training.epochs, given.folder / f"{stem}-{given.kind}-{given.profile}.npz", unsaid)
     return training, time.process_time() - since
