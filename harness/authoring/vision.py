@@ -234,7 +234,7 @@ class _Making:
         return training
 
     def pictures(self, finish: CellsFinish) -> list[Exact]:
-        found = pictures_to_learn(self.lit, finish, self.seed, self.held_out, self.report)
+        found = pictures_to_learn(*(self.lit, finish, self.seed, self.held_out, self.report, self.threads))
         self.clock.lap("pictures")
         return found
 

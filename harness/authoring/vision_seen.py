@@ -1,6 +1,7 @@
 """What the rays of a picture asked a network, kept, so that the network may learn from the picture itself."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -10,6 +11,7 @@ from harness.authoring.training import Report
 from harness.authoring.vision_data import HeldOut, draw_views
 from harness.authoring.vision_finish_profiles import PictureSet
 from harness.authoring.vision_teacher_pictures import Answers, TeacherRenderer
+from harness.cores import own_cores
 from harness.linear_image import LinearImage
 from harness.mesh import Mesh
 from harness.objectfile.vision_network import Kind, VisionGrid
@@ -68,7 +70,12 @@ def together(parts: Sequence[SeenRays]) -> SeenRays:
 
 
 def pictures_to_learn(
-    lit: LitObject, wanted: PictureSet, seed: int, held_out: HeldOut, report: Report
+    lit: LitObject,
+    wanted: PictureSet,
+    seed: int,
+    held_out: HeldOut,
+    report: Report,
+    threads: int | None = None,
 ) -> list[Exact]:
     """Exact pictures, clear of those kept back.
 
@@ -78,15 +85,24 @@ def pictures_to_learn(
         seed: of their cameras and lights.
         held_out: what nothing is learned from.
         report: told of progress.
+        threads: None for as many as the process has cores; pictures are the same for any number.
 
     Raises:
         OutOfDomain: too few views are clear of those kept back.
     """
-    count, side = wanted.pictures, wanted.side
+    count, side, beside = wanted.pictures, wanted.side, own_cores() if threads is None else threads
+    views = draw_views(lit.appearance.mesh, count, side, side, seed, held_out)
+
+    def drawn(view: tuple[Pinhole, DirectionalLight]) -> Exact:
+        camera, light = view
+        return camera, light, lit.render(camera, [light], wanted.samples).image
+
     found: list[Exact] = []
-    for camera, light in draw_views(lit.appearance.mesh, count, side, side, seed, held_out):
-        report(f"drawing picture {len(found) + 1} of {count} to learn from", len(found) / count)
-        found.append((camera, light, lit.render(camera, [light], wanted.samples).image))
+    with ThreadPoolExecutor(beside) as pool:
+        # No more at once than are drawn beside each other, so that who stops it waits for these alone.
+        for begin in range(0, count, beside):
+            report(f"drawing picture {begin + 1} of {count} to learn from", begin / count)
+            found += pool.map(drawn, views[begin : begin + beside])
     return found
 
 

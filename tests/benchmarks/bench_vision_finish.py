@@ -71,7 +71,7 @@ def measure(name: str, given: argparse.Namespace) -> None:
         if (count or 1) not in drawn:
             since = time.process_time()
             wanted = CellsFinish(pictures=count or 1)
-            found = pictures_to_learn(lit, wanted, given.seed, held_out, unsaid)
+            found = pictures_to_learn(lit, wanted, given.seed, held_out, unsaid, given.threads)
             drawn[count or 1] = found, time.process_time() - since
         pictures, to_draw = drawn[count or 1]
         for share in given.share if count else [0.0]:
