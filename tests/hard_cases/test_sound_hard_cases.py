@@ -143,14 +143,21 @@ def silenced(_: int, strike: Strike) -> Strike:
     return replace(strike, force=force, pressure=pressure, onset=0, silent=True)
 
 
+def radius99(found: Estimate) -> float:
+    """Metres, of 99 answers in a hundred, of a Gaussian on a surface: one in ten is beyond ``credible90``.
+
+    A region of nine tenths misses one true place in ten as well: what one run of a seed is held to, on any
+    machine, is this; how many regions hold their place is counted by ``touchstone tables localization``.
+    """
+    return float(np.sqrt(2.0) * found.credible90)
+
+
 def assert_says_how_sure_it_is(found: Estimate, whole: Estimate, run: Run) -> None:
     """A strike less moves the answer by no more than it says it may, and by a few millimetres at most."""
     moved = float(np.linalg.norm(found.position_in_object - whole.position_in_object))
-    # One answer in ten is beyond its radius; this is that of 99 in a hundred of a Gaussian on a surface.
-    sure = np.sqrt(2.0) * found.credible90
-    assert moved < sure
+    assert moved < radius99(found)
     assert moved < 6e-3
-    assert run.error(found) < sure
+    assert run.error(found) < radius99(found)
 
 
 def assert_nothing_was_heard(
@@ -186,7 +193,7 @@ def test_a_strike_that_failed_is_left_out_and_said(
     assert f"contact {contact + 1}" in doubt
     assert reason in doubt
     assert_says_how_sure_it_is(by("both", observations, run), whole["both"], run)
-    assert by("audio", observations, run).region.contains(run.true)
+    assert_says_how_sure_it_is(by("audio", observations, run), whole["audio"], run)
 
 
 def test_a_strike_that_was_never_made_is_left_out_and_said(run: Run, whole: dict[Senses, Estimate]) -> None:
