@@ -6,6 +6,7 @@ Inverse depth is linear in the picture, so that a triangle is a plane there.
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray
+from harness.objectfile.vision_ahead import AHEAD, bring_row
 from harness.objectfile.vision_contour import EMPTY, NEIGHBOURS
 from harness.sim.compiled import compiled
 
@@ -71,7 +72,11 @@ def find_front(
     scale, share = float(side), 1.0 / side
     middle, small = float(side // 2), float(side * NEIGHBOURS)
     bottom, right = rows * scale - 1.0, columns * scale - 1.0
-    for m in some:
+    for n in range(len(some)):
+        m = some[n]
+        if n + AHEAD < len(some):
+            for corner in range(3):
+                bring_row(seen, faces[some[n + AHEAD], corner])
         a, b, c = faces[m, 0], faces[m, 1], faces[m, 2]
         x0, x1, x2, y0, y1, y2 = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
         y_low, y_high = min(y0, min(y1, y2)), max(y0, max(y1, y2))

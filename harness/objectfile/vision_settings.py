@@ -43,7 +43,7 @@ class RenderSettings:
     coverage: int = 3
     lead: float = float("inf")
     rays: int = 1
-    wave: int = 4
+    wave: int = 3
 
     def __post_init__(self) -> None:
         if self.level not in LEVELS or self.coverage not in COVERS:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from harness.arrays import AnyArray, FloatArray, IntArray
+from harness.objectfile.vision_ahead import AHEAD, bring_row
 from harness.objectfile.vision_faces import Lists, meet
 from harness.sim.compiled import compiled
 from harness.sim.lambert_kernels import cosine_of, place_on
@@ -47,6 +48,12 @@ def tell(
     nothing: Hit = (np.inf, -1, 0.0, 0.0)
     triangles = cubes[6]
     for n in range(len(ways)):
+        if n + AHEAD < len(likely):
+            next_face = likely[n + AHEAD]
+            bring_row(triangles, next_face)
+            bring_row(corners, next_face)
+            bring_row(flats, next_face)
+            bring_row(normals, next_face)
         hit = nothing
         if len(likely):
             hit = nearest_of(eye, ways[n], begin[n], -1, n, n + 1, likely, triangles, nothing)
