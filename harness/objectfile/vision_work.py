@@ -1,5 +1,6 @@
 """Threads that share loops, and arrays that are used again."""
 
+import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -66,7 +67,7 @@ class Room:
 
     def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> AnyArray:
         """An array with anything in it; the last one of that name is overwritten."""
-        size = int(np.prod(shape))
+        size = math.prod(shape)
         held = self._arrays.get(name)
         if held is None or len(held) < size or held.dtype != dtype:
             held = self._arrays[name] = np.empty(max(size, 1), dtype)
