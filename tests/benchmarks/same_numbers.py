@@ -1,0 +1,210 @@
+"""Whether this checkout computes, to the bit, what commit 488cc9b computed: ``python tests/benchmarks/same_numbers.py``.
+
+Under ``--folder`` it keeps a clone of that commit with its own environment, and what that clone made: the rows
+of the localization table (nine objects, two spacings, struck too), three runs over the wires and one
+calibration run of the arm, and an ObjectFile of each sense. Whatever is missing there is made first (about
+fifteen minutes on two cores). Then this checkout makes the table and the ObjectFiles anew, replays the four
+runs, and everything is compared: estimates and hashes to the bit, results in all but paths, versions and
+seconds. Ends with 1 where anything differs.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+BEFORE = "488cc9b"
+"""The commit whose numbers are the reference."""
+
+ROOT = Path(__file__).resolve().parents[2]
+
+RUNS = {
+    "mug": ["--scene", "{code}/scenes/mug_both.toml", "--seed", "11"],
+    "bowl": ["--scene", "{code}/scenes/bowl_touch.toml", "--seed", "12"],
+    "wrench": ["--object", "builtin:wrench", "--sense", "both", "--spacing", "spread", "--seed", "13"],
+}
+"""Runs over the wires, by name."""
+
+OBJECTFILES = {
+    "audio": ["builtin:bowl", "--material", "ceramic", "--only", "audio"],
+    "touch": ["builtin:mug", "--material", "ceramic", "--only", "touch"],
+    "vision": ["builtin:mug", "--material", "ceramic", "--only", "vision"],
+}
+"""ObjectFiles of profile smoke, by sense."""
+
+PASSING = {
+    "recording", "report", "command", "folder", "versions", "git", "made", "created", "calls", "answered",
+    "from_store", "schema", "seconds", "seconds_by_stage", "stage_seconds", "cores", "machine", "out", "page",
+    "page_html", "artefact", "objectfile", "size_bytes",
+}  # fmt: skip
+"""Keys whose values are paths, versions and times, in which two computations may differ."""
+
+
+class Side:
+    """One checkout, the environment that runs it, and the folder of what it made.
+
+    Args:
+        code: the checkout.
+        made: what it makes goes here, its cache too: nothing that one side solved is given to the other.
+    """
+
+    def __init__(self, code: Path, made: Path) -> None:
+        self.code, self.made = code, made
+        made.mkdir(parents=True, exist_ok=True)
+
+    def touchstone(self, *arguments: str) -> str:
+        """Standard output of a command of this checkout."""
+        environment = {**os.environ, "TOUCHSTONE_CACHE": str(self.made / "cache")}
+        python = self.code / ".venv" / "bin" / "python"
+        main = "import sys; from harness.cli import main; sys.exit(main())"
+        done = subprocess.run(
+            [str(python), "-c", main, *arguments],
+            cwd=self.made,
+            env={**environment, "PYTHONPATH": str(self.code)},
+            stdout=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+        if done.returncode:
+            raise SystemExit(f"{self.code}: touchstone {' '.join(arguments)} ended with {done.returncode}")
+        return done.stdout
+
+    def table(self, name: str) -> None:
+        """Rows of nine objects, close and spread, touched and struck, one file each."""
+        shared = os.environ.get("TOUCHSTONE_DATA", str(ROOT.parent / "shared" / "data"))
+        options = ["--seeds", "1", "--gap", "default", "--yaw", "known", "--data", shared, "--json"]
+        self.once("table.json", lambda: self.touchstone("tables", name, *options, "--out", "table"))
+
+    def once(self, name: str, make: Callable[[], str]) -> None:
+        """Make the file ``name`` from what ``make`` printed, unless it is there."""
+        path = self.made / name
+        if not path.exists():
+            print(f"making {path}", file=sys.stderr, flush=True)
+            said = make()
+            path.write_text(said)
+
+    def objectfiles(self) -> None:
+        """An ObjectFile of each sense, of profile smoke."""
+        for sense, named in OBJECTFILES.items():
+            options = ["--profile", "smoke", "--threads", "1", "--out", f"objects/{sense}", "--json"]
+            self.once(f"object_{sense}.json", lambda: self.touchstone("object", "build", *named, *options))
+
+
+def record(before: Side) -> None:
+    """Everything that the reference commit makes, where it is not there yet."""
+    if not (before.code / ".venv" / ".installed").exists():
+        subprocess.run(["git", "clone", "--quiet", str(ROOT), str(before.code)], check=True)
+        subprocess.run(["git", "-C", str(before.code), "checkout", "--quiet", BEFORE], check=True)
+        subprocess.run(["make", "-C", str(before.code), "install"], check=True)
+    for name, options in RUNS.items():
+        filled = [option.format(code=before.code) for option in options]
+        command = ["run", "contact-localization", "--station", "mock", *filled, "--out", f"runs/{name}", "--json"]
+        before.once(f"run_{name}.json", lambda: before.touchstone(*command))
+        before.once(f"replay_{name}.json", lambda: replayed(before, before, name))
+    options = ["--station", "mock", "--ball-radius", "2mm", "--presses", "20", "--run", "runs/taxim", "--json"]
+    before.once("run_taxim.json", lambda: before.touchstone("calibrate", "taxim", *options))
+    before.once("replay_taxim.json", lambda: calibrated(before, before))
+    before.table("localization")
+    before.objectfiles()
+
+
+def replayed(side: Side, before: Side, name: str) -> str:
+    """What a checkout says of a run that the reference recorded."""
+    return side.touchstone("replay", str(before.made / "runs" / name), "--out", f"replays/{name}", "--json")
+
+
+def calibrated(side: Side, before: Side) -> str:
+    """The same of the reference's presses of a ball."""
+    run = str(before.made / "runs" / "taxim")
+    return side.touchstone("calibrate", "taxim", run, "--out", "fitted.npz", "--json")
+
+
+def now_made(now: Side, before: Side, table: str) -> None:
+    """Everything that is compared, made by this checkout."""
+    for name in RUNS:
+        now.once(f"replay_{name}.json", lambda: replayed(now, before, name))
+    now.once("replay_taxim.json", lambda: calibrated(now, before))
+    now.table(table)
+    now.objectfiles()
+
+
+def differences(before: Side, now: Side) -> Iterator[str]:
+    """Every value in which the two differ, with where it stands."""
+    for name in [*(f"replay_{run}.json" for run in (*RUNS, "taxim")), *_objects()]:
+        yield from _unlike(_json(before.made / name), _json(now.made / name), name)
+    tables = sorted(path.name for path in (before.made / "table").glob("*.json"))
+    for name in tables:
+        yield from _unlike(_json(before.made / "table" / name), _json(now.made / "table" / name), name)
+    for name in OBJECTFILES:
+        yield from _files(before.made / "objects" / name, now.made / "objects" / name)
+
+
+def _objects() -> list[str]:
+    return [f"object_{sense}.json" for sense in OBJECTFILES]
+
+
+def _files(before: Path, now: Path) -> Iterator[str]:
+    """ONNX graphs, tables and meshes by their hashes; the description by its values."""
+    names = {p.relative_to(before) for p in before.rglob("*") if p.suffix in (".onnx", ".npy", ".ply", ".npz")}
+    if not names:
+        yield f"{before}: holds nothing to compare"
+    for name in sorted(names):
+        same = (now / name).exists() and _hash(before / name) == _hash(now / name)
+        if not same:
+            yield f"{now / name}: not the bytes of {before / name}"
+    yield from _unlike(_json(before / "object.json"), _json(now / "object.json"), str(now / "object.json"))
+
+
+def _unlike(before: Any, now: Any, where: str) -> Iterator[str]:
+    if isinstance(before, dict) and isinstance(now, dict):
+        for key in sorted(before.keys() | now.keys()):
+            if key not in PASSING and not key.endswith("_seconds") and not key.startswith("seconds"):
+                yield from _unlike(before.get(key), now.get(key), f"{where}: {key}")
+    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        for index, (one, other) in enumerate(zip(before, now, strict=True)):
+            yield from _unlike(one, other, f"{where}[{index}]")
+    elif before != now:
+        yield f"{where}: {before!r} before, {now!r} now"
+
+
+def _json(path: Path) -> Any:
+    return json.loads(path.read_text())
+
+
+def _hash(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()
+
+
+def main() -> int:
+    """Record what is missing, compute anew, compare."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--folder", type=Path, default=ROOT.parent / "proof", help="what the reference made")
+    parser.add_argument("--now", type=Path, help="what this checkout makes; a new folder under --folder if left out")
+    parser.add_argument("--table", default="localization", help="name of the table")
+    parser.add_argument("--record", action="store_true", help="only record the reference")
+    given = parser.parse_args()
+    folder: Path = given.folder.resolve()
+    before = Side(folder / "before", folder / "recorded")
+    record(before)
+    if given.record:
+        return 0
+    commit = subprocess.run(
+        ["git", "-C", str(ROOT), "describe", "--always", "--dirty=-changed", "--abbrev=9"],
+        stdout=subprocess.PIPE, text=True, check=True,
+    ).stdout.strip()  # fmt: skip
+    now = Side(ROOT, given.now or folder / f"now-{commit}-{os.getpid()}")
+    now_made(now, before, given.table)
+    found = list(differences(before, now))
+    for line in found:
+        print(line)
+    print(f"{len(found)} differences between {BEFORE} and this checkout; {now.made}")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
