@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 from typer.exceptions import TyperException
 
-from harness.errors import TouchstoneError
+from harness.basics.errors import TouchstoneError
 
 
 class Interrupted(TouchstoneError):
@@ -50,16 +50,16 @@ COMMANDS = {
         "experiments.commands.replay:replay", "Estimate again from a recording alone; no bench is opened."
     ),
     "explain": Command(
-        "experiments.commands.explain:explain", "Say which effects a scene calls for, which not, and why."
+        "harness.commands.explain:explain", "Say which effects a scene calls for, which not, and why."
     ),
     "check": Command(
-        "experiments.commands.check:check", "Open every instrument of a station: rate, drops, latency."
+        "harness.commands.check:check", "Open every instrument of a station: rate, drops, latency."
     ),
     "mock-lab": Command(
-        "experiments.commands.mock_lab:mock_lab", "Keep a mocked bench running, to try drivers on."
+        "harness.commands.mock_lab:mock_lab", "Keep a mocked bench running, to try drivers on."
     ),
     "depth": Command(
-        "experiments.commands.depth:depth",
+        "harness.commands.press.depth:depth",
         "How deep a gel is pressed, from live pictures of it, with the error of every pixel.",
     ),
     "tables localization": Command(
@@ -71,38 +71,39 @@ COMMANDS = {
         "Error against seconds of the estimate; `run --budget` and `run --error` go by it.",
     ),
     "cost vision": Command(
-        "experiments.commands.cost_vision:vision",
+        "harness.commands.object.cost_vision:vision",
         "Error against seconds of an object's pictures, knob by knob.",
     ),
     "object build": Command(
-        "experiments.commands.object_build:build",
+        "harness.commands.object.build:build",
         "Build an object's sound, touch or look: networks, and what they are off by.",
     ),
     "object info": Command(
-        "experiments.commands.object:info", "Say what an ObjectFile holds: modes, networks, sources, licence."
+        "harness.commands.object.object:info",
+        "Say what an ObjectFile holds: modes, networks, sources, licence.",
     ),
     "object render audio": Command(
-        "experiments.commands.object_render:render",
+        "harness.commands.object.render:render",
         "Render the sound of a strike at a place: a WAV, and a picture of it and of the modes.",
     ),
     "object render touch": Command(
-        "experiments.commands.object_render_touch:render",
+        "harness.commands.object.render_touch:render",
         "Render a press at a place: what a gel's camera sees, and how far that is from the mesh's.",
     ),
     "object render vision": Command(
-        "experiments.commands.object_render_vision:render",
+        "harness.commands.object.render_vision:render",
         "Render a picture from any side in any light, or a turntable of them, by the networks.",
     ),
     "object view": Command(
-        "experiments.commands.object_view:view",
+        "harness.commands.object.view:view",
         "Turn an object with the mouse, in a browser on this machine.",
     ),
     "object compare vision": Command(
-        "experiments.commands.object_compare_vision:compare",
+        "harness.commands.object.compare_vision:compare",
         "A camera's picture beside the networks': exposure and white balance fitted, what is left.",
     ),
     "object verify": Command(
-        "experiments.commands.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
+        "harness.commands.object.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
     ),
     "calibrate taxim": Command(
         "calibration.commands.taxim:taxim",
@@ -113,11 +114,11 @@ COMMANDS = {
         "Find the dots printed on a gel, from pictures of it at rest.",
     ),
     "sim modes": Command(
-        "experiments.commands.sim:modes",
+        "harness.commands.sound.modes:modes",
         "Frequencies and dampings of a mesh, counted so that none is missing.",
     ),
     "sim touch": Command(
-        "experiments.commands.sim_touch:touch",
+        "harness.commands.press.touch:touch",
         "What a gel's camera sees of a height map, or of a mesh it is pressed onto.",
     ),
 }

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.arrays import ByteArray
-from harness.clock import now
-from harness.errors import WrongUse
+from harness.basics.arrays import ByteArray
+from harness.basics.clock import now
+from harness.basics.errors import WrongUse
 from mocks.ur.faults import KINDS as ARM_KINDS
 
 CAMERA_KINDS = ("none", "stall", "truncate", "drop", "freeze", "saturate")

@@ -28,28 +28,28 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from harness.arrays import FloatArray
-from harness.clock import now
-from harness.errors import TouchstoneError, WrongUse
-from harness.gap import load_gap
-from harness.geometry import frame_facing, inverse, transform
-from harness.kinematics import forward
-from harness.station_sections import ArmSection
+from harness.basics.arrays import FloatArray
+from harness.basics.clock import now
+from harness.basics.errors import TouchstoneError, WrongUse
+from harness.basics.geometry import frame_facing, inverse, transform
+from harness.bench.gap import load_gap
+from harness.bench.kinematics import forward
+from harness.bench.station_sections import ArmSection
+from mocks.camera.lab_cameras import Seen, stream
 from mocks.faults import parse
-from mocks.lab_cameras import Seen, stream
 from mocks.lab_processes import CAMERA_PORT, GEL_PORT, Child, Line, free_address, keep_time
 from mocks.lab_scene import read_lab_scene
 from mocks.shared_pose import Mark, SharedPose
-from mocks.sound_of_run import strikes_of
-from mocks.truth import TruthFile
 from mocks.ur.hooks import LEFT_ABOVE, ControllerConfig
 from mocks.ur.serve import serve
-from mocks.world import NominalBench, World
+from mocks.world.sound_of_run import strikes_of
+from mocks.world.truth import TruthFile
+from mocks.world.world import NominalBench, World
 
 if TYPE_CHECKING:
-    from mocks.sound_card import SoundCard
-    from mocks.strike_counts import StrikeCounts
-    from mocks.strike_on_card import Wire
+    from mocks.daq.strike_counts import StrikeCounts
+    from mocks.sound_card.card import SoundCard
+    from mocks.sound_card.strike_on_card import Wire
 
 READY_TIMEOUT = 30.0
 DRIFT_PPM = 40.0
@@ -143,14 +143,14 @@ class Lab:
         """Begin the hammer's box: the last child, so that nobody else holds its end of the cable."""
         from mocks.daq.box import DaqBox, Source  # by runs that are to be heard, and by no others
         from mocks.daq.source import Played
-        from mocks.strike_counts import Striker
+        from mocks.daq.strike_counts import Striker
 
         source: Source
         if card is None:
             striker = Striker(strikes, lambda: self._shared.firing)
             source = Played(strikes.idle(), striker.next_record)
         else:
-            from mocks.strike_on_card import StrikesOnCard
+            from mocks.sound_card.strike_on_card import StrikesOnCard
 
             source = StrikesOnCard(strikes, lambda: self._shared.firing, *card, lambda: box.scan())
             source.begin()
@@ -254,7 +254,9 @@ def _begin(arguments: argparse.Namespace) -> Lab:
     strikes = strikes_of(world, told.scene, told.station, gap, arguments.seed)
     card = None
     if strikes is not None and told.station.own_microphone is not None:
-        from mocks.strike_on_card import plug_in_card  # by runs that are heard by one, and by no others
+        from mocks.sound_card.strike_on_card import (
+            plug_in_card,  # by runs that are heard by one, and by no others
+        )
 
         card = plug_in_card(told.station, arguments.scene.parent)
     start = forward(told.station.arm.model, np.array(LEFT_ABOVE))

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from multiprocessing.connection import Connection
 
-from harness.errors import BenchFault
+from harness.basics.errors import BenchFault
 from mocks.faults import Fault
 
 ARM_PORTS = (29999, 30001, 30002, 30003, 30004)

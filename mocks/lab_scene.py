@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.arrays import FloatArray
-from harness.errors import WrongUse
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.station_file import Station, station_from_json
 from harness.objects.builtin import build
-from harness.scene import SceneFile, scene_from_json
-from harness.station_file import Station, station_from_json
-from mocks.world import Camera, Furniture, NominalBench
+from mocks.world.world import Camera, Furniture, NominalBench
 
 SCHEMA = 1
 

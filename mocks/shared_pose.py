@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.arrays import FloatArray
+from harness.basics.arrays import FloatArray
 
 _CHECKSUM = struct.Struct("<I")
 _SLOT = 256

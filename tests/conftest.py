@@ -7,11 +7,11 @@ from typing import Final
 
 import pytest
 from hypothesis import settings
-from real_data import WHY_NOT, find_shared_data
 from xdist.scheduler import LoadScopeScheduling
 
-from harness.scene import SceneFile, load_scene
-from harness.station_file import Station, load_station
+from harness.bench.scene import SceneFile, load_scene
+from harness.bench.station_file import Station, load_station
+from tests.support.real_data import WHY_NOT, find_shared_data
 
 TESTS: Final = Path(__file__).parent
 ROOT: Final = TESTS.parent
@@ -21,11 +21,10 @@ WIRES: Final = (
     "runs",
     "mocks/daq",
     "mocks/ur",
-    "mocks/test_gelsight_stream.py",
+    "mocks/camera/test_gelsight_stream.py",
     "mocks/test_lab_processes.py",
-    "mocks/test_sound_card_player.py",
-    "mocks/test_strike_on_card.py",
-    "harness/test_mock_lab.py",
+    "mocks/sound_card",
+    "harness/bench/test_mock_lab.py",
 )
 """Where processes keep each other's deadlines: one at a time, and before all that only computes."""
 

@@ -7,11 +7,11 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from harness import options
-from harness.output import ANSWERS, emit
+from harness.commands import options
+from harness.commands.output import ANSWERS, emit
 
 if TYPE_CHECKING:
-    from harness.arrays import ByteArray
+    from harness.basics.arrays import ByteArray
 
 
 def markers(
@@ -57,7 +57,7 @@ def markers(
     from calibration.markers.at_rest import Printed, markers_at_rest
     from calibration.markers.result import answer_of, file_of, report_of
     from calibration.taxim.pictures import set_digest
-    from harness.sim.marker_file import write_markers
+    from harness.sim.gel.marker_file import write_markers
 
     pictures = _pictures(source)
     printed = Printed(sensor, serial, _length("--pitch", pitch), _length("--spacing", spacing))
@@ -82,8 +82,8 @@ def markers(
 
 def _pictures(source: Path) -> "list[ByteArray]":
     from calibration.taxim.pictures import SUFFIXES
-    from harness.errors import DataRefused
-    from harness.image_file import read_image
+    from harness.basics.errors import DataRefused
+    from harness.picture.image_file import read_image
 
     if not source.is_dir():
         return [read_image(source)]
@@ -102,8 +102,8 @@ def _rest(pictures: "list[ByteArray]") -> "ByteArray":
 
 
 def _length(option: str, text: str | None) -> float | None:
-    from harness.errors import WrongUse
-    from harness.quantities import LENGTH
+    from harness.basics.errors import WrongUse
+    from harness.basics.quantities import LENGTH
 
     if text is None:
         return None

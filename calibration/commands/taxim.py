@@ -9,12 +9,12 @@ import typer
 from calibration.commands.taxim_answer import answer_of, doubts, keep, say, scale_answer
 from calibration.commands.taxim_arm import Wanted, chosen, pressed
 from calibration.commands.taxim_shadow import write_published
-from harness import options
-from harness.output import emit, warn
+from harness.commands import options
+from harness.commands.output import emit, warn
 
 if TYPE_CHECKING:
-    from calibration.taxim.arm_moves import ArmScale
-    from calibration.taxim.arm_record import ArmPresses
+    from calibration.taxim.arm.moves import ArmScale
+    from calibration.taxim.arm.record import ArmPresses
     from calibration.taxim.mark_free import Identity
     from calibration.taxim.pictures import Channels, Pictures
 
@@ -170,8 +170,8 @@ def taxim(
     """
     from calibration.taxim.mark_free import calibrate
     from calibration.taxim.pictures import squared
-    from harness.sim.lit_calibration import read_calibration
-    from harness.sim.tactile_calibration import save_calibration
+    from harness.sim.optics.lit_calibration import read_calibration
+    from harness.sim.optics.tactile_calibration import save_calibration
 
     wanted = Wanted(
         station,
@@ -227,9 +227,9 @@ def _read(
     source: Path, background: Path | None, channels: str | None
 ) -> "tuple[ArmPresses | None, ArmScale | None, Pictures]":
     """Pictures and, where an arm made them, what its moves say."""
-    from calibration.taxim.arm_record import is_arm_run, read_arm_run
+    from calibration.taxim.arm.record import is_arm_run, read_arm_run
     from calibration.taxim.pictures import read_pictures
-    from harness.errors import WrongUse
+    from harness.basics.errors import WrongUse
 
     if not is_arm_run(source):
         return None, None, read_pictures(source, background, _channels(channels))
@@ -254,7 +254,7 @@ def _identity(
 ) -> "Identity":
     """Who the sensor is, and its pitch: as given, else by the arm, else the paper's sensor's."""
     from calibration.taxim.mark_free import Identity
-    from harness.errors import WrongUse
+    from harness.basics.errors import WrongUse
 
     recorded = None if arm is None else arm.ball_radius
     if ball_radius is None and recorded is None:
@@ -276,8 +276,8 @@ def _identity(
 
 
 def _length(option: str, text: str) -> float:
-    from harness.errors import WrongUse
-    from harness.quantities import LENGTH
+    from harness.basics.errors import WrongUse
+    from harness.basics.quantities import LENGTH
 
     length = options.quantity(option, text, LENGTH)
     if length <= 0.0:
@@ -287,7 +287,7 @@ def _length(option: str, text: str) -> float:
 
 def _channels(text: str | None) -> "Channels | None":
     from calibration.taxim.pictures import Channels
-    from harness.errors import WrongUse
+    from harness.basics.errors import WrongUse
 
     if text is None:
         return None

@@ -8,11 +8,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from calibration.commands.taxim_shadow import shadow_answer, shadow_lines
-from harness.output import ANSWERS, CONSOLE
+from harness.commands.output import ANSWERS, CONSOLE
 
 if TYPE_CHECKING:
-    from calibration.taxim.arm_moves import ArmScale, Measured
-    from calibration.taxim.arm_record import ArmPresses
+    from calibration.taxim.arm.moves import ArmScale, Measured
+    from calibration.taxim.arm.record import ArmPresses
     from calibration.taxim.mark_free import MarkFree
 
 NO_MOVES = (
@@ -155,7 +155,7 @@ def doubts(scale: "ArmScale", arm: "ArmPresses", squared: float) -> list[str]:
 
 def keep(scale: dict[str, Any], artefact: Path) -> None:
     """What the arm measured, beside the artefact, whose format has a place for the pitch alone."""
-    from harness.recording import write_text_whole
+    from harness.recording.recording import write_text_whole
 
     path = artefact.with_name(f"{artefact.stem}.scale.json")
     write_text_whole(path, dumps({"schema": 1, **scale}, indent=1, allow_nan=False) + "\n")

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from harness.errors import WrongUse
-from harness.output import CONSOLE, emit, resumable
-from harness.step_file import Step
+from harness.basics.errors import WrongUse
+from harness.commands.output import CONSOLE, emit, resumable
+from harness.recording.step_file import Step
 
 if TYPE_CHECKING:
-    from harness.recording import Recording
+    from harness.recording.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def chosen(folder: Path | None, wanted: Wanted) -> None:
 
 def pressed(wanted: Wanted, as_json: bool) -> Path | None:
     """The folder of the run that the arm made or went on with; None where Ctrl-C ended it early."""
-    from calibration.taxim.arm_session import perform_on_bench
+    from calibration.taxim.arm.session import perform_on_bench
 
     recording = _recording(wanted)
     total = len(recording.header.plan["steps"])
@@ -77,8 +77,8 @@ def pressed(wanted: Wanted, as_json: bool) -> Path | None:
 
 
 def _recording(wanted: Wanted) -> "Recording":
-    from calibration.taxim.arm_record import NAME
-    from harness.recording import Recording
+    from calibration.taxim.arm.record import NAME
+    from harness.recording.recording import Recording
 
     if wanted.resume is not None:
         recording = Recording(wanted.resume)
@@ -92,11 +92,11 @@ def _recording(wanted: Wanted) -> "Recording":
 
 
 def _begun(wanted: Wanted) -> "Recording":
-    from calibration.taxim.arm_plan import PressSettings
-    from calibration.taxim.arm_session import ball_scene, begin
+    from calibration.taxim.arm.plan import PressSettings
+    from calibration.taxim.arm.session import ball_scene, begin
+    from harness.bench.scene import load_scene
+    from harness.bench.station_file import load_station, station_path
     from harness.objects.targets import BALL_RADIUS
-    from harness.scene import load_scene
-    from harness.station_file import load_station, station_path
 
     scene = None if wanted.scene is None else load_scene(wanted.scene)
     radius = wanted.ball_radius

@@ -15,9 +15,9 @@ def write_published(made: "MarkFree", polycalib: Path | None, shadow_table: Path
         CalibrationRefused: the presses show no shadows to write.
     """
     from calibration.taxim.polycalib import write_polycalib
-    from harness.errors import CalibrationRefused
-    from harness.sim.lit_calibration import shadow_of
-    from harness.sim.shadow_file import write_shadow_table
+    from harness.basics.errors import CalibrationRefused
+    from harness.sim.optics.lit_calibration import shadow_of
+    from harness.sim.optics.shadow_file import write_shadow_table
 
     if polycalib is not None:
         write_polycalib(made.calibration, polycalib)

@@ -14,10 +14,10 @@ from threadpoolctl import threadpool_limits
 
 from calibration.markers.dots import Dots, find_dots
 from calibration.markers.lattice import lay_lattice
-from calibration.taxim.arm_moves import ArmScale, arm_scale
-from harness.arrays import BoolArray, ByteArray, FloatArray, read_only
-from harness.dot_lattice import Lattice
-from harness.errors import CalibrationRefused, OutOfDomain
+from calibration.taxim.arm.moves import ArmScale, arm_scale
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
+from harness.basics.errors import CalibrationRefused, OutOfDomain
+from harness.picture.dot_lattice import Lattice
 
 LARGEST_LOCAL = 0.06
 """Of the spacing, by which a dot of a resting gel may be off its smooth grid. In two published pictures of a

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from harness.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
-from harness.errors import CalibrationRefused
+from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
+from harness.basics.errors import CalibrationRefused
 
 LEAST_INK = 0.15
 """Share of the light that a dot must swallow to be one: shades of a lit gel vary by less from dot to dot."""

@@ -10,9 +10,9 @@ from collections import deque
 import numpy as np
 from scipy.spatial import cKDTree
 
-from harness.arrays import BoolArray, FloatArray, IntArray, read_only
-from harness.dot_lattice import Lattice
-from harness.errors import CalibrationRefused
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.basics.errors import CalibrationRefused
+from harness.picture.dot_lattice import Lattice
 
 LEAST_DOTS = 12
 LEAST_LINES = 3

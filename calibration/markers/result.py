@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from calibration.markers.at_rest import Printed, RestingMarkers
-from harness.arrays import FloatArray
+from harness.basics.arrays import FloatArray
 from harness.report.marker_page import MarkerReport
-from harness.sim.marker_file import MarkerDot, MarkerFile
+from harness.sim.gel.marker_file import MarkerDot, MarkerFile
 
 
 def file_of(made: RestingMarkers, printed: Printed, made_from: str) -> MarkerFile:

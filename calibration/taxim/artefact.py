@@ -7,9 +7,9 @@ import numpy as np
 
 from calibration.taxim.held_out import Model
 from calibration.taxim.light_fit import per_metre
-from harness.arrays import ByteArray
-from harness.sim.lit_calibration import LitCalibration
-from harness.sim.tactile_calibration import CalibrationHeader, Float32Array
+from harness.basics.arrays import ByteArray
+from harness.sim.optics.lit_calibration import LitCalibration
+from harness.sim.optics.tactile_calibration import CalibrationHeader, Float32Array
 
 if TYPE_CHECKING:
     from calibration.taxim.mark_free import Identity

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, map_coordinates
 
-from harness.arrays import FloatArray
-from harness.errors import CalibrationRefused
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import CalibrationRefused
 
 _RAYS = 48
 _FROM, _TO = 0.5, 1.15

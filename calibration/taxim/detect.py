@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import irfft2, next_fast_len, rfft2
 
-from harness.arrays import AnyArray, FloatArray, block_means
+from harness.basics.arrays import AnyArray, FloatArray, block_means
 
 REACH = 0.85
 """Ball radii out to which the ramp is looked for."""

@@ -6,7 +6,7 @@ from calibration.taxim.held_out import WITHIN, Model, decibels
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Refused
 from calibration.taxim.smooth_fit import residual, strength_by_radius
-from harness.arrays import FloatArray
+from harness.basics.arrays import FloatArray
 
 LEAST_OWN_GAIN = 6.0
 """dB that a press must gain in its own fit: less than half of its change explained away is not the ball's."""

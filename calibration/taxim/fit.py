@@ -10,9 +10,9 @@ import numpy as np
 from calibration.taxim.pack import PressPack, read_pack
 from calibration.taxim.smooth_fit import changes, contact_pixels, fit_smooth, refined_centre, residual
 from calibration.taxim.table_fit import fit_table, table_shades
-from harness.arrays import FloatArray, IntArray
-from harness.errors import CalibrationRefused, WrongUse
-from harness.sim.tactile_calibration import (
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.errors import CalibrationRefused, WrongUse
+from harness.sim.optics.tactile_calibration import (
     CalibrationHeader,
     TactileCalibration,
     save_calibration,

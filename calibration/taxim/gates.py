@@ -6,8 +6,8 @@ import numpy as np
 
 from calibration.taxim.detect import Detector, Found
 from calibration.taxim.pictures import Pictures, Refused
-from harness.arrays import BoolArray, ByteArray, FloatArray, block_means
-from harness.errors import CalibrationRefused
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray, block_means
+from harness.basics.errors import CalibrationRefused
 
 CONTACT = 0.8
 """Ball radii: what a contact is taken to be until the fit has found its edge."""

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.taxim.arm.rest import rest_change
 from calibration.taxim.contact_circle import ContactCircle, contact_circle
 from calibration.taxim.light_fit import Light, fit_light, light_shades
 from calibration.taxim.pack import PressPack
-from calibration.taxim.rest import rest_change
 from calibration.taxim.smooth_fit import (
     Manner,
     SmoothFit,
@@ -17,8 +17,8 @@ from calibration.taxim.smooth_fit import (
     settled,
 )
 from calibration.taxim.table_fit import fit_table, table_shades
-from harness.arrays import BoolArray, FloatArray, IntArray
-from harness.sim.tactile_calibration import Float32Array
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.sim.optics.tactile_calibration import Float32Array
 
 FOLDS = 8
 WITHIN = 0.95

@@ -4,8 +4,8 @@ Around a ball the gel hangs in a skirt several contacts wide, and its colours ar
 slopes. They are most of what a press changes in the picture. The skirt is Taxim's pyramid of blurs; how wide
 it is, and how much of the ball's depth the object shapes, are the two numbers that explain the colours best.
 With the surface known everywhere, the smooth model is fitted to contact and skirt at once, with the light
-of ``harness.sim.lit_calibration``, in proportion to how far the gel is pushed in. Without it a slope of the
-skirt would get the dimming of a contact, or a contact none.
+of ``harness.sim.optics.lit_calibration``, in proportion to how far the gel is pushed in. Without it a slope
+of the skirt would get the dimming of a contact, or a contact none.
 """
 
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ import numpy as np
 from calibration.taxim.moments import SLOPES, ColourTerms, colour_terms, place_products
 from calibration.taxim.pack import PressPack
 from calibration.taxim.smooth_fit import distance, huber, scaled_place
-from harness.arrays import FloatArray, IntArray, read_only
-from harness.errors import CalibrationRefused
-from harness.sim import lit_calibration
-from harness.sim.gel import GelLevel, deform
-from harness.sim.shading import KNEE, POSITION_TERMS
-from harness.sim.tactile_calibration import GelSkirt, smooth_terms
+from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.errors import CalibrationRefused
+from harness.sim.gel.gel import GelLevel, deform
+from harness.sim.optics import lit_calibration
+from harness.sim.optics.shading import KNEE, POSITION_TERMS
+from harness.sim.optics.tactile_calibration import GelSkirt, smooth_terms
 
 REACH = 4.0
 """Contact radii from the centre that are looked at; in the published sets the skirt ends at 3.5."""
@@ -60,7 +60,7 @@ class Light:
 
     Attributes:
         skirt: of the gel.
-        lit: ``(156, 3)`` as ``harness.sim.lit_calibration`` keeps it, but per pixel of indentation.
+        lit: ``(156, 3)`` as ``harness.sim.optics.lit_calibration`` keeps it, but per pixel of indentation.
         depth: pixels that the ball reaches past the untouched gel.
         profile: of the ball in it.
         edge: pixels, the contact line.
@@ -225,7 +225,7 @@ def _terms(profile: Profile, offset: FloatArray, places: FloatArray, limit: floa
 
 
 def _softly_limited(sine: FloatArray, limit: float) -> FloatArray:
-    """As ``harness.sim.shading.softly_limited``, of many."""
+    """As ``harness.sim.optics.shading.softly_limited``, of many."""
     knee, room = KNEE * limit, (1.0 - KNEE) * limit
     bent: FloatArray = np.where(
         sine <= knee, sine, knee + room * (1.0 - np.exp(-np.maximum(sine - knee, 0.0) / room))

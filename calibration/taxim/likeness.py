@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from harness.arrays import FloatArray
-from harness.errors import CalibrationRefused
-from harness.sim.shading import design
-from harness.sim.tactile_calibration import TactileCalibration
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import CalibrationRefused
+from harness.sim.optics.shading import design
+from harness.sim.optics.tactile_calibration import TactileCalibration
 
 _TURNS = 24
 _SLOPE = 0.4

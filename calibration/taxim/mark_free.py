@@ -18,15 +18,15 @@ from calibration.taxim.held_out import WITHIN, Model, Score, held_out, teach
 from calibration.taxim.likeness import check_order
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures, Refused, in_order_of_content
-from calibration.taxim.shadow_fit import ShadowFit, fit_shadow
-from calibration.taxim.shadow_score import ShadowScore, score_shadow
+from calibration.taxim.shadow.fit import ShadowFit, fit_shadow
+from calibration.taxim.shadow.score import ShadowScore, score_shadow
 from calibration.taxim.smooth_fit import changes
 from calibration.taxim.table_error import table_error
-from harness.arrays import FloatArray, IntArray, read_only
-from harness.errors import CalibrationRefused
-from harness.sim.lit_calibration import LitCalibration, with_shadow
-from harness.sim.tactile_calibration import Float32Array, TactileCalibration
-from harness.square_pixels import stated
+from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.errors import CalibrationRefused
+from harness.picture.square_pixels import stated
+from harness.sim.optics.lit_calibration import LitCalibration, with_shadow
+from harness.sim.optics.tactile_calibration import Float32Array, TactileCalibration
 
 LEAST_GAIN = 12.0
 """dB over predicting nothing that presses left out must gain in the median; published sets gain 19."""

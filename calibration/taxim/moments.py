@@ -13,9 +13,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from harness.arrays import FloatArray, IntArray
-from harness.sim.shading import POSITION_TERMS
-from harness.sim.tactile_calibration import NORMAL_DEGREE, POSITION_DEGREE
+from harness.basics.arrays import FloatArray, IntArray
+from harness.sim.optics.shading import POSITION_TERMS
+from harness.sim.optics.tactile_calibration import NORMAL_DEGREE, POSITION_DEGREE
 
 Power = tuple[int, int, int]
 """Of the normal's x, of its y, and of the indentation: one group of terms, six by the place."""
@@ -23,10 +23,10 @@ Power = tuple[int, int, int]
 SLOPES: tuple[Power, ...] = tuple(
     (a, b, 0) for a in range(NORMAL_DEGREE + 1) for b in range(NORMAL_DEGREE + 1 - a) if a + b
 )
-"""As ``harness.sim.shading.design`` orders them."""
+"""As ``harness.sim.optics.shading.design`` orders them."""
 
 OFFSET: tuple[Power, ...] = ((0, 0, 0),)
-"""What a contact adds by the place alone, as ``harness.sim.lit_calibration.place_terms``."""
+"""What a contact adds by the place alone, as ``harness.sim.optics.lit_calibration.place_terms``."""
 
 _PLACES = tuple((c, d) for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c))
 

@@ -7,8 +7,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from harness.arrays import ByteArray, FloatArray, IntArray, read_only
-from harness.errors import CalibrationRefused
+from harness.basics.arrays import ByteArray, FloatArray, IntArray, read_only
+from harness.basics.errors import CalibrationRefused
 
 _KEYS = {"f0", "imgs", "touch_center", "touch_radius"}
 

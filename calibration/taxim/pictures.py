@@ -10,10 +10,10 @@ from typing import Literal
 import numpy as np
 
 from calibration.taxim.pack import read_pack
-from harness.arrays import ByteArray, FloatArray, read_only
-from harness.errors import CalibrationRefused, WrongUse
-from harness.image_file import read_image
-from harness.square_pixels import made_square, square_places
+from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.errors import CalibrationRefused, WrongUse
+from harness.picture.image_file import read_image
+from harness.picture.square_pixels import made_square, square_places
 
 Channels = Literal["rgb", "bgr"]
 

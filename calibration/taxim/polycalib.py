@@ -1,10 +1,10 @@
-"""Taxim's own file of a colour table, written; ``harness.sim.published_pack`` reads it."""
+"""Taxim's own file of a colour table, written; ``harness.sim.optics.published_pack`` reads it."""
 
 from pathlib import Path
 
 import numpy as np
 
-from harness.sim.tactile_calibration import TactileCalibration
+from harness.sim.optics.tactile_calibration import TactileCalibration
 
 
 def write_polycalib(calibration: TactileCalibration, path: Path) -> None:

@@ -2,22 +2,22 @@
 
 import numpy as np
 
-from calibration.taxim.arm_moves import ArmScale
-from calibration.taxim.arm_record import ArmPresses
+from calibration.taxim.arm.moves import ArmScale
+from calibration.taxim.arm.record import ArmPresses
+from calibration.taxim.arm.rest import AWAY, SIGHTINGS
 from calibration.taxim.light_fit import depth_of, pressed_ball
 from calibration.taxim.mark_free import MarkFree, UsedPress
 from calibration.taxim.pictures import Pictures
-from calibration.taxim.rest import AWAY, SIGHTINGS
-from calibration.taxim.shadow_polar import SAMPLE_STEP
+from calibration.taxim.shadow.polar import SAMPLE_STEP
 from calibration.taxim.smooth_fit import distance
-from harness.arrays import ByteArray, FloatArray
-from harness.report.bins_figure import BinsFigure
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.report.calibration_page import CalibrationReport, Example, MovesFigure, PressLine
-from harness.report.shadow_figure import ShadowFigure
-from harness.sim.gel import deform
-from harness.sim.lit_calibration import LitCalibration
-from harness.sim.optics import Optics
-from harness.sim.tactile_calibration import TactileCalibration
+from harness.report.figures.bins import BinsFigure
+from harness.report.figures.shadow import ShadowFigure
+from harness.sim.gel.gel import deform
+from harness.sim.optics.lit_calibration import LitCalibration
+from harness.sim.optics.optics import Optics
+from harness.sim.optics.tactile_calibration import TactileCalibration
 
 _SHARES = (0.0, 0.5, 1.0)
 """Of the presses sorted by their score: which are shown."""

@@ -15,11 +15,11 @@ import numpy as np
 
 from calibration.taxim.moments import OFFSET, SLOPES, colour_terms, place_products
 from calibration.taxim.pack import PressPack
-from harness.arrays import FloatArray, IntArray, read_only
-from harness.errors import CalibrationRefused
-from harness.sim.lit_calibration import place_terms
-from harness.sim.shading import POSITION_TERMS, scaled_position, shades
-from harness.sim.tactile_calibration import POSITION_DEGREE, smooth_terms
+from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.errors import CalibrationRefused
+from harness.sim.optics.lit_calibration import place_terms
+from harness.sim.optics.shading import POSITION_TERMS, scaled_position, shades
+from harness.sim.optics.tactile_calibration import POSITION_DEGREE, smooth_terms
 
 _HUBER = 10.0
 """Grey levels beyond which a residual counts as an outlier: about twice the typical one."""
@@ -68,8 +68,8 @@ class SmoothFit:
     """A smooth model and the presses as it sees them.
 
     Attributes:
-        colours: ``(120, 3)`` coefficients, see ``harness.sim.shading``; ``(126, 3)`` where the last six are
-            a contact's offset by the position.
+        colours: ``(120, 3)`` coefficients, see ``harness.sim.optics.shading``; ``(126, 3)`` where the last
+            six are a contact's offset by the position.
         centres: ``(presses, 2)`` pixels (column, row), refined.
         edge: pixels, the radius out to which the gel follows the ball.
         condition: of the normalised least-squares problem.

@@ -28,10 +28,10 @@ from calibration.taxim.smooth_fit import (
     stride,
 )
 from calibration.taxim.table_fit import BINS, SHRINK, bin_residuals, bin_terms, by_group, steepest_row
-from harness.arrays import FloatArray
-from harness.sim.lit_calibration import place_terms
-from harness.sim.shading import scaled_position
-from harness.sim.tactile_calibration import Float32Array
+from harness.basics.arrays import FloatArray
+from harness.sim.optics.lit_calibration import place_terms
+from harness.sim.optics.shading import scaled_position
+from harness.sim.optics.tactile_calibration import Float32Array
 
 _ROWS_BESIDE = 4
 """Rows to each side, three degrees, over which the smooth model's misfit is taken to be alike."""

@@ -12,10 +12,10 @@ import numpy as np
 
 from calibration.taxim.pack import PressPack
 from calibration.taxim.smooth_fit import SmoothFit, ball_shades, changes, contact_pixels
-from harness.arrays import BoolArray, FloatArray, IntArray
-from harness.sim.lit_calibration import place_terms
-from harness.sim.shading import POSITION_TERMS, design, scaled_position
-from harness.sim.tactile_calibration import Float32Array, smooth_terms
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.sim.optics.lit_calibration import place_terms
+from harness.sim.optics.shading import POSITION_TERMS, design, scaled_position
+from harness.sim.optics.tactile_calibration import Float32Array, smooth_terms
 
 BINS = 120
 """ObjectFolder's."""

@@ -7,8 +7,8 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from harness import options
-from harness.output import ANSWERS, CONSOLE, emit, warn
+from harness.commands import options
+from harness.commands.output import ANSWERS, CONSOLE, emit, warn
 
 
 def contact_localization(
@@ -46,16 +46,16 @@ def contact_localization(
 
     Try: touchstone cost contact-localization --seeds 2 --only mug --contacts 6
     """
-    from experiments.contact_localization.cases import preparations
-    from experiments.contact_localization.costing import Work, gathered, joined, measure
-    from experiments.contact_localization.dials import METHOD, SENSES, settings, settings_by_count
-    from experiments.contact_localization.solving import ESTIMATOR, PROGRAM
-    from experiments.contact_localization.table_cell import cells
-    from harness.cost_file import curve_path, load, save
-    from harness.cost_provenance import code, machine, stale
-    from harness.errors import DataRefused
+    from experiments.contact_localization.accuracy.cases import preparations
+    from experiments.contact_localization.accuracy.costing import Work, gathered, joined, measure
+    from experiments.contact_localization.accuracy.dials import METHOD, SENSES, settings, settings_by_count
+    from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
+    from experiments.contact_localization.accuracy.table_cell import cells
+    from harness.basics.errors import DataRefused
+    from harness.bench.station_file import load_station, station_path
+    from harness.cost.file import curve_path, load, save
+    from harness.cost.provenance import code, machine, stale
     from harness.report.cost_page import write_cost_page
-    from harness.station_file import load_station, station_path
 
     scenes = _scenes(only, scene)
     sound = _known("--sense", [sense], ("touch", "both")) == ["both"]
@@ -121,10 +121,10 @@ def _bar() -> Progress:
 
 
 def _scenes(only: list[str] | None, scene: Path | None) -> dict[str, Any]:
-    from experiments.contact_localization.table import objects
-    from harness.errors import WrongUse
-    from harness.scene import load_scene
-    from harness.toml_file import nearest
+    from experiments.contact_localization.accuracy.table import objects
+    from harness.basics.errors import WrongUse
+    from harness.basics.toml_file import nearest
+    from harness.bench.scene import load_scene
 
     if scene is not None:
         if only:
@@ -139,8 +139,8 @@ def _scenes(only: list[str] | None, scene: Path | None) -> dict[str, Any]:
 
 
 def _known(option: str, given: list[str], levels: tuple[str, ...]) -> list[str]:
-    from harness.errors import WrongUse
-    from harness.toml_file import nearest
+    from harness.basics.errors import WrongUse
+    from harness.basics.toml_file import nearest
 
     for level in given:
         if level not in levels:
@@ -149,7 +149,7 @@ def _known(option: str, given: list[str], levels: tuple[str, ...]) -> list[str]:
 
 
 def _result(curve: Any, path: Path, page: Path) -> dict[str, Any]:
-    from harness.cost import front
+    from harness.cost.curve import front
 
     conditions = []
     for condition in curve.conditions():
@@ -191,7 +191,7 @@ def _setting(point: Any, on_front: bool) -> dict[str, Any]:
 
 
 def _print(curve: Any) -> None:
-    from harness.cost import front
+    from harness.cost.curve import front
 
     for condition in curve.conditions():
         points = curve.where(condition)

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from experiments.commands.run import Experiment, Sense, Spacing, run
-from harness import options
-from harness.output import CONSOLE
+from harness.commands import options
+from harness.commands.output import CONSOLE
 
 
 def demo(

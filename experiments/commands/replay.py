@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from experiments.commands.run import show
-from harness import options
-from harness.output import CONSOLE, warn
+from harness.commands import options
+from harness.commands.output import CONSOLE, warn
 
 
 def replay(
@@ -31,12 +31,12 @@ def replay(
 
     Try: touchstone replay runs/... --level localization.method=particle
     """
-    from experiments.contact_localization import session_of
-    from experiments.contact_localization.dials import chosen
-    from experiments.contact_localization.result import levels_of_result
-    from harness.errors import RecordingDamaged
-    from harness.recording import Recording
-    from harness.wav_export import export_wav
+    from experiments.contact_localization import run as session_of
+    from experiments.contact_localization.accuracy.dials import chosen
+    from experiments.contact_localization.report.result import levels_of_result
+    from harness.basics.errors import RecordingDamaged
+    from harness.recording.recording import Recording
+    from harness.recording.wav_export import export_wav
 
     recording = Recording(run)
     if wav is not None:

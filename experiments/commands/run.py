@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from harness import options
-from harness.errors import WrongUse
-from harness.output import ANSWERS, CONSOLE, emit, millimetres, resumable, step_progress, warn
+from harness.basics.errors import WrongUse
+from harness.commands import options
+from harness.commands.output import ANSWERS, CONSOLE, emit, millimetres, resumable, step_progress, warn
 
 
 class Experiment(StrEnum):
@@ -75,11 +75,11 @@ def run(
 
     Try: touchstone run contact-localization --station mock --scene scenes/mug_touch.toml
     """
-    from experiments.commands.scenes import resolve
-    from experiments.contact_localization import session_of
-    from experiments.contact_localization.dials import chosen
-    from harness.recording import Recording
-    from harness.station_file import load_station, station_path
+    from experiments.contact_localization import run as session_of
+    from experiments.contact_localization.accuracy.dials import chosen
+    from harness.bench.station_file import load_station, station_path
+    from harness.commands.scenes import resolve
+    from harness.recording.recording import Recording
 
     assert experiment is Experiment.CONTACT_LOCALIZATION
     accuracy = chosen(level or [])
@@ -131,8 +131,8 @@ def _target(budget: str | None, error: str | None, level: list[str] | None) -> A
     given = error if budget is None else budget
     if given is None:
         return None
-    from experiments.contact_localization.front import Target
-    from harness.quantities import LENGTH, TIME
+    from experiments.contact_localization.accuracy.front import Target
+    from harness.basics.quantities import LENGTH, TIME
 
     if budget is not None and error is not None:
         raise WrongUse("--budget and --error each choose the levels; give one of them")
@@ -147,9 +147,9 @@ def _target(budget: str | None, error: str | None, level: list[str] | None) -> A
 
 def _foresee(target: Any, scene: Any) -> None:
     """What will be tried, before anything moves; a budget that cannot be kept ends here."""
-    from experiments.contact_localization.front import foresee, front_for
-    from experiments.contact_localization.solving import object_key
-    from harness.sim.scene_object import known_object
+    from experiments.contact_localization.accuracy.front import foresee, front_for
+    from experiments.contact_localization.accuracy.solving import object_key
+    from harness.effects.scene_object import known_object
 
     front = front_for(scene, scene.localization.contacts)
     name = object_key(scene.object.name, known_object(scene).mesh)
@@ -158,10 +158,10 @@ def _foresee(target: Any, scene: Any) -> None:
 
 def _answered(recording: Any, target: Any) -> dict[str, Any]:
     """The estimate as it was asked for, timed, and what the finest levels would have said."""
-    from experiments.contact_localization.front import front_for
-    from experiments.contact_localization.within import answer_within
-    from experiments.contact_localization.within_words import as_json, doubts
-    from harness.run_folder import RunFiles
+    from experiments.contact_localization.accuracy.front import front_for
+    from experiments.contact_localization.accuracy.within import answer_within
+    from experiments.contact_localization.accuracy.within_words import as_json, doubts
+    from harness.recording.run_folder import RunFiles
 
     front = front_for(RunFiles(recording).scene, recording.committed)
     for doubt in doubts(front, target):
@@ -173,9 +173,9 @@ def _with_cost(result: dict[str, Any], cost: dict[str, Any], recording: Any) -> 
     """The result, here and on the disk, with what was asked and what it took; said in two lines."""
     from json import dumps
 
-    from experiments.contact_localization.result import RESULT
-    from experiments.contact_localization.within_words import sentences
-    from harness.recording import write_text_whole
+    from experiments.contact_localization.accuracy.within_words import sentences
+    from experiments.contact_localization.report.result import RESULT
+    from harness.recording.recording import write_text_whole
 
     whole = {**result, "cost": cost}
     write_text_whole(recording.folder / RESULT, dumps(whole, indent=1, allow_nan=False) + "\n")
@@ -242,7 +242,7 @@ def _stopped(recording: Any, as_json: bool) -> int:
 
 
 def _perform(recording: Any, accuracy: Any, as_json: bool) -> tuple[bool, Any]:
-    from experiments.contact_localization import session_of
+    from experiments.contact_localization import run as session_of
 
     total = len(recording.header.plan["contacts"])
     if recording.committed == total:
@@ -260,8 +260,8 @@ def _ask(what: str) -> None:
 
 def _describe(begun: Any, accuracy: Any) -> None:
     """What is about to happen, before anything moves; what is simulated, at the levels that were turned."""
-    from harness.explain import as_table, left_out, scene_plan
-    from harness.run_folder import RunFiles
+    from harness.effects.explain import as_table, left_out, scene_plan
+    from harness.recording.run_folder import RunFiles
 
     run = RunFiles(begun.recording)
     wanted = run.scene.localization

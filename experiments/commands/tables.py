@@ -9,8 +9,8 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from harness import options
-from harness.output import ANSWERS, CONSOLE, emit, warn
+from harness.commands import options
+from harness.commands.output import ANSWERS, CONSOLE, emit, warn
 
 
 def localization(
@@ -43,11 +43,11 @@ def localization(
 
     Try: touchstone tables localization --seeds 2 --only mug
     """
-    from experiments.contact_localization.table import by_object, measure, objects, rows
-    from experiments.contact_localization.table_cell import Cell, cells
-    from harness.errors import WrongUse
-    from harness.gap import load_gap
-    from harness.toml_file import nearest
+    from experiments.contact_localization.accuracy.table import by_object, measure, objects, rows
+    from experiments.contact_localization.accuracy.table_cell import Cell, cells
+    from harness.basics.errors import WrongUse
+    from harness.basics.toml_file import nearest
+    from harness.bench.gap import load_gap
 
     folder = data or _data_folder()
     if folder is None:
@@ -109,7 +109,7 @@ _GAPS = {"default": "on", "none": "off"}
 
 
 def _print(table: list[Any]) -> None:
-    from experiments.contact_localization.table import PAPER_CM
+    from experiments.contact_localization.accuracy.table import PAPER_CM
 
     conditions = sorted({(row.spacing, row.gap, row.yaw) for row in table})
     for spacing, gap, yaw in conditions:

@@ -6,22 +6,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numba.core.event import install_recorder
 
-from experiments.contact_localization.estimate import Estimate, each_estimate, estimate
-from experiments.contact_localization.levels import Levels, Senses
+from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.model_of import model_of_run
 from experiments.contact_localization.observation import Observation
-from harness.accuracy import Accuracy
-from harness.acquisition import AcquisitionCalibration, of_one_stream, strike_from_readings
-from harness.acquisition_channels import FORCE
-from harness.arrays import FloatArray
-from harness.errors import FitRefused, RecordingDamaged, WrongUse
-from harness.geometry import rotation_from_quaternion, transform
-from harness.reading import Reading
-from harness.run_folder import RunFiles
-from harness.square_pixels import aspect_stated, made_square
-from harness.step_file import StepRecord
-from harness.synchronise import synchronised
+from experiments.contact_localization.posterior.estimate import Estimate, each_estimate, estimate
+from experiments.contact_localization.posterior.levels import Levels, Senses
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused, RecordingDamaged, WrongUse
+from harness.basics.geometry import rotation_from_quaternion, transform
+from harness.bench.acquisition import AcquisitionCalibration, of_one_stream, strike_from_readings
+from harness.bench.acquisition_channels import FORCE
+from harness.bench.reading import Reading
+from harness.effects.accuracy import Accuracy
+from harness.picture.square_pixels import aspect_stated, made_square
+from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import StepRecord
+from harness.recording.synchronise import synchronised
 
 AROUND_IMAGES = 0.1
 """s before the first frame from which the arm, at rest, is averaged too."""

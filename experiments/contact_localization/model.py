@@ -5,17 +5,17 @@ from typing import Literal
 
 import numpy as np
 
-from experiments.contact_localization.sound_gains import GainTable, gain_table
-from experiments.contact_localization.surface import Surface, sample_surface
-from experiments.contact_localization.turning import Turning, turning_of
-from harness.arrays import FloatArray, read_only
-from harness.errors import WrongUse
-from harness.materials import Material
-from harness.mesh import Mesh
-from harness.sensor import TactileSensor
-from harness.sim.height_map import RasterMesh
-from harness.sim.modes import Modes
-from harness.sim.tactile_calibration import TactileCalibration
+from experiments.contact_localization.sound.gains import GainTable, gain_table
+from experiments.contact_localization.touch.turning import Turning, turning_of
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.errors import WrongUse
+from harness.basics.materials import Material
+from harness.basics.mesh import Mesh
+from harness.bench.sensor import TactileSensor
+from harness.sim.gel.height_map import RasterMesh
+from harness.sim.modal.modes import Modes
+from harness.sim.optics.tactile_calibration import TactileCalibration
+from harness.sim.solid.surface_samples import Surface, sample_surface
 
 
 @dataclass(frozen=True, eq=False)

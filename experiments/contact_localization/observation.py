@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.hypotheses import Contact
 from experiments.contact_localization.model import Model
-from experiments.contact_localization.touch import TouchNoise, touch_map
-from harness.acquisition import Strike
-from harness.arrays import ByteArray, FloatArray, read_only
-from harness.cores import own_cores
-from harness.errors import DataRefused
-from harness.sim.inverse import invert
+from experiments.contact_localization.posterior.hypotheses import Contact
+from experiments.contact_localization.touch.touch import TouchNoise, touch_map
+from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.cores import own_cores
+from harness.basics.errors import DataRefused
+from harness.bench.acquisition import Strike
+from harness.sim.optics.inverse import invert
 
 CONTACT_THRESHOLD = 0.12e-3
 """Metres of indentation, averaged over a compared pixel, below which no contact is seen."""

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import torch
 
-from harness.arrays import AnyArray
 from harness.authoring.checkpoint import Progress, read_checkpoint, write_checkpoint
+from harness.basics.arrays import AnyArray
 
 _MOMENTS = ("step", "exp_avg", "exp_avg_sq")
 

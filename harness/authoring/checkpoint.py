@@ -8,8 +8,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from harness.arrays import AnyArray
-from harness.errors import DataRefused
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import DataRefused
 
 
 @dataclass(frozen=True, eq=False)

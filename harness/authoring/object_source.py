@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from harness.code_version import content_hash
-from harness.errors import WrongUse
-from harness.materials import Material
-from harness.mesh import Mesh
-from harness.named_file import require_file
+from harness.basics.code_version import content_hash
+from harness.basics.errors import WrongUse
+from harness.basics.materials import Material
+from harness.basics.mesh import Mesh
+from harness.basics.named_file import require_file
+from harness.bench.scene import BUILTIN
 from harness.objectfile.entries import DESCRIPTION, Provenance, Source
 from harness.objectfile.file import MESH, ObjectFile, create_object, file_entry
 from harness.objectfile.surface_file import ply_bytes
-from harness.scene import BUILTIN
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ def provenance_of(
 
     Args:
         wanted: what was asked for.
-        part: whose builder is ``harness.authoring.object_audio`` and so on.
+        part: whose builder is ``harness.authoring.audio.object_audio`` and so on.
         settings: with which it was trained.
         sources: of the mesh, and of whatever else went into the part.
     """

@@ -4,7 +4,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from harness.arrays import AnyArray, FloatArray
+from harness.basics.arrays import AnyArray, FloatArray
 from harness.objectfile.graph import Encoding, Normaliser
 
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from harness.errors import WrongUse
-from harness.image_file import png_bytes
-from harness.objectfile.vision import ObjectVision, vision_level
-from harness.objectfile.vision_settings import LEVELS, RenderSettings, VisionLevel
-from harness.objectfile.vision_view import FIELD_OF_VIEW, camera_for, light_for
-from harness.pinhole import DirectionalLight
-from harness.toml_file import nearest
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import nearest
+from harness.objectfile.vision.settings import LEVELS, RenderSettings, VisionLevel
+from harness.objectfile.vision.view import FIELD_OF_VIEW, camera_for, light_for
+from harness.objectfile.vision.vision import ObjectVision, vision_level
+from harness.picture.image_file import png_bytes
+from harness.picture.pinhole import DirectionalLight
 
 Three = tuple[float, float, float]
 

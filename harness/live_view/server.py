@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
-from harness.errors import TouchstoneError, WrongUse
+from harness.basics.errors import TouchstoneError, WrongUse
 from harness.live_view.frames import LiveFrames, asked_from
 
 HOST = "127.0.0.1"

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from harness.errors import DataRefused, WrongUse
+from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.toml_file import validate
 from harness.objectfile.entries import (
     AudioEntry,
     Entry,
@@ -19,7 +20,6 @@ from harness.objectfile.entries import (
 )
 from harness.objectfile.touch_entries import TouchEntry
 from harness.objectfile.vision_entry import VisionEntry
-from harness.toml_file import validate
 
 SCHEMA = 1
 

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from harness.materials import Material
-from harness.toml_file import StrictModel
+from harness.basics.materials import Material
+from harness.basics.toml_file import StrictModel
 
 DESCRIPTION = "object.json"
 

@@ -11,9 +11,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.errors import DataRefused, WrongUse
-from harness.materials import Material
-from harness.mesh import Mesh
+from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.materials import Material
+from harness.basics.mesh import Mesh
 from harness.objectfile.description import (
     SCHEMA,
     Description,

@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from onnx import ModelProto, NodeProto, TensorProto, ValueInfoProto, helper, numpy_helper
 
-from harness.arrays import AnyArray, FloatArray, IntArray
-from harness.errors import WrongUse
+from harness.basics.arrays import AnyArray, FloatArray, IntArray
+from harness.basics.errors import WrongUse
 
 IR_VERSION = 8
 OPSET = 17

@@ -11,7 +11,7 @@ import onnx
 from google.protobuf.message import DecodeError
 from onnx import GraphProto, ModelProto, TensorProto, TypeProto, helper, numpy_helper
 
-from harness.errors import DataRefused
+from harness.basics.errors import DataRefused
 from harness.objectfile.entries import Tensor
 
 MOST_NUMBERS = 2**24

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from harness.arrays import BoolArray, FloatArray, IntArray
-from harness.sim.compiled import compiled
-from harness.sim.surface_kernels import nearest_on_triangle
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.compiled import compiled
+from harness.basics.faces.nearest_kernels import nearest_on_triangle
 
 
 @compiled

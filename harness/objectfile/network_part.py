@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from onnx import ModelProto
 
-from harness.arrays import AnyArray, IntArray
+from harness.basics.arrays import AnyArray, IntArray
 from harness.objectfile.entries import Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
 from harness.objectfile.file import file_entry
 from harness.objectfile.runtime import Network

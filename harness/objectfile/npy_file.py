@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 
-from harness.arrays import AnyArray
-from harness.errors import DataRefused
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import DataRefused
 
 _LONGEST_HEADER = 1000
 

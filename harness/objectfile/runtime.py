@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import onnxruntime
 
-from harness.arrays import AnyArray
-from harness.errors import DataRefused, WrongUse
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import DataRefused, WrongUse
 from harness.objectfile.entries import Input, NetworkEntry, Tensor
 from harness.objectfile.graph_check import checked_graph, require_declared
 

@@ -4,10 +4,10 @@ from dataclasses import astuple
 
 import numpy as np
 
-from harness.arrays import FloatArray
-from harness.errors import WrongUse
-from harness.materials import Material
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.materials import Material
+from harness.basics.mesh import Mesh
 from harness.objectfile.file import ObjectFile, file_entry
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.surface_search import SurfaceSearch

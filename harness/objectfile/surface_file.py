@@ -8,9 +8,9 @@ import re
 
 import numpy as np
 
-from harness.arrays import AnyArray
-from harness.errors import MeshRefused
-from harness.mesh import Mesh
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import MeshRefused
+from harness.basics.mesh import Mesh
 
 _HEADER = (
     "ply\nformat binary_little_endian 1.0\n"

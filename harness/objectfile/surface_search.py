@@ -5,12 +5,12 @@ from functools import cached_property
 
 import numpy as np
 
-from harness.arrays import AnyArray, FloatArray, IntArray
-from harness.errors import OutOfDomain, WrongUse
-from harness.mesh import Mesh
+from harness.basics.arrays import AnyArray, FloatArray, IntArray
+from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.faces.face_grid import FaceGrid, build_face_grid
+from harness.basics.faces.nearest_kernels import nearest_places
+from harness.basics.mesh import Mesh
 from harness.objectfile.near_kernel import near_surface, shares_on_faces
-from harness.sim.face_grid import FaceGrid, build_face_grid
-from harness.sim.surface_kernels import nearest_places
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,9 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from harness.bench.sensor import TactileSensor
 from harness.objectfile.entries import Entry, FileEntry, NetworkEntry, Provenance
-from harness.sensor import TactileSensor
-from harness.sim.tactile_calibration import GelSkirt
+from harness.sim.optics.tactile_calibration import GelSkirt
 
 Positive = Annotated[float, Field(gt=0.0)]
 Size = Annotated[int, Field(ge=1)]

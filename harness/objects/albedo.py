@@ -9,10 +9,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from harness.arrays import ByteArray, FloatArray
-from harness.errors import WrongUse
-from harness.mesh import Mesh
-from harness.srgb import bytes_from_linear
+from harness.basics.arrays import ByteArray, FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
+from harness.picture.srgb import bytes_from_linear
 
 Colour = tuple[float, float, float]
 

@@ -2,7 +2,7 @@
 
 from types import MappingProxyType
 
-from harness.mesh import Mesh
+from harness.basics.mesh import Mesh
 from harness.objects import household, targets
 
 MATERIALS: MappingProxyType[str, str] = MappingProxyType({**household.MATERIALS, **targets.MATERIALS})

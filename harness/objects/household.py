@@ -7,9 +7,9 @@ import numpy as np
 from manifold3d import CrossSection
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from harness.arrays import FloatArray
-from harness.errors import WrongUse
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
 from harness.objects.outline import half_profile, polygon, rounded, stroke, walked
 from harness.objects.slab import slab
 from harness.objects.solid import from_manifold, lathe, outward, to_manifold, tube, union

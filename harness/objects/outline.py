@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from manifold3d import CrossSection, FillRule
 
-from harness.arrays import FloatArray
+from harness.basics.arrays import FloatArray
 
 _ROUND = 96
 _LARGEST_TURN = np.radians(22.0)

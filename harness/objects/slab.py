@@ -3,8 +3,8 @@
 import numpy as np
 from manifold3d import CrossSection, triangulate
 
-from harness.arrays import FloatArray, IntArray
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.mesh import Mesh
 from harness.objects.outline import walked
 from harness.objects.solid import outward
 

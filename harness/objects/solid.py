@@ -9,8 +9,8 @@ import numpy as np
 from manifold3d import Manifold
 from manifold3d import Mesh as ManifoldMesh
 
-from harness.arrays import FloatArray, IntArray
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.mesh import Mesh
 
 _GOLDEN = 0.6180339887498949
 

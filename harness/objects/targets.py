@@ -5,9 +5,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from harness.arrays import FloatArray
-from harness.errors import WrongUse
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
 from harness.objects.solid import lathe, outward
 
 BALL_RADIUS = 2e-3

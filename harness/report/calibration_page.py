@@ -9,13 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from harness.arrays import AnyArray, BoolArray, ByteArray, FloatArray, IntArray
-from harness.report.bins_figure import BinsFigure, bins_figure
-from harness.report.figures import Album, Picture
-from harness.report.shadow_figure import ShadowFigure, shadow_figure
-from harness.report.style import ANSWER, INK, SOFT, TOOL, blank, styled
+from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, IntArray
+from harness.report.figures.bins import BinsFigure, bins_figure
+from harness.report.figures.figures import Album, Picture
+from harness.report.figures.shadow import ShadowFigure, shadow_figure
+from harness.report.figures.style import ANSWER, INK, SOFT, TOOL, blank, styled
+from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, png
 from harness.report.template import rendered
-from harness.report.tiles import DIFFERENCE_GAIN, difference, png
 
 PAGE = "calibration.html"
 """Name of the page in its folder."""

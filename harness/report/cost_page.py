@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.accuracy import Level
-from harness.cost import Curve, Point, front
-from harness.cost_bounds import predicted_at_most
-from harness.cost_promise import MET, doubts, promises
-from harness.report.cost_chart import contacts_chart, cost_chart
-from harness.report.figures import Album, Picture
+from harness.cost.bounds import predicted_at_most
+from harness.cost.curve import Curve, Point, front
+from harness.cost.promise import MET, doubts, promises
+from harness.effects.accuracy import Level
+from harness.report.figures.cost_chart import contacts_chart, cost_chart
+from harness.report.figures.figures import Album, Picture
 from harness.report.template import rendered
 
 PAGE = "cost.html"

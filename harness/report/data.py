@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from harness.arrays import AnyArray, FloatArray
-from harness.mesh import Mesh
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.mesh import Mesh
 from harness.report.sound_data import Sound
 from harness.report.values import Missing, Posterior
 

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from harness.arrays import ByteArray, FloatArray
-from harness.dot_lattice import Lattice
-from harness.report.figures import Album
-from harness.report.style import ANSWER, SOFT, TOOL, blank, styled
+from harness.basics.arrays import ByteArray, FloatArray
+from harness.picture.dot_lattice import Lattice
+from harness.report.figures.figures import Album
+from harness.report.figures.style import ANSWER, SOFT, TOOL, blank, styled
 from harness.report.template import rendered
 
 PAGE = "markers.html"

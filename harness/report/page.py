@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from harness.arrays import AnyArray, FloatArray
+from harness.basics.arrays import AnyArray, FloatArray
 from harness.report import wording
-from harness.report.charts import error_chart
 from harness.report.data import Answer, Contact, Curve, ReportData
-from harness.report.figures import Album, Picture
-from harness.report.pictures import (
+from harness.report.figures.charts import error_chart
+from harness.report.figures.figures import Album, Picture
+from harness.report.figures.pictures import (
     Sides,
     bench_figure,
     close_up,
@@ -20,10 +20,10 @@ from harness.report.pictures import (
     posterior_figure,
     posterior_strip,
 )
+from harness.report.figures.sound import senses_figure, spectrogram_pair
+from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, height_picture, png, root_mean_square
 from harness.report.sound_data import PeakLine, Sound
-from harness.report.sound_figures import senses_figure, spectrogram_pair
 from harness.report.template import rendered
-from harness.report.tiles import DIFFERENCE_GAIN, difference, height_picture, png, root_mean_square
 from harness.report.values import Missing, Posterior
 
 PAGE = "report.html"

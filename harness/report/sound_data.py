@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from harness.arrays import FloatArray
+from harness.basics.arrays import FloatArray
 from harness.report.values import Missing, Posterior
 
 

@@ -1,6 +1,6 @@
 """Numbers as an operator reads them, and captions in words."""
 
-from harness.arrays import FloatArray
+from harness.basics.arrays import FloatArray
 from harness.report.data import Answer, ReportData
 from harness.report.sound_data import PeakLine, SenseAnswer, Sound
 from harness.report.values import Missing

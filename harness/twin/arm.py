@@ -6,10 +6,10 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
-from harness.arrays import FloatArray, read_only
-from harness.geometry import transform
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.geometry import transform
+from harness.bench.ur_tables import LINKS, TWIST_COSINES, TWIST_SINES, ArmTable, arm_table
 from harness.twin.link_hulls import link_hulls
-from harness.ur_tables import LINKS, TWIST_COSINES, TWIST_SINES, ArmTable, arm_table
 
 ARM_COLOUR: Final = (0.72, 0.74, 0.77, 1.0)
 JOINT_COLOUR: Final = (0.35, 0.52, 0.68, 1.0)

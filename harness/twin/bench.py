@@ -12,15 +12,15 @@ import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from harness.arrays import FloatArray, IntArray, read_only
-from harness.errors import WrongUse
-from harness.geometry import apply, inverse
-from harness.mesh import Mesh
-from harness.sensor import TactileSensor
+from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.errors import WrongUse
+from harness.basics.geometry import apply, inverse
+from harness.basics.mesh import Mesh
+from harness.bench.sensor import TactileSensor
+from harness.bench.ur_tables import arm_table
 from harness.twin.arm import Part, add_arm, add_hull, arm_parts, reaches
 from harness.twin.striker import striker
 from harness.twin.triangles import ConvexBody, Solid
-from harness.ur_tables import arm_table
 
 PAD_RIM: Final = 1e-3  # m of gel around the window that the camera sees
 HOUSING_LENGTH: Final = 0.06  # m along the sensor's axis

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from harness.arrays import FloatArray
-from harness.errors import WrongUse
-from harness.mesh import Mesh
-from harness.scene import SceneFile
-from harness.station_file import Station
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
 from harness.twin.bench import TwinBench
 from harness.twin.ways import connect
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness import kinematics
-from harness.arrays import FloatArray, read_only
-from harness.geometry import vector_from_rotation
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.geometry import vector_from_rotation
+from harness.bench import kinematics
 from harness.twin.bench import TwinBench
 from harness.twin.rehearsal import PredictedContact, contact_point
 

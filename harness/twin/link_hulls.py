@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from harness.arrays import FloatArray
-from harness.errors import DataRefused
-from harness.geometry import apply, rotation_from_vector, transform
-from harness.ur_tables import LINKS, arm_models, arm_table
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import DataRefused
+from harness.basics.geometry import apply, rotation_from_vector, transform
+from harness.bench.ur_tables import LINKS, arm_models, arm_table
 
 _FILES: Final = ("base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3")
 

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from harness import kinematics
-from harness.arrays import FloatArray
-from harness.geometry import translation
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import translation
+from harness.bench import kinematics
 from harness.twin.bench import TwinBench
 from harness.twin.rehearsal import NEARLY_SINGULAR, Segment
 from harness.twin.sweep import line_poses, line_postures, sweep_postures

@@ -16,7 +16,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from harness.arrays import ByteArray, FloatArray
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.twin.bench import TwinBench
 
 BACKENDS: Final = ("egl", "osmesa")

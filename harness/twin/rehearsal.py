@@ -6,10 +6,10 @@ from typing import Final, Literal
 
 import numpy as np
 
-from harness import kinematics
-from harness.arrays import FloatArray, read_only
-from harness.errors import MotionRefused
-from harness.geometry import apply, inverse
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.errors import MotionRefused
+from harness.basics.geometry import apply, inverse
+from harness.bench import kinematics
 from harness.twin.bench import TwinBench
 from harness.twin.sweep import Blocked, line_poses, line_postures, sweep, sweep_postures
 

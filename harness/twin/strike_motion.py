@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from harness import kinematics
-from harness.arrays import FloatArray
-from harness.errors import WrongUse
-from harness.geometry import apply, frame_facing, inverse, transform, translation
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.geometry import apply, frame_facing, inverse, transform, translation
+from harness.bench import kinematics
 from harness.twin.bench import TwinBench
 from harness.twin.motion import GREATEST_TURN
 from harness.twin.rehearsal import NEARLY_SINGULAR, Segment, contact_point

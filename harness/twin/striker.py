@@ -5,8 +5,8 @@ from typing import Final
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from harness.arrays import FloatArray
-from harness.geometry import apply
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import apply
 from harness.twin.arm import Part
 
 NAME: Final = "hammer"

@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from harness import kinematics
-from harness.arrays import FloatArray, IntArray
-from harness.geometry import rotation_from_vector, transform, vector_from_rotation
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.geometry import rotation_from_vector, transform, vector_from_rotation
+from harness.bench import kinematics
 from harness.twin.bench import Hit, TwinBench
 
 STEP: Final = 2e-3  # m of surface motion: the shortest step of a joint motion, the step of a line

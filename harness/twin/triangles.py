@@ -6,10 +6,10 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from harness.arrays import FloatArray, read_only
-from harness.geometry import apply, inverse
-from harness.mesh import Mesh
-from harness.sim.compiled import compiled
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.compiled import compiled
+from harness.basics.geometry import apply, inverse
+from harness.basics.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from harness import kinematics
-from harness.arrays import FloatArray
-from harness.geometry import transform, translation
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import transform, translation
+from harness.bench import kinematics
 from harness.twin.bench import TwinBench
 from harness.twin.sweep import sweep
 

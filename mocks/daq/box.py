@@ -19,8 +19,8 @@ from typing import Protocol
 
 import numpy as np
 
-from harness.arrays import AnyArray
-from harness.clock import now
+from harness.basics.arrays import AnyArray
+from harness.basics.clock import now
 from mocks.daq.instrument import MODELS, Instrument
 from mocks.daq.memory import Fifo
 from mocks.faults import ActiveFault, Fault

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.arrays import AnyArray, FloatArray
+from harness.basics.arrays import AnyArray, FloatArray
 
 
 @dataclass(frozen=True)

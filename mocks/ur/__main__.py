@@ -12,9 +12,9 @@ import select
 import sys
 from dataclasses import dataclass
 
+from mocks.ur.arm.motions import as_six
+from mocks.ur.arm.plane import PlaneContact
 from mocks.ur.hooks import HOME, ContactModel, ControllerConfig
-from mocks.ur.motions import as_six
-from mocks.ur.plane import PlaneContact
 from mocks.ur.serve import serve
 
 

@@ -6,11 +6,11 @@ It has no sockets and no clock of its own; ``cycle`` is called once for each 2 m
 import sys
 from collections.abc import Callable
 
-from mocks.ur.force_sensor import NO_WRENCH
+from mocks.ur.arm.force_sensor import NO_WRENCH
+from mocks.ur.arm.mover import MotionFault
 from mocks.ur.geometry_functions import FUNCTIONS
 from mocks.ur.hooks import CYCLE, ContactModel, ControllerConfig, OnCycle, OnOutputs
 from mocks.ur.move_functions import MoveFunctions
-from mocks.ur.mover import MotionFault
 from mocks.ur.player import Player, RuntimeState
 from mocks.ur.robot import Robot
 from mocks.ur.safety import FORCE_LIMIT, RobotMode, SafetyMode

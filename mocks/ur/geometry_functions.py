@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from mocks.ur import poses
+from mocks.ur.arm import poses
 from mocks.ur.hooks import Matrix
 from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError

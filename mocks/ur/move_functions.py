@@ -6,10 +6,8 @@ Blends (``r``) are accepted and not performed: every move comes to rest.
 from collections.abc import Generator
 from typing import Any
 
-from mocks.ur import kinematics, poses
-from mocks.ur.geometry_functions import matrix
-from mocks.ur.hooks import Matrix, Six
-from mocks.ur.motions import (
+from mocks.ur.arm import kinematics, poses
+from mocks.ur.arm.motions import (
     Motion,
     MoveJoints,
     MoveLine,
@@ -18,9 +16,11 @@ from mocks.ur.motions import (
     SpeedLine,
     as_six,
 )
-from mocks.ur.mover import PROGRAM_STOP
+from mocks.ur.arm.mover import PROGRAM_STOP
+from mocks.ur.arm.stops import StopJoints, StopLine
+from mocks.ur.geometry_functions import matrix
+from mocks.ur.hooks import Matrix, Six
 from mocks.ur.robot import Robot
-from mocks.ur.stops import StopJoints, StopLine
 from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import Pose, number, six

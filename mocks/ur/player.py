@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from enum import IntEnum
 from typing import Final
 
-from mocks.ur.mover import PROGRAM_STOP
+from mocks.ur.arm.mover import PROGRAM_STOP
 from mocks.ur.robot import Robot
 from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.compiler import Compiled, compile_program

@@ -4,10 +4,10 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Final
 
-from mocks.ur.force_sensor import ForceSensor
+from mocks.ur.arm.force_sensor import ForceSensor
+from mocks.ur.arm.kinematics import arm_model
+from mocks.ur.arm.mover import Mover
 from mocks.ur.hooks import ControllerConfig
-from mocks.ur.kinematics import arm_model
-from mocks.ur.mover import Mover
 from mocks.ur.registers import Bank, Outputs, Watchdog
 from mocks.ur.safety import Safety
 

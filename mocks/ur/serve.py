@@ -76,7 +76,7 @@ def serve(
 
     Raises:
         OSError: an address or port that cannot be bound.
-        harness.errors.WrongUse: a model that is not known.
+        harness.basics.errors.WrongUse: a model that is not known.
     """
     sys.setswitchinterval(_SWITCH_INTERVAL)
     controller = Controller(config, contact, on_cycle, step, on_outputs)

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from typing import Any
 
-from mocks.ur import kinematics, poses
+from mocks.ur.arm import kinematics, poses
+from mocks.ur.arm.motions import as_six
+from mocks.ur.arm.mover import HISTORY
 from mocks.ur.geometry_functions import matrix, pose
 from mocks.ur.hooks import CYCLE, Matrix
-from mocks.ur.motions import as_six
 from mocks.ur.move_functions import solved
-from mocks.ur.mover import HISTORY
 from mocks.ur.robot import Robot
 from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from mocks.ur import poses
+from mocks.ur.arm import poses
 from mocks.ur.controller import Controller
 from mocks.ur.player import RuntimeState
 from mocks.ur.registers import BITS, NUMERIC

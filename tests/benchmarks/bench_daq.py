@@ -10,7 +10,11 @@ import time
 
 import numpy as np
 import pytest
-from daq_bench import (
+
+from harness.bench.acquisition import strike_from_readings
+from harness.bench.acquisition_channels import BLOCK, CLOCK, FORCE, PRESSURE
+from mocks.daq.source import Wiring, skewed
+from tests.support.daq_bench import (
     CALIBRATION,
     OFFSETS,
     measured_delay,
@@ -21,10 +25,6 @@ from daq_bench import (
     opened,
     played,
 )
-
-from harness.acquisition import strike_from_readings
-from harness.acquisition_channels import BLOCK, CLOCK, FORCE, PRESSURE
-from mocks.daq.source import Wiring, skewed
 
 pytestmark = [
     pytest.mark.benchmark,

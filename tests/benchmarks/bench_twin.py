@@ -11,12 +11,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from harness import kinematics
-from harness.arrays import FloatArray
-from harness.geometry import frame_facing, rotation_about, transform, translation
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import frame_facing, rotation_about, transform, translation
+from harness.basics.mesh import Mesh
+from harness.bench import kinematics
+from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
-from harness.sensor import GELSIGHT_R15
 from harness.twin.bench import TwinBench
 from harness.twin.motion import PlannedContact, plan_contact, reachable
 from harness.twin.rehearsal import rehearse

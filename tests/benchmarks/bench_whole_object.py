@@ -1,11 +1,11 @@
 """A whole object, from its mesh to ``audio.onnx``: what each stage costs, and what the network is worth.
 
-``PYTHONPATH=tests python tests/benchmarks/bench_whole_object.py [object ...] [--profile smoke] [--out FILE]``
+``PYTHONPATH=. python tests/benchmarks/bench_whole_object.py [object ...] [--profile smoke] [--out FILE]``
 builds the built-in objects and, where the real data is found, the three real meshes of
-``experiments.contact_localization.table``, one at a time, each into a temporary folder and with an empty
-cache. Each finished object is appended as a line of JSON to ``--out``, and what stands there is not built
-again, so that a stopped run resumes. Two tables: seconds of the clock and of the processor by stage; and
-errors at held-out vertices beside both baselines and the float16 table at its own nodes, with a mean and
+``experiments.contact_localization.accuracy.table``, one at a time, each into a temporary folder and with an
+empty cache. Each finished object is appended as a line of JSON to ``--out``, and what stands there is not
+built again, so that a stopped run resumes. Two tables: seconds of the clock and of the processor by stage;
+and errors at held-out vertices beside both baselines and the float16 table at its own nodes, with a mean and
 a worst row of each. ``--finer 2`` makes elements half as long as the default: unknowns grow with the square
 of it on walls and with the cube in solids. Machine code must have been made before: build anything once.
 """
@@ -20,21 +20,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from network_worth import HEADINGS, said, worth
-from real_data import WHY_NOT, find_shared_data
 from rich.console import Console
 from rich.table import Table
 
-from experiments.contact_localization.table import REAL
-from harness.authoring.audio_profiles import PROFILES
-from harness.authoring.object_audio import MODES, STAGES, AudioRequest, build_audio
-from harness.materials import material
+from experiments.contact_localization.accuracy.table import REAL
+from harness.authoring.audio.object_audio import MODES, STAGES, AudioRequest, build_audio
+from harness.authoring.audio.profiles import PROFILES
+from harness.basics.materials import material
+from harness.basics.store import Store
+from harness.bench.scene import BUILTIN
 from harness.objects.household import MATERIALS
-from harness.scene import BUILTIN
-from harness.sim.modal import default_edge
-from harness.sim.stage_seconds import cpu, wall
-from harness.sim.taken_surface import surface_of
-from harness.store import Store
+from harness.sim.modal.modal import default_edge
+from harness.sim.modal.stage_seconds import cpu, wall
+from harness.sim.solid.taken_surface import surface_of
+from tests.samples.network_worth import HEADINGS, said, worth
+from tests.support.real_data import WHY_NOT, find_shared_data
 
 WAYS = ("network", "nearest_trained", "linear", "table_float16")
 

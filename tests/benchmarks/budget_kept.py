@@ -23,19 +23,19 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.cases import Case, performed, workers_of
-from experiments.contact_localization.front import Front, Target, front_of
-from experiments.contact_localization.solving import ESTIMATOR, PROGRAM, Models
-from experiments.contact_localization.table import objects
-from experiments.contact_localization.table_cell import Cell, cells
-from experiments.contact_localization.within import ask
-from harness.accuracy import Level
-from harness.cost import GROSS, Curve
-from harness.cost_choice import for_budget
-from harness.cost_file import curve_path, load, sample_json
-from harness.cost_provenance import code, machine, stale
-from harness.recording import write_text_whole
-from harness.station_file import load_station, station_path
+from experiments.contact_localization.accuracy.cases import Case, performed, workers_of
+from experiments.contact_localization.accuracy.front import Front, Target, front_of
+from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Models
+from experiments.contact_localization.accuracy.table import objects
+from experiments.contact_localization.accuracy.table_cell import Cell, cells
+from experiments.contact_localization.accuracy.within import ask
+from harness.bench.station_file import load_station, station_path
+from harness.cost.choice import for_budget
+from harness.cost.curve import GROSS, Curve
+from harness.cost.file import curve_path, load, sample_json
+from harness.cost.provenance import code, machine, stale
+from harness.effects.accuracy import Level
+from harness.recording.recording import write_text_whole
 
 SHARE = 0.95
 CONTACTS = 6

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.contact_localization.front import front_of
-from harness.cost import Point, Sample
-from harness.cost_choice import for_error
-from harness.cost_file import load
-from harness.cost_promise import promise
+from experiments.contact_localization.accuracy.front import front_of
+from harness.cost.choice import for_error
+from harness.cost.curve import Point, Sample
+from harness.cost.file import load
+from harness.cost.promise import promise
 
 SHIPPED = Path(__file__).parents[2] / "experiments" / "contact_localization" / "data" / "cost.json"
 ERRORS = (2e-3, 3e-3, 5e-3, 8e-3, 12e-3, 20e-3)

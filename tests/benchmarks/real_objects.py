@@ -18,9 +18,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from real_data import WHY_NOT, find_shared_data
+from tests.support.real_data import WHY_NOT, find_shared_data
 
 PROGRAM = Path(sys.executable).with_name("touchstone")
 OBJECTS = {

@@ -1,7 +1,8 @@
-"""Whether this checkout computes, to the bit, what commit 488cc9b computed: ``python tests/benchmarks/same_numbers.py``.
+"""Whether this checkout computes, to the bit, what commit 488cc9b computed: ``python
+tests/benchmarks/same_numbers.py``.
 
-Under ``--folder`` it keeps a clone of that commit with its own environment, and what that clone made: the rows
-of the localization table (nine objects, two spacings, struck too), three runs over the wires and one
+Under ``--folder`` it keeps a clone of that commit with its own environment, and what that clone made: the
+rows of the localization table (nine objects, two spacings, struck too), three runs over the wires and one
 calibration run of the arm, and an ObjectFile of each sense. Whatever is missing there is made first (about
 fifteen minutes on two cores). Then this checkout makes the table and the ObjectFiles anew, replays the four
 runs, and everything is compared: estimates and hashes to the bit, results in all but paths, versions and
@@ -11,9 +12,10 @@ seconds. Ends with 1 where anything differs.
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -40,7 +42,7 @@ OBJECTFILES = {
 PASSING = {
     "recording", "report", "command", "folder", "versions", "git", "made", "created", "calls", "answered",
     "from_store", "schema", "seconds", "seconds_by_stage", "stage_seconds", "cores", "machine", "out", "page",
-    "page_html", "artefact", "objectfile", "size_bytes",
+    "page_html", "artefact", "objectfile", "size_bytes", "code",
 }  # fmt: skip
 """Keys whose values are paths, versions and times, in which two computations may differ."""
 
@@ -78,57 +80,74 @@ class Side:
         """Rows of nine objects, close and spread, touched and struck, one file each."""
         shared = os.environ.get("TOUCHSTONE_DATA", str(ROOT.parent / "shared" / "data"))
         options = ["--seeds", "1", "--gap", "default", "--yaw", "known", "--data", shared, "--json"]
-        self.once("table.json", lambda: self.touchstone("tables", name, *options, "--out", "table"))
+        self.once("table.json", "tables", name, *options, "--out", "table")
 
-    def once(self, name: str, make: Callable[[], str]) -> None:
-        """Make the file ``name`` from what ``make`` printed, unless it is there."""
+    def once(self, name: str, *arguments: str) -> None:
+        """Write what a command prints into the file ``name``, unless it is there."""
         path = self.made / name
         if not path.exists():
-            print(f"making {path}", file=sys.stderr, flush=True)
-            said = make()
-            path.write_text(said)
+            sys.stderr.write(f"making {path}\n")
+            path.write_text(self.touchstone(*arguments))
 
     def objectfiles(self) -> None:
         """An ObjectFile of each sense, of profile smoke."""
         for sense, named in OBJECTFILES.items():
             options = ["--profile", "smoke", "--threads", "1", "--out", f"objects/{sense}", "--json"]
-            self.once(f"object_{sense}.json", lambda: self.touchstone("object", "build", *named, *options))
+            self.once(f"object_{sense}.json", "object", "build", *named, *options)
 
 
 def record(before: Side) -> None:
     """Everything that the reference commit makes, where it is not there yet."""
     if not (before.code / ".venv" / ".installed").exists():
-        subprocess.run(["git", "clone", "--quiet", str(ROOT), str(before.code)], check=True)
-        subprocess.run(["git", "-C", str(before.code), "checkout", "--quiet", BEFORE], check=True)
-        subprocess.run(["make", "-C", str(before.code), "install"], check=True)
+        _program("git", "clone", "--quiet", str(ROOT), str(before.code))
+        _program("git", "-C", str(before.code), "checkout", "--quiet", BEFORE)
+        _program("make", "-C", str(before.code), "install")
     for name, options in RUNS.items():
         filled = [option.format(code=before.code) for option in options]
-        command = ["run", "contact-localization", "--station", "mock", *filled, "--out", f"runs/{name}", "--json"]
-        before.once(f"run_{name}.json", lambda: before.touchstone(*command))
-        before.once(f"replay_{name}.json", lambda: replayed(before, before, name))
-    options = ["--station", "mock", "--ball-radius", "2mm", "--presses", "20", "--run", "runs/taxim", "--json"]
-    before.once("run_taxim.json", lambda: before.touchstone("calibrate", "taxim", *options))
-    before.once("replay_taxim.json", lambda: calibrated(before, before))
+        command = [
+            "run",
+            "contact-localization",
+            "--station",
+            "mock",
+            *filled,
+            "--out",
+            f"runs/{name}",
+            "--json",
+        ]
+        before.once(f"run_{name}.json", *command)
+        before.once(f"replay_{name}.json", *replay(before, name))
+    options = [
+        "--station",
+        "mock",
+        "--ball-radius",
+        "2mm",
+        "--presses",
+        "20",
+        "--run",
+        "runs/taxim",
+        "--json",
+    ]
+    before.once("run_taxim.json", "calibrate", "taxim", *options)
+    before.once("replay_taxim.json", *calibration(before))
     before.table("localization")
     before.objectfiles()
 
 
-def replayed(side: Side, before: Side, name: str) -> str:
-    """What a checkout says of a run that the reference recorded."""
-    return side.touchstone("replay", str(before.made / "runs" / name), "--out", f"replays/{name}", "--json")
+def replay(before: Side, name: str) -> tuple[str, ...]:
+    """The command that answers a run of the reference again."""
+    return ("replay", str(before.made / "runs" / name), "--out", f"replays/{name}", "--json")
 
 
-def calibrated(side: Side, before: Side) -> str:
-    """The same of the reference's presses of a ball."""
-    run = str(before.made / "runs" / "taxim")
-    return side.touchstone("calibrate", "taxim", run, "--out", "fitted.npz", "--json")
+def calibration(before: Side) -> tuple[str, ...]:
+    """The command that fits a gel to the reference's presses of a ball again."""
+    return ("calibrate", "taxim", str(before.made / "runs" / "taxim"), "--out", "fitted.npz", "--json")
 
 
-def now_made(now: Side, before: Side, table: str) -> None:
+def make_anew(now: Side, before: Side, table: str) -> None:
     """Everything that is compared, made by this checkout."""
     for name in RUNS:
-        now.once(f"replay_{name}.json", lambda: replayed(now, before, name))
-    now.once("replay_taxim.json", lambda: calibrated(now, before))
+        now.once(f"replay_{name}.json", *replay(before, name))
+    now.once("replay_taxim.json", *calibration(before))
     now.table(table)
     now.objectfiles()
 
@@ -150,7 +169,9 @@ def _objects() -> list[str]:
 
 def _files(before: Path, now: Path) -> Iterator[str]:
     """ONNX graphs, tables and meshes by their hashes; the description by its values."""
-    names = {p.relative_to(before) for p in before.rglob("*") if p.suffix in (".onnx", ".npy", ".ply", ".npz")}
+    names = {
+        p.relative_to(before) for p in before.rglob("*") if p.suffix in (".onnx", ".npy", ".ply", ".npz")
+    }
     if not names:
         yield f"{before}: holds nothing to compare"
     for name in sorted(names):
@@ -172,6 +193,13 @@ def _unlike(before: Any, now: Any, where: str) -> Iterator[str]:
         yield f"{where}: {before!r} before, {now!r} now"
 
 
+def _program(name: str, *arguments: str) -> str:
+    found = shutil.which(name)
+    if found is None:
+        raise SystemExit(f"{name} is not installed")
+    return subprocess.run([found, *arguments], stdout=subprocess.PIPE, text=True, check=True).stdout
+
+
 def _json(path: Path) -> Any:
     return json.loads(path.read_text())
 
@@ -184,7 +212,9 @@ def main() -> int:
     """Record what is missing, compute anew, compare."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--folder", type=Path, default=ROOT.parent / "proof", help="what the reference made")
-    parser.add_argument("--now", type=Path, help="what this checkout makes; a new folder under --folder if left out")
+    parser.add_argument(
+        "--now", type=Path, help="what this checkout makes; a new folder under --folder if left out"
+    )
     parser.add_argument("--table", default="localization", help="name of the table")
     parser.add_argument("--record", action="store_true", help="only record the reference")
     given = parser.parse_args()
@@ -193,16 +223,14 @@ def main() -> int:
     record(before)
     if given.record:
         return 0
-    commit = subprocess.run(
-        ["git", "-C", str(ROOT), "describe", "--always", "--dirty=-changed", "--abbrev=9"],
-        stdout=subprocess.PIPE, text=True, check=True,
-    ).stdout.strip()  # fmt: skip
+    described = ("-C", str(ROOT), "describe", "--always", "--dirty=-changed", "--abbrev=9")
+    commit = _program("git", *described).strip()
     now = Side(ROOT, given.now or folder / f"now-{commit}-{os.getpid()}")
-    now_made(now, before, given.table)
+    make_anew(now, before, given.table)
     found = list(differences(before, now))
     for line in found:
-        print(line)
-    print(f"{len(found)} differences between {BEFORE} and this checkout; {now.made}")
+        sys.stdout.write(f"{line}\n")
+    sys.stdout.write(f"{len(found)} differences between {BEFORE} and this checkout; {now.made}\n")
     return 1 if found else 0
 
 

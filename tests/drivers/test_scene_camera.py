@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from seen_shapes import cuboid
 
-from harness.arrays import ByteArray
-from harness.errors import OutOfDomain, WrongUse
-from harness.geometry import apply, inverse
-from harness.scene import Light, SceneFile, scene_from_options
-from harness.scene_camera import scene_frame, scene_lamps, scene_pinhole
-from harness.station_file import Station, load_station, station_path
-from mocks.gelsight_stream import MjpegServer
+from harness.basics.arrays import ByteArray
+from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.geometry import apply, inverse
+from harness.bench.scene import Light, SceneFile, scene_from_options
+from harness.bench.scene_camera import scene_frame, scene_lamps, scene_pinhole
+from harness.bench.station_file import Station, load_station, station_path
+from mocks.camera.gelsight_stream import MjpegServer
+from tests.oracles.seen_shapes import cuboid
 
 MESH = cuboid(0.1, 0.08, 0.06)
 SCENE = scene_from_options("builtin:mug")

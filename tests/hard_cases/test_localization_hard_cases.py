@@ -4,18 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from whole_run import in_process_run, touch_scene
 
 from experiments.contact_localization.answer import observe, prior_of
-from experiments.contact_localization.estimate import Estimate, estimate
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.truth import read_truth
-from harness.arrays import FloatArray
-from harness.errors import FitRefused, WrongUse
-from harness.mesh import Mesh
+from experiments.contact_localization.posterior.estimate import Estimate, estimate
+from experiments.contact_localization.report.truth import read_truth
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused, WrongUse
+from harness.basics.mesh import Mesh
 from harness.objects.household import build
-from harness.run_folder import RunFiles
+from harness.recording.run_folder import RunFiles
+from tests.support.whole_run import in_process_run, touch_scene
 
 CONTACTS = 6
 

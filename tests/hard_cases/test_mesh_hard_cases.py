@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from harness.arrays import FloatArray, IntArray
-from harness.errors import MeshRefused, WrongUse
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.errors import MeshRefused, WrongUse
+from harness.basics.mesh import Mesh
 from harness.objects.household import build
-from harness.sim.intake import Intake, take_in
+from harness.sim.solid.intake import Intake, take_in
 
 Soup = tuple[FloatArray, IntArray]
 

@@ -6,20 +6,20 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from exact_solids import exact_box
 from manifold3d import Manifold
-from ritz_box import ritz_frequencies
 from scipy.linalg import subspace_angles
-from volume_meshes import box
 
-from harness.errors import MeshRefused, WrongUse
-from harness.geometry import rotation_about
-from harness.materials import MATERIALS
-from harness.mesh import Mesh
+from harness.basics.errors import MeshRefused, WrongUse
+from harness.basics.geometry import rotation_about
+from harness.basics.materials import MATERIALS
+from harness.basics.mesh import Mesh
 from harness.objects.solid import from_manifold
-from harness.sim.modal_file import modes_of_file
-from harness.sim.modal_mesh import QuadraticMesh
-from harness.sim.modal_solve import solve_mesh
+from harness.sim.modal.file import modes_of_file
+from harness.sim.modal.solve import solve_mesh
+from harness.sim.solid.modal_mesh import QuadraticMesh
+from tests.oracles.exact_solids import exact_box
+from tests.oracles.ritz_box import ritz_frequencies
+from tests.oracles.volume_meshes import box
 
 STEEL, GLASS = MATERIALS["steel"], MATERIALS["glass"]
 

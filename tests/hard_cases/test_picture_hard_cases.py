@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-from seen_shapes import ball, cuboid, square, together
 
-from harness.arrays import FloatArray
-from harness.errors import MeshRefused
-from harness.geometry import apply, rotation_from_vector, transform
-from harness.linear_image import LinearImage
-from harness.mesh import Mesh
-from harness.pinhole import DirectionalLight, Pinhole
-from harness.sim.appearance import plain
-from harness.sim.appearance_source import builtin_appearance
-from harness.sim.direct_image import LitObject
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import MeshRefused
+from harness.basics.geometry import apply, rotation_from_vector, transform
+from harness.basics.mesh import Mesh
+from harness.picture.linear_image import LinearImage
+from harness.picture.pinhole import DirectionalLight, Pinhole
+from harness.sim.light.appearance import plain
+from harness.sim.light.appearance_source import builtin_appearance
+from harness.sim.light.direct_image import LitObject
+from tests.oracles.seen_shapes import ball, cuboid, square, together
 
 UP = (0.0, 0.0, 1.0)
 GREY = (0.8, 0.5, 0.2)

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 import trimesh
 
-from harness.arrays import FloatArray
-from harness.geometry import rotation_about
-from harness.mesh import Mesh
-from harness.scene import scene_from_options
-from harness.sensor import GELSIGHT_R15, TactileSensor
-from harness.sim.gel import R15_SKIRT, deform, skirt_for
-from harness.sim.given_heights import Heights, given_heights
-from harness.sim.height_map import RasterMesh, height_maps
-from harness.sim.press_pose import contact_place, gel_from_object
-from harness.sim.pressed_gel import Gel
-from harness.sim.shadow import ShadowTable
-from harness.sim.tactile_calibration import shipped_calibration
-from harness.sim.touch_press import Press, press_heights, press_mesh
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import rotation_about
+from harness.basics.mesh import Mesh
+from harness.bench.scene import scene_from_options
+from harness.bench.sensor import GELSIGHT_R15, TactileSensor
+from harness.effects.touch_press import Press, press_heights, press_mesh
+from harness.sim.gel.gel import R15_SKIRT, deform, skirt_for
+from harness.sim.gel.given_heights import Heights, given_heights
+from harness.sim.gel.height_map import RasterMesh, height_maps
+from harness.sim.gel.press_pose import contact_place, gel_from_object
+from harness.sim.optics.pressed_gel import Gel
+from harness.sim.optics.shadow import ShadowTable
+from harness.sim.optics.tactile_calibration import shipped_calibration
 
 SCENE = scene_from_options("builtin:mug")
 PLAIN = Gel(GELSIGHT_R15, shipped_calibration("gelsight_r15_bench"))

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.errors import WrongUse
-from harness.scene import load_scene
+from harness.basics.errors import WrongUse
+from harness.bench.scene import load_scene
 
 GOOD = """
 schema = 1

@@ -9,26 +9,26 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.answer import observe_step
-from experiments.contact_localization.estimate import Estimate, estimate
-from experiments.contact_localization.experiment import ContactLocalization
-from experiments.contact_localization.levels import Levels, Senses
+from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.model_of import model_of_scene
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.planning import RunPlan, plan_run
-from experiments.contact_localization.sound_gate import doubts_of_sound
-from harness.acquisition import Strike
-from harness.arrays import FloatArray
-from harness.errors import DataRefused, FitRefused
-from harness.gap import gap_path
-from harness.run_folder import station_acquisition, station_calibration
-from harness.scene import SceneFile, scene_from_json
-from harness.sim.scene_object import known_object
-from harness.station import RunContext
-from harness.station_file import Station, load_station, station_path
-from harness.step_file import Step, StepRecord
+from experiments.contact_localization.posterior.estimate import Estimate, estimate
+from experiments.contact_localization.posterior.levels import Levels, Senses
+from experiments.contact_localization.sound.gate import doubts_of_sound
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import DataRefused, FitRefused
+from harness.bench.acquisition import Strike
+from harness.bench.gap import gap_path
+from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.station import RunContext
+from harness.bench.station_file import Station, load_station, station_path
+from harness.effects.scene_object import known_object
+from harness.recording.run_folder import station_acquisition, station_calibration
+from harness.recording.step_file import Step, StepRecord
+from harness.skills.planning import RunPlan, plan_run
+from harness.skills.press import ContactLocalization
 from harness.twin.bench_of import way_between
-from mocks.in_process import in_process_bench
+from mocks.in_process.bench import in_process_bench
 
 pytestmark = pytest.mark.timeout(300, func_only=True)  # on a cold machine the modes are computed first
 

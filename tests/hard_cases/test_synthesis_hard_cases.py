@@ -4,10 +4,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from harness.materials import Material
-from harness.sim.modal_sound import ring
-from harness.sim.modes import dampings
-from harness.sim.synthesis import SynthesisLevel, synthesize
+from harness.basics.materials import Material
+from harness.sim.modal.modes import dampings
+from harness.sim.sound.modal_sound import ring
+from harness.sim.sound.synthesis import SynthesisLevel, synthesize
 
 RATE = 44.1e3
 LEVELS: tuple[SynthesisLevel, ...] = ("fast", "double", "exact")

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from harness import geometry
-from harness.arrays import FloatArray
-from harness.errors import OutOfDomain
-from harness.mesh import Mesh
-from harness.sensor import GELSIGHT_R15, TactileSensor
-from harness.sim.gel import R15_SKIRT, deform, over_range
-from harness.sim.height_map import RasterMesh, height_maps, penetration
-from harness.sim.inverse import Inversion, invert
-from harness.sim.optics import Optics, OpticsLevel, TactileImages
-from harness.sim.tactile_calibration import TactileCalibration, shipped_calibration
+from harness.basics import geometry
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import OutOfDomain
+from harness.basics.mesh import Mesh
+from harness.bench.sensor import GELSIGHT_R15, TactileSensor
+from harness.sim.gel.gel import R15_SKIRT, deform, over_range
+from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
+from harness.sim.optics.inverse import Inversion, invert
+from harness.sim.optics.optics import Optics, OpticsLevel, TactileImages
+from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
 
 SENSOR = GELSIGHT_R15
 LEVELS: tuple[OpticsLevel, ...] = ("exact", "fast", "smooth")

@@ -7,23 +7,23 @@ import numpy as np
 import pytest
 from numba import njit
 from numba.extending import intrinsic
-from plain_look import SMALL, box_grid, even_look, file_of, filled_grid, looking
-from seen_shapes import ball, cuboid, square
 
-from harness.arrays import AnyArray, FloatArray
-from harness.errors import DataRefused, OutOfDomain
-from harness.linear_image import LinearImage
-from harness.mesh import Mesh
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.errors import DataRefused, OutOfDomain
+from harness.basics.mesh import Mesh
 from harness.objectfile.runtime import Network
-from harness.objectfile.vision_blocks import composite, sort_samples
-from harness.objectfile.vision_network import VisionGrid
-from harness.objectfile.vision_render import VisionRenderer
-from harness.objectfile.vision_settings import RenderSettings, VisionLevel
-from harness.objectfile.vision_shell import grid_of, lattice_of, surface_shell
-from harness.objectfile.vision_tensors import vision_tensors
-from harness.objectfile.vision_tiles import layer_tile
-from harness.objectfile.vision_voxels import walk
-from harness.pinhole import DirectionalLight, Pinhole
+from harness.objectfile.vision.coverage.blocks import composite, sort_samples
+from harness.objectfile.vision.network.network import VisionGrid
+from harness.objectfile.vision.network.tensors import vision_tensors
+from harness.objectfile.vision.network.tiles import layer_tile
+from harness.objectfile.vision.render import VisionRenderer
+from harness.objectfile.vision.settings import RenderSettings, VisionLevel
+from harness.objectfile.vision.shell import grid_of, lattice_of, surface_shell
+from harness.objectfile.vision.voxels import walk
+from harness.picture.linear_image import LinearImage
+from harness.picture.pinhole import DirectionalLight, Pinhole
+from tests.oracles.plain_look import SMALL, box_grid, even_look, file_of, filled_grid, looking
+from tests.oracles.seen_shapes import ball, cuboid, square
 
 LEVELS: tuple[VisionLevel, ...] = get_args(VisionLevel)
 LIGHT = DirectionalLight(np.array([0.0, 0.0, 1.0]))

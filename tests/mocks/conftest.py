@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from harness.arrays import FloatArray
-from harness.geometry import frame_facing, inverse, transform, translation
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import frame_facing, inverse, transform, translation
+from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
-from harness.sensor import GELSIGHT_R15
-from mocks.world import Camera, NominalBench
+from mocks.world.world import Camera, NominalBench
 
 Press = Callable[[float, float, float], FloatArray]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.errors import BenchFault
+from harness.basics.errors import BenchFault
 from mocks.faults import Fault
 from mocks.lab_processes import ARM_PORTS, Child, Line, free_address
 from mocks.shared_pose import Mark, SharedPose

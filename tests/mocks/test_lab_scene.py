@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from harness.errors import WrongUse
-from harness.gap import load_gap
-from harness.mesh import Mesh
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
+from harness.bench.gap import load_gap
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
 from harness.objects.household import build
-from harness.scene import SceneFile
-from harness.station_file import Station
 from mocks.lab_scene import nominal_bench, read_lab_scene
-from mocks.world import World
+from mocks.world.world import World
 
 
 def told(scene: SceneFile, station: Station, mesh: Path | None) -> dict[str, Any]:

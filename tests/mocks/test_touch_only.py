@@ -8,21 +8,21 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 OF_SOUND = (
-    "harness.sim.modal",
-    "harness.sim.room",
-    "mocks.world_sound",
-    "mocks.strike_counts",
+    "harness.sim.modal.modal",
+    "harness.sim.sound.room",
+    "mocks.world.sound",
+    "mocks.daq.strike_counts",
     "mocks.daq.box",
 )
 
 BENCH = """
 from pathlib import Path
-from harness.mesh import Mesh
-from harness.scene import scene_from_options
-from harness.sim.scene_object import known_object
-from harness.station import RunContext
-from harness.station_file import load_station, station_path
-from mocks.in_process import in_process_bench
+from harness.basics.mesh import Mesh
+from harness.bench.scene import scene_from_options
+from harness.effects.scene_object import known_object
+from harness.bench.station import RunContext
+from harness.bench.station_file import load_station, station_path
+from mocks.in_process.bench import in_process_bench
 scene = scene_from_options("builtin:wrench")
 context = RunContext(Path("unused.json"), known_object(scene).mesh, 1, "none")
 bench = in_process_bench(scene, load_station(station_path("mock")), context)
@@ -47,4 +47,6 @@ def test_a_touch_only_run_loads_nothing_of_sound(program: str) -> None:
 
 
 def test_what_sound_loads_is_known() -> None:
-    assert loaded_after("import mocks.strike_counts, mocks.world_instrument, mocks.daq.box") >= set(OF_SOUND)
+    assert loaded_after("import mocks.daq.strike_counts, mocks.world.instrument, mocks.daq.box") >= set(
+        OF_SOUND
+    )

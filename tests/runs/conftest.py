@@ -1,9 +1,9 @@
 """One run on the bench in process, made once and copied by the tests that change it."""
 
 import pytest
-from whole_run import in_process_run, touch_scene
 
-from harness.recording import Recording
+from harness.recording.recording import Recording
+from tests.support.whole_run import in_process_run, touch_scene
 
 
 @pytest.fixture(scope="session")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from harness.basics.mesh import Mesh
 from harness.cli import invoke
-from harness.mesh import Mesh
 from harness.objects.household import build
 
 SCENE = """

@@ -6,28 +6,35 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from whole_run import copied
 
 from experiments.commands import run as run_command
-from experiments.contact_localization import session_of
-from experiments.contact_localization.cases import Case
-from experiments.contact_localization.costing import Work, gathered, joined, measure
-from experiments.contact_localization.dials import FINEST, KNOBS, METHOD, SPACING, setting_name, settings
-from experiments.contact_localization.front import Front, Target, foresee, front_for, shipped_curve
-from experiments.contact_localization.solving import ESTIMATOR, PROGRAM, object_key
-from experiments.contact_localization.table import objects
-from experiments.contact_localization.table_cell import cells
-from experiments.contact_localization.within import answer_within
-from experiments.contact_localization.within_words import as_json, doubts, sentences, staleness
-from harness.accuracy import Accuracy, Level
+from experiments.contact_localization import run as session_of
+from experiments.contact_localization.accuracy.cases import Case
+from experiments.contact_localization.accuracy.costing import Work, gathered, joined, measure
+from experiments.contact_localization.accuracy.dials import (
+    FINEST,
+    KNOBS,
+    METHOD,
+    SPACING,
+    setting_name,
+    settings,
+)
+from experiments.contact_localization.accuracy.front import Front, Target, foresee, front_for, shipped_curve
+from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, object_key
+from experiments.contact_localization.accuracy.table import objects
+from experiments.contact_localization.accuracy.table_cell import cells
+from experiments.contact_localization.accuracy.within import answer_within
+from experiments.contact_localization.accuracy.within_words import as_json, doubts, sentences, staleness
+from harness.basics.errors import WrongUse
+from harness.bench.station_file import load_station, station_path
 from harness.cli import invoke
-from harness.cost import Curve, Point, Sample
-from harness.cost_file import curve_path, load, save
-from harness.cost_provenance import code, machine
-from harness.errors import WrongUse
-from harness.recording import Recording
-from harness.run_folder import RunFiles
-from harness.station_file import load_station, station_path
+from harness.cost.curve import Curve, Point, Sample
+from harness.cost.file import curve_path, load, save
+from harness.cost.provenance import code, machine
+from harness.effects.accuracy import Accuracy, Level
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from tests.support.whole_run import copied
 
 COARSE: dict[str, Level] = {
     METHOD.name: "grid",
@@ -259,7 +266,7 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     def again(*_: object) -> Case:
         raise AssertionError("the run was performed again")
 
-    monkeypatch.setattr("experiments.contact_localization.cases.perform", again)
+    monkeypatch.setattr("experiments.contact_localization.accuracy.cases.perform", again)
     ((_, resumed),) = measure(two_settings, scenes, station, tmp_path, pytest.fail)
     assert [point.samples for point in resumed] == [point.samples for point in points]
     (kept,) = tmp_path.glob("*.json")
@@ -271,7 +278,9 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     with pytest.raises(AssertionError, match="performed again"):
         list(measure(two_settings, scenes, station, tmp_path, pytest.fail))
     kept.write_text(whole, encoding="utf-8")
-    monkeypatch.setattr("experiments.contact_localization.costing.code", lambda _: {"sha256": "other"})
+    monkeypatch.setattr(
+        "experiments.contact_localization.accuracy.costing.code", lambda _: {"sha256": "other"}
+    )
     with pytest.raises(AssertionError, match="performed again"):
         list(measure(two_settings, scenes, station, tmp_path, pytest.fail))
     monkeypatch.undo()
@@ -282,7 +291,9 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
 def test_the_command_measures_keeps_and_draws(
     cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("experiments.contact_localization.dials.settings", lambda *_asked: [COARSE, DEFAULT])
+    monkeypatch.setattr(
+        "experiments.contact_localization.accuracy.dials.settings", lambda *_asked: [COARSE, DEFAULT]
+    )
     arguments = ["cost", "contact-localization", "--only", "wrench", "--seeds", "1", "--spacing", "spread"]
     arguments += ["--sense", "touch"]
     arguments += ["--contacts", "2", "--out", str(tmp_path / "out"), "--json"]

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from whole_run import copied, edited, rewritten, with_reading
 
+from experiments.contact_localization.accuracy.dials import chosen, levels_of
 from experiments.contact_localization.answer import Answer, answer
-from experiments.contact_localization.dials import chosen, levels_of
-from experiments.contact_localization.session_of import score
-from harness.arrays import FloatArray
-from harness.errors import FitRefused
-from harness.recording import Recording
-from harness.run_folder import RunFiles
-from harness.step_file import StepRecord
+from experiments.contact_localization.run import score
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import StepRecord
+from tests.support.whole_run import copied, edited, rewritten, with_reading
 
 MOVED = np.array([0.03, -0.02, 0.01])
 

@@ -13,19 +13,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from whole_run import Quiet, copied, edited
 
-from experiments.contact_localization import session_of
-from experiments.contact_localization.strike import Ask
+from experiments.contact_localization import run as session_of
+from harness.basics.errors import SafetyStop, TouchstoneError
+from harness.bench.device import Health
+from harness.bench.station import Bench, RunContext
 from harness.cli import invoke
-from harness.device import Health
-from harness.errors import SafetyStop, TouchstoneError
-from harness.recording import Recording
-from harness.run_folder import RunFiles
-from harness.session import Progress
-from harness.station import Bench, RunContext
-from harness.step_file import Step
-from mocks.in_process import in_process_bench
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.recording.session import Progress
+from harness.recording.step_file import Step
+from harness.skills.strike import Ask
+from mocks.in_process.bench import in_process_bench
+from tests.support.whole_run import Quiet, copied, edited
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),

@@ -6,10 +6,10 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
-from run_process import RunProcess
 
-from harness.acquisition_channels import FORCE, PRESSURE
-from harness.recording import Recording
+from harness.bench.acquisition_channels import FORCE, PRESSURE
+from harness.recording.recording import Recording
+from tests.support.run_process import RunProcess
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),

@@ -12,25 +12,25 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
-from whole_run import copied
 
 from experiments.contact_localization import answer as answer_module
-from experiments.contact_localization import session_of
-from experiments.contact_localization.dials import chosen
-from experiments.contact_localization.estimate import Estimate, each_estimate
-from experiments.contact_localization.levels import Levels
-from experiments.contact_localization.result import result_of
+from experiments.contact_localization import run as session_of
+from experiments.contact_localization.accuracy.dials import chosen
+from experiments.contact_localization.posterior.estimate import Estimate, each_estimate
+from experiments.contact_localization.posterior.levels import Levels
+from experiments.contact_localization.report.result import result_of
 from harness.cli import invoke
-from harness.effects import Effect
-from harness.recording import Recording
-from harness.run_folder import RunFiles
-from harness.sim import catalogue
-from harness.sim.optics import Optics
+from harness.effects import catalogue
+from harness.effects.effect import Effect
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.sim.optics.optics import Optics
+from tests.support.whole_run import copied
 
 KERNELS = (
-    "harness.sim.height_map:height_maps",
-    "harness.sim.gel:deform",
-    "harness.sim.noise:with_camera_noise",
+    "harness.sim.gel.height_map:height_maps",
+    "harness.sim.gel.gel:deform",
+    "harness.sim.optics.noise:with_camera_noise",
 )
 """Simulation of readings; the estimator has its own cheaper terms, and calls none of these."""
 
@@ -150,7 +150,7 @@ def test_exactly_the_plan_ran(finished: tuple[dict[str, Any], Counting, Path]) -
 def test_what_is_not_planned_would_be_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """The control: the counters stand where an evaluation looks for its effects."""
     counting = Counting(monkeypatch)
-    effects: tuple[Effect, ...] = vars(importlib.import_module("harness.explain"))["EFFECTS"]
+    effects: tuple[Effect, ...] = vars(importlib.import_module("harness.effects.explain"))["EFFECTS"]
     shadow = next(effect for effect in effects if effect.provides == "touch.shadow")
     with pytest.raises(KeyError):
         shadow.compute({}, {})

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from run_process import RunProcess
 
-from harness.recording import Recording
+from harness.recording.recording import Recording
+from tests.support.run_process import RunProcess
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),

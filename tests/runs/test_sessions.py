@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from whole_run import Quiet, copied, edited, in_process_run, touch_scene
 
-from experiments.contact_localization import session_of
+from experiments.contact_localization import run as session_of
+from harness.basics.errors import BenchFault, NotTouched, WrongUse
+from harness.bench.reading import Reading
+from harness.bench.station import Bench, RunContext
+from harness.bench.station_file import load_station, station_path
 from harness.cli import invoke
-from harness.errors import BenchFault, NotTouched, WrongUse
-from harness.output import warn
-from harness.reading import Reading
-from harness.recording import Recording
-from harness.run_folder import RunFiles
-from harness.station import Bench, RunContext
-from harness.station_file import load_station, station_path
-from harness.step_file import Step
-from mocks.in_process import in_process_bench
+from harness.commands.output import warn
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import Step
+from mocks.in_process.bench import in_process_bench
+from tests.support.whole_run import Quiet, copied, edited, in_process_run, touch_scene
 
 PACKETS_APART = 0.1e-3
 """m: simulated packets are 0.4 mm of the search apart, and the touch is interpolated between two."""

@@ -10,43 +10,44 @@ from typing import Any
 
 import numpy as np
 import pytest
-from whole_run import in_process_run, touch_scene
 
-from experiments.contact_localization import session_of, sound_analysis
-from experiments.contact_localization.dials import chosen
-from harness.acquisition import Strike
-from harness.recording import Recording
-from harness.sim import sound_effects
+from experiments.contact_localization import run as session_of
+from experiments.contact_localization.accuracy.dials import chosen
+from experiments.contact_localization.sound import analysis as sound_analysis
+from harness.bench.acquisition import Strike
+from harness.effects import sound_effects
+from harness.recording.recording import Recording
+from tests.support.whole_run import in_process_run, touch_scene
 
 OF_SOUND = (
-    "harness.acquisition",
-    "harness.sim.microphone_response",
-    "harness.sim.modal",
-    "harness.sim.modal_lanczos",
-    "harness.sim.modal_mesh",
-    "harness.sim.modal_sound",
-    "harness.sim.modal_system",
-    "harness.sim.modes",
-    "harness.sim.room",
-    "harness.sim.tetrahedra",
-    "experiments.contact_localization.sound_analysis",
-    "experiments.contact_localization.sound_gains",
-    "experiments.contact_localization.sound_likelihood",
-    "experiments.contact_localization.sound_matching",
-    "experiments.contact_localization.sound_mfcc",
-    "experiments.contact_localization.sound_places",
-    "experiments.contact_localization.sound_spectra",
-    "mocks.strike_counts",
-    "mocks.world_instrument",
-    "mocks.world_modes",
-    "mocks.world_sound",
+    "harness.bench.acquisition",
+    "harness.sim.sound.microphone_response",
+    "harness.sim.modal.modal",
+    "harness.sim.modal.lanczos",
+    "harness.sim.solid.modal_mesh",
+    "harness.sim.sound.modal_sound",
+    "harness.sim.modal.system",
+    "harness.sim.modal.modes",
+    "harness.sim.sound.room",
+    "harness.sim.solid.tetrahedra",
+    "experiments.contact_localization.sound.analysis",
+    "experiments.contact_localization.sound.gains",
+    "experiments.contact_localization.sound.likelihood",
+    "experiments.contact_localization.sound.matching",
+    "experiments.contact_localization.sound.mfcc",
+    "experiments.contact_localization.sound.places",
+    "experiments.contact_localization.sound.spectra",
+    "mocks.daq.strike_counts",
+    "mocks.world.instrument",
+    "mocks.world.modes",
+    "mocks.world.sound",
 )
 """Modules of which no function may be called."""
 
 ALLOWED = {
     # The world's box, hammer and microphone have a calibration in the station's file, heard or not.
-    "harness.acquisition.shipped_acquisition",
-    "harness.acquisition._check_number",
+    "harness.bench.acquisition.shipped_acquisition",
+    "harness.bench.acquisition._check_number",
 }
 
 
@@ -96,4 +97,4 @@ def test_calls_of_sound_would_be_counted() -> None:
     with pytest.MonkeyPatch.context() as patch:
         calls = count_calls(patch)
         sound_analysis.analyse([strike, strike])
-    assert calls["experiments.contact_localization.sound_spectra.spectra_of"] == 1
+    assert calls["experiments.contact_localization.sound.spectra.spectra_of"] == 1

@@ -18,29 +18,29 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from real_data import find_shared_data
-from whole_run import Quiet, copied, touch_scene
 
-from experiments.contact_localization import session_of
+from experiments.contact_localization import run as session_of
+from experiments.contact_localization.accuracy.table import REAL, objects
+from experiments.contact_localization.accuracy.table_cell import Cell, scene_of
 from experiments.contact_localization.answer import Answer, answer
-from experiments.contact_localization.estimate import Estimate, estimate
-from experiments.contact_localization.levels import Levels
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.table import REAL, objects
-from experiments.contact_localization.table_cell import Cell, scene_of
-from harness.arrays import ByteArray, FloatArray
-from harness.gap import load_gap
-from harness.geometry import inverse
+from experiments.contact_localization.posterior.estimate import Estimate, estimate
+from experiments.contact_localization.posterior.levels import Levels
+from harness.basics.arrays import ByteArray, FloatArray
+from harness.basics.geometry import inverse
+from harness.bench.gap import load_gap
+from harness.bench.scene import SceneFile
+from harness.bench.station import PRESS, RunContext
+from harness.bench.station_file import load_station, station_path
 from harness.objects.household import MATERIALS
-from harness.recording import Recording
-from harness.run_folder import RunFiles
-from harness.scene import SceneFile
-from harness.station import PRESS, RunContext
-from harness.station_file import load_station, station_path
-from mocks.gelsight_stream import encode
-from mocks.in_process import in_process_bench
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from mocks.camera.gelsight_stream import encode
+from mocks.in_process.bench import in_process_bench
 from mocks.lab_scene import nominal_bench
-from mocks.world import World
+from mocks.world.world import World
+from tests.support.real_data import find_shared_data
+from tests.support.whole_run import Quiet, copied, touch_scene
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),

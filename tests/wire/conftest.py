@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from ur_process import HOME, PLANE, UrProcess, wait_until
+
+from tests.support.ur_process import HOME, PLANE, UrProcess, wait_until
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arm_bench import DOWN, FLOOR, READY, FarEnd, child_pid, make_arm
 
-from drivers import dashboard
-from drivers.ur_arm import UrArm
-from harness.arrays import FloatArray
-from harness.errors import BenchFault, ProtectiveStop, SafetyStop
-from harness.geometry import translation
+from drivers.ur import dashboard
+from drivers.ur.arm import UrArm
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import BenchFault, ProtectiveStop, SafetyStop
+from harness.basics.geometry import translation
+from tests.support.arm_bench import DOWN, FLOOR, READY, FarEnd, child_pid, make_arm
 
 FAR: FloatArray = READY + np.array([0.6, 0, 0, 0, 0, 0])
 
@@ -149,7 +149,7 @@ def test_killing_the_program_in_flight_stops_the_arm_and_leaves_no_process(
     far_end: FarEnd, tmp_path: Path
 ) -> None:
     program = (
-        "import sys; from pathlib import Path; from arm_bench import make_arm, child_pid; "
+        "import sys; from pathlib import Path; from tests.support.arm_bench import make_arm, child_pid; "
         "from test_arm_faults import FAR\n"
         "arm = make_arm(sys.argv[1], Path(sys.argv[2])); arm.open()\n"
         "sys.stdout.write(f'{child_pid(arm)}\\n'); sys.stdout.flush()\n"

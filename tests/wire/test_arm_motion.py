@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arm_bench import DOWN, FLOOR, READY, FarEnd, make_arm
 
-from drivers.ur_arm import UrArm
-from harness import kinematics
-from harness.arrays import FloatArray
-from harness.errors import BenchFault, LimitExceeded, SafetyStop
-from harness.geometry import rotation_about, transform, translation, vector_from_rotation
+from drivers.ur.arm import UrArm
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import BenchFault, LimitExceeded, SafetyStop
+from harness.basics.geometry import rotation_about, transform, translation, vector_from_rotation
+from harness.bench import kinematics
+from tests.support.arm_bench import DOWN, FLOOR, READY, FarEnd, make_arm
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from daq_bench import (
+
+from drivers.dataq.hammer import DataqHammer
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import BenchFault
+from harness.bench.acquisition_channels import FORCE, PRESSURE
+from tests.support.daq_bench import (
     CALIBRATION,
     Bench,
     idle_counts,
@@ -21,11 +26,6 @@ from daq_bench import (
     opened,
     played,
 )
-
-from drivers.hammer import DataqHammer
-from harness.acquisition_channels import FORCE, PRESSURE
-from harness.arrays import AnyArray
-from harness.errors import BenchFault
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="pseudo-terminals as the mock uses them need Linux"
@@ -148,16 +148,17 @@ def test_a_fetching_process_that_dies_is_named(bench: Bench) -> None:
 
 def test_a_driver_that_is_killed_leaves_no_process_and_a_quiet_box(bench: Bench) -> None:
     program = (
-        "import os; from daq_bench import CALIBRATION; from drivers.hammer import DataqHammer\n"
+        "import os; from tests.support.daq_bench import CALIBRATION\n"
+        "from drivers.dataq.hammer import DataqHammer\n"
         f"h = DataqHammer(CALIBRATION, port={bench.box.port!r}); h.open()\n"
         "print(h._stream._fetcher.pid, flush=True); os.kill(os.getpid(), 9)"
     )
-    roots = os.pathsep.join(str(Path(__file__).parents[k]) for k in (1, 2))
+    root = str(Path(__file__).parents[2])
     done = subprocess.run(
         [sys.executable, "-c", program],
         capture_output=True,
         text=True,
-        env={**os.environ, "PYTHONPATH": roots},
+        env={**os.environ, "PYTHONPATH": root},
         check=False,
     )
     fetcher = Path("/proc") / done.stdout.strip()

@@ -5,7 +5,14 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from daq_bench import (
+
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.errors import BenchFault, WrongUse
+from harness.bench.acquisition import strike_from_readings
+from harness.bench.acquisition_channels import BLOCK, CLOCK, FLAG_FIELDS, FLAGS, FORCE, PRESSURE
+from harness.bench.reading import Reading
+from mocks.daq.source import Wiring, skewed
+from tests.support.daq_bench import (
     CALIBRATION,
     OFFSETS,
     Bench,
@@ -18,13 +25,6 @@ from daq_bench import (
     opened,
     played,
 )
-
-from harness.acquisition import strike_from_readings
-from harness.acquisition_channels import BLOCK, CLOCK, FLAG_FIELDS, FLAGS, FORCE, PRESSURE
-from harness.arrays import AnyArray, FloatArray
-from harness.errors import BenchFault, WrongUse
-from harness.reading import Reading
-from mocks.daq.source import Wiring, skewed
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="pseudo-terminals as the mock uses them need Linux"
@@ -216,7 +216,7 @@ def test_a_station_that_asks_for_what_is_not_is_refused(
 
 
 def test_a_port_that_is_not_there_is_named() -> None:
-    from drivers.hammer import DataqHammer
+    from drivers.dataq.hammer import DataqHammer
 
     with pytest.raises(BenchFault, match="/dev/ttyACM77 cannot be opened"):
         DataqHammer(CALIBRATION, port="/dev/ttyACM77").open()

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.http_camera import HttpCamera, gelsight
-from harness.arrays import ByteArray
-from harness.clock import now
-from harness.errors import BenchFault
-from harness.sensor import GELSIGHT_R15
+from drivers.camera.http_camera import HttpCamera, gelsight
+from harness.basics.arrays import ByteArray
+from harness.basics.clock import now
+from harness.basics.errors import BenchFault
+from harness.bench.sensor import GELSIGHT_R15
+from mocks.camera.gelsight_stream import MjpegServer
 from mocks.faults import Fault
-from mocks.gelsight_stream import MjpegServer
 from mocks.lab_processes import Child, Line, free_address
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux")

@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.http_camera import gelsight
-from harness.errors import BenchFault
-from harness.gap import gap_path
-from harness.mock_lab import LabAddresses, MockLab
+from drivers.camera.http_camera import gelsight
+from harness.basics.errors import BenchFault
+from harness.bench.gap import gap_path
+from harness.bench.mock_lab import LabAddresses, MockLab
+from harness.bench.scene import SceneFile
+from harness.bench.sensor import GELSIGHT_R15
+from harness.bench.station_file import Station
 from harness.objects.household import build
-from harness.scene import SceneFile
-from harness.sensor import GELSIGHT_R15
-from harness.station_file import Station
 
 ROOT = Path(__file__).parents[2]
 PORTS = (29999, 30001, 30002, 30003, 30004, 8080, 8081)
@@ -136,8 +136,8 @@ import sys, time
 sys.path.insert(0, {tests!r})
 from pathlib import Path
 import test_lab_life as t
-from harness.scene import load_scene
-from harness.station_file import load_station
+from harness.bench.scene import load_scene
+from harness.bench.station_file import load_station
 scene, station = load_scene(Path("scenes/mug_touch.toml")), load_station(Path("stations/mock.toml"))
 lab = t.make_lab(scene, station, Path({truth!r}))
 where = lab.start()

@@ -15,22 +15,22 @@ import cv2
 import numpy as np
 import pytest
 
-from experiments.contact_localization.experiment import ContactLocalization, Speeds
-from experiments.contact_localization.planning import RunPlan, plan_run
-from harness.arrays import FloatArray
-from harness.gap import load_gap
-from harness.geometry import rotation_from_quaternion, transform
-from harness.reading import Reading
-from harness.scene import SceneFile
-from harness.sim.scene_object import known_object
-from harness.station import Bench, RunContext, open_station
-from harness.station_file import Station
-from harness.step_file import Step
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import rotation_from_quaternion, transform
+from harness.bench.gap import load_gap
+from harness.bench.reading import Reading
+from harness.bench.scene import SceneFile
+from harness.bench.station import Bench, RunContext, open_station
+from harness.bench.station_file import Station
+from harness.effects.scene_object import known_object
+from harness.recording.step_file import Step
+from harness.skills.planning import RunPlan, plan_run
+from harness.skills.press import ContactLocalization, Speeds
 from harness.twin.bench_of import way_between
-from mocks.gelsight_stream import encode
-from mocks.in_process import in_process_bench
+from mocks.camera.gelsight_stream import encode
+from mocks.in_process.bench import in_process_bench
 from mocks.lab_scene import nominal_bench
-from mocks.world import World
+from mocks.world.world import World
 
 SEED, GAP = 5, "default"
 STEP = 3

@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import drivers.microphone
-from drivers.microphone import PortAudioMicrophone
-from harness.arrays import AnyArray
-from harness.clock import now
-from harness.errors import BenchFault
-from harness.microphone_take import BAD, UNSURE, UNTRIGGERED, flags_of
-from harness.reading import Reading
-from mocks.sound_card import SoundCard, why_not
+import drivers.microphone.microphone
+from drivers.microphone.microphone import PortAudioMicrophone
+from harness.basics.arrays import AnyArray
+from harness.basics.clock import now
+from harness.basics.errors import BenchFault
+from harness.bench.microphone_take import BAD, UNSURE, UNTRIGGERED, flags_of
+from harness.bench.reading import Reading
+from mocks.sound_card.card import SoundCard, why_not
 
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not() or "a sound card can be mocked here")
 
@@ -131,9 +131,9 @@ def test_a_computer_late_for_a_second_is_noticed(
             time.sleep(pauses.pop())
         return now()
 
-    monkeypatch.setattr(drivers.microphone, "STALL", 3.0)
+    monkeypatch.setattr(drivers.microphone.microphone, "STALL", 3.0)
     microphone.record(0.5)
-    monkeypatch.setattr(drivers.microphone, "now", late_clock)
+    monkeypatch.setattr(drivers.microphone.microphone, "now", late_clock)
     take = microphone.record(1.5)
     assert not pauses
     assert flags_of(take) & BAD
@@ -193,7 +193,7 @@ def test_a_card_taken_away_is_named_and_a_new_one_is_heard(monkeypatch: pytest.M
 
 _PARENT = """
 import sys, time
-from mocks.sound_card import SoundCard
+from mocks.sound_card.card import SoundCard
 card = SoundCard()
 card.start()
 print(card._folder, *[child.pid for child in card._children], flush=True)

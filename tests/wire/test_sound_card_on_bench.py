@@ -6,22 +6,22 @@ from typing import Any
 
 import numpy as np
 import pytest
-from heard_strikes import Readings, delay, performed, strikes_on
 
-from experiments.commands.check import rest_levels
-from experiments.contact_localization.planning import RunPlan, plan_run
-from harness.acquisition import Strike
-from harness.acquisition_channels import FORCE, PRESSURE
-from harness.errors import BenchFault
-from harness.mesh import Mesh
-from harness.microphone_take import BAD, CALLBACK, CLOCK, FLAGS, UNSURE, take_of
-from harness.scene import SceneFile, load_scene
-from harness.sim.scene_object import known_object
-from harness.station import RunContext, open_station
-from harness.station_file import load_station
-from harness.synchronise import synchronised
-from mocks.in_process import in_process_bench
-from mocks.sound_card import why_not
+from harness.basics.errors import BenchFault
+from harness.basics.mesh import Mesh
+from harness.bench.acquisition import Strike
+from harness.bench.acquisition_channels import FORCE, PRESSURE
+from harness.bench.microphone_take import BAD, CALLBACK, CLOCK, FLAGS, UNSURE, take_of
+from harness.bench.scene import SceneFile, load_scene
+from harness.bench.station import RunContext, open_station
+from harness.bench.station_file import load_station
+from harness.commands.check import rest_levels
+from harness.effects.scene_object import known_object
+from harness.recording.synchronise import synchronised
+from harness.skills.planning import RunPlan, plan_run
+from mocks.in_process.bench import in_process_bench
+from mocks.sound_card.card import why_not
+from tests.support.heard_strikes import Readings, delay, performed, strikes_on
 
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not() or "a sound card can be mocked here")
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.errors import BenchFault
+from harness.basics.errors import BenchFault
+from harness.bench.scene import load_scene
+from harness.bench.station import RunContext, open_station
+from harness.bench.station_file import load_station, station_path
 from harness.objects.household import build
-from harness.scene import load_scene
-from harness.station import RunContext, open_station
-from harness.station_file import load_station, station_path
 
 ROOT = Path(__file__).parents[2]
 

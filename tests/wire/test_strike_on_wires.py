@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.experiment import ContactLocalization, Speeds
-from experiments.contact_localization.planning import RunPlan, plan_run
-from experiments.contact_localization.strike import AFTER, BEFORE, POSE
-from harness.acquisition import strike_from_readings
-from harness.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
-from harness.arrays import AnyArray, FloatArray
-from harness.errors import BenchFault
-from harness.geometry import rotation_from_quaternion, transform
-from harness.mesh import Mesh
-from harness.reading import Reading
-from harness.scene import SceneFile, load_scene
-from harness.sim.scene_object import known_object
-from harness.station import STRIKE, Bench, RunContext, open_station
-from harness.station_file import Station, load_station
-from harness.step_file import Step
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.errors import BenchFault
+from harness.basics.geometry import rotation_from_quaternion, transform
+from harness.basics.mesh import Mesh
+from harness.bench.acquisition import strike_from_readings
+from harness.bench.acquisition_channels import CLOCK, FLAGS, FORCE, PRESSURE
+from harness.bench.reading import Reading
+from harness.bench.scene import SceneFile, load_scene
+from harness.bench.station import STRIKE, Bench, RunContext, open_station
+from harness.bench.station_file import Station, load_station
+from harness.effects.scene_object import known_object
+from harness.recording.step_file import Step
+from harness.skills.planning import RunPlan, plan_run
+from harness.skills.press import ContactLocalization, Speeds
+from harness.skills.strike import AFTER, BEFORE, POSE
 from harness.twin.bench_of import way_between
-from mocks.in_process import in_process_bench
+from mocks.in_process.bench import in_process_bench
 
 ROOT = Path(__file__).parents[2]
 SEED, GAP, STEP = 5, "none", 3

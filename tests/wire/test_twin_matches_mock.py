@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from harness import kinematics
-from harness.geometry import translation
+from harness.basics.geometry import translation
+from harness.bench import kinematics
+from harness.bench.sensor import GELSIGHT_R15
+from harness.bench.ur_tables import arm_models
 from harness.objects.household import build
-from harness.sensor import GELSIGHT_R15
 from harness.twin.bench import TwinBench
-from harness.ur_tables import arm_models
-from mocks.ur import kinematics as controller
+from mocks.ur.arm import kinematics as controller
 
 POSTURES = np.random.default_rng(5).uniform(-np.pi, np.pi, (200, 6))
 

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
-from ur_process import UrProcess, wait_until
+
+from tests.support.ur_process import UrProcess, wait_until
 
 HOME = np.array([0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0])
 FAR = HOME + np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
-from ur_process import HOME, TURN, UrProcess, wait_until
+
+from tests.support.ur_process import HOME, TURN, UrProcess, wait_until
 
 UNREACHABLE = [3.0, 0.0, 0.5, 0.0, 0.0, 0.0]
 

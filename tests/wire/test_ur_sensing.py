@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from rtde_io import RTDEIOInterface
-from ur_process import HOME, PLANE, TURN, UrProcess, wait_until
+
+from tests.support.ur_process import HOME, PLANE, TURN, UrProcess, wait_until
 
 pytestmark = pytest.mark.usefixtures("at_home")
 

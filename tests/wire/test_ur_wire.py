@@ -10,9 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from ur_process import PORTS, UrProcess, is_free, wait_until
 
-TESTS = str(Path(__file__).resolve().parents[1])
+from tests.support.ur_process import PORTS, UrProcess, is_free, wait_until
+
+ROOT = str(Path(__file__).resolve().parents[2])
 NORMAL = (86, 118, 77, 85, 79, 73, 83, 80)
 
 
@@ -204,7 +205,8 @@ def test_the_process_ends_with_the_parent_that_was_killed() -> None:
         [
             sys.executable,
             "-c",
-            f"import sys, time; sys.path.insert(0, {TESTS!r}); from ur_process import UrProcess\n"
+            f"import sys, time; sys.path.insert(0, {ROOT!r})\n"
+            "from tests.support.ur_process import UrProcess\n"
             "mock = UrProcess().__enter__(); print(mock.host, mock.process.pid, flush=True); time.sleep(60)",
         ],
         stdout=subprocess.PIPE,

@@ -1,13 +1,13 @@
 """Exact presses on a stepped block, and what an estimator would know of them."""
 
 import pytest
-from synthetic_press import BASE_FROM_OBJECT, PRESSES, contact, stepped_block
 
-from experiments.contact_localization.hypotheses import Contact, Noise
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.search import Search
-from harness.sensor import GELSIGHT_R15
-from harness.sim.tactile_calibration import shipped_calibration
+from experiments.contact_localization.posterior.hypotheses import Contact, Noise
+from experiments.contact_localization.posterior.search import Search
+from harness.bench.sensor import GELSIGHT_R15
+from harness.sim.optics.tactile_calibration import shipped_calibration
+from tests.samples.synthetic_press import BASE_FROM_OBJECT, PRESSES, contact, stepped_block
 
 
 @pytest.fixture(scope="session")

@@ -4,21 +4,21 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from synthetic_press import BLOCK, Press, felt, stepped_block
 
 from experiments.contact_localization.answer import AROUND_IMAGES, observe_step
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation, height_map, read_contacts
-from experiments.contact_localization.touch import TouchNoise
-from harness.arrays import ByteArray, FloatArray
-from harness.errors import DataRefused, RecordingDamaged, WrongUse
-from harness.geometry import quaternion_from_rotation, rotation_about, rotation_from_vector, transform
-from harness.reading import Channel, Reading
-from harness.sensor import GELSIGHT_R15
-from harness.sim.optics import Optics
-from harness.sim.tactile_calibration import shipped_calibration
-from harness.square_pixels import made_square
-from harness.step_file import Step, StepRecord
+from experiments.contact_localization.touch.touch import TouchNoise
+from harness.basics.arrays import ByteArray, FloatArray
+from harness.basics.errors import DataRefused, RecordingDamaged, WrongUse
+from harness.basics.geometry import quaternion_from_rotation, rotation_about, rotation_from_vector, transform
+from harness.bench.reading import Channel, Reading
+from harness.bench.sensor import GELSIGHT_R15
+from harness.picture.square_pixels import made_square
+from harness.recording.step_file import Step, StepRecord
+from harness.sim.optics.optics import Optics
+from harness.sim.optics.tactile_calibration import shipped_calibration
+from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
 
 IMAGE = Channel("gel.image", "count", (120, 160, 3), "uint8", "gel")
 POSE = Channel("arm.base_from_flange", "m", (7,), "float64", "base")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from harness.arrays import FloatArray
-from harness.sim.modal_mesh import QuadraticMesh, quadratic_mesh
-from harness.sim.modes import Modes
+from harness.basics.arrays import FloatArray
+from harness.sim.modal.modes import Modes
+from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh
 
 MODES = 6
 

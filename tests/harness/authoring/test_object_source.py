@@ -6,11 +6,11 @@ from typing import Literal
 
 import pytest
 
-from harness.authoring.object_audio import AudioRequest
+from harness.authoring.audio.object_audio import AudioRequest
 from harness.authoring.object_source import PartRequest, provenance_of
-from harness.authoring.object_touch import TouchRequest
-from harness.code_version import closure, content_hash
-from harness.materials import MATERIALS
+from harness.authoring.touch.object_touch import TouchRequest
+from harness.basics.code_version import closure, content_hash
+from harness.basics.materials import MATERIALS
 from harness.objectfile.entries import Provenance, Source
 
 WANTED = PartRequest("block.ply", MATERIALS["wood"], "smoke", "mm", 2e-3, "CC-BY-4.0", 7)

@@ -2,16 +2,16 @@
 
 from collections.abc import Iterator
 
-import browser
 import numpy as np
 import pytest
-from look_bench import box_file, told_look
-from served_look import served
 
-from harness.arrays import FloatArray
+from harness.basics.arrays import FloatArray
 from harness.live_view.frames import LiveFrames
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.vision import open_vision
+from harness.objectfile.vision.vision import open_vision
+from tests.samples.look_bench import box_file, told_look
+from tests.support import browser
+from tests.support.served_look import served
 
 pytestmark = pytest.mark.skipif(browser.found() is None, reason="no Chromium or Chrome is installed")
 

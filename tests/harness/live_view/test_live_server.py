@@ -10,15 +10,15 @@ from pathlib import Path
 from urllib.parse import urlencode
 
 import pytest
-from look_bench import box_file, told_look
-from served_look import served
 
+from harness.basics.errors import WrongUse
 from harness.cli import invoke
-from harness.errors import WrongUse
 from harness.live_view.frames import NAMES, LiveFrames
 from harness.live_view.server import SAID, LiveServer, page
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.vision import open_vision
+from harness.objectfile.vision.vision import open_vision
+from tests.samples.look_bench import box_file, told_look
+from tests.support.served_look import served
 
 
 @pytest.fixture(scope="module")

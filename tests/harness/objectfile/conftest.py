@@ -4,9 +4,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from object_bench import egg_file
 
 from harness.objectfile.file import ObjectFile
+from tests.samples.object_bench import egg_file
 
 
 @pytest.fixture(scope="session")

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
-from object_bench import ENCODING, MODES, egg, normaliser, perceptron, scales
 from onnx import ModelProto, NodeProto, TensorProto, helper, numpy_helper
 
-from harness.arrays import AnyArray
-from harness.errors import DataRefused
-from harness.objectfile.audio_graph import audio_graph
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import DataRefused
+from harness.objectfile.audio.graph import audio_graph
 from harness.objectfile.graph_check import checked_graph, declared
+from tests.samples.object_bench import ENCODING, MODES, egg, normaliser, perceptron, scales
 
 
 def good() -> ModelProto:

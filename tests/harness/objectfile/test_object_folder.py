@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from object_bench import MODES, PROVENANCE, egg, egg_file, egg_part, rewrite
 
-from harness.errors import DataRefused, MeshRefused, WrongUse
-from harness.materials import MATERIALS
-from harness.mesh import Mesh
-from harness.objectfile.audio_part import with_audio
+from harness.basics.errors import DataRefused, MeshRefused, WrongUse
+from harness.basics.materials import MATERIALS
+from harness.basics.mesh import Mesh
+from harness.objectfile.audio.part import with_audio
 from harness.objectfile.description import description_from, description_text
 from harness.objectfile.file import ObjectFile, create_object, with_part
 from harness.objectfile.surface_file import mesh_from_ply, ply_bytes
+from tests.samples.object_bench import MODES, PROVENANCE, egg, egg_file, egg_part, rewrite
 
 FILES = ["mesh.ply", "audio.onnx", "audio_table.npy", "audio_surface.ply"]
 

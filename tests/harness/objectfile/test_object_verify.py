@@ -5,20 +5,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from object_bench import ENCODING, MODES, egg, exchange, normaliser, perceptron, rewrite, scales
 from onnx import TensorProto, helper, load_model_from_string, numpy_helper
 
-from harness.errors import DataRefused
-from harness.mesh import Mesh
-from harness.objectfile.audio import open_audio
-from harness.objectfile.audio_graph import OutputScales, audio_graph
-from harness.objectfile.audio_table import table_bytes
+from harness.basics.errors import DataRefused
+from harness.basics.mesh import Mesh
+from harness.objectfile.audio.audio import open_audio
+from harness.objectfile.audio.graph import OutputScales, audio_graph
+from harness.objectfile.audio.table import table_bytes
 from harness.objectfile.entries import Domain, Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
 from harness.objectfile.file import ObjectFile, file_entry
 from harness.objectfile.runtime import open_network
 from harness.objectfile.surface_file import ply_bytes
-from harness.objectfile.verify import verify
-from harness.objectfile.verify_network import look_at_domain, look_at_self_test
+from harness.objectfile.verify.network import look_at_domain, look_at_self_test
+from harness.objectfile.verify.verify import verify
+from tests.samples.object_bench import ENCODING, MODES, egg, exchange, normaliser, perceptron, rewrite, scales
 
 SAMPLES = Path(__file__).parent / "samples"
 

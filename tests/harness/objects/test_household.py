@@ -3,8 +3,8 @@ import pytest
 import trimesh
 from scipy.spatial import cKDTree
 
-from harness.errors import WrongUse
-from harness.mesh import Mesh
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
 from harness.objects.household import MATERIALS, build
 
 EDGES = (3e-3, 2.2e-3)

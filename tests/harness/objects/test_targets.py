@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.errors import WrongUse
+from harness.basics.errors import WrongUse
 from harness.objects.builtin import MATERIALS, build
 from harness.objects.solid import signed_volume
 from harness.objects.targets import BALL_RADIUS, ball

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.arrays import ByteArray, FloatArray
-from harness.geometry import frame_facing, inverse, transform, translation
-from harness.kinematics import inverse as joints_for
-from harness.mesh import Mesh
+from harness.basics.arrays import ByteArray, FloatArray
+from harness.basics.geometry import frame_facing, inverse, transform, translation
+from harness.basics.mesh import Mesh
+from harness.bench.kinematics import inverse as joints_for
+from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
 from harness.report.data import (
     Answer,
@@ -21,11 +22,10 @@ from harness.report.data import (
     ReportData,
     TwinDeviation,
 )
-from harness.report.props import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.report.figures.props import arm_parts, object_part, sensor_parts, table_and_pedestal
 from harness.report.sound_data import PeakLine, SenseAnswer, Sound, SpectrogramPair, StrikeLine
 from harness.report.values import Missing, Posterior
-from harness.sensor import GELSIGHT_R15
-from harness.sim.height_map import RasterMesh, height_maps, penetration
+from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
 
 BASE_FROM_OBJECT = translation(np.array([-0.5, 0.0, 0.25]))
 GEL_FROM_FLANGE = translation(np.array([0.0, 0.0, -0.12]))

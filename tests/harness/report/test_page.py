@@ -236,6 +236,6 @@ def test_the_same_data_give_the_same_bytes(report_data: ReportData, tmp_path: Pa
 
 
 def test_a_report_needs_no_simulator_of_the_arm() -> None:
-    ask = "import sys, harness.report.page, harness.report.props; print('mujoco' in sys.modules)"
+    ask = "import sys, harness.report.page, harness.report.figures.props; print('mujoco' in sys.modules)"
     answer = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "False"

@@ -6,18 +6,18 @@ import mujoco
 import numpy as np
 import pytest
 
-from harness import kinematics
-from harness.arrays import FloatArray
-from harness.errors import WrongUse
-from harness.geometry import apply, rotation_about, transform, translation
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.geometry import apply, rotation_about, transform, translation
+from harness.basics.mesh import Mesh
+from harness.bench import kinematics
+from harness.bench.sensor import GELSIGHT_R15
+from harness.bench.ur_tables import LINKS, arm_models, arm_table
 from harness.objects.household import build
-from harness.sensor import GELSIGHT_R15
 from harness.twin.arm import add_arm, arm_parts, link_from_previous, reaches
 from harness.twin.bench import TwinBench
 from harness.twin.link_hulls import link_hulls, placed
 from harness.twin.sweep import sweep
-from harness.ur_tables import LINKS, arm_models, arm_table
 
 TOOL = translation(np.array([0.0, 0.0, 0.12]))
 OVER_TABLE = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])  # the gel points down

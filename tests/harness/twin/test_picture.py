@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from harness.geometry import translation
+from harness.basics.geometry import translation
+from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
-from harness.sensor import GELSIGHT_R15
 from harness.twin import picture as drawing
 from harness.twin.bench import TwinBench
 from harness.twin.picture import View, picture

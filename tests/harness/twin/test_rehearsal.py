@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness import kinematics
-from harness.arrays import FloatArray
-from harness.errors import MotionRefused
-from harness.geometry import (
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import MotionRefused
+from harness.basics.geometry import (
     apply,
     frame_facing,
     rotation_about,
@@ -18,9 +17,10 @@ from harness.geometry import (
     transform,
     translation,
 )
-from harness.mesh import Mesh
+from harness.basics.mesh import Mesh
+from harness.bench import kinematics
+from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
-from harness.sensor import GELSIGHT_R15
 from harness.twin.bench import TwinBench
 from harness.twin.compare import compare_arm, compare_contact
 from harness.twin.motion import PlannedContact, approaches, plan_contact, reachable

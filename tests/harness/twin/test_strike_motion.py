@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from harness import kinematics
-from harness.arrays import FloatArray
-from harness.errors import WrongUse
-from harness.geometry import apply, frame_facing, inverse, rotation_from_vector, transform, translation
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.geometry import apply, frame_facing, inverse, rotation_from_vector, transform, translation
+from harness.bench import kinematics
+from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
-from harness.sensor import GELSIGHT_R15
 from harness.twin.bench import TwinBench
 from harness.twin.motion import plan_contact
 from harness.twin.rehearsal import Segment, rehearse

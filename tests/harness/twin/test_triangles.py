@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from harness.arrays import FloatArray
-from harness.geometry import apply, inverse, rotation_from_vector, transform, translation
-from harness.mesh import Mesh
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import apply, inverse, rotation_from_vector, transform, translation
+from harness.basics.mesh import Mesh
 from harness.twin.triangles import ConvexBody, Solid
 
 HALF = np.array([0.03, 0.02, 0.01])

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from daq_bench import Bench, mocked_box, numbered, numbered_source
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mocks.daq.source import Played, Wiring, skewed
+from tests.support.daq_bench import Bench, mocked_box, numbered, numbered_source
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="pseudo-terminals as the mock uses them need Linux"

@@ -6,12 +6,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from mocks.ur.arm.plane import PlaneContact
+from mocks.ur.arm.profiles import trapezoid
 from mocks.ur.controller import Controller
 from mocks.ur.dashboard import TOO_EARLY, Dashboard
 from mocks.ur.hooks import CYCLE, HOME, ControllerConfig, Six
-from mocks.ur.plane import PlaneContact
 from mocks.ur.player import RuntimeState
-from mocks.ur.profiles import trapezoid
 from mocks.ur.safety import SafetyMode
 
 CONFIG = ControllerConfig(host="127.0.0.2")

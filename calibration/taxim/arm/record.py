@@ -1,0 +1,244 @@
+"""Ball presses as an arm recorded them, read back from the run's folder alone."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calibration.taxim.arm.channels import ARM, DESCENT, IMAGE, STATE, UNREST, UNTOUCHED
+from calibration.taxim.arm.moves import ArmScale, arm_scale
+from calibration.taxim.arm.plan import ball_on_gel
+from calibration.taxim.arm.settled import look
+from calibration.taxim.arm.touch_down import middles_at_depth, touch_downs
+from calibration.taxim.pictures import Pictures, Refused, set_digest
+from harness.basics.arrays import ByteArray, FloatArray, block_means, read_only
+from harness.basics.errors import CalibrationRefused, RecordingDamaged
+from harness.basics.geometry import rotation_from_quaternion, transform
+from harness.bench.reading import Reading
+from harness.bench.station_file import station_from_json
+from harness.recording.recording import Recording
+from harness.recording.step_file import StepRecord
+
+NAME = "calibrate-taxim"
+"""Of these runs, in ``run.json``."""
+
+LEAST_BALL = 1.2
+"""Of a measured pitch over the stated one, either way: beyond, the scene's ball or the station is wrong."""
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """One press as it was recorded.
+
+    Attributes:
+        name: for people and for files.
+        image: ``(rows, columns, 3)`` grey levels, pressed.
+        rest: ``(rows, columns, 3)`` grey levels, untouched, just before.
+        descent: ``(pictures, rows, columns, 3)`` grey levels against ``rest``, from the first touch on.
+        on_gel: ``(2,)`` m, where the arm says the ball is on the gel.
+        touched: whether the ball was met.
+        settled: whether the picture came to rest.
+        unrest: grey levels between the last two looks.
+        seconds: that it was waited for.
+    """
+
+    name: str
+    image: FloatArray
+    rest: FloatArray
+    descent: FloatArray
+    on_gel: FloatArray
+    touched: bool
+    settled: bool
+    unrest: float
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPresses:
+    """A run's presses.
+
+    Attributes:
+        pictures: that a calibration is made of; presses without contact or rest are refused in it.
+        taken: every press, in the order they were made.
+        backgrounds: ``(n, rows, columns, 3)`` grey levels, of the untouched gel, in order.
+        ball_radius: m.
+        pitch: m a pixel, as the station states it.
+        sensor: its make.
+        serial: of the sensor.
+        drift: grey levels, the most that the untouched gel as a whole moved from the first background.
+        marked: grey levels, the most that a place of it changed beside the whole.
+    """
+
+    pictures: Pictures
+    taken: tuple[Taken, ...]
+    backgrounds: FloatArray
+    ball_radius: float
+    pitch: float
+    sensor: str
+    serial: str
+    drift: float
+    marked: float
+
+    def scale(self) -> ArmScale:
+        """Pitch, aspect and rotation by the arm.
+
+        Raises:
+            CalibrationRefused: too few presses that began, or a map that cannot be.
+        """
+        ball = self.ball_radius / self.pitch
+        descents = [one.descent for one in self.taken]
+        on_gel = np.array([one.on_gel for one in self.taken])
+        found = arm_scale(touch_downs(descents, ball), on_gel, middles_at_depth(descents, ball))
+        share = found.pitch.value / self.pitch
+        if not 1.0 / LEAST_BALL < share < LEAST_BALL:
+            raise CalibrationRefused(
+                f"by the arm a pixel shows {1e3 * found.pitch.value:.4f} mm, and by the station's sensor "
+                f"{1e3 * self.pitch:.4f} mm: the camera's resolution or the make in the station is wrong"
+            )
+        return found
+
+
+def is_arm_run(folder: Path) -> bool:
+    """Whether a folder is a run of ``calibrate taxim``."""
+    return (folder / "run.json").is_file() and Recording(folder).header.experiment == NAME
+
+
+def read_arm_run(folder: Path) -> ArmPresses:
+    """Everything that a calibration is made of, from a run's folder.
+
+    Raises:
+        CalibrationRefused: another experiment's run, or no background or no press in it yet.
+        RecordingDamaged: a step that does not read back.
+    """
+    recording = Recording(folder)
+    if recording.header.experiment != NAME:
+        raise CalibrationRefused(
+            f"{folder} is a run of {recording.header.experiment}; calibrations are made of {NAME}"
+        )
+    steps = recording.steps()
+    rests = [look(record.readings[IMAGE]) for record in steps if record.step.kind == "background"]
+    taken = tuple(taken_of(record, recording) for record in steps if record.step.kind == "press")
+    if not rests or not taken:
+        raise CalibrationRefused(
+            f"{folder} holds {len(rests)} pictures of the untouched gel and {len(taken)} presses so far; go "
+            f"on with `touchstone calibrate taxim --resume {folder}`"
+        )
+    station, plan = recording.header.station, recording.header.plan
+    drift, marked = _changed(rests[0], [*rests[1:], *(one.rest for one in taken)])
+    return ArmPresses(
+        _pictures(rests[0], taken, folder.name),
+        taken,
+        np.array(rests),
+        float(plan["ball_radius_m"]),
+        float(plan["pitch_m"]),
+        str(plan["sensor"]),
+        str(station["gel"]["serial"]),
+        drift,
+        marked,
+    )
+
+
+def taken_of(record: StepRecord, recording: Recording) -> Taken:
+    """One recorded press."""
+    readings = record.readings
+    touched, settled, seconds = readings[STATE].values[-1]
+    unrest = readings.get(UNREST)
+    rest = look(readings[UNTOUCHED])
+    descent = readings.get(DESCENT)
+    return Taken(
+        press_name(record.step.index),
+        look(readings[IMAGE]),
+        rest,
+        np.zeros((0, *rest.shape)) if descent is None else descent.values.astype(np.float64) - rest,
+        _on_gel(readings[ARM], recording),
+        bool(touched),
+        bool(settled),
+        0.0 if unrest is None else float(unrest.values[-1]),
+        float(seconds),
+    )
+
+
+def press_name(step: int) -> str:
+    """Of a step, counted from 1 as its file's number is not: as an operator counts."""
+    return f"step {step + 1:03d}"
+
+
+def _on_gel(poses: Reading, recording: Recording) -> FloatArray:
+    """``(2,)`` m, mean over the packets that came with the picture."""
+    station = station_from_json(recording.header.station, f"{recording.folder}/run.json")
+    ball = np.asarray(recording.header.plan["ball_in_base_m"], dtype=np.float64)
+    each = [
+        ball_on_gel(transform(rotation_from_quaternion(pose[3:]), pose[:3]), station.flange_from_gel, ball)
+        for pose in poses.values
+    ]
+    if not each:
+        raise RecordingDamaged(f"{recording.folder}: a press without the arm's pose")
+    return np.asarray(np.mean(each, axis=0), dtype=np.float64)
+
+
+def _pictures(rest: FloatArray, taken: tuple[Taken, ...], name: str) -> Pictures:
+    bad = tuple(_refused(taken))
+    kept = [one for one in taken if one.touched and one.settled]
+    if not kept:
+        raise CalibrationRefused(f"{name}: no press met the ball and came to rest; {bad[0].reason}")
+    background = _rounded(rest)
+    images = np.stack([_rounded(one.image) for one in kept])
+    return Pictures(
+        read_only(background),
+        "taken by the arm before the first press",
+        read_only(images),
+        tuple(one.name for one in kept),
+        None,
+        name,
+        set_digest(background, images),
+        bad,
+    )
+
+
+def _refused(taken: tuple[Taken, ...]) -> Iterator[Refused]:
+    for one in taken:
+        reason = why_not(one)
+        if reason is not None:
+            yield reason
+
+
+def why_not(one: Taken) -> Refused | None:
+    """Why a press is no picture of a ball at rest; None where it is."""
+    return why_not_of(one.name, one.touched, one.settled, one.unrest, one.seconds)
+
+
+def why_not_of(name: str, touched: bool, settled: bool, unrest: float, seconds: float) -> Refused | None:
+    """The same of a press's own words: ``unrest`` in grey levels, ``seconds`` that it was waited for."""
+    if not touched:
+        return Refused(
+            name,
+            "no contact",
+            "the gel went down as far as was rehearsed and its picture showed nothing: no ball was there",
+        )
+    if not settled:
+        return Refused(
+            name,
+            "unsettled",
+            f"its picture still changed by {unrest:.1f} grey levels from look to look after "
+            f"{seconds:.1f} s: the gel slips or creeps, or the light flickers",
+        )
+    return None
+
+
+def _changed(first: FloatArray, later: list[FloatArray]) -> tuple[float, float]:
+    """The most that the whole, and that a place beside the whole, moved from the first picture."""
+    pairs = [changed(first, other) for other in later]
+    return max(whole for whole, _ in pairs), max(place for _, place in pairs)
+
+
+def changed(first: FloatArray, later: FloatArray) -> tuple[float, float]:
+    """Grey levels by which the untouched gel as a whole, and beside that any place of it, has changed."""
+    apart = later - first
+    whole = np.median(apart.reshape(-1, 3), axis=0)
+    left = np.abs(block_means(apart - whole, 4))
+    return float(np.abs(whole).max()), float(np.percentile(left.max(axis=2), 99.5))
+
+
+def _rounded(picture: FloatArray) -> ByteArray:
+    return np.asarray(np.round(picture), dtype=np.uint8)

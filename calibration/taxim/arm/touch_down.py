@@ -1,0 +1,159 @@
+"""Where a ball first touched, from pictures of it sinking into the gel: one place a press, in pixels.
+
+What the middle of a contact is cannot be read off its colours. Lights differ from one side of the gel to the
+other, every way to see a middle is drawn aside by that, and more so the larger the contact: over the picture
+it looks like another scale. The pictures of the arm's way down tell: the centre of brightness wanders in
+proportion to the strength of the change, and where that is carried back to no strength at all the ball is a
+point, and lights have nothing left to draw aside. Strength is the root of the change's energy, for small
+contacts proportional to the depth: the depth itself need not be known.
+
+There is more than one way to see it, by how much of the outskirts counts and how many pictures; their
+disagreement is what the answer is uncertain by, beside its scatter.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from harness.basics.arrays import FloatArray
+
+BLUR = 1.0
+"""Pixels, of the change before it is looked at."""
+
+_FIND = 3.0
+"""Pixels of blur within which a contact is looked for."""
+
+_REACH = 1.05
+"""Ball radii around its middle that are looked at."""
+
+_TURNS = 6
+_SOFT = 0.3
+"""Of the strongest change, over which a pixel begins to count: whole pixels would jump by a tenth of one."""
+
+_FAINT = 3.0
+"""Grey levels that noise may reach."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way to see the middle of a contact.
+
+    Attributes:
+        above: share of the strongest change from which on a pixel counts.
+        even: whether pixels that count, count alike; else by how far they are above.
+        pictures: of the way down, from the first touch on.
+        degree: of the polynomial by which the middle is carried back.
+    """
+
+    above: float
+    even: bool
+    pictures: int
+    degree: int = 1
+
+
+WAYS = (
+    Way(0.15, False, 4),
+    Way(0.15, False, 6),
+    Way(0.15, False, 6, degree=2),
+    Way(0.35, True, 4),
+    Way(0.35, True, 6),
+    Way(0.35, True, 6, degree=2),
+)
+"""The first is the one whose presses off the map are named."""
+
+PICTURES = max(way.pictures for way in WAYS)
+"""Of the way down that are worth taking."""
+
+
+def touch_downs(descents: list[FloatArray], ball: float) -> tuple[FloatArray, ...]:
+    """Where each press began, once for every one of ``WAYS``.
+
+    Args:
+        descents: of every press ``(pictures, rows, columns, 3)`` grey levels against the untouched gel, from
+            the first picture that showed the touch on; fewer than three are no way down.
+        ball: radius in pixels.
+
+    Returns:
+        ``(presses, 2)`` pixels (column, row) a way; NaN where a press shows nothing.
+    """
+    seen = [_contact(change, ball) for change in descents]
+    return tuple(np.array([_began(one, way) for one in seen]).reshape(-1, 2) for way in WAYS)
+
+
+def middles_at_depth(descents: list[FloatArray], ball: float) -> FloatArray:
+    """Where the middles are before they are carried back: in the deepest picture, by the first of ``WAYS``.
+
+    Args:
+        descents: as for ``touch_downs``.
+        ball: radius in pixels.
+
+    Returns:
+        ``(presses, 2)`` pixels (column, row), NaN where nothing was seen.
+    """
+    seen = [_contact(change, ball).strength for change in descents]
+    deepest = [_middle(_weight(one[-1], WAYS[0])) if len(one) else np.full(2, np.nan) for one in seen]
+    return np.array(deepest).reshape(-1, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Contact:
+    """The strength of change within reach of one contact: ``(pictures, rows, columns)`` grey levels."""
+
+    strength: FloatArray
+
+
+def _contact(change: FloatArray, ball: float) -> _Contact:
+    strength = np.stack([_strength(picture) for picture in change]) if len(change) else np.zeros((0, 1, 1))
+    if not len(strength):
+        return _Contact(strength)
+    centre = _found(strength[min(2, len(strength) - 1)])
+    y, x = (axis.astype(np.float64) for axis in np.mgrid[: strength.shape[1], : strength.shape[2]])
+    for _ in range(_TURNS):
+        near = np.hypot(x - centre[0], y - centre[1]) <= _REACH * ball
+        strongest = strength[-1] * near
+        weight = np.maximum(strongest - 0.15 * strongest.max(), 0.0)
+        centre = _middle(weight)
+    return _Contact(strength * near)
+
+
+def _strength(change: FloatArray) -> FloatArray:
+    """Root of the energy of all channels: ``(rows, columns)`` grey levels."""
+    energy = (change**2).sum(axis=2)
+    return np.sqrt(np.asarray(gaussian_filter(energy, BLUR), dtype=np.float64))
+
+
+def _found(strength: FloatArray) -> FloatArray:
+    smooth = gaussian_filter(strength, _FIND)
+    row, column = np.unravel_index(int(np.argmax(smooth)), smooth.shape)
+    return np.array([float(column), float(row)])
+
+
+def _began(contact: _Contact, way: Way) -> FloatArray:
+    strength = contact.strength[: way.pictures]
+    if len(strength) < way.degree + 2 or strength[-1].max() < 2.0 * _FAINT:
+        return np.full(2, np.nan)
+    middles = np.array([_middle(_weight(one, way)) for one in strength])
+    total = np.sqrt((strength**2).sum(axis=(1, 2)))
+    share = total / total[-1]
+    powers = np.vander(share, way.degree + 1, increasing=True)
+    # The noise of a middle is as one over its strength: so much less does a faint picture weigh.
+    solved = np.linalg.lstsq(powers * share[:, None], middles * share[:, None], rcond=None)[0]
+    return np.asarray(solved[0], dtype=np.float64)
+
+
+def _weight(strength: FloatArray, way: Way) -> FloatArray:
+    strongest = float(strength.max())
+    floor = max(way.above * strongest, _FAINT)
+    if way.even:
+        return np.clip(0.5 + (strength - floor) / (_SOFT * strongest + 1e-9), 0.0, 1.0)
+    return np.maximum(strength - floor, 0.0)
+
+
+def _middle(weight: FloatArray) -> FloatArray:
+    """Centre of gravity (column, row) in pixels; NaN of nothing."""
+    total = float(weight.sum())
+    if total <= 0.0:
+        return np.full(2, np.nan)
+    rows, columns = (np.arange(size, dtype=np.float64) for size in weight.shape)
+    return np.array([weight.sum(axis=0) @ columns, weight.sum(axis=1) @ rows]) / total

@@ -1,0 +1,1 @@
+"""The shadows that a pressed ball throws."""

@@ -1,0 +1,251 @@
+"""The shadows that a pressed ball throws over the gel, from the same presses as the colours.
+
+What slopes, skirt and light of a press (``light_fit``) leave over is looked at along rays from the rim of
+the contact. A shadow is a wedge that is darker than explained, on the side away from the light of its colour;
+the light is seen in the slopes' own colours, whose dark side is the shadow's. Where a wedge is hardly darker
+than other places are too bright, or lies towards the light, nothing is fitted: it is said why.
+
+Balls of one depth show the shadows of one depth. For others the law of the nine depths that Taxim published
+is taken: samples move out in proportion to the depth of the rim, and darken with its square root. From the
+deepest of those nine it gives the other eight to 3.6 grey levels rms, where the same shadow at every depth is
+16.5 off and no shadow 23.4 (``tests/benchmarks/touch/real_shadows.py law``).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from calibration.taxim.light_fit import Light
+from calibration.taxim.pack import PressPack
+from calibration.taxim.shadow.polar import DIRECTIONS, SAMPLE_STEP, Around, around
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.sim.optics.shadow import ShadowTable
+
+COLOURS = ("red", "green", "blue")
+
+LEAST = 2.0
+"""Grey levels, of a sample of a shadow; and no fewer than twice its own standard error."""
+
+DEEPEST = 4.0
+"""Grey levels that a shadow's darkest sample must have, at the least."""
+
+OVER_MISFIT = 1.5
+"""Times by which it must be darker than anything that far out is too bright: what colours are off by."""
+
+_ASIDE = np.radians(75.0)
+"""From the dark side of the slopes: further off a dark wedge is no shadow of that light."""
+
+_SMOOTH = (1.0, 1.0)
+"""Directions and samples, sigma of the blur of the medians."""
+
+_LEAST_PRESSES = 8
+"""That must show a sample."""
+
+_MEDIAN_ERROR = 1.2533
+"""Of a median against a mean, of Gaussian errors."""
+
+_NONE = 255.0
+"""Grey levels, a sample that darkens nothing."""
+
+ROWS = 8
+"""Of depths."""
+
+
+@dataclass(frozen=True)
+class ColourShadow:
+    """What presses show of one colour's shadow.
+
+    Attributes:
+        colour: red, green or blue.
+        missing: why it is not drawn; empty where it is.
+        falls: rad, direction in the picture (from columns towards rows) in which the shadow falls; the light
+            comes from the other side. NaN where nothing is darker than explained.
+        falls_error: rad, one standard error, by the presses' scatter.
+        dark_side: rad, where slopes turn the gel away from that light.
+        deepest: grey levels by which the darkest sample is darker than explained.
+        deepest_error: one standard error of it.
+        misfit: grey levels by which the brightest sample is brighter than explained: what is no shadow.
+        reach: pixels from the rim within which half of the shadow's darkness lies.
+        wide: rad, of all directions that are shaded.
+    """
+
+    colour: str
+    missing: str
+    falls: float
+    falls_error: float
+    dark_side: float
+    deepest: float
+    deepest_error: float
+    misfit: float
+    reach: float
+    wide: float
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowFit:
+    """The shadows of a set of presses.
+
+    Attributes:
+        table: with depths in pixels of indentation; None where no colour throws any.
+        colours: red, green, blue.
+        rim: pixels of indentation, of the rim that was seen.
+        directions: ``(d,)`` rad, of the rays.
+        typical: ``(3, d, samples)`` grey levels that presses leave over along them, median.
+        cells: ``(3, d, samples)`` what is taken for a shadow.
+    """
+
+    table: ShadowTable | None
+    colours: tuple[ColourShadow, ...]
+    rim: float
+    directions: FloatArray
+    typical: FloatArray
+    cells: BoolArray
+
+    def in_metres(self, pitch: float) -> ShadowTable | None:
+        """The table as simulators take it; ``pitch`` in metres a pixel."""
+        one = self.table
+        if one is None:
+            return None
+        return ShadowTable(
+            one.directions, one.lengths, one.values, pitch * one.shallowest, pitch * one.depth_step
+        )
+
+
+def fit_shadow(pack: PressPack, clean: FloatArray, centres: FloatArray, light: Light) -> ShadowFit:
+    """Fit the shadows of presses.
+
+    Args:
+        pack: the presses.
+        clean: ``(presses, rows, columns, 3)`` grey levels against the untouched gel.
+        centres: ``(presses, 2)`` pixels (column, row), of the balls' axes.
+        light: slopes, skirt and light of the same presses.
+    """
+    seen = around(pack, clean, centres, light)
+    known = np.isfinite(seen.left[..., 0]).sum(axis=0)
+    enough = known >= _LEAST_PRESSES
+    found = [_colour(seen, c, enough, known) for c in range(3)]
+    depth = float(np.interp(seen.starts, np.arange(len(light.profile.height)), light.profile.height).mean())
+    lists = [_lists(seen.seen[..., c], cells, enough) for c, (_, cells) in enumerate(found)]
+    drawn = any(len(one) for colour in lists for one in colour)
+    table = _table(seen.directions, lists, depth) if drawn else None
+    typical = read_only(np.stack([_typical(seen.left[..., c], enough) for c in range(3)]))
+    cells = read_only(np.stack([cells for _, cells in found]))
+    return ShadowFit(table, tuple(colour for colour, _ in found), depth, seen.directions, typical, cells)
+
+
+def _colour(seen: Around, c: int, enough: BoolArray, known: IntArray) -> tuple[ColourShadow, BoolArray]:
+    """What is known of one colour, and which ``(directions, samples)`` its shadow takes."""
+    left = seen.left[..., c]
+    typical = _typical(left, enough)
+    error = _MEDIAN_ERROR * np.nanstd(np.where(enough, left, 0.0), axis=0) / np.sqrt(np.maximum(known, 1))
+    dark_side = _dark_side(seen, c)
+    aside = np.abs(_between(seen.directions, dark_side)) < _ASIDE
+    dark = (typical < -np.maximum(LEAST, 2.0 * error)) & enough & aside[:, None]
+    cells = _largest(dark, typical)
+    misfit = float(typical[enough].max(initial=0.0))
+    if not cells.any():
+        sentence = f"nothing away from the light is darker than explained by {LEAST:g} grey levels or more"
+        nothing = ColourShadow(COLOURS[c], sentence, np.nan, np.nan, dark_side, 0.0, np.nan, misfit, 0.0, 0.0)
+        return nothing, cells
+    darkest = np.unravel_index(np.argmin(np.where(cells, typical, 0.0)), cells.shape)
+    deepest = -float(typical[darkest])
+    sentence = _missing(deepest, float(error[darkest]), misfit)
+    falls, falls_error = _direction(seen, left, cells)
+    return ColourShadow(
+        COLOURS[c],
+        sentence,
+        falls,
+        falls_error,
+        dark_side,
+        deepest,
+        float(error[darkest]),
+        misfit,
+        _reach(typical, cells),
+        float(cells.any(axis=1).sum() * 2.0 * np.pi / DIRECTIONS),
+    ), cells if not sentence else np.zeros_like(cells)
+
+
+def _missing(deepest: float, error: float, misfit: float) -> str:
+    if deepest < max(DEEPEST, 3.0 * error):
+        return (
+            f"its darkest place is {deepest:.1f} grey levels (to {error:.1f}) darker than explained; "
+            f"at least {DEEPEST:g}, and three times the error, are wanted"
+        )
+    if deepest < OVER_MISFIT * misfit:
+        return (
+            f"its darkest place is {deepest:.1f} grey levels darker than explained, and other places are up "
+            f"to {misfit:.1f} too bright: what colours are off by, not to be told from a shadow"
+        )
+    return ""
+
+
+def _typical(values: FloatArray, enough: BoolArray) -> FloatArray:
+    """``(directions, samples)``: the presses' median, smoothed; 0 where too few show a sample."""
+    middle = np.zeros(enough.shape)
+    middle[enough] = np.nanmedian(values[:, enough], axis=0)
+    share = ndimage.gaussian_filter(enough.astype(np.float64), _SMOOTH, mode=("wrap", "nearest"))
+    smooth = ndimage.gaussian_filter(middle, _SMOOTH, mode=("wrap", "nearest"))
+    typical: FloatArray = np.where(enough, smooth / np.maximum(share, 1e-9), 0.0)
+    return typical
+
+
+def _dark_side(seen: Around, c: int) -> float:
+    return float(np.angle(-(seen.within[:, c] * np.exp(1j * seen.directions)).sum()) % (2.0 * np.pi))
+
+
+def _between(directions: FloatArray, other: float) -> FloatArray:
+    turned: FloatArray = (directions - other + np.pi) % (2.0 * np.pi) - np.pi
+    return turned
+
+
+def _largest(dark: BoolArray, typical: FloatArray) -> BoolArray:
+    """The connected part that is darkest in all; the last direction touches the first."""
+    labels, count = ndimage.label(np.concatenate([dark, dark]))
+    if count == 0:
+        return dark
+    twice = np.concatenate([typical, typical])
+    best = 1 + int(np.argmin(ndimage.sum_labels(twice, labels, np.arange(1, count + 1))))
+    first, second = np.split(labels == best, 2)
+    return np.asarray(first | second)
+
+
+def _direction(seen: Around, left: FloatArray, cells: BoolArray) -> tuple[float, float]:
+    """Where the shadow falls, and one standard error of it by the scatter of the presses."""
+    darkness = -left[:, cells]
+    # A press at the border shows a part of the wedge; of the rest it is taken to be like the others.
+    darkness = np.where(np.isfinite(darkness), darkness, np.nanmean(darkness, axis=0))
+    each = darkness @ np.exp(1j * seen.directions)[np.nonzero(cells)[0]]
+    mean = each.mean()
+    across = (each * np.conj(mean)).imag / np.abs(mean) ** 2
+    error = float(across.std(ddof=1) / np.sqrt(len(each)))
+    return float(np.angle(mean) % (2.0 * np.pi)), error
+
+
+def _reach(typical: FloatArray, cells: BoolArray) -> float:
+    by_sample = np.where(cells, -typical, 0.0).sum(axis=0)
+    share = np.cumsum(by_sample) / by_sample.sum()
+    return float(SAMPLE_STEP * np.interp(0.5, share, np.arange(1, len(share) + 1)))
+
+
+def _lists(seen: FloatArray, cells: BoolArray, enough: BoolArray) -> list[FloatArray]:
+    """Of every direction the grey levels that its shadow holds colours down to, outwards from the rim."""
+    level = np.where(cells, _typical(seen, enough), _NONE)
+    ends = [1 + int(np.flatnonzero(one)[-1]) if one.any() else 0 for one in cells]
+    return [level[d, :end] for d, end in enumerate(ends)]
+
+
+def _table(directions: FloatArray, lists: list[list[FloatArray]], depth: float) -> ShadowTable:
+    """Lists of the rim that was seen, and of shallower ones by the published law."""
+    shares = (np.arange(ROWS) + 0.5) / (ROWS - 0.5)
+    kept = [[[_at_depth(one, share) for share in shares] for one in colour] for colour in lists]
+    lengths = np.array([[[len(row) for row in one] for one in colour] for colour in kept], dtype=np.int64)
+    values = np.concatenate([row for colour in kept for one in colour for row in one])
+    return ShadowTable(directions, read_only(lengths), read_only(values), 0.0, depth / (ROWS - 0.5))
+
+
+def _at_depth(one: FloatArray, share: float) -> FloatArray:
+    """A list of a rim at a share of the depth: nearer by that, and darker by less, by its square root."""
+    at = np.rint(np.arange(int(np.ceil(share * len(one)))) / share).astype(np.int64)
+    level = one[np.minimum(at, len(one) - 1)]
+    return np.where(level < _NONE, np.sqrt(share) * level, _NONE)

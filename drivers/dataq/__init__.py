@@ -1,0 +1,1 @@
+"""A DATAQ acquisition box, and the impact hammer on it."""

@@ -1,0 +1,1 @@
+"""A microphone on a sound card."""

@@ -1,0 +1,114 @@
+"""A microphone's newest blocks, as the sound library handed them over."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.basics.arrays import AnyArray
+from harness.bench.microphone_take import BAD
+
+
+@dataclass(frozen=True)
+class Block:
+    """What one callback handed over.
+
+    Attributes:
+        first: number of its first sample since the stream began.
+        arrived: s on the bench clock, at the callback.
+        age: s from its first sample's conversion to the callback, as PortAudio states it.
+        flags: of `harness.bench.microphone_take`.
+        counts: the bytes of its samples, all channels.
+    """
+
+    first: int
+    arrived: float
+    age: float
+    flags: int
+    counts: bytes
+
+
+@dataclass(frozen=True)
+class Format:
+    """How a microphone's bytes are read.
+
+    Attributes:
+        rate: samples a second, nominal.
+        bits: 24 or 32, of one sample.
+        channels: interleaved in a block.
+        channel: which of them is the microphone, from 0.
+        block: samples in a block.
+        latency: s by which the card's times are late, as measured; taken off.
+    """
+
+    rate: int
+    bits: int
+    channels: int
+    channel: int
+    block: int
+    latency: float = 0.0
+
+    @property
+    def full_scale(self) -> int:
+        """The largest count; the smallest is one further from zero."""
+        return (1 << (self.bits - 1)) - 1
+
+    def counts(self, raw: bytes) -> AnyArray:
+        """``(samples,)`` int32 of the microphone's channel; 24-bit samples keep their sign."""
+        if self.bits == 32:
+            samples = np.frombuffer(raw, np.dtype("=i4"))
+        else:
+            wide = np.zeros((len(raw) // 3, 4), np.uint8)
+            wide[:, 1:] = np.frombuffer(raw, np.uint8).reshape(-1, 3)
+            samples = wide.view(np.dtype("<i4"))[:, 0] >> 8
+        return samples.reshape(-1, self.channels)[:, self.channel].astype(np.int32)
+
+
+class Blocks:
+    """The newest blocks of a stream; filled by the sound library's thread, read by any.
+
+    Args:
+        capacity: how many blocks are kept.
+        size: samples in a block.
+
+    Attributes:
+        bad: blocks since opening that must not be used.
+    """
+
+    def __init__(self, capacity: int, size: int) -> None:
+        self._kept: deque[Block] = deque(maxlen=capacity)
+        self._size = size
+        # Re-entrant, so that what is waited for may look at the blocks.
+        self._arrived = threading.Condition(threading.RLock())
+        self._total = 0
+        self.bad = 0
+
+    def add(self, block: Block) -> None:
+        """Keep a block and wake whoever waits for one."""
+        with self._arrived:
+            self.bad += bool(block.flags & BAD)
+            self._total += 1
+            self._kept.append(block)
+            self._arrived.notify_all()
+
+    @property
+    def total(self) -> int:
+        """Blocks that have come since opening, kept or not."""
+        return self._total
+
+    def newest(self) -> Block | None:
+        """The last block, if there is one."""
+        with self._arrived:
+            return self._kept[-1] if self._kept else None
+
+    def since(self, first: int) -> list[Block]:
+        """The kept blocks that hold sample number ``first`` or later ones, oldest first."""
+        with self._arrived:
+            return [block for block in self._kept if block.first + self._size > first]
+
+    def wait(self, enough: Callable[[], bool], timeout: float) -> bool:
+        """Wait until ``enough()``, or ``timeout`` s; looked at after every block."""
+        with self._arrived:
+            return self._arrived.wait_for(enough, timeout)

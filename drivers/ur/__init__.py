@@ -1,0 +1,1 @@
+"""A Universal Robots arm: limits, motion, state, and the process that owns ur_rtde."""

@@ -1,0 +1,286 @@
+"""The process that owns ur_rtde: ``python -m drivers.ur.child`` with frames on its standard streams.
+
+The parent may kill it at any moment: the controller's watchdog then stops the arm. When the
+parent dies, its end of the pipe closes, and this process stops the arm and ends.
+"""
+
+import argparse
+import contextlib
+import os
+import signal
+import sys
+import time
+from typing import Final
+
+from drivers.ur import dashboard, pipe
+from drivers.ur import state as ur_state
+from drivers.ur.link import PATIENCE, Link
+from drivers.ur.motion import Motion, Outcome
+from drivers.ur.parent import Parent
+from drivers.ur.safety import require_loopback
+from drivers.ur.stream import Stream
+from drivers.ur.watchdog import Watchdog
+from harness.basics.clock import now
+from harness.basics.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
+
+TICK: Final = 0.002  # s between looks at a motion
+REST_TICK: Final = 0.01
+# In units of the watchdog's patience, 0.1 s at a real bench:
+STALE: Final = 0.5  # without a packet: nothing is commanded, the watchdog is not kicked
+LOST_MOVING: Final = 5.0  # without a packet during a motion: give up
+LOST_AT_REST: Final = 20.0
+BEAT_LATE: Final = 3.0  # without a heartbeat during a motion: stop
+
+
+class Child:
+    """Serves requests one by one; one motion at a time; a stop request at any moment."""
+
+    def __init__(self, link: Link, requests: int, replies: int) -> None:
+        self._link = link
+        self._parent = Parent(requests, replies, self._stop_hard)
+        self._stream = Stream(link, self._parent.send_packet, self._parent.wake)
+        self._motion: Motion | None = None
+        self._latched: TouchstoneError | None = None
+        self._watchdog = Watchdog(link)
+        self._patience = link.patience
+
+    def run(self, model: str) -> None:
+        """Connect, then serve until the parent closes the pipe or the link is lost."""
+        self._parent.listen()
+        try:
+            controller = self._link.connect(model)
+            self._stream.start()
+            self._link.arm()
+        except TouchstoneError as error:
+            self._parent.refuse(0, error)
+            return
+        self._watchdog.start()
+        self._parent.answer(0, [controller.model, controller.serial, controller.version])
+        try:
+            while not self._parent.closed:
+                self._tick()
+        except (TouchstoneError, RuntimeError) as error:
+            self._give_up(error)
+        else:
+            self._leave()
+
+    def _tick(self) -> None:
+        message = self._parent.next(TICK if self._motion else REST_TICK)
+        if message is not None:
+            self._serve(message)
+        self._check_link()
+        self._check_safety()
+        self._check_script()
+        if self._motion is not None:
+            self._watch(self._motion)
+        self._kick()
+
+    # Requests
+
+    def _serve(self, message: pipe.Message) -> None:
+        try:
+            match message["do"]:
+                case "stop":
+                    self._stop(message)
+                case "move":
+                    self._start(message)
+                case "zero_force":
+                    self._zero_force()
+                    self._parent.answer(message["id"], True)
+                case "tool_output":
+                    self._link.set_tool_output(message["index"], message["on"])
+                    self._parent.answer(message["id"], True)
+                case unknown:
+                    raise BenchFault(f"the arm's process was asked to '{unknown}', which it does not know")
+        except TouchstoneError as error:
+            self._parent.refuse(message["id"], error)
+
+    def _stop(self, message: pipe.Message) -> None:
+        if self._motion is not None:
+            self._motion.stop(
+                self._link, Outcome(error=SafetyStop(f"{self._motion.what} was stopped by request"))
+            )
+        self._parent.answer(message["id"], True)
+
+    def _start(self, message: pipe.Message) -> None:
+        if message["epoch"] < self._parent.epoch:
+            raise SafetyStop("a stop was requested before this motion began; it was not sent")
+        self._require_calm("move")
+        motion = Motion.from_message(message, self._stream.force)
+        if motion.pose is not None and not self._reachable(motion.pose, motion.near):
+            raise BenchFault(
+                f"{motion.what}: the controller finds no joints for the target; nothing was moved"
+            )
+        self._parent.expect_beats()
+        self._stream.watch(motion.guard)
+        self._stream.moving = True
+        self._motion = motion
+        try:
+            motion.start(self._link)
+        except TouchstoneError:
+            self._end_motion()
+            raise
+
+    def _reachable(self, pose: list[float], near: list[float]) -> bool:
+        """Ask the controller; once more where this computer's own delay ended the script that was asked.
+
+        Nothing has begun to move yet, so asking twice does nothing twice.
+        """
+        try:
+            return self._link.reachable(pose, near)
+        except RuntimeError:
+            self._check_script()
+            if not self._link.program_running():
+                raise
+            return self._link.reachable(pose, near)
+
+    def _zero_force(self) -> None:
+        self._require_calm("zero the force sensor")
+        if not self._comes_to_rest(0.2):
+            raise BenchFault("the force sensor was not zeroed: the arm is not at rest; wait and ask again")
+        self._link.zero_force()
+
+    def _require_calm(self, what: str) -> None:
+        if self._latched is not None:
+            raise self._latched
+        if self._motion is not None:
+            raise BenchFault(f"the arm was asked to {what} during a motion; wait for it to end")
+        if not self._becomes_fresh(LOST_MOVING * self._patience):
+            raise BenchFault(
+                f"the arm was asked to {what}, but its state is {1e3 * self._stream.age:.0f} ms old "
+                f"(limit {1e3 * STALE * self._patience:.0f} ms); check this computer's load and the network"
+            )
+
+    def _comes_to_rest(self, seconds: float) -> bool:
+        """Whether the arm is at rest within some seconds; the watchdog is kicked meanwhile."""
+        end = now() + seconds
+        while not self._stream.at_rest and now() < end:
+            self._kick()
+            time.sleep(TICK)
+        return self._stream.at_rest
+
+    def _becomes_fresh(self, seconds: float) -> bool:
+        """Whether the arm's state is, or within some seconds becomes, fresh enough to command on."""
+        end = now() + seconds
+        while not self._is_fresh() and now() < end:
+            time.sleep(TICK)
+        return self._is_fresh()
+
+    def _is_fresh(self) -> bool:
+        return self._stream.age <= STALE * self._patience
+
+    # What goes on meanwhile
+
+    def _watch(self, motion: Motion) -> None:
+        late = self._parent.late
+        if late > BEAT_LATE * self._patience and not motion.stopping:
+            text = (
+                f"{motion.what} was stopped: the program that asked for it fell behind by {1e3 * late:.0f} ms"
+            )
+            motion.stop(self._link, Outcome(error=BenchFault(text)))
+        outcome = motion.look(self._link, self._stream)
+        if outcome is None:
+            return
+        self._end_motion()
+        if outcome.latch:
+            self._latched = outcome.error
+        if outcome.error is not None:
+            self._parent.refuse(motion.id, outcome.error)
+        else:
+            self._parent.answer(motion.id, outcome.value)
+
+    def _end_motion(self) -> None:
+        self._motion = None
+        self._stream.moving = False
+        self._stream.watch(None)
+
+    def _check_safety(self) -> None:
+        """Latch a stop of the controller's, and end the program, so that no release resumes the motion."""
+        safety = self._stream.safety
+        if safety in ("normal", "reduced") or isinstance(self._latched, ProtectiveStop):
+            return
+        during = f"during {self._motion.what}" if self._motion is not None else "at rest"
+        self._latched = ProtectiveStop(ur_state.stopped_by_controller(self._stream.newest, during))
+        if self._motion is not None:
+            self._parent.refuse(self._motion.id, self._latched)
+            self._end_motion()
+        with contextlib.suppress(BenchFault):
+            self._link.halt()
+
+    def _check_script(self) -> None:
+        """Start the script again if this computer's own delay let the watchdog end it; at rest only.
+
+        A motion it was cut out of has failed, and was told so.
+        """
+        self._watchdog.look()
+        if self._watchdog.bit and not self._motion and not self._latched and self._stream.at_rest:
+            self._link.revive()
+            self._watchdog.start()
+            self._stream.restarts += 1
+
+    def _check_link(self) -> None:
+        if self._stream.failure:
+            raise BenchFault(self._stream.failure)
+        limit = (LOST_MOVING if self._motion else LOST_AT_REST) * self._patience
+        if self._stream.age > limit:
+            raise BenchFault(
+                f"no state arrived from the arm for {self._stream.age:.1f} s (limit {limit:g} s); "
+                "check the network cable of the control box"
+            )
+
+    def _kick(self) -> None:
+        if self._is_fresh():
+            self._watchdog.kick()
+
+    # The end
+
+    def _give_up(self, error: Exception) -> None:
+        try:
+            # Before the halt, which ends the program whose state says why.
+            fault = error if isinstance(error, TouchstoneError) else self._named(error)
+        finally:
+            # Nothing that words may run into keeps the arm from being halted.
+            with contextlib.suppress(BenchFault):
+                self._link.halt()
+        self._parent.refuse(-1, fault)
+
+    def _named(self, error: Exception) -> TouchstoneError:
+        """What the controller's state says about a call of the library that failed."""
+        cause = self._link.why()
+        return type(cause)(f"ur_rtde failed ({error}); {cause}")
+
+    def _stop_hard(self) -> None:
+        """The main thread is stuck in the library, and nobody is left to kill it."""
+        with contextlib.suppress(BenchFault):
+            dashboard.stop(self._link.address)
+        os._exit(1)
+
+    def _leave(self) -> None:
+        """Stop, end the script. Sockets are closed by the exit: disconnecting takes 0.5 s an interface."""
+        with contextlib.suppress(TouchstoneError, RuntimeError):
+            if self._motion is not None:
+                self._motion.stop(self._link, Outcome(error=SafetyStop("the program ended")))
+                self._comes_to_rest(0.5)
+            self._link.end_script()
+
+
+def main() -> None:
+    """Serve one arm until standard input closes."""
+    parser = argparse.ArgumentParser(description="Owns ur_rtde for one arm; started by the arm driver.")
+    parser.add_argument("--address", required=True)
+    parser.add_argument("--model", required=True)
+    parser.add_argument("--rate", type=float, required=True)
+    parser.add_argument("--patience", type=float, default=PATIENCE)
+    arguments = parser.parse_args()
+    require_loopback(arguments.address)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
+    replies = os.dup(sys.stdout.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # ur_rtde prints; that must not enter the frames
+    pipe.prepare_to_write(replies)
+    child = Child(Link(arguments.address, arguments.rate, arguments.patience), sys.stdin.fileno(), replies)
+    child.run(arguments.model)
+    os._exit(0)  # the library's destructors race with its threads and crash
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""From packets of the arm's stream to states and readings; UR's rotation vectors end here."""
+
+from typing import Final
+
+import numpy as np
+
+from drivers.ur import pipe
+from drivers.ur import words as ur_words
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import BenchFault
+from harness.basics.geometry import (
+    quaternion_from_rotation,
+    rotation_from_vector,
+    transform,
+    vector_from_rotation,
+)
+from harness.bench import kinematics
+from harness.bench.device import ArmState
+from harness.bench.reading import Channel, Reading
+
+SAME_POSE: Final = 5e-3  # m between the model's flange and the controller's
+
+
+def pose_vector(base_from_flange: FloatArray) -> list[float]:
+    """UR's (x, y, z, rx, ry, rz) of a ``(4, 4)`` pose: metres and a rotation vector in rad."""
+    return [*base_from_flange[:3, 3].tolist(), *vector_from_rotation(base_from_flange[:3, :3]).tolist()]
+
+
+def pose_quaternion(pose: FloatArray) -> FloatArray:
+    """``(7,)`` x, y, z, qw, qx, qy, qz of UR's ``(6,)`` pose vector."""
+    return np.concatenate([pose[:3], quaternion_from_rotation(rotation_from_vector(pose[3:]))])
+
+
+def arm_state(packet: FloatArray) -> ArmState:
+    """The state that a ``(pipe.WIDTH,)`` packet holds."""
+    fields = pipe.FIELDS
+    pose = packet[fields["pose"]]
+    return ArmState(
+        time=float(packet[0]),
+        joints=packet[fields["joints"]],
+        joint_speeds=packet[fields["joint_speeds"]],
+        base_from_flange=transform(rotation_from_vector(pose[3:]), pose[:3]),
+        wrench=packet[fields["wrench"]],
+        safety=ur_words.safety_words(int(packet[fields["safety_bits"]][0])),
+        moving=bool(packet[fields["moving"]][0]),
+    )
+
+
+def readings(packets: FloatArray, rate: float) -> tuple[Reading, ...]:
+    """Joints, flange poses, wrenches and the controller's clock of ``(n, pipe.WIDTH)`` packets."""
+    poses = np.array([pose_quaternion(row) for row in packets[:, pipe.FIELDS["pose"]]]).reshape(-1, 7)
+    columns = (
+        ("arm.joints", "rad", "", packets[:, pipe.FIELDS["joints"]]),
+        ("arm.base_from_flange", "m, 1", "base", poses),
+        ("arm.wrench", "N, N m", "base", packets[:, pipe.FIELDS["wrench"]]),
+        ("arm.controller_time", "s", "", packets[:, pipe.FIELDS["controller_time"]][:, 0]),
+    )
+    return tuple(
+        Reading(Channel(name, unit, values.shape[1:], "float64", frame, rate), packets[:, 0], values)
+        for name, unit, frame, values in columns
+    )
+
+
+def force(packet: FloatArray) -> float:
+    """N, the length of a packet's force."""
+    return float(np.linalg.norm(packet[pipe.FIELDS["wrench"]][:3]))
+
+
+def detail(packet: FloatArray) -> str:
+    """Safety state and anything unusual since opening, in words."""
+    words = ur_words.safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))
+    restarts = int(packet[pipe.FIELDS["restarts"]][0])
+    late = f"; the control script was restarted {restarts} times after a delay at rest" if restarts else ""
+    return f"safety {words}{late}"
+
+
+def stopped_by_controller(packet: FloatArray, during: str) -> str:
+    """What an operator must know of a stop that only they may release."""
+    x, y, z = 1e3 * packet[pipe.FIELDS["pose"]][:3]
+    fx, fy, fz = packet[pipe.FIELDS["wrench"]][:3]
+    words = ur_words.safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))
+    return (
+        f"the controller stopped the arm {during}: {words}; flange at ({x:.1f}, {y:.1f}, {z:.1f}) mm in "
+        f"base, force ({fx:.1f}, {fy:.1f}, {fz:.1f}) N. Look for the cause, free the arm and release the "
+        "stop at the pendant, then start again; nothing resumes by itself"
+    )
+
+
+def require_model(model: str, address: str, state: ArmState) -> None:
+    """The station's model, the controller's pose and its zero tool offset agree, or ``BenchFault``."""
+    expected = kinematics.forward(model, state.joints)
+    off = float(np.linalg.norm(expected[:3, 3] - state.base_from_flange[:3, 3]))
+    if off > SAME_POSE:
+        raise BenchFault(
+            f"the flange of a {model} with these joints is {1e3 * off:.1f} mm from where the controller at "
+            f"{address} says it is (limit {1e3 * SAME_POSE:g} mm): the station file names another model, or "
+            "the controller keeps a tool offset"
+        )

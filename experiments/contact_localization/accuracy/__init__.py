@@ -1,0 +1,1 @@
+"""The dials of a localization: cases, cost curve, budget, table."""

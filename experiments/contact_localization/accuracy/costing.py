@@ -1,0 +1,177 @@
+"""Measure what the estimate's accuracy costs: runs performed once, answered at every setting."""
+
+import datetime as dt
+import json
+import os
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from experiments.contact_localization.accuracy.cases import Case, Say, performed, workers_of
+from experiments.contact_localization.accuracy.dials import setting_name
+from experiments.contact_localization.accuracy.solving import (
+    ESTIMATOR,
+    PROGRAM,
+    Models,
+    Setting,
+)
+from experiments.contact_localization.accuracy.table_cell import Cell
+from harness.basics.errors import TouchstoneError
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
+from harness.cost.curve import Curve, Point, Sample
+from harness.cost.file import sample_from, sample_json
+from harness.cost.provenance import code, machine
+from harness.recording.recording import write_text_whole
+
+_SCHEMA = 2
+"""Of a run's file; one of another schema is measured again."""
+
+_ROUND = 24
+"""Runs performed side by side, then answered one at a time while nothing else runs."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """What is to be measured.
+
+    Attributes:
+        cells: the runs.
+        settings: of the dials.
+        contacts: how many contacts are used, each a condition of its own.
+        fewer: settings that are measured with fewer contacts than the most; None for all of them.
+    """
+
+    cells: tuple[Cell, ...]
+    settings: tuple[Setting, ...]
+    contacts: tuple[int, ...]
+    fewer: tuple[Setting, ...] | None = None
+
+    @property
+    def asked(self) -> tuple[tuple[int, Setting], ...]:
+        """The answers a run is asked for: how many contacts, and the setting."""
+        fewer = self.settings if self.fewer is None else self.fewer
+        most = max(self.contacts)
+        return tuple((n, each) for n in self.contacts for each in (self.settings if n == most else fewer))
+
+    @property
+    def each(self) -> int:
+        """Answers a run is asked for."""
+        return len(self.asked)
+
+
+def measure(
+    work: Work,
+    scenes: Mapping[str, SceneFile],
+    station: Station,
+    folder: Path,
+    say: Say,
+    workers: int = 1,
+    models: MutableMapping[str, Models] | None = None,
+) -> Iterator[tuple[Cell, list[Point]]]:
+    """Perform and answer every run that is not on the disk yet; one file a run.
+
+    Args:
+        work: the runs and settings.
+        scenes: by object.
+        station: a mocked one.
+        folder: of the files; those of another machine or of other code are measured again.
+        say: told of a run that cannot be planned or performed, and left out.
+        workers: processes that perform runs; answers are timed in this one, while the others rest.
+        models: by object, taken from and added to.
+
+    Yields:
+        Each run with its points, of one sample each.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    models = {} if models is None else models
+    stamp = {"schema": _SCHEMA, "machine": machine(), "sha256": code(ESTIMATOR)["sha256"]}
+    with workers_of(workers) as pool:
+        for first in range(0, len(work.cells), _ROUND):
+            cells = work.cells[first : first + _ROUND]
+            known = {cell: _kept(folder / f"{cell.name}.json", stamp, work) for cell in cells}
+            missing = [cell for cell, points in known.items() if points is None]
+            cases = performed(missing, scenes, station, pool, models, say)
+            for cell in cells:
+                points = known[cell]
+                if points is None:
+                    points = _measured(cases.pop(cell), work, say) if cell in cases else []
+                    tree: dict[str, Any] = {**stamp, "work": _work_json(work)}
+                    tree["points"] = [_one_json(p) for p in points]
+                    write_text_whole(folder / f"{cell.name}.json", json.dumps(tree, allow_nan=False))
+                yield cell, points
+
+
+def _measured(case: Case, work: Work, say: Say) -> list[Point]:
+    condition = {"spacing": case.cell.spacing, "gap": case.cell.gap, "yaw": case.cell.yaw}
+    asked = [(count, setting) for count, setting in work.asked if count <= len(case.run.observations)]
+    points = []
+    try:
+        for count, setting in asked:
+            sample = case.sample(setting, count)
+            points.append(Point(setting_name(setting), setting, {**condition, "contacts": count}, (sample,)))
+    except TouchstoneError as error:
+        say(f"{case.cell.name} was not answered: {error}")
+        return []
+    return points
+
+
+def gathered(points: Sequence[Point], title: str, notes: Sequence[str] = ()) -> Curve:
+    """One curve of the points of many runs."""
+    merged: dict[tuple[Any, ...], list[Point]] = {}
+    for point in points:
+        merged.setdefault(_key(point), []).append(point)
+    return Curve(
+        program=PROGRAM,
+        points=tuple(_joined(same) for same in merged.values()),
+        machine=machine(),
+        code=code(ESTIMATOR),
+        made=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        title=title,
+        notes=(f"load of the machine at the end: {os.getloadavg()[0]:.1f}", *notes),
+    )
+
+
+def joined(old: Curve, new: Curve) -> Curve:
+    """The new measurements beside the old ones of the same machine and code; the new ones win."""
+    merged = gathered([*new.points, *old.points], new.title)
+    return replace(merged, made=new.made, notes=new.notes)
+
+
+def _key(point: Point) -> tuple[Any, ...]:
+    return tuple(sorted(point.levels.items())), tuple(sorted(point.condition.items()))
+
+
+def _joined(same: Sequence[Point]) -> Point:
+    samples: dict[str, Sample] = {}
+    for point in same:
+        for sample in point.samples:
+            samples.setdefault(sample.run, sample)
+    return replace(same[0], samples=tuple(samples.values()))
+
+
+def _kept(path: Path, stamp: Mapping[str, Any], work: Work) -> list[Point] | None:
+    """The points of a run measured before, by this machine, this code and for the same work."""
+    if not path.exists():
+        return None
+    tree = json.loads(path.read_text(encoding="utf-8"))
+    same = all(tree.get(name) == value for name, value in {**stamp, "work": _work_json(work)}.items())
+    return [_one_from(point) for point in tree["points"]] if same else None
+
+
+def _work_json(work: Work) -> dict[str, Any]:
+    return {"asked": [[count, dict(setting)] for count, setting in work.asked]}
+
+
+def _one_json(point: Point) -> dict[str, Any]:
+    return {
+        "name": point.name,
+        "levels": dict(point.levels),
+        "condition": dict(point.condition),
+        "sample": sample_json(point.samples[0]),
+    }
+
+
+def _one_from(tree: Mapping[str, Any]) -> Point:
+    return Point(str(tree["name"]), tree["levels"], tree["condition"], (sample_from(tree["sample"]),))

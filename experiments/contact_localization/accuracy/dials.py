@@ -1,0 +1,199 @@
+"""Every dial of a localization run: the estimator's own and the simulation's, as one accuracy."""
+
+from collections.abc import Iterator, Mapping
+
+from experiments.contact_localization.posterior.levels import Levels, Senses
+from harness.basics.errors import WrongUse
+from harness.effects.accuracy import Accuracy, Knob, Level
+from harness.effects.catalogue import EFFECTS
+from harness.effects.effect import knobs_of
+from harness.effects.sound_effects import EDGE, MODES, SHAPES
+from harness.effects.touch_file_effects import SHAPES as DRAWN
+
+METHOD = Knob(
+    "localization.method", ("particle", "grid"), "", "method", "grid", "the paper's filter, or ours"
+)
+SENSES = Knob(
+    "localization.senses",
+    ("touch", "audio", "both"),
+    "",
+    "method",
+    "both",
+    "what is used of what was recorded",
+)
+SPACING = Knob(
+    "localization.spacing", (4e-3, 3e-3, 2e-3, 1.5e-3), "m", "number", 2e-3, "between surface samples"
+)
+ROUNDS = Knob(
+    "localization.rounds", (0, 1, 2, 3, 5), "rounds", "number", 5, "most refinements after the grid"
+)
+SAMPLES = Knob(
+    "localization.samples", (600, 1500, 3000, 6000), "", "number", 3000, "hypotheses a refinement draws"
+)
+PARTICLES = Knob(
+    "localization.particles", (300, 1000, 3000, 10_000), "", "number", 1000, "of the paper's filter"
+)
+BLOCK = Knob("localization.block", (16, 8), "pixels", "number", 8, "tactile pixels averaged, each way")
+
+KNOBS = (SENSES, METHOD, SPACING, ROUNDS, SAMPLES, PARTICLES, BLOCK, *knobs_of(EFFECTS))
+
+SIMULATED = (MODES, EDGE, SHAPES)
+"""Dials of the simulation that an estimate depends on: the modes that its sounds are compared with.
+Its other terms are its own, and only the comparison of a report draws simulated readings."""
+
+
+def _grid(senses: str, spacing: float, rounds: int, samples: int, block: int) -> dict[str, Level]:
+    dials = {SPACING.name: spacing, ROUNDS.name: rounds, SAMPLES.name: samples, BLOCK.name: block}
+    return {SENSES.name: senses, METHOD.name: "grid", **dials}
+
+
+def _particles(number: int, spacing: float, block: int) -> dict[str, Level]:
+    dials = {SPACING.name: spacing, PARTICLES.name: number, BLOCK.name: block}
+    return {SENSES.name: "touch", METHOD.name: "particle", **dials}
+
+
+def _by_sound(spacing: float) -> dict[str, Level]:
+    return {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: spacing}
+
+
+_COARSEST = (4e-3, 0, 3000, 16)
+_DEFAULT = (2e-3, 5, 3000, 8)
+_GRIDS = (
+    _COARSEST,
+    (3e-3, 0, 3000, 16),
+    (2e-3, 0, 3000, 16),
+    (2e-3, 0, 3000, 8),
+    (3e-3, 1, 1500, 16),
+    (2e-3, 1, 1500, 16),
+    (2e-3, 5, 1500, 8),
+    _DEFAULT,
+    (1.5e-3, 5, 6000, 8),
+)
+"""Spacing, rounds, samples and block: from the cheapest to the finest, where the front is likely to lie."""
+
+FINEST = _grid("both", 1.5e-3, 5, 6000, 8)
+"""What is asked after an answer, to say what more time would have given."""
+
+
+def chosen(texts: list[str], start: Mapping[str, Level] | None = None) -> Accuracy:
+    """The default accuracy but for what an operator wrote, for example ``["localization.rounds=1"]``.
+
+    Args:
+        texts: what was written.
+        start: levels to turn from instead of the default ones.
+
+    Raises:
+        WrongUse: an unknown dial or level, and the nearest is named; a touch that no run carries.
+    """
+    accuracy = Accuracy.default(KNOBS).with_(start or {}).with_texts(texts)
+    if accuracy[DRAWN.name] != DRAWN.default:
+        raise WrongUse(
+            f"{DRAWN.name} = {accuracy[DRAWN.name]}: a run is compared with the mesh that it carries, and it "
+            f"carries no ObjectFile's touch; take {DRAWN.name} = {DRAWN.default}, or draw a press with "
+            "`touchstone object render touch`"
+        )
+    return accuracy
+
+
+def levels_of(accuracy: Accuracy) -> Levels:
+    """What the estimator takes."""
+    senses: dict[Level, Senses] = {"touch": "touch", "audio": "audio", "both": "both"}
+    return Levels(
+        senses=senses[accuracy[SENSES.name]],
+        method="particle" if accuracy[METHOD.name] == "particle" else "grid",
+        spacing=float(accuracy[SPACING.name]),
+        particles=int(accuracy[PARTICLES.name]),
+        block=int(accuracy[BLOCK.name]),
+        rounds=int(accuracy[ROUNDS.name]),
+        samples=int(accuracy[SAMPLES.name]),
+    )
+
+
+def settings(thorough: bool = False, sound: bool = True, objectfile: bool = False) -> list[dict[str, Level]]:
+    """Choices of levels to measure, each once: by every sense, from the cheapest to the finest.
+
+    Args:
+        thorough: also every single dial turned from the default, by each sense.
+        sound: whether the runs were heard; touch alone where not.
+        objectfile: whether every scene names one, from which modes can come too.
+    """
+    found = [
+        *(_grid("touch", *dials) for dials in _GRIDS),
+        *(_particles(*dials) for dials in ((300, 4e-3, 16), (1000, 2e-3, 8), (3000, 2e-3, 8))),
+    ]
+    if sound:
+        found += [_grid("both", *dials) for dials in _GRIDS]
+        found += [_by_sound(float(spacing)) for spacing in SPACING.levels]
+        found += _other_modes()
+        found += _other_shapes() if objectfile else []
+    for turned in _turned(sound) if thorough else ():
+        if turned not in found:
+            found.append(turned)
+    return found
+
+
+def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
+    """The few settings that are measured with fewer contacts too."""
+    cheapest = _grid("touch", *_COARSEST)
+    dials = ((2e-3, 0, 3000, 16), _DEFAULT)
+    touch = [cheapest, *(_grid("touch", *each) for each in dials)]
+    both = [_grid("both", *each) for each in dials]
+    return [*touch, *both, _by_sound(4e-3), _by_sound(2e-3)] if sound else touch
+
+
+def _other_modes() -> list[dict[str, Level]]:
+    """Fewer modes, and modes of coarser elements, than the default ones."""
+    few: tuple[dict[str, Level], ...] = ({MODES.name: 16}, {MODES.name: 32}, {EDGE.name: 0.7})
+    full, quick = _grid("both", *_DEFAULT), _grid("both", *_COARSEST)
+    return [*({**full, **level} for level in few), {**quick, **few[0]}, {**_by_sound(2e-3), **few[1]}]
+
+
+def _other_shapes() -> list[dict[str, Level]]:
+    """Modes of the ObjectFile in place of those that finite elements give."""
+    others: list[dict[str, Level]] = [
+        {SHAPES.name: level} for level in SHAPES.levels if level != SHAPES.default
+    ]
+    quick = (_grid("both", *_COARSEST), _grid("both", *_DEFAULT), _by_sound(2e-3))
+    return [{**setting, **shapes} for shapes in others for setting in quick]
+
+
+def _turned(sound: bool) -> Iterator[dict[str, Level]]:
+    """Every dial of the grid turned from its default, one at a time."""
+    for senses in ("touch", "both") if sound else ("touch",):
+        default = _grid(senses, *_DEFAULT)
+        for knob in (SPACING, ROUNDS, SAMPLES, BLOCK, *((MODES, EDGE) if senses == "both" else ())):
+            for level in knob.levels:
+                if level == knob.default:
+                    continue
+                yield {**default, knob.name: level}
+
+
+def setting_name(setting: Mapping[str, Level]) -> str:
+    """For people: ``"both, grid, spacing 2 mm, rounds 5, samples 3000, block 8"``."""
+    knobs = {knob.name: knob for knob in KNOBS}
+    said = [str(setting[name]) for name in (SENSES.name, METHOD.name) if name in setting]
+    for name, level in setting.items():
+        if name not in (SENSES.name, METHOD.name):
+            value = f"{1e3 * float(level):g} mm" if knobs[name].unit == "m" else f"{level}"
+            said.append(f"{name.removeprefix('localization.')} {value}")
+    return ", ".join(said)
+
+
+def needs_images(setting: Mapping[str, Level]) -> bool:
+    """Whether a setting looks at the tactile images."""
+    return setting.get(SENSES.name, SENSES.default) != "audio"
+
+
+def needs_sound(setting: Mapping[str, Level]) -> bool:
+    """Whether a setting was measured on runs that were heard; one that names no sense was not."""
+    return setting.get(SENSES.name, "touch") != "touch"
+
+
+def needs_objectfile(setting: Mapping[str, Level]) -> bool:
+    """Whether a setting takes the modes from an ObjectFile."""
+    return setting.get(SHAPES.name, SHAPES.default) != SHAPES.default
+
+
+def saves_no_answer_time(setting: Mapping[str, Level]) -> bool:
+    """Whether a setting's modes are of coarser elements: found sooner, once an object; heard no faster."""
+    return setting.get(EDGE.name, EDGE.default) != EDGE.default

@@ -1,0 +1,186 @@
+"""One recorded run, answered at any setting of the dials, with the seconds each answer takes."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from numba.core.event import install_recorder
+
+from experiments.contact_localization.accuracy.dials import (
+    KNOBS,
+    SENSES,
+    SIMULATED,
+    levels_of,
+    needs_images,
+    needs_sound,
+)
+from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.observation import Observation, contact_of, height_map
+from experiments.contact_localization.posterior.estimate import Estimate, locate
+from experiments.contact_localization.posterior.hypotheses import Contact, Noise
+from experiments.contact_localization.posterior.levels import Levels
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused
+from harness.basics.mesh import Mesh
+from harness.basics.store import digest
+from harness.effects.accuracy import Accuracy, Level
+
+PROGRAM = "contact-localization"
+ESTIMATOR = "experiments.contact_localization.posterior.estimate"
+"""The module whose sources, with all they import, decide whether a curve still holds."""
+
+Setting = Mapping[str, Level]
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """A run's readings, brought as far as settings share: the height maps of its images.
+
+    Attributes:
+        observations: of the contacts.
+        heights: a height map for each; none where no setting looks at images.
+        model: the object and the sensor.
+        prior: of its orientation.
+        seed: of the draws.
+        shared: s of CPU time and on the clock that the height maps took.
+    """
+
+    observations: tuple[Observation, ...]
+    heights: tuple[FloatArray, ...]
+    model: Model
+    prior: Prior
+    seed: int
+    shared: tuple[float, float]
+
+    @property
+    def heard(self) -> bool:
+        """Whether any contact was struck."""
+        return any(observation.strike is not None for observation in self.observations)
+
+    def under(self, model: Model) -> "Readings":
+        """The same readings, to be compared with another model of the object."""
+        return replace(self, model=model)
+
+    def first(self, count: int) -> "Readings":
+        """Those of the first contacts alone."""
+        share = count / len(self.observations)
+        return replace(
+            self,
+            observations=self.observations[:count],
+            heights=self.heights[:count],
+            shared=(share * self.shared[0], share * self.shared[1]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """An answer and what it took beyond what is shared.
+
+    Attributes:
+        estimate: None where the fit was refused.
+        cpu: s of CPU time.
+        wall: s on the clock.
+        refusal: why, where it was refused.
+    """
+
+    estimate: Estimate | None
+    cpu: float
+    wall: float
+    refusal: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Models:
+    """The models of one object, one for each choice of the simulation's dials; each is made on first use.
+
+    Attributes:
+        make: of the accuracy that chooses the modes.
+    """
+
+    make: Callable[[Accuracy], Model]
+    _made: dict[tuple[Level, ...], Model] = field(init=False, default_factory=dict, repr=False)
+
+    def at(self, setting: Setting) -> Model:
+        """The model that a setting compares with; without sound all are one."""
+        plain = setting if needs_sound(setting) else {}
+        chosen = tuple(plain.get(knob.name, knob.default) for knob in SIMULATED)
+        if chosen not in self._made:
+            self._made[chosen] = self.make(_accuracy(plain))
+        return self._made[chosen]
+
+    def all(self) -> Mapping[tuple[Level, ...], Model]:
+        """Those made so far, by the levels of ``SIMULATED``."""
+        return dict(self._made)
+
+
+def read(
+    observations: Sequence[Observation], model: Model, prior: Prior, seed: int, images: bool = True
+) -> Readings:
+    """Do, and time, what settings share.
+
+    Args:
+        observations: of the contacts.
+        model: the object and the sensor.
+        prior: of the object's orientation.
+        seed: of the draws.
+        images: whether any setting looks at the images.
+    """
+    cpu, wall = time.process_time(), time.perf_counter()
+    heights = tuple(height_map(observation, model) for observation in observations) if images else ()
+    taken = time.process_time() - cpu, time.perf_counter() - wall
+    return Readings(tuple(observations), heights, model, prior, seed, taken)
+
+
+def prepare(model: Model, setting: Setting) -> None:
+    """Make what depends on the object alone, before any reading is needed: its samples and gains."""
+    spacing = levels_at(setting).spacing
+    _ = model.surface(spacing).tree
+    if model.modes is not None and needs_sound({SENSES.name: SENSES.default, **setting}):
+        model.gains(spacing)
+
+
+def solve(readings: Readings, setting: Setting) -> Solved:
+    """Answer at one setting, timed; call ``prepare`` before."""
+    levels, noise = levels_at(setting), Noise()
+    cpu, wall = time.process_time(), time.perf_counter()
+    estimate, refusal = None, None
+    try:
+        contacts = _contacts(readings, levels, noise, needs_images(setting))
+        strikes = [observation.strike for observation in readings.observations]
+        estimate = locate(
+            contacts, readings.model, readings.prior, levels, noise, seed=readings.seed, strikes=strikes
+        )[-1]
+    except FitRefused as error:
+        refusal = str(error)
+    return Solved(estimate, time.process_time() - cpu, time.perf_counter() - wall, refusal)
+
+
+def solve_loaded(readings: Readings, setting: Setting) -> Solved:
+    """As ``solve``, once more where a kernel was compiled or loaded meanwhile: no answer costs that."""
+    with install_recorder("numba:compiler_lock") as loads:
+        solved = solve(readings, setting)
+    return solve(readings, setting) if loads.buffer else solved
+
+
+def levels_at(setting: Setting) -> Levels:
+    """What the estimator takes at a setting; what it leaves open is at its default."""
+    return levels_of(_accuracy(setting))
+
+
+def _accuracy(setting: Setting) -> Accuracy:
+    return Accuracy.default(KNOBS).with_(setting)
+
+
+def _contacts(readings: Readings, levels: Levels, noise: Noise, images: bool) -> list[Contact]:
+    if not images:
+        return [Contact(observation.base_from_gel) for observation in readings.observations]
+    pitch = readings.model.sensor.pitch
+    return [
+        contact_of(observation.base_from_gel, heights, pitch, levels.block, noise.touch)
+        for observation, heights in zip(readings.observations, readings.heights, strict=True)
+    ]
+
+
+def object_key(name: str, mesh: Mesh) -> str:
+    """A name that two different objects do not share."""
+    return f"{name}-{digest([mesh.vertices, mesh.faces])[:8]}"

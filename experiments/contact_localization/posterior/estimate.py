@@ -1,0 +1,256 @@
+"""Which point of the object was touched: from tactile images and relative arm poses alone."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.model import Model, Prior
+from experiments.contact_localization.observation import Observation, read_contacts
+from experiments.contact_localization.posterior.gate import Gate, gates, refuse_bad_fit, refuse_inside_out
+from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise
+from experiments.contact_localization.posterior.levels import Levels, Senses
+from experiments.contact_localization.posterior.methods import Solution, lap, solve_run
+from experiments.contact_localization.posterior.posterior import (
+    Mode,
+    Region,
+    best_point,
+    credible_radius,
+    credible_region,
+    modes,
+    settled,
+)
+from experiments.contact_localization.posterior.search import Search
+from experiments.contact_localization.sound.gate import (
+    distinct_strikes,
+    doubts_of_sound_at,
+    refuse_strange_sound,
+)
+from experiments.contact_localization.sound.heard import Heard, hear
+from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.errors import WrongUse
+from harness.basics.faces.nearest import nearest_point
+from harness.bench.acquisition import Strike
+
+FLOORS: Mapping[Senses, float] = {"touch": 0.4e-3, "audio": 0.75e-3, "both": 0.3e-3}
+"""Metres, one sigma of the errors that hypotheses by these senses do not show, fitted to calibration runs. By
+sound alone they name no error that the contacts share, which therefore is here."""
+
+AGREES = 6.0e-3
+"""Metres from the answer at which a hypothesis of the last contact still agrees with it."""
+
+_CANDIDATES = 10
+_TURNED = 4000
+"""Points that stand for a posterior which no reading of the yaw narrows: a ring of a metre, well filled."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The answer to one run.
+
+    Attributes:
+        position_in_object: ``(3,)`` metres: the last contact, a point on the surface.
+        contacts: ``(contacts, 3)`` metres: all of them, on the surface to half a pixel of a view.
+        modes: places the last contact may be, heaviest first.
+        region: the part of the surface that holds 90 % of the posterior.
+        credible90: metres around the answer that hold 90 % of it.
+        candidates: ``(10, 3)`` metres: the most probable distinct hypotheses of the last contact.
+        gates: how each contact's image fits; none where no image was used.
+        yaw: rad away from the nominal orientation, of the hypothesis that ``contacts`` are of.
+        yaw_sigma: rad, circular spread of the posterior.
+        points: ``(n, 3)`` metres: hypotheses of the last contact, for pictures.
+        weights: ``(n,)`` of the hypotheses, summing to 1.
+        seconds: by stage.
+        doubts: what a reader must know of an answer whose sound may be another object's.
+    """
+
+    position_in_object: FloatArray
+    contacts: FloatArray
+    modes: tuple[Mode, ...]
+    region: Region
+    credible90: float
+    candidates: FloatArray
+    gates: tuple[Gate, ...]
+    yaw: float
+    yaw_sigma: float
+    points: FloatArray
+    weights: FloatArray
+    seconds: dict[str, float]
+    doubts: tuple[str, ...] = ()
+
+
+def estimate(
+    observations: Sequence[Observation],
+    model: Model,
+    prior: Prior,
+    accuracy: Levels | None = None,
+    noise: Noise | None = None,
+    seed: int = 0,
+) -> Estimate:
+    """Localize the last contact.
+
+    Args:
+        observations: the contacts, in the order they were made.
+        model: object and sensor.
+        prior: of the object's orientation.
+        accuracy: the method and its levels; the default is the grid at 2 mm.
+        noise: of the terms; the default is what calibration runs gave.
+        seed: of the draws inside the method.
+
+    Raises:
+        FitRefused: no place on this object explains the contacts.
+        WrongUse: there are no observations.
+    """
+    return each_estimate(observations, model, prior, accuracy, noise, seed, first=len(observations))[-1]
+
+
+def each_estimate(
+    observations: Sequence[Observation],
+    model: Model,
+    prior: Prior,
+    accuracy: Levels | None = None,
+    noise: Noise | None = None,
+    seed: int = 0,
+    first: int = 1,
+) -> tuple[Estimate, ...]:
+    """The estimate after each contact from the ``first`` on; readings are prepared once.
+
+    Estimates of fewer than all contacts are not refused: they are pictures of the way to the
+    answer. The last one is as ``estimate`` gives it, and is refused as it is.
+    """
+    if len(observations) == 0:
+        raise WrongUse("no contacts were given; a run needs at least one")
+    levels, noise = accuracy or Levels(), noise or Noise()
+    started = time.perf_counter()
+    if levels.senses == "audio":
+        contacts = tuple(Contact(observation.base_from_gel) for observation in observations)
+    else:
+        contacts = read_contacts(observations, model, levels.block, noise.touch)
+    images = time.perf_counter() - started
+    strikes = [observation.strike for observation in observations]
+    return locate(contacts, model, prior, levels, noise, seed, first, images, strikes)
+
+
+def locate(
+    contacts: Sequence[Contact],
+    model: Model,
+    prior: Prior,
+    levels: Levels,
+    noise: Noise,
+    seed: int = 0,
+    first: int | None = None,
+    image_seconds: float = 0.0,
+    strikes: Sequence[Strike | None] = (),
+) -> tuple[Estimate, ...]:
+    """As ``each_estimate``, from height maps already recovered and strikes as they were captured."""
+    search = Search(contacts, model, prior, levels.spacing, noise)
+    strikes = distinct_strikes([contact.base_from_gel for contact in contacts[: len(strikes)]], strikes)
+    count = len(contacts)
+    answers = []
+    for k in range(count if first is None else first, count + 1):
+        seconds = {"images": image_seconds * k / count}
+        start = time.perf_counter()
+        alone = levels.senses == "audio"
+        heard = None if levels.senses == "touch" else hear(strikes[:k], model, levels.spacing, alone)
+        if alone and heard is None:
+            raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
+        if heard is not None:
+            lap(seconds, "sounds", start)
+        found = solve_run(search, k, levels, seed, seconds, heard)
+        doubts = _judged(search, found, levels, heard, k, seconds) if k == count else ()
+        floor = FLOORS[levels.senses if heard else "touch"]
+        answers.append(_answer(search, k, found, seconds, floor, doubts))
+    return tuple(answers)
+
+
+def _judged(
+    search: Search,
+    found: Solution,
+    levels: Levels,
+    heard: Heard | None,
+    count: int,
+    seconds: dict[str, float],
+) -> tuple[str, ...]:
+    """What a reader must know of an answer that is not refused."""
+    start = time.perf_counter()
+    doubts: tuple[str, ...] = ()
+    if heard is not None:
+        judge = refuse_strange_sound if levels.senses == "audio" else doubts_of_sound_at
+        doubts = judge(search, found.hypotheses, heard, count)
+    # The paper's filter has no measure of fit to be refused by.
+    if levels.method == "grid" and found.pictured:
+        refuse_bad_fit(search, found.members, found.fits)
+        refuse_inside_out(search, found.hypotheses.top, found.members)
+    lap(seconds, "judge", start)
+    return doubts
+
+
+def _answer(
+    search: Search,
+    count: int,
+    found: Solution,
+    seconds: dict[str, float],
+    floor: float,
+    doubts: tuple[str, ...],
+) -> Estimate:
+    start = time.perf_counter()
+    mesh = search.model.mesh
+    hypotheses, clouds, owners = _everywhere(search, count, found)
+    weights, yaws = hypotheses.weights, hypotheses.yaws
+    answers, chosen = _together(clouds, hypotheses)
+    # A view's pixel is off the surface where that curves within it; the answer is not.
+    answers[-1] = nearest_point(mesh, answers[-1])
+    points = clouds[-1]
+    ranked = np.argsort(-found.hypotheses.log_weights, kind="stable")[:_CANDIDATES]
+    turning = complex(np.exp(1j * yaws) @ weights)
+    result = Estimate(
+        position_in_object=read_only(answers[-1]),
+        contacts=read_only(answers),
+        modes=modes(points, weights),
+        region=credible_region(points, weights, search.surface, floor),
+        credible90=credible_radius(points, weights, answers[-1], floor),
+        candidates=read_only(points[np.searchsorted(owners, ranked)]),
+        gates=gates(search, count, found.members, found.fits) if found.pictured else (),
+        yaw=float(yaws[chosen]),
+        yaw_sigma=float(np.sqrt(max(0.0, -2.0 * np.log(max(abs(turning), 1e-12))))),
+        points=read_only(points),
+        weights=read_only(weights),
+        seconds=seconds,
+        doubts=doubts,
+    )
+    lap(seconds, "answer", start)
+    return result
+
+
+def _everywhere(search: Search, count: int, found: Solution) -> tuple[Hypotheses, list[FloatArray], IntArray]:
+    """Hypotheses spread over turns that the object does not show, contacts' points, and whose each is."""
+    hypotheses, clouds = found.hypotheses, [_points(search, k, found) for k in range(count)]
+    if search.turning is None:
+        return hypotheses, clouds, np.arange(len(hypotheses.yaws))
+    owners, turns, weights = search.turning.copies(hypotheses.weights, _TURNED)
+    # A point turned with the object is the same reading under a yaw turned the other way.
+    yaws, logs = hypotheses.yaws[owners] - turns, np.log(np.maximum(weights, 1e-300))
+    spread = Hypotheses(hypotheses.gels[owners], yaws, logs - logs.max())
+    return spread, [search.turning.turned(cloud[owners], turns) for cloud in clouds], owners
+
+
+def _points(search: Search, contact: int, found: Solution) -> FloatArray:
+    if found.pictured:
+        return search.surface_points(contact, found.hypotheses)
+    places = search.contact_places(contact, found.hypotheses)
+    return search.surface.points[search.surface.tree.query(places)[1]]
+
+
+def _together(clouds: Sequence[FloatArray], hypotheses: Hypotheses) -> tuple[FloatArray, int]:
+    """``(contacts, 3)`` points that one hypothesis can have touched, and which hypothesis that is.
+
+    The last contact is the answer; the others are those of the most probable hypothesis that agrees
+    with it, so that a symmetric object's contacts are not each answered under a yaw of its own.
+    """
+    weights = hypotheses.weights
+    answer = best_point(clouds[-1], weights)
+    near = np.linalg.norm(clouds[-1] - answer, axis=1) < AGREES
+    chosen = int(np.argmax(np.where(near, hypotheses.log_weights, -np.inf)))
+    others = [settled(cloud, weights, cloud[chosen]) for cloud in clouds[:-1]]
+    return np.array([*others, answer]), chosen

@@ -1,0 +1,155 @@
+"""What the search is about: contacts, places they may have been, and how noisy everything is."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from experiments.contact_localization.posterior.likelihood import GeometryNoise
+from experiments.contact_localization.posterior.shared_errors import SharedNoise
+from experiments.contact_localization.touch.touch import TouchMap, TouchNoise
+from harness.basics.arrays import FloatArray, IntArray
+
+_GOLDEN = 0.6180339887498949
+
+UNKNOWN_INDENTATION = 1.0e-3
+"""Metres that a press usually leaves at the gel's centre."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """One contact as the estimator knows it.
+
+    Attributes:
+        base_from_gel: ``(4, 4)``; its translation is used only against other contacts'.
+        touch: what the gel read; None for a contact whose image must not be used.
+        coarse: the same at half the resolution, for a first look at many places.
+    """
+
+    base_from_gel: FloatArray
+    touch: TouchMap | None = None
+    coarse: TouchMap | None = None
+
+    @property
+    def shows_contact(self) -> bool:
+        """Whether there is an image and it shows one."""
+        return self.touch is not None and len(self.touch.touched) > 0
+
+    @property
+    def axis(self) -> FloatArray:
+        """``(3,)`` unit, in base: where the tool points."""
+        return np.asarray(self.base_from_gel[:3, 2])
+
+    @property
+    def indentation(self) -> float:
+        """Metres at the gel's centre, or what presses usually leave where the image does not say."""
+        if self.touch is None or not self.shows_contact:
+            return UNKNOWN_INDENTATION
+        heights = self.touch.heights
+        rows, columns = heights.shape
+        middle = heights[(rows - 1) // 2 : rows // 2 + 1, (columns - 1) // 2 : columns // 2 + 1]
+        return float(middle.mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Hypotheses:
+    """Weighted places of the gel's centre at the first contact.
+
+    Attributes:
+        gels: ``(n, 3)`` metres, in the object's frame.
+        yaws: ``(n,)`` rad away from the nominal one.
+        log_weights: ``(n,)`` nats, the greatest 0.
+        shared: ``(n, 6)`` errors that all contacts share (``shared_errors``); None where not named.
+    """
+
+    gels: FloatArray
+    yaws: FloatArray
+    log_weights: FloatArray
+    shared: FloatArray | None = None
+
+    @property
+    def weights(self) -> FloatArray:
+        """``(n,)``, summing to 1."""
+        return normalised(self.log_weights)
+
+    @property
+    def effective(self) -> float:
+        """How many equal weights would make as sure a mean (Kong, 1992): one over the sum of squares."""
+        return float(1.0 / np.sum(self.weights**2))
+
+    @property
+    def perplexity(self) -> float:
+        """How many equal weights would be as undecided as these."""
+        positive = self.weights[self.weights > 0.0]
+        return float(np.exp(-np.sum(positive * np.log(positive))))
+
+    def told(self, nats: FloatArray) -> "Hypotheses":
+        """With ``(n,)`` nats more, up to a constant."""
+        total = self.log_weights + nats
+        return replace(self, log_weights=total - total.max(initial=-np.inf))
+
+    def best(self, within: float, most: int) -> "Hypotheses":
+        """Those within so many nats of the best, evenly thinned where they are more than ``most``."""
+        kept = best_of(self.log_weights, within, most)
+        if len(kept) == len(self.log_weights):
+            return self
+        return self.taken(kept, self.log_weights[kept])
+
+    def taken(self, chosen: IntArray, log_weights: FloatArray) -> "Hypotheses":
+        """Those of ``(m,)`` indices, with other weights."""
+        shared = None if self.shared is None else self.shared[chosen]
+        return Hypotheses(self.gels[chosen], self.yaws[chosen], log_weights, shared)
+
+    @property
+    def top(self) -> "Hypotheses":
+        """The most probable one alone."""
+        best = int(np.argmax(self.log_weights))
+        return self.taken(np.array([best], dtype=np.int64), np.zeros(1))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of every term, as measured on calibration runs.
+
+    Attributes:
+        geometry: of places and tool axes.
+        unread: the same where no image is read: how far the gel was pressed in, and past which edge, is not
+            known there, so that the surface met may face elsewhere than the one that was aimed at.
+        touch: of the images.
+        temperature: factor on the images' share: their errors are shared between contacts.
+        shared: of what all contacts share, and of what is left to each where that is named.
+    """
+
+    geometry: GeometryNoise = field(default_factory=GeometryNoise)
+    unread: GeometryNoise = field(default_factory=lambda: GeometryNoise(gap=1.2e-3, angle=np.radians(4.0)))
+    touch: TouchNoise = field(default_factory=TouchNoise)
+    temperature: float = 0.8
+    shared: SharedNoise = field(default_factory=SharedNoise)
+
+
+def anchors(members: IntArray, most: int) -> IntArray:
+    """At most ``most`` of ``(m,)`` contacts, evenly among them, that hypotheses are hung on in turn.
+
+    A hypothesis hangs on its anchor: where that contact slid off an edge, another must carry the others.
+    """
+    spread = np.linspace(0, len(members) - 1, min(most, len(members)))
+    return members[np.unique(spread.astype(np.int64))]
+
+
+def normalised(log_weights: FloatArray) -> FloatArray:
+    """``(n,)`` weights summing to 1, of ``(n,)`` nats the greatest of which is 0."""
+    weights = np.exp(log_weights)
+    return np.asarray(weights / weights.sum())
+
+
+def best_of(log_weights: FloatArray, within: float, most: int) -> IntArray:
+    """Rising indices within so many nats of the best; of more than ``most``, an even choice of ``most``.
+
+    Hypotheses come in the samples' random order with the yaws of each in turn, so any even choice
+    covers the surface; one without a period covers the yaws too (a stride that their number
+    divides would keep one yaw of all). Multiples of the golden section, modulo 1, are such a choice.
+    """
+    kept = np.nonzero(log_weights > log_weights.max() - within)[0].astype(np.int64)
+    if len(kept) <= most:
+        return kept
+    ranks = np.mod(np.arange(len(kept)) * _GOLDEN, 1.0)
+    return np.asarray(kept[np.sort(np.argpartition(ranks, most)[:most])])

@@ -1,0 +1,1 @@
+"""The answer as JSON, the comparison and the report of a localization."""

@@ -1,0 +1,93 @@
+"""Error against seconds: one recording, estimated at several levels of accuracy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.accuracy.dials import (
+    BLOCK,
+    METHOD,
+    PARTICLES,
+    ROUNDS,
+    SAMPLES,
+    SENSES,
+    SPACING,
+)
+from experiments.contact_localization.accuracy.solving import Setting, levels_at, prepare, read, solve_loaded
+from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.posterior.levels import Levels
+from harness.basics.arrays import FloatArray
+
+
+def _grid(spacing: float, rounds: int, samples: int) -> Setting:
+    return {METHOD.name: "grid", SPACING.name: spacing, ROUNDS.name: rounds, SAMPLES.name: samples}
+
+
+def _particles(number: int) -> Setting:
+    return {
+        SENSES.name: "touch",
+        METHOD.name: "particle",
+        PARTICLES.name: number,
+        BLOCK.name: BLOCK.default,
+    }
+
+
+LEVELS: dict[str, Setting] = {
+    "4 mm, no refinement": _grid(4.0e-3, 0, 3000),
+    "3 mm, no refinement": _grid(3.0e-3, 0, 3000),
+    "2 mm, no refinement": _grid(2.0e-3, 0, 3000),
+    "2 mm, refined once": _grid(2.0e-3, 1, 3000),
+    "2 mm, refined": _grid(2.0e-3, 5, 3000),
+    "1.5 mm, refined": _grid(1.5e-3, 5, 6000),
+    "300 particles": _particles(300),
+    "1,000 particles": _particles(1000),
+    "3,000 particles": _particles(3000),
+}
+"""What the report tries, by name, from cheap to exact for each method; `touchstone cost` tries more."""
+
+BY_SENSE: dict[str, Setting] = {
+    "touch: 4 mm, no refinement": {SENSES.name: "touch", **_grid(4.0e-3, 0, 3000)},
+    "touch: 2 mm, no refinement": {SENSES.name: "touch", **_grid(2.0e-3, 0, 3000)},
+    "touch: 2 mm, refined": {SENSES.name: "touch", **_grid(2.0e-3, 5, 3000)},
+    "sound: 4 mm": {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: 4.0e-3},
+    "sound: 2 mm": {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: 2.0e-3},
+}
+"""What is tried beside where contacts were struck, so that each sense is seen alone."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One level of accuracy on one recording.
+
+    Attributes:
+        name: of the level.
+        levels: the dials.
+        seconds_a_contact: of the estimate, samples of the surface prepared.
+        error: m, of the last contact.
+    """
+
+    name: str
+    levels: Levels
+    seconds_a_contact: float
+    error: float
+
+
+def trade(found: Answer, true: FloatArray, seed: int) -> tuple[Point, ...]:
+    """Estimate the same readings again at every level; a level that refuses the fit is left out.
+
+    Args:
+        found: the answer whose readings are used.
+        true: ``(3,)`` metres, the last contact.
+        seed: of the draws.
+    """
+    readings = read(found.observations, found.model, found.prior, seed)
+    points = []
+    for name, setting in (LEVELS | BY_SENSE if readings.heard else LEVELS).items():
+        prepare(found.model, setting)
+        solved = solve_loaded(readings, setting)
+        if solved.estimate is None:
+            continue
+        seconds = (readings.shared[1] + solved.wall) / len(found.observations)
+        error = float(np.linalg.norm(solved.estimate.position_in_object - true))
+        points.append(Point(name, levels_at(setting), seconds, error))
+    return tuple(points)

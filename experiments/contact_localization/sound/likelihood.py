@@ -1,0 +1,305 @@
+"""How probable the sounds of a run are, given where its strikes fell.
+
+At a peak the strikes' shares are ``y = c (G a + e)``: ``G`` the gains of the mode, or of a group of
+near-equal modes, at the struck places along the strikes; ``a`` how the microphone hears each; ``c`` any
+complex number; ``e`` what the model does not know. With ``a`` and ``c`` integrated out the direction
+of ``y`` is complex angular central Gaussian with matrix ``G G^T + spread^2 I`` (Kent, Data analysis for
+shapes and images, JSPI 57, 1997). The microphone's gains need not be known and signs between strikes count.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import logsumexp
+
+from experiments.contact_localization.sound.analysis import Peak, SoundEvidence
+from experiments.contact_localization.sound.density import MOST_RANK, sound_scores
+from experiments.contact_localization.sound.gains import GainTable
+from experiments.contact_localization.sound.matching import (
+    Pairs,
+    Scales,
+    SoundNoise,
+    group_starts,
+    likely_scales,
+    pairs_of,
+)
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.errors import WrongUse
+from harness.basics.materials import Material
+from harness.sim.modal.modes import Modes, dampings
+
+
+@dataclass(frozen=True)
+class ModeRow:
+    """One row of the table of peaks and modes.
+
+    Attributes:
+        frequency: Hz, of the peak.
+        damping: 1/s, as heard.
+        residual: share of the peak's band that is not one waveform.
+        level: dB against the strongest peak.
+        modes: numbers of the matched group's modes, from 0; empty for a peak that no mode explains.
+        model_frequency: Hz, of the matched modes, under the scale; 0 where there is none.
+        model_damping: 1/s, of the matched modes; 0 where there is none.
+        probability: of the match.
+        nats: that the peak adds at the given places, over a peak that says nothing.
+    """
+
+    frequency: float
+    damping: float
+    residual: float
+    level: float
+    modes: tuple[int, ...]
+    model_frequency: float
+    model_damping: float
+    probability: float
+    nats: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Heard:
+    """Peaks as ``sound_scores`` takes them."""
+
+    rows: FloatArray
+    real: FloatArray
+    imaginary: FloatArray
+    counts: IntArray
+    offsets: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Struck:
+    """Places and ways of strikes as ``sound_scores`` takes them."""
+
+    samples: IntArray
+    blend: FloatArray
+    directions: FloatArray
+
+
+class SoundTerm:
+    """The sounds of one run as a term of its posterior.
+
+    Attributes:
+        evidence: what the strikes said.
+        scales: frequency scales between object and model, most probable first.
+    """
+
+    def __init__(
+        self,
+        evidence: SoundEvidence,
+        table: GainTable,
+        modes: Modes,
+        material: Material,
+        noise: SoundNoise | None = None,
+    ) -> None:
+        """Prepare the term.
+
+        Args:
+            evidence: of the run's strikes.
+            table: of the modes, at any spacing.
+            modes: of the object.
+            material: for the damping that the modes should have.
+            noise: of the term.
+
+        Raises:
+            WrongUse: a group may be larger than the kernel takes.
+        """
+        noise = noise or SoundNoise()
+        if not 1 <= noise.most <= MOST_RANK:
+            raise WrongUse(f"groups of {noise.most} modes were asked for; 1 to {MOST_RANK} can be weighed")
+        self.evidence = evidence
+        self._table, self._modes, self._material, self._noise = table, modes, material, noise
+        self._starts = group_starts(modes.frequencies, noise)
+        self._peaks = evidence.peaks if len(modes.frequencies) else ()
+        frequencies = np.array([peak.frequency for peak in self._peaks])
+        self.scales: Scales = likely_scales(frequencies, modes.frequencies, noise)
+        self._pairs = pairs_of(frequencies, self._group_frequencies(), self.scales.factors, noise)
+        self._gain_scales = self._unit_gains()
+
+    @property
+    def weight(self) -> float:
+        """Factor on every peak's nats."""
+        return self._noise.weight
+
+    @property
+    def aside(self) -> float:
+        """Metres, one sigma along each axis: how far all strikes fell aside, by what they say."""
+        return self._noise.aside
+
+    @property
+    def says_something(self) -> bool:
+        """Whether any peak can set places apart."""
+        return len(self._pairs.groups) > 0
+
+    def log_likelihood(self, points: FloatArray, directions: FloatArray, between: bool = False) -> FloatArray:
+        """``(h,)`` nats of hypotheses, 0 for sounds that say nothing.
+
+        Args:
+            points: ``(h, K, 3)`` metres, in the object's frame: where each strike fell.
+            directions: ``(h, K, 3)`` or ``(K, 3)`` unit, in the object's frame: where the hammer went.
+            between: whether gains are interpolated between samples, which takes longer, or are the
+                nearest sample's.
+
+        Raises:
+            WrongUse: shapes that are not those of the evidence's strikes.
+        """
+        strikes = len(self.evidence.used)
+        if points.ndim != 3 or points.shape[1:] != (strikes, 3):
+            raise WrongUse(
+                f"points of shape {points.shape} were given; {strikes} strikes need (h, {strikes}, 3)"
+            )
+        if directions.shape not in ((strikes, 3), points.shape):
+            raise WrongUse(
+                f"directions of shape {directions.shape} were given; ({strikes}, 3) or {points.shape} wanted"
+            )
+        if not self.says_something or len(points) == 0:
+            return np.zeros(len(points))
+        struck = self._struck(points, directions, between)
+        return self._scores(struck, self._heard, self._pairs, self.scales.log_shares, self._noise.weight)
+
+    def mode_table(self, points: FloatArray, directions: FloatArray) -> tuple[ModeRow, ...]:
+        """Every peak with the group of modes that explains it best at one set of places.
+
+        Args:
+            points: ``(K, 3)`` metres, in the object's frame.
+            directions: ``(K, 3)`` unit.
+        """
+        struck = self._struck(points[None], directions, between=True)
+        shares = self._scale_shares(struck)
+        return tuple(self._row(index, struck, shares) for index in range(len(self._peaks)))
+
+    def scale_at(self, points: FloatArray, directions: FloatArray) -> float:
+        """The most probable factor between the object's frequencies and the model's, at one set of places.
+
+        Args:
+            points: ``(K, 3)`` metres, in the object's frame.
+            directions: ``(K, 3)`` unit.
+        """
+        shares = self._scale_shares(self._struck(points[None], directions, between=True))
+        return float(self.scales.factors[int(np.argmax(shares))])
+
+    @cached_property
+    def _heard(self) -> _Heard:
+        return _whitened(self._peaks, self._noise.spreads)
+
+    def _struck(self, points: FloatArray, directions: FloatArray, between: bool) -> _Struck:
+        """Of ``(h, K, 3)`` points and ``(h, K, 3)`` or ``(K, 3)`` directions."""
+        strikes = len(self.evidence.used)
+        flat = points.reshape(-1, 3)
+        if between:
+            samples, blend = self._table.about(flat)
+        else:
+            samples, blend = self._table.nearest(flat)[:, None], np.ones((len(flat), 1))
+        shape = (len(points), strikes, samples.shape[1])
+        return _Struck(
+            samples.reshape(shape),
+            blend.reshape(shape),
+            np.ascontiguousarray(directions.reshape(-1, strikes, 3)),
+        )
+
+    def _scale_shares(self, struck: _Struck) -> FloatArray:
+        """``(S,)``: how probable each scale is at one set of places, summing to 1."""
+        nats = self.scales.log_shares.copy()
+        for s in range(len(nats) if self.says_something else 0):
+            nats[s] += self._scores(
+                struck, self._heard, self._pairs.under(s), np.zeros(1), self._noise.weight
+            )[0]
+        return np.asarray(np.exp(nats - logsumexp(nats)))
+
+    def _scores(
+        self, struck: _Struck, heard: _Heard, pairs: Pairs, log_shares: FloatArray, weight: float
+    ) -> FloatArray:
+        return sound_scores(
+            self._table.shapes,
+            struck.samples,
+            struck.blend,
+            struck.directions,
+            self._gain_scales,
+            heard.rows,
+            heard.real,
+            heard.imaginary,
+            heard.counts,
+            heard.offsets,
+            pairs.starts,
+            pairs.groups,
+            self._starts,
+            pairs.shares,
+            pairs.clutter,
+            weight,
+            log_shares,
+        )
+
+    def _group_frequencies(self) -> FloatArray:
+        logs = np.log(self._modes.frequencies)
+        return np.array(
+            [np.exp(logs[a:b].mean()) for a, b in zip(self._starts[:-1], self._starts[1:], strict=True)]
+        )
+
+    def _unit_gains(self) -> FloatArray:
+        """``(C, m)``: one over the noise of a mode's gain; one figure a group, so that any basis will do."""
+        squares = self._table.mean_squares
+        result = np.empty(len(squares))
+        for a, b in zip(self._starts[:-1], self._starts[1:], strict=True):
+            result[a:b] = 1.0 / np.sqrt(squares[a:b].mean())
+        return np.asarray(result / np.array(self._noise.spreads)[:, None])
+
+    def _row(self, index: int, struck: _Struck, scale_shares: FloatArray) -> ModeRow:
+        peak, pairs = self._peaks[index], self._pairs
+        span = range(int(pairs.starts[index]), int(pairs.starts[index + 1]))
+        factor = self.scales.factors[int(np.argmax(scale_shares))]
+        odds = np.array(
+            [scale_shares @ pairs.clutter[:, index]] + [scale_shares @ pairs.shares[:, q] for q in span]
+        )
+        fits = np.array([0.0] + [self._fit_of(peak, int(pairs.groups[q]), struck) for q in span])
+        total = float(np.sum(odds * np.exp(fits)))
+        chances = odds * np.exp(fits) / total
+        best = int(np.argmax(chances))
+        group = int(pairs.groups[span[best - 1]]) if best else -1
+        modes = tuple(range(int(self._starts[group]), int(self._starts[group + 1]))) if best else ()
+        at = np.array([self._group_frequencies()[group]]) if best else np.zeros(0)
+        return ModeRow(
+            peak.frequency,
+            peak.damping,
+            peak.residual,
+            peak.level,
+            modes,
+            float(at[0] * factor) if best else 0.0,
+            float(dampings(at * factor, self._material)[0]) if best else 0.0,
+            float(chances[best]),
+            float(np.log(total)),
+        )
+
+    def _fit_of(self, peak: Peak, group: int, struck: _Struck) -> float:
+        """Nats of one peak if one group of modes made it."""
+        sure = Pairs(
+            np.array([0, 1], dtype=np.int64),
+            np.array([group], dtype=np.int64),
+            np.ones((1, 1)),
+            np.zeros((1, 1)),
+        )
+        heard = _whitened((peak,), self._noise.spreads)
+        return float(self._scores(struck, heard, sure, np.zeros(1), 1.0)[0])
+
+
+def _whitened(peaks: tuple[Peak, ...], spreads: tuple[float, ...]) -> _Heard:
+    """The peaks' shares divided by what each spread leaves of them, and the nats of that division."""
+    rows, ys, offsets = [], [], []
+    for spread in spreads:
+        for peak in peaks:
+            unit = np.sqrt(np.mean(np.abs(peak.y[peak.heard]) ** 2))
+            row = peak.heard / np.hypot(1.0, peak.sigma / (spread * unit))
+            length = float(np.linalg.norm(row * peak.y))
+            rows.append(row)
+            ys.append(row * peak.y / length)
+            logs = 2.0 * np.log(row[peak.heard])
+            offsets.append(float(np.sum(logs - 2.0 * np.log(length / np.linalg.norm(peak.y)))))
+    shape = (len(spreads), len(peaks))
+    y = np.array(ys).reshape(*shape, -1)
+    return _Heard(
+        np.array(rows).reshape(y.shape),
+        np.ascontiguousarray(y.real),
+        np.ascontiguousarray(y.imag),
+        np.array([peak.heard.sum() for peak in peaks], dtype=np.int64),
+        np.array(offsets).reshape(shape) - np.log(len(spreads)),
+    )

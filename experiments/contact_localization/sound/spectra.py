@@ -1,0 +1,135 @@
+"""Spectra of a run's strikes: what was heard over what was struck, and the noise of both."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import next_fast_len, rfft, rfftfreq
+
+from harness.basics.arrays import BoolArray, FloatArray
+from harness.basics.errors import DataRefused
+from harness.bench.acquisition import Strike
+
+ComplexArray = npt.NDArray[np.complex128]
+
+_RATE_TOLERANCE = 1.0e-3
+_LEAST_NOISE_SAMPLES = 64
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """How strikes are read.
+
+    Attributes:
+        decay: 1/s of the exponential window, against late reverberation. It is put on the force too:
+            an exponential passes through a convolution, so that it changes no transfer function
+            but by adding to the damping of every mode.
+        duration: s of each strike that are read.
+        before: s before the trigger at which reading begins.
+        pulse: s of force that are read; what the cell shows later is its own noise (ISO 7626-5).
+        force_floor: share of its greatest spectral value below which a force excites nothing: 26 dB
+            against the 20 of ISO 7626-5, because what is too noisy is found out by itself.
+        lowest: Hz; below it are the room and the object rocking on its stand.
+        prominence: dB that a peak stands above its surroundings, and a broad one.
+        range: dB below the highest at which peaks are no longer looked at: what is left there is skirts.
+        above_noise: dB that it stands above what was heard before the strikes.
+        above_floor: dB that it stands above the median about it: between resonances a room's echoes make
+            peaks out of what all modes together answer, seldom 10 dB above their median. And a broad one.
+        broad: Hz between the edges of a peak that is too broad for an echo's.
+        floor_reach: Hz to each side over which that median is taken, at least.
+        edge: share of a peak's power down to which its band reaches.
+        residual: share of a band's energy that may differ from one waveform.
+        skirt: dB that a peak must stand above the skirts of stronger ones, on which a room's echoes make
+            peaks of their own.
+        shared_skirt: the same for a peak whose shares are those of the stronger ones.
+        shared: share of a peak's energy beyond which its shares are its own.
+        most: peaks kept at most, strongest first.
+    """
+
+    decay: float = 20.0
+    duration: float = 0.3
+    before: float = 1.0e-3
+    pulse: float = 4.0e-3
+    force_floor: float = 0.05
+    lowest: float = 150.0
+    prominence: tuple[float, float] = (6.0, 4.0)
+    range: float = 45.0
+    above_noise: float = 10.0
+    above_floor: tuple[float, float] = (9.0, 6.0)
+    broad: float = 60.0
+    floor_reach: float = 250.0
+    edge: float = 0.25
+    residual: float = 0.12
+    skirt: float = 6.0
+    shared_skirt: float = 14.0
+    shared: float = 0.1
+    most: int = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Of the strikes that count: rows are strikes, columns frequencies.
+
+    Attributes:
+        frequencies: ``(F,)`` Hz.
+        transfer: ``(K, F)`` Pa/N, pressure over force; 0 where the force has nothing.
+        excited: ``(K, F)`` whether the force has something.
+        noise: ``(K, F)`` Pa/N expected of what was heard before the strikes.
+    """
+
+    frequencies: FloatArray
+    transfer: ComplexArray
+    excited: BoolArray
+    noise: FloatArray
+
+
+def _common_rate(strikes: Sequence[Strike]) -> float:
+    rates = np.array([strike.rate for strike in strikes])
+    rate = float(np.median(rates))
+    if np.max(np.abs(rates / rate - 1.0)) > _RATE_TOLERANCE:
+        raise DataRefused(
+            f"the strikes were sampled at {rates.min():g} to {rates.max():g} Hz; "
+            "strikes of one run must share one rate, to one part in a thousand"
+        )
+    return rate
+
+
+def spectra_of(strikes: Sequence[Strike], settings: Analysis) -> Spectra:
+    """The spectra of strikes that count.
+
+    Raises:
+        DataRefused: their rates differ.
+    """
+    rate = _common_rate(strikes)
+    samples = round(settings.duration * rate)
+    size = int(next_fast_len(2 * samples, real=True))
+    frequencies = rfftfreq(size, 1.0 / rate)
+    window = np.exp(-settings.decay * np.arange(samples) / rate)
+    force, pressure, noise = [], [], []
+    for strike in strikes:
+        start = max(0, strike.onset - round(settings.before * rate))
+        pulse = round((settings.before + settings.pulse) * rate)
+        force.append(rfft(_windowed(strike.force, start, window, pulse), size))
+        pressure.append(rfft(_windowed(strike.pressure, start, window, samples), size))
+        noise.append(_noise_density(strike.pressure[:start], window))
+    forces = np.array(force)
+    strength = np.abs(forces)
+    excited = strength >= settings.force_floor * strength.max(axis=1, keepdims=True)
+    excited &= (strength > 0.0) & (frequencies >= settings.lowest)
+    safe = np.where(excited, forces, 1.0)
+    transfer = np.where(excited, np.array(pressure) / safe, 0.0)
+    return Spectra(frequencies, transfer, excited, np.array(noise)[:, None] / np.abs(safe))
+
+
+def _windowed(signal: FloatArray, start: int, window: FloatArray, length: int) -> FloatArray:
+    rest = signal[:start].mean() if start >= _LEAST_NOISE_SAMPLES else 0.0
+    piece = signal[start : start + min(length, len(window))] - rest
+    return np.asarray(piece * window[: len(piece)])
+
+
+def _noise_density(before: FloatArray, window: FloatArray) -> float:
+    """Expected magnitude of a spectral line of what was heard before the strike, as if white."""
+    if len(before) < _LEAST_NOISE_SAMPLES:
+        return 0.0
+    return float(before.std() * np.sqrt(np.sum(window**2)))

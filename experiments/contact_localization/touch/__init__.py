@@ -1,0 +1,1 @@
+"""How well tactile images fit an object at a place."""

@@ -1,0 +1,250 @@
+"""The touch term: does the object, seen along the tool, look there as the gel says it does?
+
+With the tool's attitude known, what the gel would read at every place of the object is a
+crop of one orthographic depth image along the tool's axis: one render answers for all
+candidates of a contact, and what stands in the way of the sensor is in the picture.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.contact_localization.touch.kernels import (
+    Reading,
+    Sigmas,
+    fill_scores,
+    similarities_at,
+    terms_at,
+)
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
+
+LEVEL_SLOPE = 0.06
+"""Mean slope of a pixel below which it may be the gel at rest."""
+
+
+@dataclass(frozen=True)
+class TouchNoise:
+    """How far a recovered height map may be from the predicted one.
+
+    Attributes:
+        rms: metres, root mean square over the touched area at the true place, one sigma.
+        tilt: rad, one sigma about each axis of the image: sensor frame and object's attitude.
+        skirt: metres, sigma of the blur that stands for the gel hanging from the contact.
+        edge: metres, sigma of the blur over the contact's own edges: what the sensor cannot resolve.
+        shift: metres, one sigma in the plane of the gel of where the arm says a contact was
+            relative to the others.
+        depth: metres, one sigma across it.
+        cap: the most that one contact may cost, nats.
+    """
+
+    rms: float = 0.064e-3
+    tilt: float = np.radians(1.75)
+    skirt: float = 1.0e-3
+    edge: float = 0.6e-3
+    shift: float = 0.6e-3
+    depth: float = 0.6e-3
+    cap: float = 12.0
+
+    @property
+    def sigmas(self) -> Sigmas:
+        """As the loops take them."""
+        return float(self.rms), float(self.tilt)
+
+
+@dataclass(frozen=True, eq=False)
+class TouchMap:
+    """What the gel read at one contact, reduced to what the term compares.
+
+    Attributes:
+        heights: ``(rows, columns)`` metres of indentation, at ``pitch``.
+        pitch: metres.
+        touched: ``(n, 2)`` row and column of the pixels surely in contact; empty for a contact
+            that the image does not show.
+        flat: ``(rows, columns)`` where the gel is level: pressed by something level, or at rest
+            beyond an edge too steep for its height to be read from the colour.
+        skirt: ``(m,)`` one half of the skirt's kernel, from its centre out.
+        edge: ``(m,)`` one half of the kernel that softens the contact's own edges.
+    """
+
+    heights: FloatArray
+    pitch: float
+    touched: IntArray
+    flat: BoolArray
+    skirt: FloatArray
+    edge: FloatArray
+
+    @property
+    def reading(self) -> Reading:
+        """As the loops take it."""
+        return self.heights, self.pitch, self.touched, self.flat, self.skirt, self.edge
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """The object seen along the tool, with the touch term at each place filled in on demand.
+
+    Attributes:
+        object_from_view: ``(3, 3)``, columns x and y of the gel's image and z along the tool.
+        origin: ``(2,)`` metres, view x and y of the centre of pixel (0, 0).
+        pitch: metres a pixel, half of the touch map's.
+        depth: ``(rows, columns)`` metres along z of the first surface, inf where there is none.
+        nearest: for blocks of ``POOL`` pixels each way, metres along z: the gel's centre cannot be
+            nearer to the arm, or nothing would touch it.
+        farthest: for the same blocks, metres along z: it cannot be farther, or the object would
+            reach through the gel.
+        score: ``(rows, columns)`` nats, NaN where not asked for yet.
+        gel_depth: ``(rows, columns)`` metres along z of the gel's centre, from the fit.
+    """
+
+    object_from_view: FloatArray
+    origin: FloatArray
+    pitch: float
+    depth: FloatArray
+    nearest: FloatArray
+    farthest: FloatArray
+    score: FloatArray
+    gel_depth: FloatArray
+
+
+def touch_map(
+    heights: FloatArray, pitch: float, block: int, skirt: float, edge: float, threshold: float
+) -> TouchMap:
+    """A height map averaged over blocks of pixels.
+
+    Args:
+        heights: ``(rows, columns)`` metres of indentation.
+        pitch: metres a pixel.
+        block: pixels a side; rows and columns left over are cut evenly at both ends.
+        skirt: metres, sigma of the gel's blur around a contact.
+        edge: metres, sigma of the blur of the contact itself.
+        threshold: metres; a map that rises no higher shows no contact.
+    """
+    rows, columns = heights.shape[0] // block, heights.shape[1] // block
+    top, left = (heights.shape[0] - rows * block) // 2, (heights.shape[1] - columns * block) // 2
+    cut = heights[top : top + rows * block, left : left + columns * block]
+    coarse = block_means(cut, block)
+    peak = float(coarse.max())
+    core = coarse > max(threshold, 0.4 * peak)
+    touched = np.argwhere(core) if peak > threshold else np.empty((0, 2), dtype=np.int64)
+    coarse_pitch = pitch * block
+    return TouchMap(
+        read_only(np.ascontiguousarray(coarse)),
+        coarse_pitch,
+        read_only(touched),
+        read_only(_level(cut, pitch, block) & (coarse > 0.0)),
+        read_only(_half_kernel(skirt / coarse_pitch)),
+        read_only(_half_kernel(edge / coarse_pitch)),
+    )
+
+
+def _half_kernel(sigma: float) -> FloatArray:
+    """A Gaussian of ``sigma`` pixels from its centre out, all of it summing to 1."""
+    kernel = np.exp(-0.5 * (np.arange(int(np.ceil(2.5 * sigma)) + 1) / sigma) ** 2)
+    return np.asarray(kernel / (kernel[0] + 2.0 * kernel[1:].sum()))
+
+
+def _level(heights: FloatArray, pitch: float, block: int) -> BoolArray:
+    down, right = np.gradient(heights, pitch)
+    steep = np.hypot(down, right)
+    return np.asarray(block_means(steep, block) < LEVEL_SLOPE)
+
+
+def view_scores(view: View, touch: TouchMap, noise: TouchNoise, pixels: IntArray) -> None:
+    """Fill in the touch term at ``(n, 2)`` pixels (row, column) of a view."""
+    fill_scores(
+        view.depth,
+        view.score,
+        view.gel_depth,
+        touch.reading,
+        noise.sigmas,
+        pixels,
+    )
+
+
+def touch_terms(
+    view: View,
+    touch: TouchMap,
+    noise: TouchNoise,
+    places: FloatArray,
+    step: int,
+    rings: int,
+    shift: float,
+    temperature: float,
+) -> FloatArray:
+    """Log-likelihood of one contact's image and place under each hypothesis.
+
+    The arm's error is integrated out: the contact may have been at any of the cells around
+    the place that a hypothesis gives it, each at the price of its distance.
+
+    Args:
+        view: along the tool, under the hypotheses' yaw.
+        touch: what the gel read.
+        noise: of the term.
+        places: ``(n, 3)`` metres in view coordinates: the gel's centre, x, y and depth.
+        step: pixels between cells.
+        rings: cells looked at on each side.
+        shift: metres, one sigma of the place in the plane of the gel.
+        temperature: factor on the image's share.
+
+    Returns:
+        ``(n,)`` nats, not below ``-noise.cap``.
+    """
+    return terms_at(
+        view.origin,
+        view.pitch,
+        view.depth,
+        view.nearest,
+        view.farthest,
+        view.score,
+        view.gel_depth,
+        touch.reading,
+        noise.sigmas,
+        places,
+        step,
+        rings,
+        shift,
+        noise.depth,
+        noise.cap,
+        temperature,
+    )
+
+
+def best_fit(view: View, touch: TouchMap, noise: TouchNoise, place: FloatArray, shift: float) -> float:
+    """How well a contact fits near one place: nats of its best cell, untempered and uncapped.
+
+    Args:
+        view: along the tool.
+        touch: what the gel read.
+        noise: of the term.
+        place: ``(3,)`` metres in view coordinates: the gel's centre.
+        shift: metres, one sigma of the place in the plane of the gel.
+    """
+    rings = int(np.ceil(3.0 * shift / view.pitch))
+    column, row = np.round((place[:2] - view.origin) / view.pitch).astype(np.int64)
+    around = np.arange(-rings, rings + 1)
+    rows, columns = view.depth.shape
+    r, c = (a.ravel() for a in np.meshgrid(row + around, column + around, indexing="ij"))
+    inside = (r >= 0) & (r < rows) & (c >= 0) & (c < columns)
+    r, c = r[inside], c[inside]
+    view_scores(view, touch, noise, np.ascontiguousarray(np.column_stack([r, c])))
+    dx = view.origin[0] + c * view.pitch - place[0]
+    dy = view.origin[1] + r * view.pitch - place[1]
+    dz = place[2] - view.gel_depth[r, c]
+    cost = (dx**2 + dy**2) / shift**2 + (dz / noise.depth) ** 2
+    fits = view.score[r, c] - 0.5 * np.where(np.isfinite(cost), cost, np.inf)
+    return float(fits.max(initial=-np.inf))
+
+
+def similarities(view: View, touch: TouchMap, places: FloatArray, behind: float = 1.5e-3) -> FloatArray:
+    """Cosine between what the gel read and what it would have read at each place.
+
+    Args:
+        view: along the tool.
+        touch: what the gel read.
+        places: ``(n, 3)`` metres in view coordinates, on the object's surface.
+        behind: metres; a place so far behind the first surface cannot be touched and scores 0.
+
+    Returns:
+        ``(n,)`` between 0 and 1.
+    """
+    return similarities_at(view.origin, view.pitch, view.depth, touch.reading, places, behind)

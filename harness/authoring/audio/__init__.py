@@ -1,0 +1,1 @@
+"""From modes to the network of an object's sound."""

@@ -1,0 +1,200 @@
+"""From modes to the network of an object's sound, and what it is worth on nodes it never saw."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from onnx import ModelProto
+from threadpoolctl import threadpool_limits
+
+from harness.authoring.audio.data import Samples, Split, split_nodes, wave_number
+from harness.authoring.audio.export import waves_graph
+from harness.authoring.audio.metrics import (
+    DURATION,
+    RATE,
+    interpolated,
+    nearest_trained,
+    quantiles,
+    relative_errors,
+    sound_distances,
+)
+from harness.authoring.audio.profiles import PerceptronSpec, Profile
+from harness.authoring.audio.waves import fit_enough_waves
+from harness.authoring.training import Report, median_seconds, train
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.objectfile.audio.graph import audio_graph
+from harness.objectfile.audio.part import NETWORK, network_tensors
+from harness.objectfile.audio.table import scaled
+from harness.objectfile.runtime import Network
+from harness.sim.modal.modes import Modes
+from harness.sim.modal.stage_seconds import timed
+from harness.sim.sound.modal_sound import audible
+from harness.sim.sound.synthesis import synthesize
+
+CHECKPOINT = ".audio_training.npz"
+"""Beside ``object.json`` until the training is over."""
+
+_TIMED = 200
+_CHUNK = 256
+
+_ANYWHERE = 1.0
+"""m: a graph that belongs to no object yet is not asked how near to its surface a point is."""
+
+
+@dataclass(frozen=True, eq=False)
+class AuthoredAudio:
+    """A network and its worth.
+
+    Attributes:
+        graph: of the network.
+        split: of the nodes.
+        errors: of each way to the shapes at held-out nodes, ``"network"``, ``"nearest_trained"``,
+            ``"linear"``, and ``"table_float16"`` at the nodes themselves: by a name with its unit.
+        settings: how it was made.
+        seconds: s of ``"train"`` and ``"measure"`` (``stage_seconds.timed``).
+    """
+
+    graph: ModelProto
+    split: Split
+    errors: Mapping[str, Mapping[str, float]]
+    settings: Mapping[str, str | float | int | bool | None]
+    seconds: Mapping[str, float]
+
+
+def author_audio(
+    modes: Modes,
+    dampings: FloatArray,
+    profile: Profile,
+    seed: int,
+    folder: Path,
+    report: Report,
+    threads: int = 1,
+) -> AuthoredAudio:
+    """Make and measure a network.
+
+    Args:
+        modes: of the object, canonical (``audio_data.canonical``).
+        dampings: ``(m,)`` 1/s.
+        profile: which network.
+        seed: of the split, of first weights, of orders.
+        folder: where a checkpoint is kept; a training that was killed goes on from it.
+        report: told of progress.
+        threads: of a training; with one, a resumed training gives the same network bit for bit.
+
+    Raises:
+        DataRefused: a checkpoint in the folder that cannot be gone on from.
+    """
+    split = split_nodes(len(modes.points), seed=seed)
+    seconds: dict[str, float] = {}
+    with timed(seconds, "train"), threadpool_limits(limits=threads, user_api="blas"):
+        graph, settings = _made(modes, split, profile, seed, folder, report, threads)
+    report("measuring", 0.0)
+    with timed(seconds, "measure"):
+        errors = measure_audio(modes, dampings, split, graph, profile.sounds)
+    return AuthoredAudio(graph, split, errors, settings, seconds)
+
+
+def _made(
+    modes: Modes, split: Split, profile: Profile, seed: int, folder: Path, report: Report, threads: int
+) -> tuple[ModelProto, dict[str, str | float | int | bool | None]]:
+    spec = profile.network
+    if isinstance(spec, PerceptronSpec):
+        return _perceptrons(modes, split, spec, seed, folder, report, threads)
+    report("fitting waves", 0.0)
+    nodes = Samples(modes.points[split.trained], modes.shapes[split.trained])
+    number = wave_number(modes)
+    fitted = fit_enough_waves(nodes, np.arange(len(nodes.points)), number, spec, seed)
+    return waves_graph(fitted.network), {
+        "network": "waves",
+        "width": len(fitted.network.phases),
+        "wave_number_rad_per_m": number,
+        "reach": fitted.reach,
+        "ridge": fitted.readout.ridge,
+        "expected_relative_error": fitted.readout.expected,
+    }
+
+
+def _perceptrons(
+    modes: Modes, split: Split, spec: PerceptronSpec, seed: int, folder: Path, report: Report, threads: int
+) -> tuple[ModelProto, dict[str, str | float | int | bool | None]]:
+    # Heavy, and only here: waves are made without it.
+    import torch
+
+    from harness.authoring.audio.mlp import Training
+
+    torch.set_num_threads(threads)
+    training = Training(spec, modes, split.trained, seed)
+    train(training, spec.epochs, folder / CHECKPOINT, report)
+    trained = training.finish()
+    graph = audio_graph(trained.branches, trained.normaliser, trained.scales, trained.encoding)
+    settings: dict[str, str | float | int | bool | None] = {"network": "perceptrons", **vars(spec)}
+    return graph, settings | {"last_loss": training.losses[-1]}
+
+
+def measure_audio(
+    modes: Modes, dampings: FloatArray, split: Split, graph: ModelProto, sounds: int
+) -> dict[str, dict[str, float]]:
+    """Errors of the network and of what needs none, at held-out nodes; sounds of some of them.
+
+    A sound is that of a unit impulse along the normal, ``sum g exp(-d t) sin(w t)``, ``DURATION`` long at
+    ``RATE``.
+    """
+    truth = modes.shapes[split.held_out]
+    network = opened(graph, len(modes.frequencies))
+    table, scales = scaled(truth)
+    # What is linear between nodes of a table is not measured here: its nodes are all nodes.
+    found = {
+        "network": _in_chunks(network, modes.points[split.held_out]),
+        "nearest_trained": nearest_trained(modes, split),
+        "linear": interpolated(modes, split),
+        "table_float16": table.astype(np.float64) * scales[:, None],
+    }
+    chosen = np.linspace(0, len(truth) - 1, min(sounds, len(truth))).astype(np.int64)
+    errors = {}
+    for name, shapes in found.items():
+        gains = {
+            f"gain_error_{key}": value for key, value in quantiles(relative_errors(shapes, truth)).items()
+        }
+        errors[name] = gains | _sound_errors(modes, dampings, split, shapes, chosen)
+    vertex = {"points": modes.points[split.held_out[:1]]}
+    errors["network"]["seconds_per_vertex"] = median_seconds(lambda: network(vertex), _TIMED)
+    errors["network"]["bytes"] = float(len(graph.SerializeToString()))
+    errors["table_float16"]["bytes"] = float(2 * modes.shapes.size)
+    return errors
+
+
+def opened(graph: ModelProto, modes: int) -> Network:
+    """A graph that can be asked, before it is part of an ObjectFile."""
+    points, gains = network_tensors(modes, _ANYWHERE)
+    return Network(graph.SerializeToString(), NETWORK, [points], [gains])
+
+
+def _in_chunks(network: Network, points: FloatArray) -> FloatArray:
+    parts = [
+        network({"points": points[first : first + _CHUNK]})["gains"]
+        for first in range(0, len(points), _CHUNK)
+    ]
+    return np.concatenate(parts).astype(np.float64)
+
+
+def _sound_errors(
+    modes: Modes, dampings: FloatArray, split: Split, shapes: AnyArray, chosen: AnyArray
+) -> dict[str, float]:
+    """The medians over the chosen nodes; empty where no mode is heard."""
+    if not audible(modes.frequencies, RATE).any():
+        return {}
+    nodes = split.held_out[chosen]
+    distances = []
+    for node, place in zip(nodes, chosen, strict=True):
+        normal = modes.normals[node]
+        gains = np.stack([shapes[place] @ normal, modes.shapes[node] @ normal])
+        sound = synthesize(modes.frequencies, dampings, gains, DURATION, RATE, "double").sound
+        distances.append(sound_distances(sound[0], sound[1]))
+    return {
+        "stft_distance": float(np.median([each.stft for each in distances])),
+        "envelope_distance": float(np.median([each.envelope for each in distances])),
+        "spectral_error_db": float(np.median([each.spectral_db for each in distances])),
+        "stft_distance_worst": float(np.max([each.stft for each in distances])),
+        "envelope_distance_worst": float(np.max([each.envelope for each in distances])),
+    }

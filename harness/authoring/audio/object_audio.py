@@ -1,0 +1,194 @@
+"""From a file to an ObjectFile with a sound: intake, modes, network, measurement, writing."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from harness.authoring.audio.audio import CHECKPOINT, AuthoredAudio, author_audio
+from harness.authoring.audio.data import canonical
+from harness.authoring.audio.profiles import profile
+from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
+from harness.authoring.training import Report
+from harness.basics.errors import DataRefused, MeshRefused
+from harness.basics.mesh import Mesh
+from harness.basics.store import Store
+from harness.objectfile.audio.part import AudioPart, with_audio
+from harness.objectfile.entries import Source
+from harness.objectfile.file import ObjectFile, with_part
+from harness.objectfile.verify.verify import verify
+from harness.sim.modal.file import modes_of_file
+from harness.sim.modal.modal import HEARING, default_edge, solved_once
+from harness.sim.modal.modes import Modes, dampings
+from harness.sim.modal.stage_seconds import CPU, cpu, renamed, timed, wall
+from harness.sim.solid.taken_surface import surface_of
+from harness.sim.solid.volume_mesh import read_volume
+
+STAGES = ("intake", "mesh", "assemble", "solve", "order", "train", "measure", "export", "verify")
+"""In their order; ``"order"`` gives signs and groups of modes one meaning (``audio_data.canonical``)."""
+
+MODES = 128
+"""At most, where nobody asks for another number."""
+
+_SOLVED = {"tetrahedra": "mesh", "assembly": "assemble", "solve": "solve"}
+"""Names of stages, by those that the solver gives them."""
+
+_KEPT = "its modes were kept from an earlier solution, and so are the seconds of mesh, assemble and solve"
+
+_NEAR = 0.02
+"""Of the diagonal, how far from the surface a query may be: more than a mesh is off by."""
+
+
+@dataclass(frozen=True, eq=False)
+class AudioRequest(PartRequest):
+    """What is to be built, by a profile of ``audio_profiles.PROFILES``.
+
+    Attributes:
+        limit: Hz, modes up to there.
+        most: modes at most, the lowest.
+        edge: m, longest edge of an element; None for a share of the shortest wave.
+    """
+
+    limit: float = HEARING
+    most: int = MODES
+    edge: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltAudio:
+    """An ObjectFile and how it came about.
+
+    Attributes:
+        object: on disk.
+        modes: canonical.
+        audio: its network and errors.
+        said: what was done to the mesh and what to look at.
+        seconds: s of each of ``STAGES`` (``stage_seconds.timed``). Where modes were kept from an earlier
+            solution, ``"mesh"``, ``"assemble"`` and ``"solve"`` are what they took then.
+    """
+
+    object: ObjectFile
+    modes: Modes
+    audio: AuthoredAudio
+    said: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+
+def build_audio(
+    wanted: AudioRequest, out: Path, store: Store | None, report: Report, threads: int = 1
+) -> BuiltAudio:
+    """Build an object's sound, or go on with a build that was stopped.
+
+    Args:
+        wanted: what.
+        out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
+        store: where modes are kept, so that a build that is begun again need not solve again.
+        report: told of progress.
+        threads: of a training.
+
+    Raises:
+        WrongUse: options that cannot be.
+        MeshRefused: a mesh that cannot stand for an object, or none of whose modes is in reach.
+        DataRefused: a checkpoint or an ObjectFile in the folder that is of something else; or what was
+            written does not read back.
+    """
+    chosen = profile(wanted.profile)
+    report("modes", 0.0)
+    seconds: dict[str, float] = {}
+    mesh, found, source, said = _modes(wanted, store, seconds)
+    with timed(seconds, "order"):
+        modes = _lowest(canonical(found), wanted.most)
+    rates = dampings(modes.frequencies, wanted.material)
+    with timed(seconds, "export"):
+        created = created_object(wanted.mesh, wanted.licence, wanted.material, mesh, out, source)
+    audio = author_audio(modes, rates, chosen, wanted.seed, out, report, threads)
+    seconds |= audio.seconds
+    report("writing", 0.0)
+    part = AudioPart(
+        modes=modes,
+        dampings=rates,
+        near_surface=_NEAR * mesh.diagonal,
+        provenance=provenance_of(wanted, "audio", audio.settings, (source,)),
+        graph=audio.graph,
+        measured={"network": audio.errors["network"], "table": audio.errors["table_float16"]},
+    )
+    with timed(seconds, "export"):
+        made = with_audio(created, part)
+    (out / CHECKPOINT).unlink(missing_ok=True)
+    with timed(seconds, "verify"):
+        _check(made)
+    ordered = {before + stage: seconds[before + stage] for before in ("", CPU) for stage in STAGES}
+    return BuiltAudio(_with_seconds(made, ordered), modes, audio, said, ordered)
+
+
+def _check(made: ObjectFile) -> None:
+    """Read what was written.
+
+    Raises:
+        DataRefused: it is not what it says.
+    """
+    failed = [check for check in verify(made) if not check.passed]
+    if failed:
+        raise DataRefused(
+            f"{made.folder}: {failed[0].name}: {failed[0].said}; delete the folder and build again"
+        )
+
+
+def _with_seconds(made: ObjectFile, seconds: Mapping[str, float]) -> ObjectFile:
+    """The same files, and in ``object.json`` what they took."""
+    audio = made.description.audio
+    assert audio is not None
+    spent = {"seconds": wall(seconds), "cpu_seconds": cpu(seconds)}
+    provenance = audio.provenance.model_copy(update=spent)
+    return with_part(made, "audio", audio.model_copy(update={"provenance": provenance}), {})
+
+
+def _modes(
+    wanted: AudioRequest, store: Store | None, seconds: dict[str, float]
+) -> tuple[Mesh, Modes, Source, tuple[str, ...]]:
+    whole: dict[str, float] = {}
+    with timed(whole, "intake"):
+        source = source_of(wanted.mesh, wanted.licence)
+        volume = source.sha256 is not None and read_volume(Path(wanted.mesh), wanted.units) is not None
+    if volume:
+        mesh, modes, said = _of_volume(wanted)
+    else:
+        with timed(whole, "intake"):
+            taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
+        modes, kept = _solved(wanted, taken.mesh, store)
+        mesh, said = taken.mesh, (*taken.said, *((_KEPT,) if kept else ()))
+    none = dict.fromkeys([before + stage for before in ("", CPU) for stage in _SOLVED.values()], 0.0)
+    seconds |= whole | none | renamed(modes.seconds, _SOLVED)
+    return mesh, modes, source, said
+
+
+def _of_volume(wanted: AudioRequest) -> tuple[Mesh, Modes, tuple[str, ...]]:
+    path = Path(wanted.mesh)
+    solved = modes_of_file(path, wanted.material, wanted.units, wanted.wall, wanted.limit, edge=wanted.edge)
+    modes = solved.solution.modes
+    return Mesh(modes.points, modes.faces), modes, solved.said
+
+
+def _solved(wanted: AudioRequest, mesh: Mesh, store: Store | None) -> tuple[Modes, bool]:
+    edge = wanted.edge
+    if edge is None:
+        edge = default_edge(mesh, wanted.material, wanted.limit, wanted.most)
+    return solved_once(mesh, wanted.material, wanted.limit, edge, wanted.most, store)
+
+
+def _lowest(modes: Modes, most: int) -> Modes:
+    if len(modes.frequencies) == 0:
+        raise MeshRefused(
+            f"the object has no mode up to {modes.limit:g} Hz, so it has no sound there; "
+            "ask for modes up to a higher frequency"
+        )
+    if len(modes.frequencies) <= most:
+        return modes
+    kept = modes.frequencies[:most]
+    return replace(
+        modes,
+        frequencies=kept,
+        shapes=np.ascontiguousarray(modes.shapes[:, :most]),
+        limit=float(kept[-1]),
+    )

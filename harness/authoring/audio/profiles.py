@@ -1,0 +1,88 @@
+"""Which network of sound is made, and at what price: the profiles of ``touchstone object build``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import nearest
+
+REACHES = (0.7, 1.0, 1.4)
+"""Standard deviations of the waves' vectors along an axis that are tried, of the object's wave number."""
+
+
+@dataclass(frozen=True)
+class WavesSpec:
+    """Plane waves and a linear layer, found without training.
+
+    Attributes:
+        width: waves.
+        reaches: that are tried.
+        widest: waves at most, where those of ``width`` are too few; they are doubled up to there.
+    """
+
+    width: int
+    reaches: tuple[float, ...] = REACHES
+    widest: int = 0
+
+
+@dataclass(frozen=True)
+class PerceptronSpec:
+    """Perceptrons trained by Adam; the defaults are the paper's.
+
+    Attributes:
+        branches: 3, one for each direction of force, or 1 for all.
+        depth: hidden layers.
+        width: of each.
+        octaves: of the encoding.
+        skip: the layer, counted from 0, that takes the encoded input too; 0 for none.
+        epochs: passes over the samples.
+        batch: samples in a step.
+        rate: of Adam's first steps; it falls to zero as half a cosine.
+    """
+
+    branches: int = 3
+    depth: int = 8
+    width: int = 256
+    octaves: int = 10
+    skip: int = 5
+    epochs: int = 60
+    batch: int = 256
+    rate: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Profile:
+    """One trade of time for accuracy.
+
+    Attributes:
+        network: that is made.
+        sounds: held-out nodes whose sounds are compared.
+    """
+
+    network: WavesSpec | PerceptronSpec
+    sounds: int
+
+
+_SMALL = PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epochs=300)
+
+PROFILES: Mapping[str, Profile] = MappingProxyType({
+    "smoke": Profile(WavesSpec(768, (1.0,)), sounds=8),
+    "standard": Profile(WavesSpec(1536, widest=3072), sounds=40),
+    "small": Profile(_SMALL, sounds=40),
+    "paper": Profile(PerceptronSpec(epochs=120), sounds=40),
+})  # fmt: skip
+"""``smoke`` and ``standard`` need no torch; ``paper`` is the network of ObjectFolder 2.0, ``small`` one
+trunk for all three directions."""
+
+
+def profile(name: str) -> Profile:
+    """The profile of that name.
+
+    Raises:
+        WrongUse: there is none.
+    """
+    found = PROFILES.get(name)
+    if found is None:
+        raise WrongUse(f"no profile {name!r}; {nearest(name, PROFILES)}")
+    return found

@@ -1,0 +1,1 @@
+"""From a surface to the networks of an object's touch."""

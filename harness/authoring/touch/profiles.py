@@ -1,0 +1,86 @@
+"""Which levels of touch are made, and at what price: the profiles of ``object build --only touch``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import nearest
+
+
+@dataclass(frozen=True)
+class CodesSpec:
+    """Codes of a surface.
+
+    Attributes:
+        most_bytes: of the codes alone, about a megabyte less than their file; nodes are as dense as it
+            allows.
+        pitch: m, of a patch's pixels.
+        width: numbers of a code on a linear basis; None for the heights themselves.
+    """
+
+    most_bytes: int = 18_000_000
+    pitch: float = 0.5e-3
+    width: int | None = None
+
+
+@dataclass(frozen=True)
+class TouchPerceptronSpec:
+    """A perceptron trained by Adam; the network is the paper's, its training our own.
+
+    Attributes:
+        depth: hidden layers.
+        width: of each.
+        octaves: of the encoding.
+        skip: the layer, counted from 0, that takes the encoded input too; 0 for none.
+        presses: whose maps are learned from.
+        epochs: checkpoints on the way.
+        steps: of Adam in an epoch.
+        batch: pixels in a step.
+        rate: of Adam's first steps; it falls to zero as half a cosine.
+    """
+
+    depth: int = 8
+    width: int = 256
+    octaves: int = 10
+    skip: int = 5
+    presses: int = 4000
+    epochs: int = 100
+    steps: int = 500
+    batch: int = 4096
+    rate: float = 5e-4
+
+
+@dataclass(frozen=True)
+class TouchProfile:
+    """One trade of time for accuracy.
+
+    Attributes:
+        codes: of the surface.
+        perceptron: None for none.
+        presses: of each kind that errors are measured on.
+    """
+
+    codes: CodesSpec
+    perceptron: TouchPerceptronSpec | None
+    presses: int
+
+
+TOUCH_PROFILES: Mapping[str, TouchProfile] = MappingProxyType({
+    "smoke": TouchProfile(CodesSpec(most_bytes=3_000_000, pitch=0.6e-3), None, presses=20),
+    "standard": TouchProfile(CodesSpec(), None, presses=200),
+    "paper": TouchProfile(CodesSpec(), TouchPerceptronSpec(), presses=200),
+})  # fmt: skip
+"""``smoke`` and ``standard`` need no torch; ``paper`` trains ObjectFolder 2.0's network beside the codes."""
+
+
+def touch_profile(name: str) -> TouchProfile:
+    """The profile of that name.
+
+    Raises:
+        WrongUse: there is none.
+    """
+    found = TOUCH_PROFILES.get(name)
+    if found is None:
+        raise WrongUse(f"no profile {name!r} of touch; {nearest(name, TOUCH_PROFILES)}")
+    return found

@@ -1,0 +1,1 @@
+"""Path tracing by Mitsuba: light that bounces, beside the direct level."""

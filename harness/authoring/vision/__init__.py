@@ -1,0 +1,1 @@
+"""From a surface with its colours to the networks of an object's look."""

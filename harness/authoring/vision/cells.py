@@ -1,0 +1,160 @@
+"""The tiny networks of an object, trained cell by cell; what was trained is kept and never trained again."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import astuple
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from harness.authoring.checkpoint import Progress, read_checkpoint, write_checkpoint
+from harness.authoring.vision.batch import Lesson, Pixels, batch_of, no_pixels
+from harness.authoring.vision.cell_lessons import CellLessons
+from harness.authoring.vision.kernels import teach
+from harness.authoring.vision.layers import (
+    first_weights,
+    layer_shapes,
+    layers_of,
+    parameter_count,
+    weights_of,
+)
+from harness.authoring.vision.lessons import Lessons
+from harness.authoring.vision.profiles import CellsSpec
+from harness.basics.arrays import AnyArray
+from harness.basics.cores import own_cores
+from harness.basics.store import digest
+from harness.objectfile.vision.network.network import VisionGrid, VisionModel
+
+VERSION = 2
+"""Raised with every change of what training computes, so that no old checkpoint is gone on from."""
+
+_AT_ONCE = 32
+"""Cells between two checkpoints."""
+
+
+class CellTraining:
+    """A training that can stop after any of its epochs, each some cells, and go on, bit for bit.
+
+    Nothing random has a state, and no cell depends on another: the same networks come of any number of
+    threads.
+
+    Args:
+        spec: of the networks.
+        grid: of the cells.
+        lessons: what all learn from.
+        lamps: ``(m, 3)`` float32, drawn anew at every step for networks that are told visibility and
+            normal; ``(0, 3)`` where each lesson has a lamp of its own.
+        density_scale: 1/m of a density of 1.
+        seed: of first weights, and of what is drawn.
+        threads: None for as many as the process has cores.
+
+    Attributes:
+        losses: of the networks that were trained, in their order.
+        epoch: that is next.
+        by_cell: what each learns from.
+        flats: ``(networks, parameters)`` float32.
+        identity: hash of all that the networks depend on.
+    """
+
+    def __init__(
+        self,
+        spec: CellsSpec,
+        grid: VisionGrid,
+        lessons: Lessons,
+        lamps: AnyArray,
+        density_scale: float,
+        seed: int,
+        threads: int | None = None,
+    ) -> None:
+        self.spec, self.grid, self.scale, self.seed = spec, grid, density_scale, seed
+        self.threads = own_cores() if threads is None else threads
+        self.by_cell = CellLessons(spec.size, grid, lessons, lamps, spec.overlap, spec.least)
+        self.flats = np.zeros((len(grid), parameter_count(spec.size)), np.float32)
+        self.losses: list[float] = []
+        self.epoch = 0
+        self.identity = digest(
+            [
+                *("vision cells", VERSION, list(astuple(spec)), seed, grid.low, grid.cell, grid.cells),
+                *(lessons.points, lessons.normals, lessons.colours, lessons.lamps, lamps, density_scale),
+            ]
+        )
+        self._begin = first_weights(spec.size, seed)
+
+    @property
+    def epochs(self) -> int:
+        """That it takes."""
+        return -(-len(self.grid) // _AT_ONCE)
+
+    @property
+    def done(self) -> bool:
+        """Whether all cells were trained."""
+        return self.epoch >= self.epochs
+
+    def step_epoch(self) -> float:
+        """Train the next cells; the mean of their colours' errors, as roots of linear light."""
+        first = self.epoch * _AT_ONCE
+        found = by_threads(self._teach, range(first, min(first + _AT_ONCE, len(self.grid))), self.threads)
+        self.losses += found
+        self.epoch += 1
+        return float(np.mean(found))
+
+    def finish(self) -> VisionModel:
+        """The networks, in float16."""
+        return VisionModel(self.grid, weights_of(self.flats, self.spec.size, self.scale))
+
+    def save(self, path: Path) -> None:
+        """Write a checkpoint, whole or not at all."""
+        flats = {"flats": self.flats[: len(self.losses)]}
+        write_checkpoint(path, self.identity, Progress(self.epoch, self.losses), flats)
+
+    def load(self, path: Path) -> None:
+        """Go on from a checkpoint.
+
+        Raises:
+            DataRefused: it cannot be read, or is of another network, object, data or seed.
+        """
+        progress, arrays = read_checkpoint(path, self.identity)
+        self.epoch, self.losses = progress.epoch, progress.losses
+        self.flats[: len(self.losses)] = arrays["flats"]
+
+    def _teach(self, cell: int) -> float:
+        spec, flat = self.spec, self.flats[cell]
+        flat[:] = self._begin
+        lesson = self.by_cell.lesson(cell)
+        nothing = no_pixels(spec.size.place, layer_shapes(spec.size).told[0])
+        drawn = seed_of(self.seed, 77, cell)
+        return teach_cell(flat, spec, lesson, nothing, spec.batch, spec.steps, spec.rate, drawn)
+
+
+def teach_cell(
+    flat: AnyArray,
+    spec: CellsSpec,
+    lesson: Lesson,
+    pixels: Pixels,
+    places: int,
+    steps: int,
+    rate: float,
+    seed: int,
+) -> float:
+    """Train one network on from the weights that it has; ``vision_kernels.teach`` tells of arguments."""
+    size, slope = spec.size, np.empty_like(flat)
+    batch = batch_of(spec.batch, size.place, layer_shapes(size).told[0], size.width)
+    loss = teach(
+        *(flat, layers_of(flat, size), slope, layers_of(slope, size), lesson, pixels, places, batch),
+        *(np.ones(size.turns, np.float32), steps, rate, spec.hidden, spec.opacity, seed),
+    )
+    return float(loss)
+
+
+def by_threads(each: Callable[[int], float], cells: range, threads: int) -> list[float]:
+    """What comes of every cell, in their order; the compiled training lets threads run beside each other."""
+    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(each, cells))
+
+
+def seed_of(seed: int, *of: int) -> int:
+    """Of one cell's draws."""
+    # Below 2^63, so that the compiled kernel takes it as the integer that it is.
+    state = np.random.SeedSequence([seed, *of]).generate_state(1, np.uint64)[0]
+    return int(state >> np.uint64(1))

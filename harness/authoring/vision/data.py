@@ -1,0 +1,236 @@
+"""What a network of vision learns from: places of a surface, views, lights, and the light that leaves.
+
+All of it is the direct level's, without noise. Places are as dense on the surface as pixels of pictures
+taken from everywhere far away would be; nothing is drawn for what no camera outside can see. What is kept
+back for judging, ``HeldOut``, is never drawn: neither a light within an angle of one kept back, nor a place
+seen within that angle of how a camera kept back sees it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.authoring.vision.places import cosine_about, is_closed, sphere, surface_places, uniform_about
+from harness.basics.arrays import BoolArray, FloatArray, read_only
+from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.mesh import Mesh
+from harness.picture.pinhole import DirectionalLight, Pinhole
+from harness.sim.light.direct_image import LitObject
+from harness.sim.light.lambert import cosines, places_seen, radiance
+
+APART = float(np.radians(3.0))
+"""rad between anything learned from and anything judged by."""
+
+FACING = 0.85
+"""Share of the lights that are drawn on the side that is seen; the others are from anywhere."""
+
+_CHUNK = 1 << 16
+
+LEAST_YIELD = 1e-3
+"""Of a chunk: below it nothing of the surface can be seen and nothing will come."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Cameras and lights that only judge.
+
+    Attributes:
+        cameras: one for each picture.
+        lights: one for each picture.
+        apart: rad that everything else keeps from them.
+    """
+
+    cameras: tuple[Pinhole, ...]
+    lights: tuple[DirectionalLight, ...]
+    apart: float = APART
+
+    def __post_init__(self) -> None:
+        if len(self.cameras) != len(self.lights):
+            raise WrongUse(
+                f"{len(self.cameras)} cameras and {len(self.lights)} lights were given; give one light "
+                "a picture"
+            )
+        if not 0.0 <= self.apart < np.pi / 4.0:
+            raise WrongUse(f"{np.degrees(self.apart):g} deg apart were asked for; give 0 to below 45 deg")
+
+    def clear_of_views(self, points: FloatArray, views: FloatArray) -> BoolArray:
+        """Which of ``(n, 3)`` places with ``(n, 3)`` unit views, from the eye, are seen otherwise."""
+        clear = np.ones(len(points), np.bool_)
+        for eye in {tuple(camera.eye.tolist()) for camera in self.cameras}:
+            away = points - np.array(eye)
+            length = np.linalg.norm(away, axis=1)
+            clear &= np.einsum("nx,nx->n", away, views) < np.cos(self.apart) * length
+        return clear
+
+    def clear_of_lights(self, lights: FloatArray) -> BoolArray:
+        """Which of ``(n, 3)`` unit directions are far enough from every light kept back."""
+        if not self.lights:
+            return np.ones(len(lights), np.bool_)
+        kept = np.stack([light.direction for light in self.lights])
+        return np.asarray((lights @ kept.T).max(axis=1) < np.cos(self.apart))
+
+
+@dataclass(frozen=True, eq=False)
+class Tuples:
+    """What leaves places of a surface towards an eye; n of each.
+
+    Attributes:
+        points: ``(n, 3)`` m, in the object's frame.
+        views: ``(n, 3)`` unit, from the camera into the picture.
+        lights: ``(n, 3)`` unit, towards the lamp.
+        visible: ``(n,)`` whether the place faces the lamp and nothing is in between.
+        normals: ``(n, 3)`` unit, smooth, on the side that is seen.
+        colours: ``(n, 3)`` linear, under irradiance pi.
+    """
+
+    points: FloatArray
+    views: FloatArray
+    lights: FloatArray
+    visible: BoolArray
+    normals: FloatArray
+    colours: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def held_out_pictures(
+    mesh: Mesh, count: int, width: int, height: int, seed: int, distance: float = 2.0, apart: float = APART
+) -> HeldOut:
+    """Cameras all around an object, each with a light of its own.
+
+    Args:
+        mesh: of the object; its box's middle is in the middle of every picture.
+        count: of pictures, one or more.
+        width: columns of pixels.
+        height: rows of pixels.
+        seed: of the cameras and the lights.
+        distance: of the cameras, in diagonals of the object's box; more than a half.
+        apart: rad, as of ``HeldOut``.
+
+    Raises:
+        WrongUse: no picture, or a camera inside the object's box.
+    """
+    if count < 1 or not distance > 0.5:
+        raise WrongUse(
+            f"{count} pictures from {distance:g} diagonals away were asked for; give one or more, from more "
+            "than half a diagonal"
+        )
+    random = np.random.default_rng([seed, 71])
+    cameras = tuple(around(mesh, way, width, height, distance) for way in sphere(count, random))
+    lights = tuple(DirectionalLight(way) for way in _facing(cameras, mesh, random))
+    return HeldOut(cameras, lights, apart)
+
+
+def around(mesh: Mesh, way: FloatArray, width: int, height: int, distance: float) -> Pinhole:
+    """The camera that sees a whole object from a side.
+
+    Args:
+        mesh: of the object.
+        way: ``(3,)`` unit, from its box's middle to the camera.
+        width: columns of pixels.
+        height: rows of pixels.
+        distance: of the camera, in diagonals of the object's box; more than a half.
+    """
+    middle = mesh.bounds.mean(axis=0)
+    # Straight from above nothing is up: the least of the axes is then far from the view.
+    up = np.eye(3)[2] if abs(way[2]) < 0.99 else np.eye(3)[0]
+    # The ball around the box touches the shorter side's edges.
+    half = np.tan(np.arcsin(0.5 / distance)) * max(1.0, width / height)
+    return Pinhole.looking_at(
+        middle + distance * mesh.diagonal * way, middle, up, width, height, 2.0 * float(np.arctan(half))
+    )
+
+
+def draw_views(
+    mesh: Mesh, count: int, width: int, height: int, seed: int, held_out: HeldOut, distance: float = 2.0
+) -> tuple[tuple[Pinhole, DirectionalLight], ...]:
+    """Cameras and lights of pictures to learn from, clear of those kept back.
+
+    A camera is clear where its whole way to the object's middle is. Arguments and errors as in
+    ``held_out_pictures``.
+    """
+    random = np.random.default_rng([seed, 72])
+    middle = mesh.bounds.mean(axis=0)[None]
+    found: list[tuple[Pinhole, DirectionalLight]] = []
+    for _ in range(1000 * count):
+        if len(found) == count:
+            return tuple(found)
+        way = sphere(1, random)
+        if not held_out.clear_of_views(middle, -way)[0]:
+            continue
+        camera = around(mesh, way[0], width, height, distance)
+        light = _facing((camera,), mesh, random)
+        if held_out.clear_of_lights(light)[0]:
+            found.append((camera, DirectionalLight(light[0])))
+    if len(found) == count:
+        return tuple(found)
+    raise OutOfDomain(
+        f"{len(found)} of {count} views are clear of {len(held_out.cameras)} kept back by "
+        f"{np.degrees(held_out.apart):g} deg; keep back fewer, or a smaller angle"
+    )
+
+
+def draw_tuples(lit: LitObject, count: int, seed: int, held_out: HeldOut) -> Tuples:
+    """So many tuples; the same seed gives the same, and the first of more are those of fewer.
+
+    Views are drawn with the cosine to the face, as pixels are that look at it from everywhere; those that
+    something of the object is in the way of are not kept.
+
+    Args:
+        lit: the object.
+        count: zero or more.
+        seed: of all that is drawn.
+        held_out: is kept clear of.
+
+    Raises:
+        OutOfDomain: next to nothing of the surface can be seen from outside, clear of what is kept back.
+    """
+    random = np.random.default_rng([seed, 73])
+    both = not is_closed(lit.appearance.mesh)
+    parts: list[Tuples] = []
+    while sum(map(len, parts)) < count or not parts:
+        part = _chunk(lit, random, held_out, both)
+        if len(part) < LEAST_YIELD * _CHUNK:
+            raise OutOfDomain(
+                f"{len(part)} of {_CHUNK} places drawn can be seen from outside and are clear of what is "
+                "kept back; turn the mesh inside out, or keep back less"
+            )
+        parts.append(part)
+    return Tuples(
+        *(
+            read_only(np.concatenate([part.__dict__[name] for part in parts])[:count])
+            for name in ("points", "views", "lights", "visible", "normals", "colours")
+        )
+    )
+
+
+def _chunk(lit: LitObject, random: np.random.Generator, held_out: HeldOut, both: bool) -> Tuples:
+    mesh, size = lit.appearance.mesh, lit.appearance.mesh.diagonal
+    faces, weights = surface_places(mesh, _CHUNK, random)
+    side = np.where(random.random(_CHUNK) < 0.5, -1.0, 1.0) if both else np.ones(_CHUNK)
+    outward = side[:, None] * mesh.face_normals[faces]
+    views = -cosine_about(outward, random)
+    lights = np.where(
+        random.random((_CHUNK, 1)) < FACING, uniform_about(outward, random), sphere(_CHUNK, random)
+    )
+    corners = mesh.corners[faces]
+    points = corners[:, 0] + np.einsum("nk,nkx->nx", weights, corners[:, 1:] - corners[:, :1])
+    clear = held_out.clear_of_views(points, views) & held_out.clear_of_lights(lights)
+    seen = np.flatnonzero(clear)
+    seen = seen[lit.rays.free(points[seen], -views[seen], faces[seen])] if len(seen) else seen
+    places = places_seen(lit.appearance, faces[seen], weights[seen], views[seen])
+    faced = cosines(places, lights[seen], size)
+    visible = faced > 0.0
+    if visible.any():
+        begin, towards = places.lifted[visible], lights[seen][visible]
+        visible[visible] = lit.rays.free(begin, towards, places.faces[visible])
+    colours = radiance(places, np.pi * np.where(visible, faced, 0.0))
+    return Tuples(places.points, views[seen], lights[seen], visible, places.normals, colours)
+
+
+def _facing(cameras: tuple[Pinhole, ...], mesh: Mesh, random: np.random.Generator) -> FloatArray:
+    """``(n, 3)`` unit: a light for each camera, from its side: what lies in the dark judges nothing."""
+    middle = mesh.bounds.mean(axis=0)
+    towards = np.stack([camera.eye - middle for camera in cameras])
+    return uniform_about(towards, random)

@@ -1,0 +1,62 @@
+"""What networks of vision are worth: pictures of cameras and lights that nothing was learned from."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from harness.authoring.vision.data import HeldOut
+from harness.objectfile.vision.render import VisionRenderer
+from harness.objectfile.vision.settings import RenderSettings
+from harness.picture.image_metrics import psnr, ssim
+from harness.picture.linear_image import LinearImage
+from harness.picture.pinhole import DirectionalLight, Pinhole
+from harness.sim.light.direct_image import LitObject
+
+BEHIND = 1.0
+"""White, as ObjectFolder's pictures have it."""
+
+
+def reference_pictures(lit: LitObject, held_out: HeldOut, samples: int) -> list[LinearImage]:
+    """Exact ones, anti-aliased.
+
+    Args:
+        lit: the object.
+        held_out: one picture for each camera and its light.
+        samples: a side of a pixel.
+    """
+    return [lit.render(camera, [light], samples).image for camera, light in _kept(held_out)]
+
+
+def network_pictures(
+    renderer: VisionRenderer, held_out: HeldOut, settings: RenderSettings | None = None
+) -> list[LinearImage]:
+    """The same from networks.
+
+    Args:
+        renderer: of them.
+        held_out: one picture for each camera and its light.
+        settings: of the renderer; None for the default.
+    """
+    return [renderer.render(camera, light, settings).image for camera, light in _kept(held_out)]
+
+
+def _kept(held_out: HeldOut) -> "zip[tuple[Pinhole, DirectionalLight]]":
+    return zip(held_out.cameras, held_out.lights, strict=True)
+
+
+def picture_errors(references: Sequence[LinearImage], found: Sequence[LinearImage]) -> Mapping[str, float]:
+    """Means over pictures before white, as shown on a screen; object-only is of pixels it covers at all."""
+    rows = []
+    for wanted, got in zip(references, found, strict=True):
+        one, other = got.display(BEHIND), wanted.display(BEHIND)
+        covered = (wanted.alpha > 0.0) | (got.alpha > 0.0)
+        alone = psnr(one, other, covered) if covered.any() else np.inf
+        rows.append((psnr(one, other), alone, ssim(one, other)))
+    whole, alone_all, alike = np.array(rows).T
+    return {
+        "psnr_db": float(whole.mean()),
+        "psnr_db_worst": float(whole.min()),
+        "psnr_db_object": float(alone_all.mean()),
+        "ssim": float(alike.mean()),
+        "ssim_worst": float(alike.min()),
+    }

@@ -1,0 +1,130 @@
+"""From a file with its colours to an ObjectFile with a look: intake, training, measurement, writing."""
+
+import hashlib
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
+from harness.authoring.training import Report
+from harness.authoring.vision.profiles import vision_profile
+from harness.authoring.vision.teacher import require_torch
+from harness.authoring.vision.vision import AuthoredVision, Teaching, author_vision, checkpoints
+from harness.basics.mesh import Mesh
+from harness.bench.scene import BUILTIN
+from harness.objectfile.entries import Source
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.same_object import is_same_surface
+from harness.objectfile.vision.part import VisionPart, with_vision
+from harness.sim.light.appearance import Appearance
+from harness.sim.light.appearance_source import appearance_of
+from harness.sim.solid.taken_surface import surface_of
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltVision:
+    """An ObjectFile and how it came about.
+
+    Attributes:
+        object: on disk.
+        vision: its networks and errors.
+        said: what was done to the mesh and its colours, and what to look at.
+        seconds: s on the clock of each stage.
+    """
+
+    object: ObjectFile
+    vision: AuthoredVision
+    said: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+
+def build_vision(
+    wanted: PartRequest,
+    out: Path,
+    report: Report,
+    threads: int | None = None,
+    teaching: Teaching = "none",
+    finish: bool = False,
+) -> BuiltVision:
+    """Build an object's look, or go on with a training that was stopped.
+
+    Args:
+        wanted: what, by a profile of ``vision_profiles.VISION_PROFILES``.
+        out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
+        report: told of progress.
+        threads: of a training; None for as many as the process has cores.
+        teaching: whether a teacher is made and measured beside, or for the networks to learn from.
+        finish: whether all learn from pictures then, in a profile that does not say so itself.
+
+    Raises:
+        WrongUse: options that cannot be, a teacher without torch among them.
+        MeshRefused: a mesh that cannot stand for an object.
+        DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
+    """
+    named = vision_profile(wanted.profile)
+    chosen = named.finished() if finish else named
+    if teaching != "none":
+        require_torch()
+    begun = time.perf_counter()
+    report("reading the mesh and its colours", 0.0)
+    source = source_of(wanted.mesh, wanted.licence)
+    taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
+    look = appearance_of(wanted.mesh, taken.units)
+    created = created_object(wanted.mesh, wanted.licence, wanted.material, taken.mesh, out, source)
+    read = time.perf_counter() - begun
+    vision = author_vision(look, chosen, wanted.seed, out, report, threads, teaching)
+    begun = time.perf_counter()
+    report("writing", 1.0)
+    part = VisionPart(
+        model=vision.model,
+        provenance=provenance_of(wanted, "vision", vision.settings, (source, *_textures(wanted, look))),
+        # JSON holds no infinity, which is what equal pictures have for decibels.
+        measured={name: value for name, value in vision.errors.items() if math.isfinite(value)},
+        surface=drawn_surface(taken.mesh, look.mesh),
+    )
+    made = with_vision(created, part)
+    for checkpoint in checkpoints(out):
+        checkpoint.unlink(missing_ok=True)
+    seconds = {"mesh": read, **vision.seconds, "write": time.perf_counter() - begun}
+    return BuiltVision(made, vision, (*taken.said, *look.remarks), seconds)
+
+
+def drawn_surface(mesh: Mesh, looked_at: Mesh) -> Mesh | None:
+    """What pictures are to be drawn along; None where the object's mesh will do.
+
+    A look's surface comes with seams where its texture has them; they are closed, since which pixels a
+    closed surface covers is found faster, and an eye within it is noticed.
+
+    Args:
+        mesh: of the object, in metres.
+        looked_at: of its look, in metres.
+    """
+    return None if is_same_surface(mesh, looked_at) else without_seams(looked_at)
+
+
+def without_seams(mesh: Mesh) -> Mesh:
+    """The same faces with one vertex a place; those that have then no area are left out."""
+    vertices, place_of = np.unique(mesh.vertices[np.unique(mesh.faces)], axis=0, return_inverse=True)
+    at = np.zeros(len(mesh.vertices), np.int64)
+    at[np.unique(mesh.faces)] = place_of.reshape(-1)
+    faces = at[mesh.faces]
+    return Mesh(vertices, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
+
+
+def _textures(wanted: PartRequest, look: Appearance) -> tuple[Source, ...]:
+    """Of a file's textures, which lie beside it or within it, their pixels' hashes."""
+    if wanted.mesh.startswith(BUILTIN):
+        return ()
+    return tuple(
+        Source(
+            what=f"texture {number}, {texture.shape[1]} x {texture.shape[0]} texels",
+            origin=Path(wanted.mesh).name,
+            licence=wanted.licence,
+            sha256=hashlib.sha256(np.ascontiguousarray(texture).tobytes()).hexdigest(),
+        )
+        for number, texture in enumerate(look.textures)
+    )

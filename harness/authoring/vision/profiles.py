@@ -1,0 +1,139 @@
+"""Which networks of vision are made, and at what price: the profiles of ``object build --only vision``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from harness.authoring.vision.finish_profiles import CellsFinish, TeacherFinish
+from harness.authoring.vision.teacher_profiles import (
+    SMOKE_TEACHERS,
+    STANDARD_TEACHERS,
+    TeacherSpec,
+)
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import nearest
+from harness.objectfile.vision.network.network import CELLS, PAPER, Kind, NetworkSize
+
+
+@dataclass(frozen=True)
+class CellsSpec:
+    """Tiny networks, each trained on its own cell.
+
+    Attributes:
+        size: of each network.
+        cells: along 1.2 times the object's longest side.
+        places: of the surface that all learn from together.
+        steps: of Adam, of each network.
+        batch: places in a step.
+        rate: of Adam's first steps; it falls to zero as half a cosine.
+        hidden: share of lamps that are hidden.
+        opacity: weight of the density's errors beside the colours'.
+        overlap: cells by which each learns from beyond its border, so that neighbours agree.
+        least: places that a cell learns from at least, its neighbours' if it has fewer.
+    """
+
+    size: NetworkSize
+    cells: int = CELLS
+    places: int = 2_000_000
+    steps: int = 4000
+    batch: int = 64
+    rate: float = 8e-3
+    hidden: float = 0.2
+    opacity: float = 0.02
+    overlap: float = 0.06
+    least: int = 512
+
+    def __post_init__(self) -> None:
+        if min(self.places, self.steps, self.batch, self.least) < 1 or not 0.0 <= self.overlap <= 0.5:
+            raise WrongUse(
+                f"no networks are trained on {self.places} places in {self.steps} steps of {self.batch}, "
+                f"overlapping by {self.overlap} cells; give 1 or more of each, and 0 to 0.5"
+            )
+        if not (0.0 <= self.hidden <= 1.0 and self.opacity > 0.0 and self.rate > 0.0):
+            raise WrongUse(
+                f"a share of {self.hidden} hidden lamps, a weight of {self.opacity}, a rate of {self.rate}; "
+                "give 0 to 1, and two numbers above 0"
+            )
+
+
+@dataclass(frozen=True)
+class VisionProfile:
+    """One trade of time for accuracy.
+
+    Attributes:
+        networks: that are made.
+        strict: networks told no more than the paper's, made and judged beside and not kept; None for none.
+        pictures: kept back, by which they are judged.
+        side: pixels of those pictures.
+        samples: a side of a pixel of the reference.
+        teachers: large networks that are made beside where that is asked for, one of a kind.
+        finish: what all learn from pictures then; None for nothing.
+    """
+
+    networks: CellsSpec
+    pictures: int
+    strict: CellsSpec | None = None
+    side: int = 256
+    samples: int = 4
+    teachers: tuple[TeacherSpec, ...] = SMOKE_TEACHERS
+    finish: CellsFinish | None = None
+
+    def __post_init__(self) -> None:
+        if self.strict is not None and self.strict.size.kind != "osf":
+            raise WrongUse(
+                f"networks of kind {self.strict.size.kind!r} are told more than the paper's, which is 'osf'"
+            )
+        if min(self.pictures, self.side, self.samples) < 1:
+            raise WrongUse(
+                f"{self.pictures} pictures of {self.side} pixels with {self.samples} samples judge nothing; "
+                "give 1 or more of each"
+            )
+
+    def finished(self) -> "VisionProfile":
+        """The same, with what learns from the surface alone finished on pictures."""
+        teachers = tuple(replace(each, finish=each.finish or TeacherFinish()) for each in self.teachers)
+        return replace(self, finish=self.finish or CellsFinish(), teachers=teachers)
+
+    def teacher(self, kind: Kind) -> TeacherSpec:
+        """The teacher of a kind.
+
+        Raises:
+            WrongUse: there is none.
+        """
+        for spec in self.teachers:
+            if spec.kind == kind:
+                return spec
+        raise WrongUse(f"this profile of vision has no teacher of kind {kind!r}; take another profile")
+
+
+_COMPACT = NetworkSize(width=32, octaves=6, turns=3, kind="osf-v")
+
+VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
+    "smoke": VisionProfile(CellsSpec(_COMPACT, places=1_500_000), pictures=4),
+    "standard": VisionProfile(
+        CellsSpec(_COMPACT, places=4_000_000, steps=20_000, batch=128),
+        pictures=12,
+        strict=CellsSpec(replace(_COMPACT, kind="osf"), places=8_000_000),
+        teachers=STANDARD_TEACHERS,
+    ),
+    "paper": VisionProfile(
+        CellsSpec(replace(PAPER, kind="osf-v"), places=4_000_000, steps=10_000, batch=128),
+        pictures=12,
+        strict=CellsSpec(PAPER, places=8_000_000),
+        teachers=STANDARD_TEACHERS,
+    ).finished(),
+})  # fmt: skip
+"""``paper`` has networks of ObjectFolder 2.0's size, finished on pictures as those are; its strict ones are
+those, told no more. None of them needs torch, teachers aside."""
+
+
+def vision_profile(name: str) -> VisionProfile:
+    """The profile of that name.
+
+    Raises:
+        WrongUse: there is none.
+    """
+    found = VISION_PROFILES.get(name)
+    if found is None:
+        raise WrongUse(f"no profile {name!r} of vision; {nearest(name, VISION_PROFILES)}")
+    return found

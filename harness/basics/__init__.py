@@ -1,0 +1,1 @@
+"""What everything stands on: arrays, errors, quantities with units, transforms, meshes, materials, files."""

@@ -1,0 +1,208 @@
+"""What objects are made of: the seven materials of the paper, and those an operator describes.
+
+A file of materials has one table for each::
+
+    [materials.stoneware]
+    density = "2450 kg/m^3"
+    young = "45 GPa"
+    poisson = 0.2
+    alpha = "12 1/s"
+    beta = "0.1 us"
+    source = "ring-down of our own bowls, 14 March"
+
+    [materials.stoneware.uncertainty]
+    density = "2 %"
+    young = "10 %"
+    poisson = "10 %"
+    alpha = "30 %"
+    beta = "50 %"
+
+The table of uncertainties may be left out, and then nothing is known of them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from harness.basics.errors import WrongUse
+from harness.basics.quantities import DENSITY, PRESSURE, Decay, Nonnegative, Positive, Ratio, Time
+from harness.basics.toml_file import StrictModel, load_toml, nearest
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic elastic solid with Rayleigh damping.
+
+    A mode of angular frequency w decays as exp(-d t) with d = (alpha + beta w^2) / 2.
+
+    Attributes:
+        name: as a scene writes it.
+        density: kg/m^3.
+        young: Pa, Young's modulus.
+        poisson: Poisson's ratio.
+        alpha: 1/s, mass-proportional damping.
+        beta: s, stiffness-proportional damping.
+    """
+
+    name: str
+    density: float
+    young: float
+    poisson: float
+    alpha: float
+    beta: float
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How far an object may be from its material's constants: deviations (1 sigma) of natural logarithms.
+
+    Attributes:
+        density: 0.05 for five per cent, as all others.
+        young: of Young's modulus.
+        poisson: of Poisson's ratio.
+        alpha: of the mass-proportional damping.
+        beta: of the stiffness-proportional damping.
+    """
+
+    density: float
+    young: float
+    poisson: float
+    alpha: float
+    beta: float
+
+
+@dataclass(frozen=True)
+class KnownMaterial:
+    """A material and what its numbers rest on.
+
+    Attributes:
+        material: its constants.
+        source: of the constants.
+        uncertainty: of an object said to be of it; None where nobody has said.
+        basis: of the uncertainty, ``""`` where there is none.
+    """
+
+    material: Material
+    source: str
+    uncertainty: Uncertainty | None
+    basis: str = ""
+
+
+_KLEINPAT = (
+    "Wang and James, KleinPAT: Optimal Mode Conflation for Time-Domain Precomputation of Acoustic Transfer, "
+    "ACM TOG 38(4), article 122, 2019, table 4"
+)
+
+_ALPHA, _BETA = 0.6, 0.9
+"""Published constants for modal sound of one and the same material differ by factors of 1.5 to 4 in
+alpha (ceramic 6 and 15, plastic 20 and 30, iron 5 and 10, steel 5 and 20, all in 1/s) and of 3 to 5 in
+beta (ceramic 2e-8 and 1e-7, plastic 3e-7 and 1e-6, in s); these are the deviations of their logarithms,
+pooled. How an object is held adds to alpha beside."""
+
+_TABLE = (
+    (Material("ceramic", 2700.0, 7.2e10, 0.19, 6.0, 1e-7), (0.07, 0.20, 0.15),
+     "judged: tableware from earthenware to porcelain has 2000 to 2600 kg/m^3, and softens with its pores"),
+    (Material("glass", 2600.0, 6.2e10, 0.20, 1.0, 1e-7), (0.05, 0.08, 0.07),
+     "two thirds of the way to soda-lime glass: 2440 to 2490 kg/m^3, 69 to 72 GPa, 0.22 (Callister, "
+     "Materials Science and Engineering, 7th edition, 2007, appendix B)"),
+    (Material("wood", 750.0, 1.1e10, 0.25, 60.0, 2e-6), (0.10, 0.22, 0.30),
+     "clear wood of one species along the grain (Forest Products Laboratory, Wood Handbook, 2010, chapter "
+     "5), Poisson's ratio judged; across the grain it is ten times as soft, as no isotropic material can be"),
+    (Material("plastic", 1070.0, 1.4e9, 0.35, 30.0, 1e-6), (0.05, 0.25, 0.06),
+     "judged: ABS of all grades has 1010 to 1210 kg/m^3 and 1.1 to 2.9 GPa; other plastics differ more"),
+    (Material("iron", 8000.0, 2.1e11, 0.28, 5.0, 1e-7), (0.05, 0.35, 0.05),
+     "judged: the constants are those of pure iron; cast iron has 7000 to 7300 kg/m^3 and 70 to 175 GPa"),
+    (Material("polycarbonate", 1190.0, 2.4e9, 0.37, 0.5, 4e-7), (0.02, 0.07, 0.03),
+     "judged: unfilled grades have 1140 to 1210 kg/m^3 and 2.0 to 2.4 GPa"),
+    (Material("steel", 7850.0, 2.0e11, 0.29, 5.0, 3e-8), (0.015, 0.035, 0.03),
+     "carbon steels of 207 GPa and stainless ones of 193 GPa (Callister, as for glass)"),
+)  # fmt: skip
+
+KNOWN: Mapping[str, KnownMaterial] = MappingProxyType(
+    {
+        constants.name: KnownMaterial(constants, _KLEINPAT, Uncertainty(*spread, _ALPHA, _BETA), basis)
+        for constants, spread, basis in _TABLE
+    }
+)
+"""The seven by name, with sources and uncertainties. The constants are also those of the NeuralSound
+program (Jin et al. 2022)."""
+
+MATERIALS: MappingProxyType[str, Material] = MappingProxyType(
+    {name: known.material for name, known in KNOWN.items()}
+)
+"""The seven by name."""
+
+
+def material(name: str, own: Mapping[str, KnownMaterial] = MappingProxyType({})) -> Material:
+    """The material of that name, in any case.
+
+    Args:
+        name: of one of the seven, or of an own one.
+        own: beside the seven, from ``load_materials``.
+
+    Raises:
+        WrongUse: there is none; the nearest known one is named.
+    """
+    known = {**KNOWN, **own}
+    found = known.get(name.strip().lower())
+    if found is None:
+        raise WrongUse(f"no material {name!r}; {nearest(name, known)}")
+    return found.material
+
+
+def load_materials(path: Path) -> Mapping[str, KnownMaterial]:
+    """The materials that a file describes, by name.
+
+    Raises:
+        WrongUse: the file cannot be read, or says something no material has; each mistake is named
+            with its key, its value and what was expected.
+    """
+    tables = load_toml(path, _File).materials
+    return MappingProxyType({name: table.known(name) for name, table in tables.items()})
+
+
+class _UncertaintyTable(StrictModel):
+    density: Annotated[Ratio, Nonnegative]
+    young: Annotated[Ratio, Nonnegative]
+    poisson: Annotated[Ratio, Nonnegative]
+    alpha: Annotated[Ratio, Nonnegative]
+    beta: Annotated[Ratio, Nonnegative]
+
+
+class _MaterialTable(StrictModel):
+    density: Annotated[float, DENSITY, Positive]
+    young: Annotated[float, PRESSURE, Positive]
+    poisson: float = Field(gt=-1.0, lt=0.5)
+    alpha: Annotated[Decay, Nonnegative]
+    beta: Annotated[Time, Nonnegative]
+    source: str = Field(min_length=1)
+    uncertainty: _UncertaintyTable | None = None
+
+    def known(self, name: str) -> KnownMaterial:
+        constants = Material(name, self.density, self.young, self.poisson, self.alpha, self.beta)
+        given = self.uncertainty
+        if given is None:
+            return KnownMaterial(constants, self.source, None)
+        spread = Uncertainty(given.density, given.young, given.poisson, given.alpha, given.beta)
+        return KnownMaterial(constants, self.source, spread, self.source)
+
+
+class _File(StrictModel):
+    materials: dict[str, _MaterialTable]
+
+    @model_validator(mode="after")
+    def _names_are_new(self) -> "_File":
+        for name in self.materials:
+            if name in KNOWN:
+                raise ValueError(
+                    f"[materials.{name}] would replace a built-in material; give it another name"
+                )
+            if name != name.strip().lower() or not name:
+                raise ValueError(
+                    f"[materials.{name}] is not a name in lower case; write {name.strip().lower()!r}"
+                )
+        return self

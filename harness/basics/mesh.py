@@ -1,0 +1,72 @@
+"""A surface in metres: the one form in which every simulator takes an object."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray, IntArray, read_only
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with shared vertices, outward by the right-hand rule.
+
+    Attributes:
+        vertices: ``(n, 3)`` metres, in the object's frame.
+        faces: ``(m, 3)`` indices into the vertices.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+
+    def __post_init__(self) -> None:
+        vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
+        faces = np.ascontiguousarray(self.faces, dtype=np.int64)
+        object.__setattr__(self, "vertices", read_only(vertices.copy()))
+        object.__setattr__(self, "faces", read_only(faces.copy()))
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """``(m, 3, 3)`` metres: the three corners of every face."""
+        return read_only(self.vertices[self.faces])
+
+    @cached_property
+    def face_normals(self) -> FloatArray:
+        """``(m, 3)`` unit outward normals; zero for a face without area."""
+        return read_only(_divide(self._crosses, np.linalg.norm(self._crosses, axis=1)))
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """``(m,)`` square metres."""
+        return read_only(0.5 * np.linalg.norm(self._crosses, axis=1))
+
+    @cached_property
+    def _crosses(self) -> FloatArray:
+        a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def vertex_normals(self) -> FloatArray:
+        """``(n, 3)`` area-weighted unit normals."""
+        total = np.zeros_like(self.vertices)
+        for corner in range(3):
+            np.add.at(total, self.faces[:, corner], self._crosses)
+        return read_only(_divide(total, np.linalg.norm(total, axis=1)))
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """``(2, 3)`` metres: least and greatest corner of the axis-aligned box."""
+        used = self.vertices[np.unique(self.faces)]
+        return read_only(np.array([used.min(axis=0), used.max(axis=0)]))
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal in metres."""
+        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+
+def _divide(vectors: FloatArray, lengths: FloatArray) -> FloatArray:
+    safe = np.where(lengths > 0.0, lengths, 1.0)
+    quotient: FloatArray = vectors / safe[:, None]
+    return quotient

@@ -1,0 +1,20 @@
+"""A file that an operator names: there, or wrong use."""
+
+from pathlib import Path
+
+from harness.basics.errors import WrongUse
+
+
+def require_file(path: Path, what: str, advice: str = "check the path") -> None:
+    """Refuse a path at which there is no file.
+
+    Args:
+        path: that was named.
+        what: is expected there, as "mesh file".
+        advice: what to do next.
+
+    Raises:
+        WrongUse: there is none.
+    """
+    if not path.is_file():
+        raise WrongUse(f"there is no {what} {path}; {advice}")

@@ -1,0 +1,143 @@
+"""Files an operator writes: strict TOML, every mistake named at once, nothing guessed."""
+
+import difflib
+import tomllib
+import types
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from harness.basics.errors import WrongUse
+
+M = TypeVar("M", bound=BaseModel)
+
+
+class StrictModel(BaseModel):
+    """A table of a file: unknown keys and wrong types are refused, and what was read stays as it is."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, serialize_by_alias=True)
+
+
+def load_toml(path: Path, model: type[M]) -> M:
+    """A TOML file as a model.
+
+    Raises:
+        WrongUse: the file cannot be read, or says something the model does not know; each
+            mistake is named with its key, its value and what was expected.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise WrongUse(f"{path} is not UTF-8 text ({error.reason} at byte {error.start})") from error
+    except OSError as error:
+        raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+    try:
+        tree = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise WrongUse(f"{path} is not TOML: {str(error)[:1].lower()}{str(error)[1:]}") from error
+    return validate(tree, model, str(path))
+
+
+def validate(tree: Any, model: type[M], where: str) -> M:
+    """Plain values (as TOML or JSON give them) as a model; ``where`` names their source in messages.
+
+    Raises:
+        WrongUse: as ``load_toml``.
+    """
+    try:
+        return model.model_validate(_frozen(tree))
+    except ValidationError as error:
+        problems = [_sentence(detail, model) for detail in error.errors(include_url=False)]
+    if len(problems) == 1:
+        raise WrongUse(f"{where}: {problems[0]}")
+    listed = "".join(f"\n  - {problem}" for problem in problems)
+    raise WrongUse(f"{where}: {len(problems)} mistakes:{listed}")
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """``"; did you mean 'x'?"`` with the known name most like ``name``, and all of them beside it."""
+    names = sorted(known)
+    like = difflib.get_close_matches(name.lower(), [n.lower() for n in names], n=1, cutoff=0.5)
+    match = next((n for n in names if like and n.lower() == like[0]), None)
+    listed = f"there is {', '.join(names)}" if names else "there is none"
+    return f"did you mean {match!r}? ({listed})" if match else listed
+
+
+def _frozen(value: Any) -> Any:
+    """Lists as tuples, at every depth: a model read from a file cannot be changed."""
+    if isinstance(value, dict):
+        return {key: _frozen(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(_frozen(item) for item in value)
+    return value
+
+
+def _sentence(detail: ErrorDetails, model: type[BaseModel]) -> str:
+    location, kind = detail["loc"], detail["type"]
+    key = _dotted(location)
+    if kind == "extra_forbidden":
+        table = f"[{_dotted(location[:-1])}]" if len(location) > 1 else "the file"
+        name = str(location[-1])
+        return f"unknown key {key!r}; in {table} {nearest(name, _keys_at(model, location[:-1]))}"
+    if kind == "missing":
+        return f"{key!r} is missing"
+    if kind == "model_type":
+        return f"{key!r} must be a table, [{key}], not {detail['input']!r}"
+    if kind == "value_error":
+        return _with_value(key, detail, str(detail["ctx"]["error"]))
+    if kind == "literal_error":
+        return _with_value(key, detail, _one_of(detail))
+    return _with_value(key, detail, _lower(detail["msg"].replace("Input should", "it should")))
+
+
+def _with_value(key: str, detail: ErrorDetails, expected: str) -> str:
+    value = detail["input"]
+    shown = list(value) if isinstance(value, tuple) else value
+    quoted = repr(shown)
+    if expected.startswith(quoted):
+        return f"{key!r}: {expected}" if key else expected
+    if isinstance(value, dict):
+        return f"[{key}]: {expected}" if key else expected
+    return f"{key!r} = {quoted}: {expected}"
+
+
+def _one_of(detail: ErrorDetails) -> str:
+    allowed = str(detail["ctx"]["expected"])
+    names = [part.strip().strip("'") for part in allowed.replace(" or ", ", ").split(",")]
+    if isinstance(detail["input"], str):
+        return f"not known; {nearest(detail['input'], names)}"
+    return f"it must be {allowed}"
+
+
+def _dotted(location: Sequence[str | int]) -> str:
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _keys_at(model: type[BaseModel], location: Sequence[str | int]) -> list[str]:
+    """The keys of the table at ``location``."""
+    here: type[BaseModel] | None = model
+    for part in location:
+        if isinstance(part, int) or here is None:
+            continue
+        field = next(f for name, f in here.model_fields.items() if (f.alias or name) == part)
+        here = _model_in(field.annotation)
+    return [] if here is None else [field.alias or name for name, field in here.model_fields.items()]
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The model inside an optional or a tuple of models."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    if get_origin(annotation) in (Union, types.UnionType, tuple):
+        return next((found for part in get_args(annotation) if (found := _model_in(part))), None)
+    return None
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:]

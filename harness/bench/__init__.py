@@ -1,0 +1,1 @@
+"""What the lab is: readings, instruments, sensors, station, scene, reality gap, clocks."""

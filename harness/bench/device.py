@@ -1,0 +1,174 @@
+"""What an experiment may ask of an instrument. Drivers are plain classes and inherit nothing.
+
+Every method states an intention and may be called twice. Poses are of the flange in the
+robot's base; what the flange carries is the station's business.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from harness.basics.arrays import FloatArray
+from harness.bench.reading import Reading
+
+
+@dataclass(frozen=True, eq=False)
+class ArmState:
+    """One packet of the arm's stream.
+
+    Attributes:
+        time: s on the bench clock, at arrival.
+        joints: ``(6,)`` rad, measured.
+        joint_speeds: ``(6,)`` rad/s, measured.
+        base_from_flange: ``(4, 4)``, the controller's own.
+        wrench: ``(6,)`` N and N m at the flange, in base.
+        safety: ``"normal"``, ``"protective stop"``, ``"emergency stop"`` and so on, in words.
+        moving: whether the arm is executing a motion.
+    """
+
+    time: float
+    joints: FloatArray
+    joint_speeds: FloatArray
+    base_from_flange: FloatArray
+    wrench: FloatArray
+    safety: str
+    moving: bool
+
+
+@dataclass(frozen=True)
+class Health:
+    """How an instrument is doing, for ``touchstone check`` and the report.
+
+    Attributes:
+        name: of the instrument.
+        identity: model and serial number, as the instrument states them.
+        rate: samples a second, measured.
+        drops: samples lost since opening.
+        latency: s, median age of a sample on arrival; None where it cannot be known.
+        detail: anything worth a sentence.
+    """
+
+    name: str
+    identity: str
+    rate: float
+    drops: int
+    latency: float | None
+    detail: str = ""
+
+
+class Arm(Protocol):
+    """A six-joint arm that moves only within the station's limits."""
+
+    def open(self) -> None:
+        """Connect; raises ``BenchFault`` naming the cable or the switch to look at."""
+
+    def close(self) -> None:
+        """Stop, disconnect, release."""
+
+    def state(self) -> ArmState:
+        """The newest state; raises ``BenchFault`` where it is stale."""
+
+    def history(self, seconds: float) -> tuple[Reading, ...]:
+        """Every packet of the last ``seconds``: joints, flange poses, wrenches."""
+
+    def move_joints(self, joints: FloatArray, speed: float, acceleration: float) -> None:
+        """Move to ``(6,)`` rad at rad/s and rad/s^2; returns at rest."""
+
+    def move_line(self, base_from_flange: FloatArray, speed: float, acceleration: float) -> None:
+        """Move the flange in a straight line at m/s and m/s^2; returns at rest."""
+
+    def move_until_contact(self, direction: FloatArray, speed: float, force: float, travel: float) -> bool:
+        """Move along a unit direction in base until ``force`` N resist; False after ``travel`` m without."""
+
+    def zero_force(self) -> None:
+        """Take the present reading of the force sensor as zero; only at rest and out of contact."""
+
+    def set_digital_output(self, index: int, on: bool) -> None:
+        """Switch a tool digital output."""
+
+    def stop(self) -> None:
+        """Stop now, from any thread and in any state."""
+
+    def health(self) -> Health:
+        """Rate, drops and latency since opening."""
+
+
+class TactileCamera(Protocol):
+    """A gel seen from behind, or any camera."""
+
+    def open(self) -> None:
+        """Connect and wait for the first frame."""
+
+    def close(self) -> None:
+        """Release the stream."""
+
+    def read(self, count: int, timeout: float) -> Reading:
+        """The next ``count`` frames that arrive from now on, or ``BenchFault`` after ``timeout`` s."""
+
+    def health(self) -> Health:
+        """Rate, drops and latency since opening."""
+
+
+class ImpactHammer(Protocol):
+    """A hammer's force cell and, where one clock serves both, the microphone that hears it."""
+
+    def open(self) -> None:
+        """Connect and begin to sample."""
+
+    def close(self) -> None:
+        """Stop sampling and disconnect."""
+
+    def capture(
+        self, fire: Callable[[], None], before: float, after: float, timeout: float
+    ) -> tuple[Reading, ...]:
+        """Listen, call ``fire()``, and return what was read around the strike.
+
+        Args:
+            fire: strikes, or asks a person to; called once, when samples are arriving.
+            before: s kept from before the trigger.
+            after: s kept from the trigger on.
+            timeout: s from ``fire()``'s return to the trigger.
+
+        Returns:
+            Channels ``hammer.force`` and ``microphone.pressure`` (raw counts in blocks, each with the
+            time of its first sample), ``hammer.clock`` and ``hammer.flags``
+            (``harness.bench.acquisition_channels``). Without a trigger within ``timeout`` they are of the
+            last ``before + after`` s, and flagged silent.
+
+        Raises:
+            BenchFault: samples were lost, their order was lost, or the link went away.
+        """
+
+    def health(self) -> Health:
+        """Rate, drops and latency since opening."""
+
+
+class Microphone(Protocol):
+    """What hears the object ring; readings are blocks of counts on ``microphone.pressure``."""
+
+    def open(self) -> None:
+        """Begin to listen; raises ``BenchFault`` naming the device that is missing or does not fit."""
+
+    def close(self) -> None:
+        """Stop listening."""
+
+    def record(self, seconds: float) -> tuple[Reading, ...]:
+        """The next ``seconds`` of sound: counts, flags, callback times and the fitted clock."""
+
+    def between(self, start: float, end: float) -> tuple[Reading, ...]:
+        """The sound from ``start`` to ``end`` s on the bench clock, as ``record`` returns it.
+
+        Raises:
+            BenchFault: it is no longer remembered, or was before the opening.
+        """
+
+    def capture(
+        self, fire: Callable[[], None], before: float, after: float, timeout: float
+    ) -> tuple[Reading, ...]:
+        """Call ``fire()``; the sound from ``before`` s before it is heard to ``after`` s after.
+
+        Flagged, not raised, where nothing is heard for ``timeout`` s.
+        """
+
+    def health(self) -> Health:
+        """Rate, bad blocks and latency since opening."""

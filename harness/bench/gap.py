@@ -1,0 +1,192 @@
+"""The reality gap: how the bench differs from what is believed of it, as a file of distributions.
+
+The mocked world draws from it, once a run; nothing that estimates reads it. A value is the
+sigma of a normal distribution with mean zero unless its attribute says otherwise.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from harness.basics.errors import WrongUse
+from harness.basics.quantities import Angle, Decay, Length, Level, Nonnegative, Ordered, Positive, Ratio, Time
+from harness.basics.toml_file import StrictModel, load_toml, nearest
+
+_FOLDER = Path(__file__).parent / "gaps"
+
+
+class ArmGap(StrictModel):
+    """Where the arm is, against where its controller says.
+
+    Attributes:
+        translation: m, per axis of the base and contact.
+        along_tool: m, along the tool's axis, per contact, in addition.
+    """
+
+    translation: Annotated[Length, Nonnegative]
+    along_tool: Annotated[Length, Nonnegative]
+
+
+class ObjectGap(StrictModel):
+    """How the object stands, against the scene's nominal pose.
+
+    Attributes:
+        position: m, per axis of the base and run; no estimator is told the position.
+        yaw: rad, about the vertical, per run.
+        tilt: rad, about base x and y each, per run.
+    """
+
+    position: Annotated[Length, Nonnegative]
+    yaw: Annotated[Angle, Nonnegative]
+    tilt: Annotated[Angle, Nonnegative]
+
+
+class SensorGap(StrictModel):
+    """How the sensor is mounted, against the station's frame of it.
+
+    Attributes:
+        tilt: rad, about gel x and y each, per run.
+        tilt_per_contact: rad, about gel x and y each, per contact.
+        image_yaw: rad, of the image about the gel's z, per run.
+        gel_centre: m, per axis of the gel's frame, per run.
+        pitch: relative, of the length of gel that a pixel shows, per run.
+        aspect: relative, of a pixel's height against its width, per run.
+    """
+
+    tilt: Annotated[Angle, Nonnegative]
+    tilt_per_contact: Annotated[Angle, Nonnegative]
+    image_yaw: Annotated[Angle, Nonnegative]
+    gel_centre: Annotated[Length, Nonnegative]
+    pitch: Annotated[Ratio, Nonnegative] = 0.0
+    aspect: Annotated[Ratio, Nonnegative] = 0.0
+
+
+class GelGap(StrictModel):
+    """How the gel deforms and is seen, against its model.
+
+    Attributes:
+        height_gain: relative, of the indentation, per run.
+        height_offset: m of indentation, per contact.
+        pixel_noise: m of indentation, per pixel.
+        shading: m of indentation, smooth over the image, per run.
+        skirt: m, the blur by which the gel hangs from what it touches: the value itself.
+        calibration: whether the world's colours come from presses other than the estimator's.
+    """
+
+    height_gain: Annotated[Ratio, Nonnegative]
+    height_offset: Annotated[Length, Nonnegative]
+    pixel_noise: Annotated[Length, Nonnegative]
+    shading: Annotated[Length, Nonnegative]
+    skirt: Annotated[Length, Nonnegative]
+    calibration: Literal["other presses", "the estimator's"]
+
+
+class ShapeGap(StrictModel):
+    """The object as it was made, against its model.
+
+    Attributes:
+        scale: relative, per run.
+        deviation: m, per axis, smooth, per run.
+        deviation_length: m over which the deviation varies: the value itself.
+    """
+
+    scale: Annotated[Ratio, Nonnegative]
+    deviation: Annotated[Length, Nonnegative]
+    deviation_length: Annotated[Length, Positive]
+
+
+class SoundGap(StrictModel):
+    """The struck object and what carries its sound, against their models.
+
+    Attributes:
+        wall: relative change of the wall's thickness: uniform between the two.
+        poisson: uniform between minus and plus this.
+        elastic_field: relative, smooth fields of Young's modulus and density.
+        frequency: relative, of all modes together, per run.
+        frequency_per_mode: relative.
+        damping: of the logarithm, of all modes together, per run.
+        damping_per_mode: of the logarithm.
+        microphone_gain: dB, per mode, common to a run, with a random phase.
+        strike_direction: rad, the angle between the blow and the hammer's axis, about an axis drawn
+            uniformly, per strike.
+        strike_point: m, per axis across the hammer and strike.
+        force_gain: relative, per run.
+        pulse: s, the length of the half sine: the value itself.
+        pulse_spread: relative, per strike, uniform between minus and plus this.
+        reverberation_time: s to fall by 60 dB: the value itself; zero without a room.
+        direct_to_reverberant: dB: the value itself.
+        signal_to_noise: dB, of a middling strike over its first half second: the value itself.
+        gain_per_strike: dB, per mode and strike: a microphone, or an object, that moves in between.
+        phase_per_strike: rad, per mode and strike.
+        extra_damping: 1/s on top of every mode's, as of a hand that holds the object: the value itself.
+        silent_strikes: contacts, counted from 0, at which the striker does not reach the object.
+        saturated_strikes: contacts at which the blow is ten times as hard.
+        double_strikes: contacts at which the hammer bounces and hits twice.
+    """
+
+    wall: Annotated[tuple[Ratio, Ratio], Ordered]
+    poisson: float = Field(ge=0.0, lt=0.5)
+    elastic_field: Annotated[Ratio, Nonnegative]
+    frequency: Annotated[Ratio, Nonnegative]
+    frequency_per_mode: Annotated[Ratio, Nonnegative]
+    damping: Annotated[Ratio, Nonnegative]
+    damping_per_mode: Annotated[Ratio, Nonnegative]
+    microphone_gain: Annotated[Level, Nonnegative]
+    strike_direction: Annotated[Angle, Nonnegative]
+    strike_point: Annotated[Length, Nonnegative]
+    force_gain: Annotated[Ratio, Nonnegative]
+    pulse: Annotated[Time, Positive]
+    pulse_spread: Annotated[Ratio, Nonnegative]
+    reverberation_time: Annotated[Time, Nonnegative]
+    direct_to_reverberant: Level
+    signal_to_noise: Level
+    gain_per_strike: Annotated[Level, Nonnegative] = 0.0
+    phase_per_strike: Annotated[Angle, Nonnegative] = 0.0
+    extra_damping: Annotated[Decay, Nonnegative] = 0.0
+    silent_strikes: tuple[int, ...] = ()
+    saturated_strikes: tuple[int, ...] = ()
+    double_strikes: tuple[int, ...] = ()
+
+
+class Gap(StrictModel):
+    """Everything that may differ between the bench and what is believed of it."""
+
+    schema_number: Literal[1] = Field(alias="schema")
+    title: str
+    arm: ArmGap
+    object: ObjectGap
+    sensor: SensorGap
+    gel: GelGap
+    shape: ShapeGap
+    sound: SoundGap
+
+
+def gap_path(name: str) -> Path:
+    """The file of a gap: ``"default"``, ``"none"``, or a path.
+
+    Raises:
+        WrongUse: there is no such file and no such name.
+    """
+    shipped = {path.stem: path for path in _FOLDER.glob("*.toml")}
+    if name in shipped:
+        return shipped[name]
+    if not Path(name).is_file():
+        raise WrongUse(f"no gap file {name!r}; give a path or a shipped name: {nearest(name, shipped)}")
+    return Path(name).resolve()
+
+
+def load_gap(name: str) -> Gap:
+    """A gap by name or path; ``WrongUse`` as ``gap_path`` and ``load_toml``."""
+    return load_toml(gap_path(name), Gap)
+
+
+def lasting_name(name: str) -> str:
+    """What to write of a gap in a run: a shipped name, or a path that holds wherever it is resumed from.
+
+    Raises:
+        WrongUse: the gap cannot be read.
+    """
+    load_gap(name)
+    path = gap_path(name)
+    return name if path.stem == name else str(path)

@@ -1,0 +1,33 @@
+"""How fast joints may turn for the tool to keep the station's speed limit."""
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import apply
+from harness.bench import kinematics
+from harness.bench.station_file import Station
+
+_SAMPLES = 60
+_SHARE = 0.9
+"""Of the limit: what is sampled here may be slower than what is limited in between."""
+
+
+def joint_speed(station: Station, start: FloatArray, end: FloatArray, most: float) -> float:
+    """rad/s of the joint that turns most, for a straight motion of the joints.
+
+    Args:
+        station: whose limits hold for every point of ``tool_points``.
+        start: ``(6,)`` rad.
+        end: ``(6,)`` rad.
+        most: rad/s, never more than this.
+    """
+    turn = float(np.abs(end - start).max())
+    if turn == 0.0:
+        return most
+    shares = np.linspace(0.0, 1.0, _SAMPLES)
+    points = station.tool_points
+    poses = kinematics.forward(station.arm.model, start + shares[:, None] * (end - start))
+    places = np.array([apply(pose, points) for pose in poses])
+    farthest = float(np.linalg.norm(np.diff(places, axis=0), axis=-1).max()) * (_SAMPLES - 1)
+    limit = _SHARE * station.arm.safety.speed
+    return min(most, limit * turn / farthest) if farthest > 0.0 else most

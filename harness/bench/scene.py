@@ -1,0 +1,297 @@
+"""What is on the table: ``scene.toml``, or the options of the command line, as one model."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.errors import WrongUse
+from harness.basics.geometry import rotation_about, transform, translation
+from harness.basics.materials import MATERIALS
+from harness.basics.mesh import Mesh
+from harness.basics.quantities import (
+    Angle,
+    Length,
+    Nonnegative,
+    Ordered,
+    Positive,
+    Ratio,
+    Time,
+)
+from harness.basics.toml_file import StrictModel, load_toml, nearest, validate
+from harness.objectfile.entries import DESCRIPTION
+
+BUILTIN = "builtin:"
+UNITS = ("m", "cm", "mm", "in")
+
+_Z = np.array([0.0, 0.0, 1.0])
+_UPRIGHT = {
+    "z": np.eye(3),
+    "-z": np.diag([1.0, -1.0, -1.0]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "-y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    "x": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
+    "-x": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
+}
+
+
+class Pose(StrictModel):
+    """Where the object nominally stands, in the robot's base.
+
+    Attributes:
+        position: m, of the anchor.
+        yaw: rad, about the vertical.
+        up: the axis of the mesh file that points up.
+        anchor: the point meant by ``position``: the middle of the upright object's bottom (of
+            its bounding box), or the mesh file's origin.
+    """
+
+    position: tuple[Length, Length, Length] = (-0.42, 0.0, 0.25)
+    yaw: Angle = 0.0
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
+    anchor: Literal["bottom", "origin"] = "bottom"
+
+
+class SceneObject(StrictModel):
+    """The object under test.
+
+    Attributes:
+        mesh: ``"builtin:mug"`` and so on, or a mesh file; relative to the scene file in the file,
+            absolute once it is read.
+        units: of the mesh file's numbers; None to go by the file and its size.
+        material: a key of ``harness.basics.materials.MATERIALS``; a built-in object has one of its own.
+        scale: applied to the mesh after its units.
+        wall: m, of an object whose mesh is only its outside; None for what the mesh says.
+        objectfile: folder of its ObjectFile, found as ``mesh`` is; None where it has none.
+        pose: nominal.
+    """
+
+    mesh: str = Field(min_length=1)
+    units: Literal["m", "cm", "mm", "in"] | None = None
+    material: str
+    scale: float = Field(default=1.0, gt=0.0, allow_inf_nan=False)
+    wall: Annotated[Length, Positive] | None = None
+    objectfile: str | None = Field(default=None, min_length=1)
+    pose: Pose = Pose()
+
+    @property
+    def builtin(self) -> str | None:
+        """The name of the built-in object, None for a mesh file."""
+        return self.mesh.removeprefix(BUILTIN) if self.mesh.startswith(BUILTIN) else None
+
+    @property
+    def name(self) -> str:
+        """What to call the object."""
+        return self.builtin or Path(self.mesh).stem
+
+    @model_validator(mode="before")
+    @classmethod
+    def _builtins_have_a_material(cls, data: Any) -> Any:
+        mesh = data.get("mesh") if isinstance(data, dict) else None
+        if not (isinstance(mesh, str) and mesh.startswith(BUILTIN)):
+            return data
+        from harness.objects.builtin import MATERIALS as OWN
+
+        name = mesh.removeprefix(BUILTIN)
+        if name not in OWN:
+            raise ValueError(f"no built-in object {name!r}; {nearest(name, OWN)}")
+        return data if data.get("material") is not None else {**data, "material": OWN[name]}
+
+    @field_validator("material")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        if name.lower() not in MATERIALS:
+            raise ValueError(f"not known; {nearest(name, MATERIALS)}")
+        return name.lower()
+
+
+class Support(StrictModel):
+    """What holds the object up.
+
+    Attributes:
+        kind: ``"foam"``, a slender pedestal that leaves the object free; ``"clamped"``, a rigid one.
+        width: m, side of the pedestal's square section; its height is from the table to the object.
+    """
+
+    kind: Literal["foam", "clamped"] = "foam"
+    width: Annotated[Length, Positive] = 0.06
+
+
+class Table(StrictModel):
+    """The table's plane, horizontal.
+
+    Attributes:
+        height: m, in base.
+        size: m, along base x and y.
+    """
+
+    height: Length = 0.0
+    size: tuple[Annotated[Length, Positive], Annotated[Length, Positive]] = (1.6, 1.6)
+
+
+class Sensors(StrictModel):
+    """Which senses the scene calls for.
+
+    Attributes:
+        touch: the gel.
+        sound: hammer and microphones.
+        camera: the scene camera.
+        noise: whether simulated readings carry the instruments' own noise.
+    """
+
+    touch: bool = True
+    sound: bool = False
+    camera: bool = False
+    noise: bool = False
+
+
+class Room(StrictModel):
+    """A room around the bench; without one, the bench stands in the open.
+
+    Attributes:
+        size: m, along base x, y and z.
+        reverberation_time: s for sound to fall by 60 dB.
+        absorption: share of sound energy lost at a wall.
+    """
+
+    size: tuple[Annotated[Length, Positive], Annotated[Length, Positive], Annotated[Length, Positive]]
+    reverberation_time: Annotated[Time, Nonnegative] = 0.4
+    absorption: Annotated[Ratio, Nonnegative] | None = None
+
+
+class Light(StrictModel):
+    """A lamp over the bench, for the scene camera.
+
+    Attributes:
+        position: m, in base.
+        colour: relative red, green and blue.
+    """
+
+    position: tuple[Length, Length, Length]
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+class Localization(StrictModel):
+    """The contacts of a localization run.
+
+    Attributes:
+        contacts: how many.
+        spacing: ``"close"``, each within ``step`` of the last; ``"spread"``, over the object.
+        step: m, the greatest distance between successive close contacts.
+        depth: m, from and to: how far to press on after the first touch, uniform.
+        tilt: rad, the greatest angle of the tool from the surface's normal.
+        yaw: whether the estimator is told the object's yaw.
+        seed: of where, how deep and how tilted the contacts are; a run may say another.
+    """
+
+    contacts: int = Field(default=6, ge=1, le=100)
+    spacing: Literal["close", "spread"] = "close"
+    step: Annotated[Length, Positive] = 0.025
+    depth: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] = (0.5e-3, 2e-3)
+    tilt: Annotated[Angle, Nonnegative] = math.radians(15.0)
+    yaw: Literal["known", "unknown"] = "known"
+    seed: int = Field(default=0, ge=0)
+
+
+class SceneFile(StrictModel):
+    """A scene. Every table but ``[object]`` may be left out.
+
+    Attributes:
+        schema_number: ``schema`` in the file.
+        title: one line for reports.
+        object: under test.
+        support: under the object.
+        table: under the support.
+        sensors: that the scene calls for.
+        room: None in the open.
+        lights: for the scene camera; none means that no light is simulated.
+        observe: the quantities that a comparison asks the simulation for.
+        localization: the contacts to make.
+    """
+
+    schema_number: Literal[1] = Field(alias="schema")
+    title: str = ""
+    object: SceneObject
+    support: Support = Support()
+    table: Table = Table()
+    sensors: Sensors = Sensors()
+    room: Room | None = None
+    lights: tuple[Light, ...] = ()
+    observe: tuple[str, ...] = ("touch.image",)
+    localization: Localization = Localization()
+
+    def base_from_object(self, mesh: Mesh) -> FloatArray:
+        """``(4, 4)``, nominal, of the object whose mesh in metres is given."""
+        pose = self.object.pose
+        upright = _UPRIGHT[pose.up]
+        anchor = np.zeros(3)
+        if pose.anchor == "bottom":
+            corners = mesh.vertices[np.unique(mesh.faces)] @ upright.T
+            low, high = corners.min(axis=0), corners.max(axis=0)
+            anchor = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
+        turned = transform(rotation_about(_Z, pose.yaw), np.array(pose.position))
+        return read_only(turned @ translation(-anchor) @ transform(upright, np.zeros(3)))
+
+
+def load_scene(path: Path) -> SceneFile:
+    """A scene file, its mesh's and its ObjectFile's paths made absolute.
+
+    Raises:
+        WrongUse: naming each mistake; or the mesh file or the ObjectFile does not exist.
+    """
+    return _with_files_found(load_toml(path, SceneFile), path.parent, str(path))
+
+
+def scene_from_options(
+    mesh: str,
+    material: str | None = None,
+    units: str | None = None,
+    wall: str | None = None,
+    objectfile: str | None = None,
+) -> SceneFile:
+    """The scene that ``run --object FILE --material M --units mm --wall 2mm`` means.
+
+    Args:
+        mesh: file, relative to the working directory, or ``"builtin:mug"``.
+        material: None only for a built-in object.
+        units: of the file's numbers.
+        wall: a length with its unit.
+        objectfile: folder, relative to the working directory.
+
+    Raises:
+        WrongUse: an option that cannot be, or no such file.
+    """
+    given = {"mesh": mesh, "material": material, "units": units, "wall": wall, "objectfile": objectfile}
+    if material is None and not mesh.startswith(BUILTIN):
+        raise WrongUse(
+            f"--object {mesh} needs --material: it is one of {', '.join(MATERIALS)} (sound and mass "
+            "depend on it, touch does not)"
+        )
+    tree = {"schema": 1, "object": {key: value for key, value in given.items() if value is not None}}
+    return _with_files_found(validate(tree, SceneFile, "the options"), Path.cwd(), "the options")
+
+
+def scene_from_json(tree: Any, where: str) -> SceneFile:
+    """The scene that ``model_dump(mode="json")`` wrote, for example into a recording."""
+    return validate(tree, SceneFile, where)
+
+
+def _with_files_found(scene: SceneFile, folder: Path, where: str) -> SceneFile:
+    named, found = scene.object, {}
+    if named.builtin is None:
+        path = (folder / named.mesh).resolve()
+        if not path.is_file():
+            own = f'our own objects are written "{BUILTIN}mug" and so on'
+            raise WrongUse(f"{where}: 'object.mesh': there is no file {path}; {own}")
+        found["mesh"] = str(path)
+    if named.objectfile is not None:
+        path = (folder / named.objectfile).resolve()
+        if not (path / DESCRIPTION).is_file():
+            make = "make one with `touchstone object build`, or leave the key out"
+            kind = f"ObjectFile {path}, a folder with {DESCRIPTION} in it"
+            raise WrongUse(f"{where}: 'object.objectfile': there is no {kind}; {make}")
+        found["objectfile"] = str(path)
+    return scene.model_copy(update={"object": named.model_copy(update=found)}) if found else scene

@@ -1,0 +1,112 @@
+"""The scene camera as the object sees it: where it is, what lamps there are, and a frame of its stream."""
+
+import tempfile
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.basics.arrays import ByteArray, FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.geometry import apply, inverse
+from harness.basics.mesh import Mesh
+from harness.bench.gap import gap_path
+from harness.bench.mock_lab import MockLab
+from harness.bench.scene import SceneFile
+from harness.bench.station import addressed, make_camera
+from harness.bench.station_file import Station
+from harness.picture.pinhole import DirectionalLight, Pinhole
+
+_PATIENCE = 3.0
+"""s for a frame to come."""
+
+_NO_CAMERA = "the station {!r} has no [camera]; describe it in the station file"
+
+
+@dataclass(frozen=True, eq=False)
+class Lamp:
+    """A lamp of the scene.
+
+    Attributes:
+        light: of white, as far away as makes no difference.
+        colour: ``(3,)`` of it, relative red, green and blue.
+    """
+
+    light: DirectionalLight
+    colour: FloatArray
+
+
+def scene_pinhole(station: Station, scene: SceneFile, mesh: Mesh) -> Pinhole:
+    """The scene camera in the object's frame, at the object's nominal pose.
+
+    Args:
+        station: whose camera it is.
+        scene: says where the object stands.
+        mesh: of the object, metres.
+
+    Raises:
+        WrongUse: the station has no camera.
+    """
+    section = station.camera
+    if section is None:
+        raise WrongUse(_NO_CAMERA.format(station.title))
+    object_from_camera = inverse(scene.base_from_object(mesh)) @ section.base_from_camera.matrix
+    middle = (0.5 * section.columns, 0.5 * section.rows)
+    return Pinhole(section.columns, section.rows, section.focal_length, middle, object_from_camera)
+
+
+def scene_lamps(scene: SceneFile, mesh: Mesh) -> tuple[Lamp, ...]:
+    """The scene's lamps in the object's frame, each as seen from the middle of the object.
+
+    Args:
+        scene: says where they are, in base.
+        mesh: of the object, metres.
+
+    Raises:
+        OutOfDomain: a lamp in the middle of the object.
+    """
+    object_from_base = inverse(scene.base_from_object(mesh))
+    middle = mesh.bounds.mean(axis=0)
+    return tuple(
+        Lamp(
+            DirectionalLight(apply(object_from_base, np.array(each.position)[None])[0] - middle),
+            np.array(each.colour),
+        )
+        for each in scene.lights
+    )
+
+
+def scene_frame(station: Station, scene: SceneFile, mesh: Mesh, seed: int = 0) -> ByteArray:
+    """What the scene camera sees now; a mocked bench is started for it, and ended.
+
+    Args:
+        station: whose camera it is.
+        scene: that a mocked world shows.
+        mesh: of the object, metres.
+        seed: of a mocked world.
+
+    Returns:
+        ``(rows, columns, 3)`` RGB.
+
+    Raises:
+        WrongUse: the station has no camera.
+        BenchFault: it did not open, or sends nothing for 3 s.
+    """
+    seen = scene.model_copy(
+        update={"sensors": scene.sensors.model_copy(update={"camera": True, "sound": False})}
+    )
+    with ExitStack() as stack:
+        where = station
+        if station.mock is not None:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="touchstone-truth-"))
+            gap = gap_path(station.mock.gap)
+            lab = stack.enter_context(MockLab(seen, station, mesh, seed, gap, Path(folder) / "truth.json"))
+            where = addressed(station, lab.start())
+        camera = make_camera(where)
+        if camera is None:
+            raise WrongUse(_NO_CAMERA.format(station.title))
+        camera.open()
+        stack.callback(camera.close)
+        frame: ByteArray = camera.read(1, timeout=_PATIENCE).values[0]
+        return frame

@@ -1,0 +1,269 @@
+"""The instruments of a station file, one model for each."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.geometry import rotation_from_vector, transform
+from harness.basics.quantities import (
+    Acceleration,
+    Angle,
+    AngularAcceleration,
+    AngularSpeed,
+    Force,
+    Frequency,
+    Length,
+    Pixels,
+    Positive,
+    Speed,
+    Time,
+)
+from harness.basics.toml_file import StrictModel
+from harness.bench.acquisition import AcquisitionCalibration, shipped_acquisition
+from harness.bench.sensor import GELSIGHT_R15, MarkerGrid, TactileSensor
+
+SENSORS = {"gelsight-r1.5": GELSIGHT_R15}
+"""The makes of gel a station may name."""
+
+_TURN = 2 * np.pi
+
+Three = tuple[Length, Length, Length]
+SixAngles = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
+
+
+class Placement(StrictModel):
+    """A frame in another.
+
+    Attributes:
+        position: m, of its origin.
+        rotation: rad, the rotation vector: the axis times the angle.
+    """
+
+    position: Three = (0.0, 0.0, 0.0)
+    rotation: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+
+    @property
+    def matrix(self) -> FloatArray:
+        """``(4, 4)``, the outer frame from this one."""
+        return read_only(transform(rotation_from_vector(np.array(self.rotation)), np.array(self.position)))
+
+
+class Safety(StrictModel):
+    """What the arm may be asked to do; nothing outside is ever sent. SI, as ``drivers.ur.safety`` names them.
+
+    Attributes:
+        workspace_low: m, in base: the corner of the box that every point of the tool stays in.
+        workspace_high: m, in base: the opposite corner.
+        joint_low: rad.
+        joint_high: rad.
+        joint_step: rad, the most that a joint may turn in one motion.
+        joint_speed: rad/s.
+        joint_acceleration: rad/s^2.
+        speed: m/s of any point of the tool, away from contact.
+        speed_near: m/s while seeking contact and within ``near`` of it.
+        near: m of travel around the last contact.
+        acceleration: m/s^2.
+        travel: m, the longest search for contact.
+        force_press: N; a press beyond this is stopped.
+        force_any: N; beyond this the arm is stopped and stays stopped.
+        patience: s that the controller's watchdog waits for this computer before it stops the arm.
+    """
+
+    workspace_low: Three
+    workspace_high: Three
+    joint_low: SixAngles = (-_TURN,) * 6
+    joint_high: SixAngles = (_TURN,) * 6
+    joint_step: Annotated[Angle, Positive] = np.pi
+    joint_speed: Annotated[AngularSpeed, Positive] = 1.5
+    joint_acceleration: Annotated[AngularAcceleration, Positive] = 2.0
+    speed: Annotated[Speed, Positive] = 0.25
+    speed_near: Annotated[Speed, Positive] = 0.05
+    near: Annotated[Length, Positive] = 0.01
+    acceleration: Annotated[Acceleration, Positive] = 1.5
+    travel: Annotated[Length, Positive] = 0.2
+    force_press: Annotated[Force, Positive] = 10.0
+    force_any: Annotated[Force, Positive] = 25.0
+    patience: Annotated[Time, Positive] = 0.1
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> Self:
+        if not all(low < high for low, high in zip(self.workspace_low, self.workspace_high, strict=True)):
+            raise ValueError("workspace_low must lie below workspace_high on every axis")
+        if not all(low < high for low, high in zip(self.joint_low, self.joint_high, strict=True)):
+            raise ValueError("joint_low must lie below joint_high for every joint")
+        return self
+
+
+class ArmSection(StrictModel):
+    """The arm.
+
+    Attributes:
+        kind: of driver.
+        model: of arm.
+        address: of its control box; None only in a mocked station.
+        serial: of the arm, as its plate says.
+        rate: Hz of the state stream.
+        striker_output: the tool digital output (0 or 1) that fires the hammer's striker; None without one.
+        safety: limits.
+    """
+
+    kind: Literal["ur"] = "ur"
+    model: Literal["ur3e", "ur5e", "ur10e"] = "ur5e"
+    address: str | None = None
+    serial: str = ""
+    rate: Annotated[Frequency, Positive] = 500.0
+    striker_output: Literal[0, 1] | None = None
+    safety: Safety
+
+
+class Markers(StrictModel):
+    """Printed dots on the gel; see ``harness.bench.sensor.MarkerGrid``."""
+
+    rows: int = Field(gt=0)
+    columns: int = Field(gt=0)
+    spacing: Annotated[Length, Positive]
+    radius: Annotated[Length, Positive]
+
+
+class GelSection(StrictModel):
+    """The tactile camera.
+
+    Attributes:
+        kind: of driver.
+        url: of its stream; None only in a mocked station.
+        make: a key of ``SENSORS``.
+        serial: of the sensor.
+        calibration: path (relative to the station file, absolute once read) or name of a
+            calibration artefact.
+        casts_shadow: whether its light grazes enough for shadows.
+        markers: printed on its gel, None without.
+        rate: Hz, as its maker states it.
+    """
+
+    kind: Literal["gelsight-http"] = "gelsight-http"
+    url: str | None = None
+    make: Literal["gelsight-r1.5"] = "gelsight-r1.5"
+    serial: str = ""
+    calibration: str
+    casts_shadow: bool = False
+    markers: Markers | None = None
+    rate: Annotated[Frequency, Positive] = 25.0
+
+    @property
+    def sensor(self) -> TactileSensor:
+        """The geometry of this very sensor."""
+        grid = None if self.markers is None else MarkerGrid(**self.markers.model_dump())
+        return replace(SENSORS[self.make], markers=grid, casts_shadow=self.casts_shadow)
+
+
+class HammerSection(StrictModel):
+    """The impact hammer: a force cell on a striker, read by a data-acquisition box.
+
+    Attributes:
+        kind: of driver.
+        port: the box's serial port; None to find the box by its serial number, and in a mocked station.
+        serial: of the box.
+        model: of the box; it decides resolution and the fastest rate.
+        rate: Hz, samples of each channel.
+        calibration: path (relative to the station file, absolute once read) or name of a
+            calibration artefact: what a count of each channel means.
+        threshold: N at which a strike is noticed.
+        strike: who fires it: the arm's ``striker_output``, or a person who is asked to.
+        stand_off: m between the tip at rest and the surface when the striker is fired.
+    """
+
+    kind: Literal["dataq"] = "dataq"
+    port: str | None = None
+    serial: str = ""
+    model: Literal["DI-1110", "DI-2108"] = "DI-2108"
+    rate: Annotated[Frequency, Positive] = 50e3
+    calibration: str
+    threshold: Annotated[Force, Positive] = 2.0
+    strike: Literal["arm", "operator"] = "arm"
+    stand_off: Annotated[Length, Positive] = 6e-3
+
+    @property
+    def acquisition(self) -> AcquisitionCalibration:
+        """The calibration, read.
+
+        Raises:
+            CalibrationRefused: it is missing, damaged, or not one.
+        """
+        named = self.calibration
+        return (
+            AcquisitionCalibration.load(Path(named))
+            if named.endswith(".json")
+            else shipped_acquisition(named)
+        )
+
+
+class MicrophoneSection(StrictModel):
+    """The measurement microphone, fixed to the bench.
+
+    Attributes:
+        kind: ``"dataq"``, a channel of the hammer's box, on its clock; ``"portaudio"``, a sound
+            card's input, on a clock of its own. All keys below but ``serial`` are for the latter.
+        serial: of the microphone.
+        device: name of the sound card's input; None for the box, and in a mocked station.
+        rate: Hz, whole; one that the card has itself.
+        channels: inputs that the device has, exactly; None for one.
+        channel: which of them is the microphone, from 0; None for the first.
+        bits: of a count; None for 24.
+        latency: s by which the card's times are late, as measured; the same for all strikes.
+    """
+
+    kind: Literal["dataq", "portaudio"] = "dataq"
+    serial: str = ""
+    device: str | None = None
+    rate: Annotated[Frequency, Positive] | None = None
+    channels: int | None = Field(default=None, gt=0)
+    channel: int | None = Field(default=None, ge=0)
+    bits: Literal[24, 32] | None = None
+    latency: Time | None = None
+
+    @property
+    def full_scale(self) -> int:
+        """Greatest count of a sound card's converter."""
+        return (1 << ((self.bits or 24) - 1)) - 1
+
+    @model_validator(mode="after")
+    def _belongs_to_its_kind(self) -> Self:
+        own = {name: value for name, value in self if name not in ("kind", "serial")}
+        for key, value in own.items():
+            if self.kind == "dataq" and value is not None:
+                raise ValueError(f"{key!r} belongs to kind = 'portaudio'; the box has its own: remove it")
+        if self.kind == "portaudio" and self.rate is None:
+            raise ValueError("'rate' is missing; kind = 'portaudio' needs it")
+        if self.rate is not None and self.rate != round(self.rate):
+            raise ValueError(f"'rate' is {self.rate:g} Hz; a sound card takes whole numbers of Hz")
+        if (self.channel or 0) >= (self.channels or 1):
+            raise ValueError(
+                f"'channel' is {self.channel}, counted from 0, and the device has {self.channels or 1}"
+            )
+        return self
+
+
+class CameraSection(StrictModel):
+    """The scene camera.
+
+    Attributes:
+        kind: of driver.
+        url: of its stream; None only in a mocked station.
+        serial: of the camera.
+        rows: pixels.
+        columns: pixels.
+        focal_length: pixels.
+        base_from_camera: where it looks from (OpenCV: x right, y down, z forward).
+    """
+
+    kind: Literal["camera-http"] = "camera-http"
+    url: str | None = None
+    serial: str = ""
+    rows: int = Field(default=480, gt=0)
+    columns: int = Field(default=640, gt=0)
+    focal_length: Annotated[Pixels, Positive] = 600.0
+    base_from_camera: Placement

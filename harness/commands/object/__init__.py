@@ -1,0 +1,1 @@
+"""Commands about ObjectFiles: build, render, compare, view."""

@@ -1,0 +1,136 @@
+"""``touchstone object``: what an ObjectFile holds, and whether it is what it says."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from harness.commands import options
+from harness.commands.output import ANSWERS, emit
+
+if TYPE_CHECKING:
+    from harness.objectfile.description import Description
+
+Folder = Annotated[
+    Path, typer.Argument(help="The ObjectFile's folder: the one with object.json in it.", metavar="FOLDER")
+]
+
+
+def info(folder: Folder, json: options.Json = False) -> int:
+    """Say what an ObjectFile holds: the object, its modes, its networks, where they come from.
+
+    Only object.json is read; whether the files are what it says is asked of `touchstone object verify`.
+
+    Try: touchstone object info objects/mug
+    """
+    from harness.objectfile.file import ObjectFile
+
+    description = ObjectFile.open(folder).description
+    if json:
+        emit({"folder": str(folder), **description.model_dump(mode="json", by_alias=True)})
+    else:
+        for line in _lines(description):
+            ANSWERS.print(line, markup=False)
+    return 0
+
+
+def verify(folder: Folder, json: options.Json = False) -> int:
+    """Check an ObjectFile: hashes, graphs, shapes, finite answers, and the answers it was made with.
+
+    Nothing is written, nothing outside of the folder is read, and nothing in it can run code: a graph
+    whose weights lie elsewhere, or that asks for an unknown operation, is refused before it is opened.
+    Exit code 0 where all holds, 1 where anything does not; every line that fails says what to do.
+
+    Try: touchstone object verify objects/mug
+    """
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.verify.verify import verify as look
+
+    of = ObjectFile.open(folder)
+    checks = look(of)
+    failed = [check for check in checks if not check.passed]
+    if json:
+        listed = [{"check": c.name, "passed": c.passed, "said": c.said} for c in checks]
+        emit({"schema": 1, "folder": str(folder), "verified": not failed, "checks": listed})
+        return 1 if failed else 0
+    for check in checks:
+        ANSWERS.print(f"{'ok  ' if check.passed else 'FAIL'}  {check.name}: {check.said}", markup=False)
+    count = f"{len(failed)} of {len(checks)} checks failed" if failed else f"all {len(checks)} checks hold"
+    ANSWERS.print(f"{of.description.name}: {count}", markup=False)
+    return 1 if failed else 0
+
+
+def _lines(description: "Description") -> list[str]:
+    mesh, material = description.mesh, description.material
+    size = " x ".join(f"{(b - a) * 1e3:.4g}" for a, b in zip(mesh.low_m, mesh.high_m, strict=True))
+    lines = [
+        f"{description.name}, of {material.name}",
+        f"  mesh      {mesh.file}: {mesh.vertices} vertices, {mesh.faces} faces, {size} mm",
+        f"  material  {material.density_kg_per_m3:g} kg/m3, E = {material.young_pa:g} Pa, "
+        f"nu = {material.poisson:g}, alpha = {material.rayleigh_alpha_per_s:g}/s, "
+        f"beta = {material.rayleigh_beta_s:g} s",
+        f"  licence   {description.provenance.licence}",
+    ]
+    lines += _audio_lines(description)
+    lines += _touch_lines(description)
+    return [*lines, *_vision_lines(description)]
+
+
+def _touch_lines(description: "Description") -> list[str]:
+    touch = description.touch
+    if touch is None:
+        return ["  touch     none yet"]
+    gel, (low, high) = touch.gel, touch.depth_m
+    lines = [
+        f"  touch     {gel.name}, {gel.rows} x {gel.columns}; {low * 1e3:g} to {high * 1e3:g} mm deep, "
+        f"tilts to {math.degrees(touch.most_tilt_rad):g} deg"
+    ]
+    if touch.codes is not None:
+        size = _megabytes(touch.codes.network.bytes + touch.codes.nodes.bytes)
+        lines.append(
+            f"    codes   {touch.codes.network.file}, {size}{_measured(touch.codes.network.measured)}"
+        )
+    if touch.perceptron is not None:
+        size = _megabytes(touch.perceptron.bytes)
+        lines.append(f"    perceptron {touch.perceptron.file}, {size}{_measured(touch.perceptron.measured)}")
+    return lines
+
+
+def _vision_lines(description: "Description") -> list[str]:
+    vision = description.vision
+    if vision is None:
+        return ["  vision    none yet"]
+    grid, size, network = vision.grid, vision.size, vision.network
+    return [
+        f"  vision    {vision.level}: {grid.networks} networks {size.width} wide, in cubes of "
+        f"{grid.cell_m * 1e3:.4g} mm; {vision.colour}, camera as {vision.camera}",
+        f"    network {network.file}, {_megabytes(network.bytes)}{_measured(network.measured)}",
+    ]
+
+
+def _audio_lines(description: "Description") -> list[str]:
+    audio = description.audio
+    if audio is None:
+        return ["  audio     none yet"]
+    low, high = audio.frequencies_hz[0], audio.frequencies_hz[-1]
+    lines = [
+        f"  audio     {len(audio.frequencies_hz)} modes, {low:.5g} to {high:.5g} Hz, all up to "
+        f"{audio.complete_up_to_hz:.5g} Hz; {audio.mass_kg:.4g} kg; queries within "
+        f"{audio.near_surface_m * 1e3:g} mm of the surface"
+    ]
+    if audio.network is not None:
+        size, measured = _megabytes(audio.network.bytes), _measured(audio.network.measured)
+        lines.append(f"    network {audio.network.file}, {size}{measured}")
+    if audio.table is not None:
+        size = _megabytes(audio.table.bytes + audio.table.surface.bytes)
+        lines.append(f"    table   {audio.table.file}, {size}{_measured(audio.table.measured)}")
+    return lines
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.2f} MB"
+
+
+def _measured(numbers: dict[str, Any]) -> str:
+    return "".join(f"; {name} {number:.4g}" for name, number in numbers.items())

@@ -1,0 +1,61 @@
+"""What every command that looks at an object's networks is told, described once."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.vision.vision import ObjectVision
+
+Three = tuple[float, float, float]
+
+Folder = Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")]
+Camera = Annotated[
+    Three | None,
+    typer.Option(
+        "--camera",
+        help="Where the camera is, metres in the object's frame; else where all of it is seen.",
+        metavar="X Y Z",
+    ),
+]
+LookAt = Annotated[
+    Three | None,
+    typer.Option(
+        "--look-at", help="What is in the middle, metres; else the middle of the object.", metavar="X Y Z"
+    ),
+]
+Up = Annotated[
+    Three | None,
+    typer.Option("--up", help="What is up in the picture; else the object's z.", metavar="X Y Z"),
+]
+Light = Annotated[
+    Three | None,
+    typer.Option(
+        "--light", help="Towards the lamp, object's frame; else over the left shoulder.", metavar="X Y Z"
+    ),
+]
+Level = Annotated[
+    str,
+    typer.Option(
+        "--level", help="fused (a kernel), onnx (the graph alone), or one_sample a pixel, at the mesh."
+    ),
+]
+Threads = Annotated[
+    int | None,
+    typer.Option("--threads", help="That share the work; as many as cores if left out.", min=1),
+]
+
+
+def opened(folder: Path, threads: int | None) -> "tuple[ObjectFile, ObjectVision]":
+    """An object, and its look.
+
+    Raises:
+        DataRefused: it has none, or is damaged.
+    """
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.vision.vision import open_vision
+
+    of = ObjectFile.open(folder)
+    return of, open_vision(of, threads)

@@ -1,0 +1,91 @@
+"""What commands say: prose and progress on standard error, one JSON object on standard output."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
+
+from harness.basics.errors import TouchstoneError
+from harness.recording.step_file import Step
+
+WIDE = 132
+"""Columns of a table where what it is written to is no terminal."""
+
+CONSOLE = Console(stderr=True, highlight=False, soft_wrap=True, width=None if sys.stderr.isatty() else WIDE)
+ANSWERS = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else WIDE)
+
+
+def emit(result: Mapping[str, Any]) -> None:
+    """Print the one JSON object of a command, at once: some go on until they are told to end."""
+    sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def warn(sentence: str) -> None:
+    """Something the operator should know."""
+    CONSOLE.print(f"[yellow]note:[/] {escape(sentence)}")
+
+
+@contextmanager
+def resumable(how: str) -> Iterator[None]:
+    """Where a bench fails within it, say with which command the run goes on; the failure is raised on."""
+    try:
+        yield
+    except TouchstoneError:
+        warn(f"what was recorded is kept; go on with `{how}`")
+        raise
+
+
+class StepProgress:
+    """A bar over the steps of a run."""
+
+    def __init__(self, bar: Progress, done: int, total: int) -> None:
+        self._bar = bar
+        self._task = bar.add_task("contacts", completed=done, total=total)
+
+    def began(self, step: Step) -> None:
+        """Say which step is performed."""
+        self._bar.update(self._task, description=f"contact {step.index + 1}: {step.kind}")
+
+    def ended(self, step: Step, seconds: float) -> None:
+        """Count it, and say how long it took."""
+        self._bar.console.print(f"  contact {step.index + 1} recorded in {seconds:.1f} s")
+        self._bar.advance(self._task)
+
+
+@contextmanager
+def step_progress(done: int, total: int) -> Iterator[StepProgress]:
+    """A progress bar for the length of a session."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=CONSOLE, transient=True) as bar:
+        yield StepProgress(bar, done, total)
+
+
+@contextmanager
+def share_progress() -> Iterator[Callable[[str, float], None]]:
+    """A progress bar for the length of a work, and what tells it: what is being done, and the share done."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=CONSOLE, transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def report(doing: str, share: float) -> None:
+            bar.update(task, description=doing, completed=share)
+
+        yield report
+
+
+def millimetres(metres: float | None) -> str:
+    """For people; "unknown" where there is nothing to say."""
+    return "unknown" if metres is None else f"{metres * 1e3:.1f} mm"

@@ -1,0 +1,1 @@
+"""Commands about one press: simulate it, read its depth and force."""

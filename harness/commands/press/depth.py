@@ -1,0 +1,275 @@
+"""``touchstone depth``: how deep a gel is pressed, from live pictures, with the error of every pixel."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from harness.commands import options
+from harness.commands.output import ANSWERS, emit, warn
+from harness.commands.press import depth_force
+from harness.commands.press import force_options as forces
+
+if TYPE_CHECKING:
+    from harness.basics.arrays import ByteArray, FloatArray
+    from harness.bench.station_file import Station
+    from harness.sim.optics.depth_reading import DepthReading
+    from harness.sim.optics.inverse import Detection
+    from harness.sim.optics.tactile_calibration import TactileCalibration
+
+FRAME_WORDS = {"gel": "of the gel", "flange": "of the arm's flange"}
+
+
+def depth(
+    images: Annotated[
+        list[Path],
+        typer.Argument(
+            help="What the camera saw of one press that was held still; of several frames the mean is read.",
+            metavar="IMAGE...",
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Arrays without pickles: height, sigma (metres), contact, trusted, points, points_sigma.",
+            metavar="FILE.npz",
+        ),
+    ],
+    calibration: Annotated[
+        str | None,
+        typer.Option(
+            help="As calibrate taxim wrote it, or a shipped one's name; that of --station if left out.",
+            metavar="FILE",
+        ),
+    ] = None,
+    background: Annotated[
+        Path | None,
+        typer.Option(
+            help="Picture of the untouched gel, taken just before; the calibration's, with the light of the "
+            "moment taken out, if left out.",
+            metavar="IMAGE",
+        ),
+    ] = None,
+    station: Annotated[
+        str | None,
+        typer.Option(
+            help="A bench: points are then in the frame of its arm's flange, else in the gel's own.",
+            metavar="NAME",
+        ),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Live picture, heights and their error.", metavar="FILE.png")
+    ] = None,
+    height_out: Annotated[
+        Path | None,
+        typer.Option(
+            help="The heights alone, as `sim touch --heights-of gel` takes them.", metavar="FILE.npy"
+        ),
+    ] = None,
+    force: forces.Force = False,
+    thickness: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the gel, for --force; that of --station's sensor if left out.", metavar="LENGTH"
+        ),
+    ] = None,
+    gel_modulus: forces.Modulus = None,
+    gel_modulus_error: forces.ModulusError = None,
+    gel_poisson: forces.Poisson = None,
+    json: options.Json = False,
+) -> int:
+    """Read the surface of a pressed gel from what its camera saw.
+
+    Every pixel has its height and one standard deviation of it: by the camera's noise, the calibration's own
+    misfit, slopes steeper than it knows, and what a contact itself does to the colour.
+
+    Try: touchstone depth press.png --background rest.png --calibration r15.npz --out d.npz --picture d.png
+    """
+    from harness.bench.station_file import load_station, station_path
+    from harness.picture.image_file import read_image
+    from harness.sim.optics.depth_reading import read_press
+
+    _checked(out, picture, height_out)
+    bench = None if station is None else load_station(station_path(station))
+    wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, bench)
+    known = _calibration(calibration, bench)
+    rest = None if background is None else read_image(background)
+    found = read_press(_frames(images), known, _detection(rest), rest)
+    frame_from_gel = None if bench is None else bench.flange_from_gel
+    points = found.points(frame_from_gel)
+    pressed = depth_force.answer_force(wanted, found)
+    _write(found, points, out, height_out)
+    if picture is not None:
+        _draw(found, picture)
+    answer = _answer(found, known, points, "gel" if bench is None else "flange")
+    files = {"out": out, "picture": picture, "height_out": height_out}
+    answer |= {name: None if path is None else str(path) for name, path in files.items()}
+    answer["images"] = [str(path) for path in images]
+    answer["seconds"]["force_cpu"] = pressed.pop("seconds")
+    answer["notes"] += pressed.pop("notes")
+    answer |= pressed
+    for sentence in answer["notes"]:
+        warn(sentence)
+    if json:
+        emit(answer)
+    else:
+        _say(answer)
+    return 0
+
+
+def _checked(out: Path, picture: Path | None, height_out: Path | None) -> None:
+    from harness.basics.errors import WrongUse
+
+    wanted = (("--out", out, ".npz"), ("--picture", picture, ".png"), ("--height-out", height_out, ".npy"))
+    for option, path, suffix in wanted:
+        if path is not None and path.suffix != suffix:
+            raise WrongUse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
+
+
+def _calibration(named: str | None, bench: "Station | None") -> "TactileCalibration":
+    from harness.basics.errors import WrongUse
+    from harness.recording.run_folder import station_calibration
+    from harness.sim.optics.lit_calibration import read_calibration
+    from harness.sim.optics.tactile_calibration import shipped_calibration
+
+    if named is None:
+        if bench is None:
+            raise WrongUse("say by which colours: --calibration FILE, or a --station that has one")
+        return station_calibration(bench)
+    path = Path(named)
+    return shipped_calibration(named) if not path.exists() and path.suffix == "" else read_calibration(path)
+
+
+def _frames(images: list[Path]) -> "ByteArray":
+    import numpy as np
+
+    from harness.basics.errors import DataRefused
+    from harness.picture.image_file import read_image
+
+    read = [read_image(path) for path in images]
+    for path, one in zip(images, read, strict=True):
+        if one.shape != read[0].shape:
+            raise DataRefused(
+                f"{path} is {one.shape[1]} x {one.shape[0]} pixels and {images[0]} {read[0].shape[1]} x "
+                f"{read[0].shape[0]}; give frames of one press by one camera"
+            )
+    return np.stack(read)
+
+
+def _detection(rest: "ByteArray | None") -> "Detection":
+    """A background of just now is by the light of now; the calibration's is of another day."""
+    from harness.sim.optics.inverse import DRIFTING, STEADY
+
+    return DRIFTING if rest is None else STEADY
+
+
+def _write(found: "DepthReading", points: "FloatArray", out: Path, height_out: Path | None) -> None:
+    import numpy as np
+
+    np.savez_compressed(
+        out,
+        height=found.height,
+        sigma=found.sigma,
+        contact=found.contact,
+        trusted=found.trusted,
+        points=points,
+        points_sigma=found.sigma[found.contact],
+    )
+    if height_out is not None:
+        np.save(height_out, found.height)
+
+
+def _draw(found: "DepthReading", picture: Path) -> None:
+    from harness.report.figures.depth import DepthPictures, depth_figure
+    from harness.report.figures.figures import Album
+
+    shown = DepthPictures(found.image, found.height, found.sigma, found.contact, found.trusted, found.pitch)
+    Album(picture.parent).photograph(picture.stem, depth_figure(shown))
+
+
+def _answer(
+    found: "DepthReading", known: "TactileCalibration", points: "FloatArray", frame: str
+) -> dict[str, Any]:
+    """The one JSON object, but for the files."""
+    import numpy as np
+
+    contact, (row, column) = found.contact, found.deepest
+    touched = bool(contact.any())
+    deepest_at = int(np.argmax(found.height[contact])) if touched else 0
+    border = bool(contact[[0, -1]].any() or contact[:, [0, -1]].any())
+    return {
+        "schema": 1,
+        "calibration": {"made_from": known.header.made_from, "sha256": known.sha256},
+        "made_square_by": found.aspect,
+        "rows": found.height.shape[0],
+        "columns": found.height.shape[1],
+        "pitch_m": found.pitch,
+        "contact": touched,
+        "contact_pixels": int(contact.sum()),
+        "contact_area_m2": float(contact.sum()) * found.pitch**2,
+        "deepest_m": float(found.height[row, column]),
+        "deepest_sigma_m": float(found.sigma[row, column]),
+        "deepest_point_m": points[deepest_at].tolist() if touched else None,
+        "frame": frame,
+        "sigma_contact_m": float(np.median(found.sigma[contact])) if touched else None,
+        "sigma_rest_m": float(found.sigma.min()),
+        "trusted_share": float(found.trusted[contact].mean()) if touched else None,
+        "light_moved_levels": found.depth.drift[0].tolist(),
+        "flags": {
+            "no_contact": not touched,
+            "touches_border": border,
+            "not_anchored": not found.anchored,
+        },
+        "seconds": {"reading_cpu": found.seconds[0], "error_cpu": found.seconds[1]},
+        "notes": _notes(found, touched, border),
+    }
+
+
+def _notes(found: "DepthReading", touched: bool, border: bool) -> list[str]:
+    said = []
+    if not touched:
+        said.append("no contact: nothing in the picture differs from the untouched gel")
+    if border:
+        said.append("the contact reaches the edge of the window; there is more of it than is seen")
+    if not found.anchored:
+        said.append(
+            "none of the gel in view is at rest, or the light changed: heights are counted from their least, "
+            "and only shapes mean anything; take --background just before the press, or leave it out"
+        )
+    if touched and found.trusted[found.contact].mean() < 0.5:
+        said.append(
+            "more than half of the contact is steeper than any press of the calibration, or of another "
+            "colour: its heights are worth what their error says"
+        )
+    if found.aspect != 1.0:
+        said.append(f"the picture was made square by {found.aspect:.4f}, as the calibration's presses were")
+    return said
+
+
+def _say(answer: dict[str, Any]) -> None:
+    if answer["contact"]:
+        x, y, z = (1e3 * value for value in answer["deepest_point_m"])
+        ANSWERS.print(
+            f"{1e3 * answer['deepest_m']:.3f} mm at the deepest (one standard deviation "
+            f"{1e3 * answer['deepest_sigma_m']:.3f}), at ({x:.2f}, {y:.2f}, {z:.2f}) mm in the frame "
+            f"{FRAME_WORDS[answer['frame']]}"
+        )
+        ANSWERS.print(
+            f"{answer['contact_pixels']} pixels in contact, a deviation of "
+            f"{1e3 * answer['sigma_contact_m']:.3f} mm in the median, slopes of "
+            f"{answer['trusted_share']:.0%} of them trusted"
+        )
+    else:
+        ANSWERS.print("no contact")
+    for row in depth_force.say_force(answer):
+        ANSWERS.print(row)
+    moved = ", ".join(f"{level:+.1f}" for level in answer["light_moved_levels"])
+    ANSWERS.print(f"the light moved by {moved} grey levels (red, green, blue)")
+    seconds = answer["seconds"]
+    ANSWERS.print(
+        f"reading {1e3 * seconds['reading_cpu']:.0f} ms, its error {1e3 * seconds['error_cpu']:.0f} ms of "
+        "the processor"
+    )
+    for name in ("out", "height_out", "picture"):
+        if answer[name] is not None:
+            ANSWERS.print(answer[name], markup=False)

@@ -1,0 +1,185 @@
+"""Options of a press that ask for its force, each described once, and what is answered of it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from harness.commands import options
+
+if TYPE_CHECKING:
+    from harness.effects.touch_press import Press
+    from harness.sim.gel.contact_force import ContactForce
+    from harness.sim.gel.elastic import GelElastic
+    from harness.sim.gel.force_table import ForceTable
+
+Force = Annotated[
+    bool,
+    typer.Option(
+        "--force",
+        help="How hard the gel is pressed as well, in newtons, with its uncertainty: docs/touch_force.md.",
+    ),
+]
+Modulus = Annotated[
+    str | None,
+    typer.Option(
+        "--gel-modulus",
+        help="Young's modulus of the gel, as 0.2MPa. Left out: 0.255MPa give or take 53 %, for nobody has "
+        "published this gel's. Forces go as it.",
+        metavar="PRESSURE",
+    ),
+]
+ModulusError = Annotated[
+    str | None,
+    typer.Option(
+        "--gel-modulus-error", help="One standard deviation of --gel-modulus, as 5%.", metavar="SHARE"
+    ),
+]
+Poisson = Annotated[
+    float | None,
+    typer.Option("--gel-poisson", help="Poisson's ratio of the gel, 0 to 0.5; 0.485 if left out."),
+]
+Table = Annotated[
+    Path | None,
+    typer.Option(
+        "--force-table", help="Forces measured on this gel, in place of its modulus.", metavar="FILE.json"
+    ),
+]
+PressureOut = Annotated[
+    Path | None,
+    typer.Option("--pressure-out", help="Pascals of every pixel.", metavar="FILE.npy"),
+]
+
+LEVEL = "touch.force"
+
+
+def require_force(
+    force: bool, levels: Sequence[str], modulus: str | None, share: str | None, **others: object
+) -> None:
+    """``WrongUse`` for options of a force that is not asked for, or that contradict each other."""
+    from harness.basics.errors import WrongUse
+
+    named = {"--gel-modulus": modulus, "--gel-modulus-error": share, **others}
+    idle = [option for option, value in named.items() if value is not None]
+    idle += [text for text in levels if text.startswith(LEVEL)]
+    if idle and not force:
+        raise WrongUse(f"{idle[0]} is of a force, and none is asked for; add --force, or leave it out")
+    if (modulus is None) != (share is None):
+        raise WrongUse(
+            "a modulus and how well it is known go together; say both, as --gel-modulus 0.2MPa "
+            "--gel-modulus-error 10%"
+        )
+
+
+def stiffness(modulus: str | None, share: str | None, poisson: float | None) -> "GelElastic":
+    """The gel that the options describe, the one that nobody measured where they say nothing."""
+    from dataclasses import replace
+
+    from harness.basics.quantities import PRESSURE, RATIO
+    from harness.sim.gel.elastic import NOT_MEASURED, GelElastic
+
+    gel = NOT_MEASURED
+    if modulus is not None:
+        young = options.quantity("--gel-modulus", modulus, PRESSURE)
+        gel = GelElastic(young, options.quantity("--gel-modulus-error", share or "", RATIO))
+    return gel if poisson is None else replace(gel, poisson=poisson)
+
+
+def measured(table: Path | None, levels: list[str]) -> "tuple[ForceTable | None, list[str]]":
+    """The table of forces, and the levels, with the one that reads it where no other is chosen."""
+    from harness.sim.gel.force_table import read_force_table
+
+    if table is None:
+        return None, levels
+    chosen = any(text.partition("=")[0].strip() == LEVEL for text in levels)
+    return read_force_table(table), levels if chosen else [*levels, f"{LEVEL}=table"]
+
+
+def force_json(press: "Press") -> dict[str, Any]:
+    """``force_n``, ``force_uncertainty_n`` and ``force``; each null where none was asked for."""
+    found = press.force
+    if found is None:
+        return {"force_n": None, "force_uncertainty_n": None, "force": None}
+    level = str(press.levels[LEVEL])
+    gel = None if level == "table" else press.gel.elastic
+    said = described(found, level, gel, lower_bound(press))
+    if gel is None and press.gel.forces is not None:
+        table = press.gel.forces
+        said["source"] = f"{table.indenter} on {table.sensor} {table.serial}: {table.made_from}"
+    return {
+        "force_n": float(found.newtons[0]),
+        "force_uncertainty_n": float(found.uncertainty[0]),
+        "force": said,
+    }
+
+
+def described(found: "ContactForce", level: str, gel: "GelElastic | None", bound: bool) -> dict[str, Any]:
+    """What there is to say of the force of one press; ``gel`` is None where the force was measured."""
+    from harness.sim.gel.contact_force import PARTS
+
+    return {
+        "level": level,
+        "uncertainty_shares": dict(zip(PARTS, found.shares[0].tolist(), strict=True)),
+        "centre_m": found.centre[0].tolist() if found.newtons[0] > 0.0 else None,
+        "largest_pressure_pa": None if gel is None else float(found.pressure[0].max()),
+        "depth_share": float(found.depth_share[0]),
+        "strain": float(found.strain[0]),
+        "lower_bound": bound,
+        "beyond_checked": gel is not None and bool(found.beyond_checked[0]),
+        "young_pa": None if gel is None else gel.young,
+        "poisson": None if gel is None else gel.poisson,
+        "source": None if gel is None else gel.source,
+    }
+
+
+def lower_bound(press: "Press") -> bool:
+    """Whether there is more of the contact than is seen, or than the map has heights for."""
+    found = press.force
+    missing = press.missing is not None and bool(press.missing.any())
+    return found is not None and (bool(found.lower_bound[0]) or missing)
+
+
+def force_notes(press: "Press") -> list[str]:
+    """What the operator should know of the force."""
+    if press.force is None:
+        return []
+    gel = None if press.levels[LEVEL] == "table" else press.gel.elastic
+    return noted(press.force, gel, lower_bound(press))
+
+
+def noted(found: "ContactForce", gel: "GelElastic | None", bound: bool) -> list[str]:
+    """The same of the force of one press; arguments as ``described``."""
+    from harness.sim.gel.contact_force import CHECKED
+    from harness.sim.gel.elastic import NOT_MEASURED
+
+    said = list[str]()
+    if found.newtons[0] == 0.0:
+        return said
+    if bound:
+        said.append("the force is a lower bound: what is not seen, or has no height, presses as well")
+    if gel is None:
+        return said
+    if found.beyond_checked[0]:
+        said.append(
+            f"the press is {found.depth_share[0]:.2f} thicknesses and {found.strain[0]:.2f} contact radii "
+            f"deep; the force is that of a linear gel, checked to {CHECKED[0]:g} and {CHECKED[1]:g}, and its "
+            "uncertainty does not count what is beyond"
+        )
+    if gel.source == NOT_MEASURED.source:
+        said.append(
+            "nobody measured this gel's modulus: press a known object with a known force, and say "
+            f"--gel-modulus, {gel.young:g} Pa times measured over computed"
+        )
+    return said
+
+
+def force_row(press: "Press") -> str | None:
+    """For people; None where none was asked for."""
+    found = press.force
+    return None if found is None else sentence(float(found.newtons[0]), float(found.uncertainty[0]))
+
+
+def sentence(newtons: float, uncertainty: float) -> str:
+    """For people."""
+    return f"pressed with {newtons:.3g} N (one standard deviation {uncertainty:.2g} N)"

@@ -1,0 +1,148 @@
+"""What ``sim touch`` is given: a gel, and a height map or a mesh to press onto it."""
+
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from harness.commands import options
+from harness.commands.press.touch_answer import Touched
+
+if TYPE_CHECKING:
+    from harness.bench.scene import SceneFile
+    from harness.sim.gel.given_heights import Heights
+    from harness.sim.optics.pressed_gel import Gel
+
+Three = tuple[float, float, float]
+
+
+def refuse(sentence: str) -> NoReturn:
+    """Raise ``WrongUse``."""
+    from harness.basics.errors import WrongUse
+
+    raise WrongUse(sentence)
+
+
+def gel(
+    sensor: str | None,
+    calibration: str | None,
+    pitch: str | None,
+    thickness: str | None,
+    background: Path | None,
+    shadow: bool | None,
+    noise: float,
+    seed: int,
+    markers: Path | None = None,
+) -> "Gel":
+    """The gel that the options describe; ``WrongUse`` and ``CalibrationRefused`` as ``known_gel``."""
+    from dataclasses import replace
+
+    from harness.basics.quantities import LENGTH
+    from harness.picture.image_file import read_image
+    from harness.sim.gel.marker_file import read_markers
+    from harness.sim.optics.known_gel import known_gel
+
+    gel = known_gel(
+        sensor,
+        calibration,
+        pitch=_positive("--pitch", options.quantity("--pitch", pitch, LENGTH)),
+        thickness=_positive("--thickness", options.quantity("--thickness", thickness, LENGTH)),
+        background=None if background is None else read_image(background),
+        shadow=shadow,
+    )
+    if not math.isfinite(noise):
+        refuse(f"--noise of {noise} grey levels cannot be drawn; give a finite number")
+    gel = replace(gel, noise=noise, seed=seed)
+    return gel if markers is None else gel.with_dots(read_markers(markers))
+
+
+def _positive(option: str, value: float | None) -> float | None:
+    if value is not None and value <= 0.0:
+        refuse(f"{option} of {value:g} m cannot be; say a length above zero")
+    return value
+
+
+def of_heights(
+    path: Path, of: str, under: Path | None, gel: "Gel", levels: list[str], force: bool = False
+) -> Touched:
+    """The press of a height map; ``under`` is how deep the object reaches below a gel's surface."""
+    from harness.effects.touch_press import press_heights
+    from harness.sim.gel.given_heights import read_heights
+
+    kind = _heights_of(of)
+    begun = time.perf_counter()
+    given = read_heights(path, gel.sensor, kind)
+    if under is not None and kind == "object":
+        refuse("--reached stands beside the surface of a gel; an object's --height says it already")
+    reached = None if under is None else read_heights(under, gel.sensor)
+    read = time.perf_counter() - begun
+    missing = given.missing if reached is None else given.missing | reached.missing
+    touched = None if reached is None else reached.heights
+    scene = _scene(str(path), None, gel)
+    press = press_heights(given.heights, kind, gel, scene, levels, touched, missing, force)
+    return Touched(press, str(path), seconds={"read": read})
+
+
+def _heights_of(text: str) -> "Heights":
+    from harness.basics.errors import WrongUse
+
+    if text == "object":
+        return "object"
+    if text == "gel":
+        return "gel"
+    raise WrongUse(f"--heights-of {text} is no kind of height map; there are object and gel")
+
+
+def of_mesh(
+    mesh: str,
+    units: str | None,
+    contact: Three,
+    pose: tuple[str | None, str | None, str | None, str | None],
+    gel: "Gel",
+    levels: list[str],
+    objectfile: Path | None = None,
+    force: bool = False,
+) -> Touched:
+    """The press of a mesh; ``pose`` is depth, tilt, azimuth and yaw with their units, None where left out."""
+    import numpy as np
+
+    from harness.basics.quantities import ANGLE, LENGTH
+    from harness.effects.scene_object import known_object
+    from harness.effects.touch_press import press_mesh
+    from harness.sim.gel.press_pose import contact_place, gel_from_object
+    from harness.sim.gel.presses import Presses
+
+    depth = options.quantity("--depth", pose[0] or "1mm", LENGTH)
+    tilt, azimuth, yaw = (
+        options.quantity(option, text or "0deg", ANGLE)
+        for option, text in zip(("--tilt", "--azimuth", "--yaw"), pose[1:], strict=True)
+    )
+    begun = time.perf_counter()
+    scene = _scene(mesh, units, gel, objectfile)
+    known = known_object(scene)
+    place = contact_place(known.mesh, np.array(contact))
+    at = gel_from_object(place, depth, tilt, azimuth, yaw)
+    read = time.perf_counter() - begun
+    sources = {
+        "object.mesh": known.mesh,
+        "contact.gel_from_object": at[None],
+        "contact.presses": Presses.one(place.point, place.normal, depth, tilt, azimuth, yaw),
+    }
+    press = press_mesh(sources, gel, scene, levels, force)
+    asked = {"depth_m": depth, "tilt_rad": tilt, "azimuth_rad": azimuth, "yaw_rad": yaw}
+    return Touched(press, mesh, place, at, asked, known.warnings, seconds={"mesh": read})
+
+
+def _scene(what: str, units: str | None, gel: "Gel", objectfile: Path | None = None) -> "SceneFile":
+    """A table with nothing on it but what is touched; touch does not depend on its material."""
+    from harness.basics.toml_file import validate
+    from harness.bench.scene import BUILTIN, SceneFile, scene_from_options
+
+    if what.endswith(".npy"):
+        tree = {"schema": 1, "object": {"mesh": what, "material": "steel"}}
+        scene = validate(tree, SceneFile, "the options")
+    else:
+        material = None if what.startswith(BUILTIN) else "steel"
+        named = None if objectfile is None else str(objectfile)
+        scene = scene_from_options(what, material, units, objectfile=named)
+    return scene.model_copy(update={"sensors": scene.sensors.model_copy(update={"noise": gel.noise > 0.0})})

@@ -1,0 +1,1 @@
+"""What accuracy costs: curves, the choice of a setting, promises."""

@@ -1,0 +1,205 @@
+"""What accuracy costs: errors and seconds as measured, the settings worth taking, and which to take.
+
+A setting is a choice of levels. It is measured on many runs, the same runs for every setting, so
+that settings are compared in pairs. Error is stated as the mean, each counted at 20 mm at most: a
+median would not see the run in five that fails grossly, and a plain mean would see little else.
+Seconds are stated as the geometric mean: they span decades, and "half as long again" is a ratio.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.metrics import Interval, bootstrap, mean, median
+from harness.effects.accuracy import Level
+
+GROSS = 20.0e-3
+"""m: errors beyond this are failures, and count alike; as the estimate itself counts them."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One run, answered at one setting.
+
+    Attributes:
+        run: its name; the same readings at every setting.
+        object: what was touched, by a name that two different objects do not share.
+        error: m; a refused answer counts as a random one.
+        radius: m, within which the answer itself claims 90 %; None where it claims nothing.
+        shared: s of CPU time for what is done alike at every setting that needs it: reading images.
+        cpu: s of CPU time for the rest.
+        wall: s on the clock for the rest.
+        work: what the run itself showed, before it was answered, of how much there is to do; what it
+            counts is the program's own. None where it was not counted.
+    """
+
+    run: str
+    object: str
+    error: float
+    radius: float | None
+    shared: float
+    cpu: float
+    wall: float
+    work: float | None = None
+
+    def __post_init__(self) -> None:
+        numbers = (self.error, 0.0 if self.radius is None else self.radius, self.shared, self.cpu, self.wall)
+        if not all(np.isfinite(number) and number >= 0.0 for number in numbers):
+            raise WrongUse(
+                f"run {self.run}: error, radius and seconds must be finite and not negative, not {numbers}"
+            )
+        if self.work is not None and not (np.isfinite(self.work) and self.work > 0.0):
+            raise WrongUse(f"run {self.run}: work must be finite and above zero, not {self.work}")
+        if self.cpu == 0.0 or self.wall == 0.0:
+            raise WrongUse(f"run {self.run}: an answer in 0 s was not measured; use a finer clock")
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One setting, measured.
+
+    Attributes:
+        name: for people.
+        levels: of the dials that are turned.
+        condition: what was given and not chosen: how many contacts, whether the yaw was known.
+        samples: at least one, each of another run.
+    """
+
+    name: str
+    levels: Mapping[str, Level]
+    condition: Mapping[str, Level]
+    samples: tuple[Sample, ...]
+
+    def __post_init__(self) -> None:
+        runs = [sample.run for sample in self.samples]
+        if not runs or len(set(runs)) != len(runs):
+            raise WrongUse(f"{self.name}: {len(runs)} samples of {len(set(runs))} runs; give each run once")
+        object.__setattr__(self, "levels", MappingProxyType(dict(self.levels)))
+        object.__setattr__(self, "condition", MappingProxyType(dict(self.condition)))
+
+    @cached_property
+    def errors(self) -> FloatArray:
+        """``(runs,)`` m."""
+        return np.array([sample.error for sample in self.samples])
+
+    @cached_property
+    def cpu_seconds(self) -> FloatArray:
+        """``(runs,)`` s of CPU time, from readings to answer."""
+        return np.array([sample.shared + sample.cpu for sample in self.samples])
+
+    @cached_property
+    def wall_seconds(self) -> FloatArray:
+        """``(runs,)`` s on the clock, from readings to answer."""
+        return np.array([sample.shared + sample.wall for sample in self.samples])
+
+    @cached_property
+    def error(self) -> Interval:
+        """In m: mean over the runs, none counted beyond ``GROSS``, with its 90 % bootstrap interval."""
+        return bootstrap(np.minimum(self.errors, GROSS), mean)
+
+    @cached_property
+    def median_error(self) -> Interval:
+        """In m, with its 90 % bootstrap interval."""
+        return bootstrap(self.errors, median)
+
+    @cached_property
+    def seconds(self) -> Interval:
+        """In s of CPU time: geometric mean over the runs, with its 90 % bootstrap interval."""
+        return bootstrap(self.cpu_seconds, geometric_mean)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """All settings of a program, with where and with what they were measured.
+
+    Attributes:
+        program: such as ``"contact-localization"``.
+        points: measured.
+        machine: its description, see ``harness.cost.provenance``.
+        code: its version, likewise.
+        made: ISO time of the last measurement.
+        title: of the page.
+    """
+
+    program: str
+    points: tuple[Point, ...]
+    machine: Mapping[str, str]
+    code: Mapping[str, str]
+    made: str
+    title: str = ""
+    notes: tuple[str, ...] = field(default=())
+
+    def where(self, condition: Mapping[str, Level]) -> tuple[Point, ...]:
+        """The points measured under a condition; what it leaves open may be anything."""
+        return tuple(
+            point for point in self.points if all(point.condition.get(k) == v for k, v in condition.items())
+        )
+
+    def conditions(self) -> tuple[dict[str, Level], ...]:
+        """Each condition that points were measured under, once, in their order."""
+        found: list[dict[str, Level]] = []
+        for point in self.points:
+            if dict(point.condition) not in found:
+                found.append(dict(point.condition))
+        return tuple(found)
+
+
+def geometric_mean(values: FloatArray) -> FloatArray:
+    """``(k,)`` geometric means of ``(k, n)`` positive values."""
+    return np.asarray(np.exp(np.log(values).mean(axis=1)))
+
+
+def front(points: Iterable[Point]) -> tuple[Point, ...]:
+    """The points that no other beats in error without costing more (Pareto), cheapest first."""
+    kept: list[Point] = []
+    for point in sorted(points, key=lambda p: (p.seconds.value, p.error.value)):
+        if not kept or point.error.value < kept[-1].error.value:
+            kept.append(point)
+    return tuple(kept)
+
+
+def best_within(
+    points: Sequence[Point],
+    seconds: float,
+    prices: Mapping[str, float] | None = None,
+    errors: Mapping[str, float] | None = None,
+) -> Point | None:
+    """The setting of least error that costs at most ``seconds``; None where none does.
+
+    Args:
+        points: of one condition.
+        seconds: above zero.
+        prices: s by name of a point, instead of its measured mean.
+        errors: m by name of a point, instead of its measured mean: of one object, where one is touched.
+    """
+    _refuse_odd(seconds, "a budget", "s")
+    price = {p.name: p.seconds.value for p in points} if prices is None else prices
+    loss = {p.name: p.error.value for p in points} if errors is None else errors
+    within = [point for point in points if price[point.name] <= seconds]
+    return min(within, key=lambda p: (loss[p.name], price[p.name]), default=None)
+
+
+def cheapest_within(
+    points: Sequence[Point], error: float, errors: Mapping[str, float] | None = None
+) -> Point | None:
+    """The cheapest setting whose error is at most ``error``; None where none is.
+
+    Args:
+        points: of one condition.
+        error: m, above zero.
+        errors: m by name of a point, instead of its measured mean: a bound, where one is wanted.
+    """
+    _refuse_odd(error, "an error", "m")
+    loss = {p.name: p.error.value for p in points} if errors is None else errors
+    within = [point for point in points if loss[point.name] <= error]
+    return min(within, key=lambda p: (p.seconds.value, loss[p.name]), default=None)
+
+
+def _refuse_odd(value: float, what: str, unit: str) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise WrongUse(f"{what} of {value:g} {unit} cannot be kept; give a number above zero")

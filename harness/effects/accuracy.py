@@ -1,0 +1,129 @@
+"""How well to compute: dials with levels, and one choice of them all."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import nearest
+
+Level = str | int | float
+"""One position of a dial: the name of a method, or a number."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One dial.
+
+    Attributes:
+        name: of the effect it belongs to, or that and a word more: ``"touch.optics"``.
+        levels: from cheap to exact. Levels that are methods are only roughly ordered; what they
+            cost and what they lose is measured.
+        unit: of a number, ``""`` for a method or a count.
+        kind: whether the levels are numbers or methods.
+        default: where nobody chooses.
+        meaning: what it dials, in a few words.
+    """
+
+    name: str
+    levels: tuple[Level, ...]
+    unit: str
+    kind: Literal["number", "method"]
+    default: Level
+    meaning: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.levels or len(set(self.levels)) != len(self.levels):
+            raise ValueError(f"the levels of {self.name} are {self.levels}; give one or more, each once")
+        if any(isinstance(level, str) != (self.kind == "method") for level in self.levels):
+            raise ValueError(f"{self.name} is a {self.kind} and has the levels {self.levels}")
+        self.checked(self.default)
+
+    def checked(self, level: Level) -> Level:
+        """``level``, if the dial has it.
+
+        Raises:
+            WrongUse: it has not; those it has are listed.
+        """
+        for known in self.levels:
+            if known == level and isinstance(known, str) == isinstance(level, str):
+                return known
+        hint = nearest(level, map(str, self.levels)) if isinstance(level, str) else f"it has {self._listed()}"
+        raise WrongUse(f"{self.name} has no level {level!r}; {hint}")
+
+    def read(self, text: str) -> Level:
+        """The level that an operator wrote; ``WrongUse`` where there is none."""
+        try:
+            return self.checked(text.strip() if self.kind == "method" else float(text))
+        except ValueError:
+            raise WrongUse(f"{self.name} = {text!r} is not a number; it has {self._listed()}") from None
+
+    def _listed(self) -> str:
+        return ", ".join(map(str, self.levels)) + (f" ({self.unit})" if self.unit else "")
+
+
+@dataclass(frozen=True)
+class Accuracy(Mapping[str, Level]):
+    """A level for each of some knobs; cannot be changed."""
+
+    knobs: tuple[Knob, ...]
+    levels: Mapping[str, Level]
+
+    def __post_init__(self) -> None:
+        by_name = {knob.name: knob for knob in self.knobs}
+        for name in self.levels:
+            if name not in by_name:
+                raise WrongUse(f"no knob {name!r}; {nearest(name, by_name)}")
+        chosen = {name: by_name[name].checked(level) for name, level in self.levels.items()}
+        whole = {knob.name: chosen.get(knob.name, knob.default) for knob in self.knobs}
+        object.__setattr__(self, "levels", MappingProxyType(whole))
+
+    @classmethod
+    def default(cls, knobs: Iterable[Knob]) -> "Accuracy":
+        """Every knob where nobody chooses."""
+        return cls(tuple(knobs), {})
+
+    @classmethod
+    def finest(cls, knobs: Iterable[Knob]) -> "Accuracy":
+        """Every knob at its most exact level."""
+        knobs = tuple(knobs)
+        return cls(knobs, {knob.name: knob.levels[-1] for knob in knobs})
+
+    @classmethod
+    def coarsest(cls, knobs: Iterable[Knob]) -> "Accuracy":
+        """Every knob at its cheapest level."""
+        knobs = tuple(knobs)
+        return cls(knobs, {knob.name: knob.levels[0] for knob in knobs})
+
+    def with_(self, changes: Mapping[str, Level]) -> "Accuracy":
+        """The same choice but for ``changes``; ``WrongUse`` for an unknown knob or level."""
+        return Accuracy(self.knobs, {**self.levels, **changes})
+
+    def with_texts(self, texts: Sequence[str]) -> "Accuracy":
+        """The same choice but for what an operator wrote: ``["touch.gel=fast"]``.
+
+        Raises:
+            WrongUse: not of that form, or an unknown knob or level.
+        """
+        by_name = {knob.name: knob for knob in self.knobs}
+        changes: dict[str, Level] = {}
+        for text in texts:
+            name, equals, level = text.partition("=")
+            if not equals:
+                raise WrongUse(f"{text!r} does not set a knob; write KNOB=LEVEL, for example touch.gel=fast")
+            if name.strip() not in by_name:
+                raise WrongUse(f"no knob {name.strip()!r}; {nearest(name.strip(), by_name)}")
+            changes[name.strip()] = by_name[name.strip()].read(level)
+        return self.with_(changes)
+
+    def __getitem__(self, name: str) -> Level:
+        if name not in self.levels:
+            raise WrongUse(f"no knob {name!r}; {nearest(name, self.levels)}")
+        return self.levels[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.levels)
+
+    def __len__(self) -> int:
+        return len(self.levels)

@@ -1,0 +1,164 @@
+"""Run a plan: each of its effects once, on one fixed set of sources."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from harness.basics.clock import now
+from harness.basics.errors import WrongUse
+from harness.basics.store import Store, digest
+from harness.effects.accuracy import Level
+from harness.effects.effect import Effect
+from harness.effects.plan import Plan, PlannedEffect
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What came of a plan.
+
+    Attributes:
+        values: the wanted quantities, and everything computed on the way; arrays are read-only.
+        seconds: by effect, what each took; what came from the store took its reading.
+        calls: by effect, how often it was computed.
+        from_store: effects whose result was read instead of computed.
+    """
+
+    values: Mapping[str, Any]
+    seconds: Mapping[str, float]
+    calls: Mapping[str, int]
+    from_store: tuple[str, ...]
+
+    def __getitem__(self, quantity: str) -> Any:
+        return self.values[quantity]
+
+
+def evaluate(plan: Plan, sources: Mapping[str, Any], store: Store | None = None) -> Evaluation:
+    """Compute what the plan wants.
+
+    With a store, a result found there is read, and what only it needed is not computed at all.
+
+    Args:
+        plan: what to run.
+        sources: a value for each of ``plan.sources``.
+        store: of results worth keeping; None to compute everything.
+
+    Raises:
+        WrongUse: a source is missing.
+    """
+    missing = [name for name in plan.sources if name not in sources]
+    if missing:
+        needed = ", ".join(missing)
+        raise WrongUse(f"{needed}: needed, computed by no effect, and not among the sources; give it")
+    run = _Run(plan, sources, store)
+    for quantity in plan.wanted:
+        run.value(quantity)
+    for quantity in plan.aliases:
+        if plan.resolved(quantity) in run.values:
+            run.values[quantity] = run.values[plan.resolved(quantity)]
+    return Evaluation(
+        MappingProxyType(run.values),
+        MappingProxyType(run.seconds),
+        MappingProxyType(run.calls),
+        tuple(run.from_store),
+    )
+
+
+@dataclass
+class _Run:
+    """The state of one evaluation."""
+
+    plan: Plan
+    sources: Mapping[str, Any]
+    store: Store | None
+    values: dict[str, Any] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    calls: dict[str, int] = field(default_factory=dict)
+    from_store: list[str] = field(default_factory=list)
+    _keys: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._planned = {step.effect.provides: step for step in self.plan.ran}
+
+    def value(self, quantity: str) -> Any:
+        """A quantity, computed on first use."""
+        name = self.plan.resolved(quantity)
+        if name not in self._planned:
+            return self.sources[name]
+        if name not in self.values and not self._read(self._planned[name]):
+            self._compute(self._planned[name])
+        return self.values[name]
+
+    def _compute(self, step: PlannedEffect) -> None:
+        effect = step.effect
+        given = {need: self.value(need) for need in effect.needs}
+        start = now()
+        result = frozen(effect.compute(MappingProxyType(given), step.levels))
+        self.seconds[effect.provides] = now() - start
+        self.calls[effect.provides] = self.calls.get(effect.provides, 0) + 1
+        self.values[effect.provides] = result
+        if self.store is not None and effect.stored:
+            self.store.put(self._key(effect), result)
+
+    def _read(self, step: PlannedEffect) -> bool:
+        """Whether the store had the result."""
+        effect = step.effect
+        if self.store is None or not effect.stored:
+            return False
+        start = now()
+        found = self.store.get(self._key(effect))
+        if found is None:
+            return False
+        self.values[effect.provides] = frozen(found)
+        self.seconds[effect.provides] = now() - start
+        self.from_store.append(effect.provides)
+        return True
+
+    def _key(self, effect: Effect) -> str:
+        """What the result depends on: the effect's version and levels, and the same of all before it."""
+        step = self._planned[effect.provides]
+        if effect.provides not in self._keys:
+            needs = [self._input_key(need) for need in effect.needs]
+            about = (effect.provides, effect.version, tuple(needs), tuple(sorted(_named(step).items())))
+            self._keys[effect.provides] = digest(about)
+        return self._keys[effect.provides]
+
+    def _input_key(self, need: str) -> str:
+        name = self.plan.resolved(need)
+        if name in self._planned:
+            return self._key(self._planned[name].effect)
+        if name not in self._keys:
+            self._keys[name] = digest(self.sources[name])
+        return self._keys[name]
+
+
+def _named(step: PlannedEffect) -> dict[str, Level]:
+    """The levels that tell a result from others.
+
+    An effect's own way, the one that others are held against, goes without a name, so that a new way
+    beside it drops nothing that was stored.
+    """
+    choice, levels = step.effect.choice, dict(step.levels)
+    if choice is not None and levels[choice.name] not in step.effect.ways:
+        del levels[choice.name]
+    return levels
+
+
+def frozen(value: Any) -> Any:
+    """``value`` with every array in it refusing to be written to; its own arrays, not copies."""
+    if isinstance(value, np.ndarray):
+        view = value.view()
+        view.setflags(write=False)
+        return view
+    if isinstance(value, tuple):
+        return tuple(frozen(item) for item in value)
+    if isinstance(value, dict):
+        return MappingProxyType({key: frozen(item) for key, item in value.items()})
+    if is_dataclass(value) and not isinstance(value, type):
+        for item in fields(value):
+            part = vars(value).get(item.name)
+            if isinstance(part, np.ndarray):
+                part.setflags(write=False)
+    return value

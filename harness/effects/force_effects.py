@@ -1,0 +1,111 @@
+"""The force of a press as an effect: computed where it is asked for, and by nothing else.
+
+Sources, beside those of the touch: ``sensor.elastic`` (how stiff the gel is, ``GelElastic``) or, at the level
+``table``, ``sensor.forces`` (``ForceTable``, measured).
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.bench.sensor import TactileSensor
+from harness.effects.accuracy import Knob, Level
+from harness.effects.effect import Effect, Way
+from harness.sim.gel.contact_force import PARTS, ContactForce, ForceLevel, contact_force, require_depths
+from harness.sim.gel.force_table import ForceTable
+
+Given = Mapping[str, Any]
+Levels = Mapping[str, Level]
+
+FORCE = Knob(
+    "touch.force",
+    ("table", "winkler", "layer"),
+    "",
+    "method",
+    "layer",
+    "measured forces, springs under each contact, or the elastic layer",
+)
+CELLS = Knob(
+    "touch.force_cells", (4, 2, 1), "pixels", "number", 1, "pixels to a square that presses, each way"
+)
+
+OF_GEL = 0.1
+"""Share of the deepest pixel from which the surface of a gel is taken to be pressed."""
+
+_NEEDS = ("touch.height_map", "sensor", "sensor.elastic")
+
+
+def _by(level: ForceLevel, given: Given, cells: int) -> ContactForce:
+    sensor: TactileSensor = given["sensor"]
+    depth: FloatArray = given["touch.height_map"]
+    return contact_force(depth, sensor.pitch, sensor.gel_thickness, given["sensor.elastic"], level, cells)
+
+
+def _by_layer(given: Given, levels: Levels) -> ContactForce:
+    return _by("layer", given, int(levels[CELLS.name]))
+
+
+def _by_springs(given: Given, _levels: Levels) -> ContactForce:
+    return _by("winkler", given, 1)
+
+
+def _by_table(given: Given, _levels: Levels) -> ContactForce:
+    table: ForceTable | None = given["sensor.forces"]
+    if table is None:
+        raise WrongUse("touch.force=table needs forces that were measured; say --force-table FILE.json")
+    sensor: TactileSensor = given["sensor"]
+    return table_force(given["touch.height_map"], sensor.pitch, sensor.gel_thickness, table)
+
+
+def pressed_of_gel(surface: FloatArray, share: float = OF_GEL) -> FloatArray:
+    """How deep a gel is pressed where only its surface is known: what is deeper than a share of its deepest.
+
+    The surface of a gel that is pressed lies where the object is, and what hangs beside it asks for no force;
+    a drawn skirt would (``docs/touch_force.md`` has what the tenth costs).
+
+    Args:
+        surface: ``(rows, columns)`` metres of indentation.
+        share: of the deepest pixel.
+    """
+    kept: FloatArray = np.where(surface > share * surface.max(), np.maximum(surface, 0.0), 0.0)
+    return kept
+
+
+def table_force(depth: FloatArray, pitch: float, thickness: float, table: ForceTable) -> ContactForce:
+    """The force of each press by what was measured; where it acts is the middle of the volume taken.
+
+    Args:
+        depth: ``(n, rows, columns)`` metres, 0 or more: how deep the object reaches into the untouched gel.
+        pitch: metres a pixel.
+        thickness: metres of the gel.
+        table: of that gel.
+
+    Raises:
+        OutOfDomain: as ``contact_force``, or a press beyond the table.
+    """
+    require_depths(depth, thickness)
+    found = np.array([table.at(table.measure(each, pitch)) for each in depth]).reshape(-1, 2)
+    newtons, sigma = found.T
+    volume = depth.sum(axis=(1, 2)) * pitch**2
+    # A table says how much, not where: as springs of one stiffness would share it.
+    springs = np.divide(newtons, volume, out=np.zeros_like(newtons), where=volume > 0.0)
+    shares = np.zeros((len(depth), len(PARTS)))
+    scatter = np.divide(sigma, newtons, out=np.zeros_like(newtons), where=newtons > 0.0)
+    shares[:, PARTS.index("theory")] = scatter
+    return ContactForce.of(depth, springs[:, None, None] * depth, shares, pitch, thickness)
+
+
+FORCE_EFFECT = Effect(
+    "touch.force",
+    _NEEDS,
+    _by_layer,
+    knobs=(CELLS,),
+    choice=FORCE,
+    ways={
+        "winkler": Way(_NEEDS, _by_springs),
+        "table": Way(("touch.height_map", "sensor", "sensor.forces"), _by_table),
+    },
+)

@@ -1,0 +1,186 @@
+"""Which effects will run for what is wanted, and which not, each with its reason."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import nearest
+from harness.effects.accuracy import Accuracy, Knob, Level
+from harness.effects.effect import Effect, Facts, by_name, knobs_of
+
+
+@dataclass(frozen=True)
+class PlannedEffect:
+    """An effect that will run.
+
+    Attributes:
+        effect: itself, as its levels have it computed.
+        reason: who needs it, what in the scene calls for it, and in which of several ways it runs.
+        levels: of its knobs, the first that of its choice where it has one.
+    """
+
+    effect: Effect
+    reason: str
+    levels: Mapping[str, Level]
+
+
+@dataclass(frozen=True)
+class SkippedEffect:
+    """An effect that will not run, and why."""
+
+    effect: Effect
+    reason: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What an evaluation will do.
+
+    Attributes:
+        wanted: quantities asked for.
+        ran: effects in the order in which they run.
+        skipped: every other effect of the catalogue.
+        aliases: quantities whose effect is bypassed, and what takes their place.
+        sources: quantities that must be given.
+    """
+
+    wanted: tuple[str, ...]
+    ran: tuple[PlannedEffect, ...]
+    skipped: tuple[SkippedEffect, ...]
+    aliases: Mapping[str, str]
+    sources: tuple[str, ...]
+
+    def resolved(self, quantity: str) -> str:
+        """The quantity that stands for ``quantity`` once bypassed effects are passed through."""
+        return _resolved(self.aliases, quantity)
+
+
+@dataclass
+class _Search:
+    """A walk from what is wanted to the sources."""
+
+    effects: Mapping[str, Effect]
+    facts: Facts
+    accuracy: Accuracy
+    order: list[str] = field(default_factory=list)
+    asked_by: dict[str, list[str]] = field(default_factory=dict)
+    aliases: dict[str, str] = field(default_factory=dict)
+    sources: list[str] = field(default_factory=list)
+
+    def visit(self, quantity: str, asked_by: str, path: tuple[str, ...]) -> None:
+        """Note ``quantity`` and, before it, everything it needs."""
+        if quantity in path:
+            loop = " needs ".join((*path[path.index(quantity) :], quantity))
+            raise ValueError(f"the effects go round in a circle: {loop}")
+        seen = quantity in self.asked_by
+        self.asked_by.setdefault(quantity, []).append(asked_by)
+        if seen:
+            return
+        effect = self.effects.get(quantity)
+        if effect is None:
+            self.sources.append(quantity)
+            return
+        path = (*path, quantity)
+        if _called_for(effect, self.facts):
+            _require_way(effect, self.facts, self.accuracy)
+            for need in effect.needs:
+                self.visit(need, quantity, path)
+            self.order.append(quantity)
+        else:
+            self.aliases[quantity] = _bypass(effect, asked_by)
+            self.visit(self.aliases[quantity], asked_by, path)
+
+
+def plan(effects: Sequence[Effect], facts: Facts, wanted: Iterable[str], accuracy: Accuracy) -> Plan:
+    """What would run to compute ``wanted``, without computing anything.
+
+    Args:
+        effects: the catalogue.
+        facts: of the scene and the sensor.
+        wanted: quantities of the catalogue.
+        accuracy: a level for every knob of the catalogue.
+
+    Raises:
+        WrongUse: a wanted quantity that no effect provides, or that the scene rules out; a level that
+            the scene does not have what it takes for.
+        ValueError: a catalogue that is not one: circular, or two effects for one quantity.
+    """
+    known = {name: effect.at(accuracy) for name, effect in by_name(effects).items()}
+    search = _Search(known, facts, accuracy)
+    wanted = tuple(wanted)
+    for quantity in wanted:
+        if quantity not in known:
+            raise WrongUse(f"nothing computes {quantity!r}; {nearest(quantity, known)}")
+        search.visit(quantity, "", ())
+    ran = tuple(_planned(known[name], search) for name in search.order)
+    skipped = tuple(
+        SkippedEffect(effect, _why_not(effect, search))
+        for effect in effects
+        if effect.provides not in search.order
+    )
+    return Plan(wanted, ran, skipped, MappingProxyType(search.aliases), tuple(search.sources))
+
+
+def default_accuracy(effects: Iterable[Effect]) -> Accuracy:
+    """Every knob of a catalogue where nobody chooses."""
+    return Accuracy.default(knobs_of(effects))
+
+
+def _called_for(effect: Effect, facts: Facts) -> bool:
+    return effect.when is None or effect.when.holds(facts)
+
+
+def _bypass(effect: Effect, asked_by: str) -> str:
+    if effect.bypass is not None:
+        return effect.bypass
+    assert effect.when is not None
+    who = f"{asked_by} needs {effect.provides}" if asked_by else f"{effect.provides} is asked for"
+    raise WrongUse(f"{who}, but {effect.when.otherwise}; change the scene, or do not ask for it")
+
+
+def _require_way(effect: Effect, facts: Facts, accuracy: Accuracy) -> None:
+    way = effect.way(accuracy)
+    if way is None or way.when is None or way.when.holds(facts):
+        return
+    assert effect.choice is not None
+    name, level = effect.choice.name, accuracy[effect.choice.name]
+    raise WrongUse(
+        f"{name} = {level}: {way.when.otherwise}; change the scene, or take {name} = {effect.choice.default}"
+    )
+
+
+def _planned(effect: Effect, search: _Search) -> PlannedEffect:
+    asked_by, accuracy = search.asked_by[effect.provides], search.accuracy
+    who = [f"{name} needs it" for name in asked_by if name]
+    reasons = (["it is asked for"] if "" in asked_by else []) + who
+    if effect.when is not None:
+        reasons.append(effect.when.because)
+    knobs = effect.knobs
+    if effect.choice is not None:
+        knobs = (effect.choice, *knobs)
+        reasons.append(_why_this_way(effect, effect.choice, accuracy))
+    levels = MappingProxyType({knob.name: accuracy[knob.name] for knob in knobs})
+    return PlannedEffect(effect, "; ".join(reasons), levels)
+
+
+def _why_this_way(effect: Effect, choice: Knob, accuracy: Accuracy) -> str:
+    way, level = effect.way(accuracy), accuracy[choice.name]
+    said = f"{choice.name} is {level}"
+    if way is not None and way.when is not None:
+        return f"{said}, and {way.when.because}"
+    return f"{said}, its default" if level == choice.default else said
+
+
+def _why_not(effect: Effect, search: _Search) -> str:
+    if effect.when is not None and not effect.when.holds(search.facts):
+        in_its_place = _resolved(search.aliases, effect.provides)
+        through = f"; {in_its_place} passes through" if effect.provides in search.aliases else ""
+        return effect.when.otherwise + through
+    return f"nothing asked for {effect.provides}"
+
+
+def _resolved(aliases: Mapping[str, str], quantity: str) -> str:
+    while quantity in aliases:
+        quantity = aliases[quantity]
+    return quantity

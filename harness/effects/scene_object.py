@@ -1,0 +1,64 @@
+"""The object of a scene as the estimator and the plan know it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from harness.basics.materials import MATERIALS
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.same_object import require_same
+from harness.objects.builtin import build
+from harness.sim.solid.intake import IntakeReport, take_in
+from harness.sim.solid.walls import walled
+
+
+@dataclass(frozen=True, eq=False)
+class KnownObject:
+    """An object's surface, and how it came about.
+
+    Attributes:
+        mesh: in metres, in the object's frame.
+        report: of the intake of a mesh file; None for a built-in object.
+    """
+
+    mesh: Mesh
+    report: IntakeReport | None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the operator should look at."""
+        return self.report.warnings if self.report is not None else ()
+
+
+def known_file(scene: SceneFile, mesh: Mesh) -> ObjectFile | None:
+    """The scene's ObjectFile, seen to be of the scene's object; None where it names none.
+
+    Args:
+        scene: may name one.
+        mesh: of the scene's object, as ``known_object`` gives it.
+
+    Raises:
+        WrongUse: it is of another object or material; what differs is said.
+        DataRefused: it is missing or damaged.
+    """
+    if scene.object.objectfile is None:
+        return None
+    of = ObjectFile.open(Path(scene.object.objectfile))
+    require_same(of, walled(mesh, scene.object.wall), MATERIALS[scene.object.material])
+    return of
+
+
+def known_object(scene: SceneFile) -> KnownObject:
+    """Build or take in the scene's object.
+
+    Raises:
+        WrongUse: units that are wrong or ambiguous.
+        MeshRefused: a file that cannot stand for an object.
+    """
+    wanted = scene.object
+    if wanted.builtin is not None:
+        mesh = build(wanted.builtin)
+        return KnownObject(Mesh(mesh.vertices * wanted.scale, mesh.faces), None)
+    taken = take_in(Path(wanted.mesh), wanted.units, wanted.scale, wanted.wall)
+    return KnownObject(taken.mesh, taken.report)

@@ -1,0 +1,1 @@
+"""The sound of an ObjectFile: its network, its strikes, its WAV files."""

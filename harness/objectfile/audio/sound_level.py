@@ -1,0 +1,124 @@
+"""The modes of a scene's object out of its ObjectFile: levels of what finite elements solve for.
+
+What is handed on is what ``harness.sim.modal.modal.modes_of`` would have found for the same object: the
+lowest modes asked for, up to the limit of hearing, their shapes at the nodes of a surface fine enough
+to be linear between them. Nothing is meshed and nothing is solved.
+"""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.materials import Material
+from harness.basics.mesh import Mesh
+from harness.objectfile.audio.audio import AudioLevel, open_audio
+from harness.objectfile.entries import AudioEntry
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.same_object import require_same
+from harness.objectfile.surface_file import mesh_from_ply
+from harness.sim.modal.modes import Modes, dampings
+
+_SAME = 5e-5
+"""Relative distance of frequencies that are not parted: as the solver has it of their squares, 1e-4."""
+
+_SPARE = 8
+"""Modes that a solver may have left out of those asked for, so as not to part one frequency."""
+
+_DAMPING = 1e-6
+"""Relative, by which dampings may differ from those of alpha and beta: more than JSON rounds them by."""
+
+
+def modes_from(
+    of: ObjectFile, level: AudioLevel, surface: Mesh, material: Material, most: int, limit: float
+) -> Modes:
+    """The modes of an object, as its ObjectFile has them.
+
+    Args:
+        of: of this object.
+        level: where the shapes come from.
+        surface: of the object's material, in metres.
+        material: it is made of.
+        most: modes at most, the lowest; fewer where that would part modes of one frequency.
+        limit: Hz; modes above it are left out.
+
+    Raises:
+        WrongUse: an ObjectFile of another object or material, or of fewer modes; what differs is said.
+        DataRefused: it has no sound, or not at that level; or a file of it is damaged.
+    """
+    begun, entry = time.perf_counter(), of.description.audio
+    if entry is None:
+        raise DataRefused(
+            f"{of.folder} has no sound; add it with `touchstone object build --only audio`, or take "
+            "sound.shapes = elements"
+        )
+    require_same(of, surface, material)
+    _require_dampings(of, entry, material)
+    count = _count(of, entry, most, limit)
+    sound = open_audio(of, level)
+    everywhere = sound.as_modes(_nodes(of, entry) if level == "network" else None)
+    lowest = _lowest(everywhere, count, limit)
+    return replace(lowest, seconds={"objectfile": time.perf_counter() - begun})
+
+
+def _nodes(of: ObjectFile, entry: AudioEntry) -> Mesh:
+    """Where the network is asked: at the table's nodes, which are those of the elements.
+
+    A mesh may have faces as long as the object, over which no shape is linear.
+    """
+    if entry.table is None:
+        raise DataRefused(
+            f"{of.folder} has no table, and so no surface fine enough to ask its network at; build it again "
+            "with `touchstone object build`, or take sound.shapes = elements"
+        )
+    return mesh_from_ply(of.read(entry.table.surface), entry.table.surface.file)
+
+
+def _require_dampings(of: ObjectFile, entry: AudioEntry, material: Material) -> None:
+    wanted = dampings(np.array(entry.frequencies_hz), material)
+    apart = np.abs(np.array(entry.dampings_per_s) - wanted) > _DAMPING * np.maximum(wanted, 1e-12)
+    if apart.any():
+        first = int(np.argmax(apart))
+        raise WrongUse(
+            f"{of.folder}: mode {first + 1} of {entry.frequencies_hz[first]:.5g} Hz decays at "
+            f"{entry.dampings_per_s[first]:.5g} 1/s, and with the alpha and beta of {material.name} at "
+            f"{wanted[first]:.5g}; a scene has the dampings of its material: build the object again, or "
+            "take sound.shapes = elements"
+        )
+
+
+def _count(of: ObjectFile, entry: AudioEntry, most: int, limit: float) -> int:
+    """How many of the modes are kept.
+
+    Raises:
+        WrongUse: it was built with fewer than are asked for.
+    """
+    frequencies = np.array(entry.frequencies_hz)
+    heard = int(np.count_nonzero(frequencies <= limit))
+    if heard == len(frequencies) and entry.complete_up_to_hz < limit and heard + _SPARE < most:
+        raise WrongUse(
+            f"{of.folder} has {heard} modes, complete up to {entry.complete_up_to_hz:.5g} Hz, where {most} "
+            f"up to {limit:g} Hz are asked for; take sound.modes of at most {heard}, or build it again "
+            f"with --modes {most}"
+        )
+    count = min(most, heard)
+    while 0 < count < len(frequencies) and _one(frequencies[count - 1], frequencies[count]):
+        count -= 1
+    return count or min(most, heard)
+
+
+def _one(lower: float, upper: float) -> bool:
+    return bool(upper - lower <= _SAME * upper)
+
+
+def _lowest(modes: Modes, count: int, limit: float) -> Modes:
+    reached = min(modes.limit, limit)
+    if count < len(modes.frequencies) and modes.frequencies[count] <= limit:
+        reached = float(0.5 * (modes.frequencies[count - 1] + modes.frequencies[count]))
+    return replace(
+        modes,
+        frequencies=modes.frequencies[:count],
+        shapes=np.ascontiguousarray(modes.shapes[:, :count]),
+        limit=reached,
+    )

@@ -1,0 +1,1 @@
+"""The touch of an ObjectFile: codes of its surface, and the height maps they give."""

@@ -1,0 +1,284 @@
+"""The graph of an object's touch: a code of the surface around a place, seen from a pressed gel.
+
+*The code.* Around each of many nodes of the surface, the heights over the tangent plane are a mean and a
+linear basis times the node's code; beside them is how much of each pixel the surface covers, which says
+where it ends to a part of a pixel. *The press in closed form.* Where the gel stands in the frame of the
+node is a rigid motion; a pixel of the gel is a ray through those heights, and where it meets them is
+found by looking up, moving along the ray to the height that was found, and looking up again. So tilt,
+azimuth, yaw, depth and the way from the node to the contact cost the code nothing: it need not have
+seen them. *The gel.* What reaches behind the gel's plane goes through the skirt of ``harness.sim.gel.gel``,
+to the operation.
+
+Inputs: ``node`` int64 ``(n, 1)``, and ``node_from_gel`` float64 ``(n, 3, 4)``, the upper rows of a
+rigid transform in metres. Output ``maps``: float32 ``(n, rows, columns)``, metres of indentation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from onnx import ModelProto, TensorProto, helper
+
+from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray
+from harness.basics.errors import WrongUse
+from harness.bench.sensor import TactileSensor
+from harness.objectfile.graph import Nodes, Storage
+from harness.objectfile.touch.rays import between, ray_places, row_terms
+from harness.objectfile.touch.skirt import hung
+from harness.sim.optics.tactile_calibration import GelSkirt
+
+LOOKUPS = 3
+"""Along a ray. The error of a look-up shrinks by the surface's slope times the gel's lean, about a fifth."""
+
+_LEAST_COSINE = 0.25
+"""Between node and gel: what a rotation that is none may do to a division."""
+
+_COVERED = 127.5
+"""Of 255, from which a place counts as surface: the edge of a half-plane is then where it is."""
+
+_COARSE = 4
+"""Pixels a side to one ray of the first look-ups, which only say where the last one looks."""
+
+
+@dataclass(frozen=True, eq=False)
+class PatchCodes:
+    """Heights around the nodes of a surface.
+
+    Pixel (i, j) of a patch is the place x = (j + 0.5 - size / 2) pitch, y = (i + 0.5 - size / 2) pitch
+    of the node's frame, whose z axis points into the object.
+
+    Attributes:
+        codes: ``(nodes, k)`` m.
+        basis: ``(k, pixels)``, of the pixels inside; None where a code is the pixels themselves.
+        mean: ``(pixels,)`` m, which is added.
+        cover: ``(nodes, pixels)`` uint8, the share of a pixel that is surface in reach, times 255.
+        inside: ``(size, size)``: the pixels that a code says something of.
+        outside: m, the height of all others: out of any gel's reach.
+        pitch: m.
+    """
+
+    codes: FloatArray
+    basis: FloatArray | None
+    mean: FloatArray
+    cover: ByteArray
+    inside: BoolArray
+    outside: float
+    pitch: float
+
+    def heights(self, node: int) -> FloatArray:
+        """``(size, size)`` m, as the graph takes them to be."""
+        patch = np.full(self.inside.shape, self.outside)
+        code = self.codes[node]
+        patch[self.inside] = self.mean + (code if self.basis is None else code @ self.basis)
+        return patch
+
+    def covers(self, node: int) -> FloatArray:
+        """``(size, size)`` of 0 to 255, as the graph takes them to be."""
+        patch = np.zeros(self.inside.shape)
+        patch[self.inside] = self.cover[node]
+        return patch
+
+
+def codes_graph(
+    patches: PatchCodes,
+    sensor: TactileSensor,
+    skirt: GelSkirt,
+    lookups: int = LOOKUPS,
+    storage: Storage = "float16",
+) -> ModelProto:
+    """The graph of patches, a sensor and its gel.
+
+    Args:
+        patches: of the object.
+        sensor: a flat gel; no press goes deeper than it is thick.
+        skirt: of the gel, in its pixels.
+        lookups: along each ray, 1 or more.
+        storage: of codes and basis in the file; computed is in float32.
+
+    Raises:
+        WrongUse: arrays that do not fit together or are not finite, or a dome.
+    """
+    _check(patches, sensor, lookups)
+    nodes = Nodes(storage)
+    heights, covers = _patch(nodes, patches)
+    size = len(patches.inside)
+    half_width = 0.5 * size * patches.pitch
+    moved = nodes.add("Transpose", nodes.add("Cast", "node_from_gel", to=TensorProto.FLOAT), perm=[0, 2, 1])
+    scale = np.array([1.0 / half_width, 1.0 / half_width, 1.0], np.float32)
+    motion = _Motion(nodes, nodes.add("Mul", moved, nodes.constant(scale)), sensor, patches.outside)
+    coarse, half = coarseness(patches, sensor)
+    near: str | None = None
+    for _ in range(lookups - 1):
+        near = motion.clipped(motion.to_height(heights, near, coarse, coarse))
+    covered = motion.finer(motion.look_up(covers, near, coarse, half), half)
+    along = motion.to_height(heights, near, coarse, 1)
+    reached = motion.where_covered(nodes.add("Neg", along), covered)
+    limits = [nodes.constant(np.array(value, np.float32)) for value in (0.0, sensor.gel_thickness)]
+    deep = nodes.add("Clip", reached, *limits)
+    nodes.add("Identity", hung(nodes, deep, sensor, skirt), name="maps")
+    return nodes.model(
+        "touch",
+        [
+            helper.make_tensor_value_info("node", TensorProto.INT64, ["n", 1]),
+            helper.make_tensor_value_info("node_from_gel", TensorProto.DOUBLE, ["n", 3, 4]),
+        ],
+        [helper.make_tensor_value_info("maps", TensorProto.FLOAT, ["n", sensor.rows, sensor.columns])],
+        "A node (n, 1) and the gel's pose in its frame (n, 3, 4), m, to indentation (n, rows, columns), m.",
+    )
+
+
+def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
+    """``(n, 1, size, size)``: heights of the asked nodes over that of all that lies outside, and covers."""
+    size = len(patches.inside)
+    asked = nodes.add("Reshape", "node", _shape(nodes, -1))
+    # In half precision what is below 60 um would be lost, were it metres.
+    millimetres = patches.codes * 1e3
+    if patches.basis is None:
+        millimetres = np.hstack([millimetres, np.zeros((len(millimetres), 1))])
+    code = nodes.add("Gather", nodes.weight(millimetres, "the codes"), asked, axis=0)
+    # All pixels outside read one column behind the others: no code, and the height of outside.
+    pixels = len(patches.mean)
+    columns = np.full(patches.inside.shape, pixels)
+    columns[patches.inside] = np.arange(pixels)
+    index = nodes.constant(columns.ravel().astype(np.int64))
+    if patches.basis is None:
+        flat = nodes.add("Gather", code, index, axis=1)
+    else:
+        held = nodes.weight(np.hstack([patches.basis, np.zeros((len(patches.basis), 1))]), "the basis")
+        flat = nodes.add("MatMul", code, nodes.add("Gather", held, index, axis=1))
+    mean = np.append(patches.mean, patches.outside)[columns.ravel()].astype(np.float32)
+    metres = nodes.add("Mul", flat, nodes.constant(np.array(1e-3, np.float32)))
+    above = nodes.add("Sub", nodes.constant(mean), nodes.constant(np.array(patches.outside, np.float32)))
+    heights = nodes.add("Reshape", nodes.add("Add", metres, above), _shape(nodes, -1, 1, size, size))
+    none = np.zeros((len(patches.cover), 1), np.uint8)
+    cover = nodes.add("Gather", nodes.constant(np.hstack([patches.cover, none])), asked, axis=0)
+    spread = nodes.add("Cast", nodes.add("Gather", cover, index, axis=1), to=TensorProto.FLOAT)
+    return heights, nodes.add("Reshape", spread, _shape(nodes, -1, 1, size, size))
+
+
+def coarseness(patches: PatchCodes, sensor: TactileSensor) -> tuple[int, int]:
+    """Pixels a side to one ray of the first look-ups, and of those of covers."""
+    coarse = _COARSE if sensor.rows % _COARSE == 0 and sensor.columns % _COARSE == 0 else 1
+    # A cover is linear between a patch's pixels: half the rays see all of it where they are closer.
+    return coarse, 2 if coarse > 1 and 2.0 * sensor.pitch <= patches.pitch else 1
+
+
+class _Motion:
+    """The rays of a gel's pixels through the heights of a node."""
+
+    def __init__(self, nodes: Nodes, motion: str, sensor: TactileSensor, outside: float) -> None:
+        self._nodes, self._sensor = nodes, sensor
+        self._names: dict[tuple[str, int], str] = {}
+        columns, height = self._cut(motion, 2, 0, 2), self._cut(motion, 2, 2, 3)
+        # Heights are counted from the height outside, and so are those of the gel's plane.
+        over = np.array([[0.0], [0.0], [0.0], [outside]], np.float32)
+        self._across, self._height = columns, nodes.add("Sub", height, nodes.constant(over))
+        self._drift = self._cut(columns, 1, 2, 3)
+        least = nodes.constant(np.array(_LEAST_COSINE, np.float32))
+        self._rise = nodes.add("Max", self._cut(height, 1, 2, 3), least)
+        limits = (-sensor.gel_thickness, sensor.gel_thickness)
+        self._limits = [nodes.constant(np.array(value, np.float32)) for value in limits]
+
+    def to_height(self, heights: str, near: str | None, coarse: int, fine: int) -> str:
+        """``(n, rows, columns)`` m along the gel's z axis to the height under the rays, as ``look_up``."""
+        nodes = self._nodes
+        found = self.look_up(heights, near, coarse, fine)
+        plane = nodes.add("MatMul", self._rows(fine), self._line(self._height, fine))
+        return nodes.add("Div", nodes.add("Sub", found, plane), self._rise)
+
+    def look_up(self, image: str, near: str | None, coarse: int, fine: int) -> str:
+        """``(n, rows, columns)`` of an image of the node, of rays that are ``fine`` pixels apart.
+
+        They are ``near`` metres along the gel's z, ``(n, rows, columns)`` of rays ``coarse`` pixels apart and
+        linear between them; in the gel's plane if None.
+        """
+        nodes, sensor = self._nodes, self._sensor
+        rows, columns = sensor.rows // fine, sensor.columns // fine
+        grid = nodes.add("Reshape", self._places(near, coarse, fine), _shape(nodes, -1, rows, columns, 2))
+        found = nodes.add("GridSample", image, grid, mode="bilinear", padding_mode="zeros", align_corners=0)
+        return nodes.add("Reshape", found, _shape(nodes, -1, rows, columns))
+
+    def _places(self, near: str | None, coarse: int, fine: int) -> str:
+        """``(n, rows, 2 columns)``: where the rays are in the patch, x and y in turn.
+
+        A place is a sum of what its row says, what its column says and the way along the ray, so that all are
+        found by products with a few columns: one for each ray takes onnxruntime five times as long.
+        """
+        nodes, sensor = self._nodes, self._sensor
+        line = self._line(self._across, fine)
+        if near is None:
+            return nodes.add("MatMul", self._rows(fine), line)
+        rows, columns, step = sensor.rows // coarse, sensor.columns // coarse, coarse // fine
+        shift = nodes.add("MatMul", nodes.add("Reshape", near, _shape(nodes, 0, -1, 1)), self._drift)
+        shift = nodes.add("Reshape", shift, _shape(nodes, -1, rows, 2 * columns))
+        if step == 1:
+            return nodes.add("Add", nodes.add("MatMul", self._rows(fine), line), shift)
+        wide = np.kron(between(columns * step, step).T, np.eye(2, dtype=np.float32))
+        shift = nodes.add("MatMul", shift, nodes.constant(wide))
+        tall = np.hstack([between(rows * step, step), row_terms(sensor, fine)])
+        return nodes.add("MatMul", nodes.constant(tall), nodes.add("Concat", shift, line, axis=1))
+
+    def clipped(self, along: str) -> str:
+        """No farther from the gel's plane than the gel is thick; beyond is no touch, or too much."""
+        return self._nodes.add("Clip", along, *self._limits)
+
+    def where_covered(self, reached: str, covers: str) -> str:
+        """``(n, rows, columns)`` m that the object reaches into the gel; 0 where there is no surface."""
+        nodes = self._nodes
+        covered = nodes.add("Greater", covers, nodes.constant(np.array(_COVERED, np.float32)))
+        return nodes.add("Where", covered, reached, nodes.constant(np.array(0.0, np.float32)))
+
+    def finer(self, image: str, coarse: int) -> str:
+        """``(n, rows, columns)`` of the pixels, linear between rays that are ``coarse`` pixels apart."""
+        if coarse == 1:
+            return image
+        nodes, sensor = self._nodes, self._sensor
+        tall = nodes.add("MatMul", nodes.constant(between(sensor.rows, coarse)), image)
+        return nodes.add("MatMul", tall, nodes.constant(between(sensor.columns, coarse).T))
+
+    def _line(self, motion: str, fine: int) -> str:
+        """``(n, 2, columns k)`` of a motion to k numbers, ``(n, 4, k)``.
+
+        What a place's column says of it, in which x and 1 count, and the step along y: a row's terms times
+        these are the motion of all its places.
+        """
+        x = ray_places(self._sensor, fine)[0]
+        terms = np.zeros((2, len(x), 4), np.float32)
+        terms[0, :, 0], terms[0, :, 3], terms[1, :, 1] = x, 1.0, 1.0
+        line = self._nodes.add("MatMul", self._kept(("columns", fine), terms.reshape(-1, 4)), motion)
+        return self._nodes.add("Reshape", line, _shape(self._nodes, 0, 2, -1))
+
+    def _rows(self, fine: int) -> str:
+        return self._kept(("rows", fine), row_terms(self._sensor, fine))
+
+    def _kept(self, name: tuple[str, int], value: AnyArray) -> str:
+        """The constant of that name, once in the file."""
+        if name not in self._names:
+            self._names[name] = self._nodes.constant(value)
+        return self._names[name]
+
+    def _cut(self, value: str, axis: int, first: int, last: int) -> str:
+        ends = [self._nodes.constant(np.array([number])) for number in (first, last, axis)]
+        return self._nodes.add("Slice", value, *ends)
+
+
+def _shape(nodes: Nodes, *sizes: int) -> str:
+    return nodes.constant(np.array(sizes, np.int64))
+
+
+def _check(patches: PatchCodes, sensor: TactileSensor, lookups: int) -> None:
+    if sensor.gel_radius is not None:
+        raise WrongUse(f"{sensor.name} has a dome; codes are seen through a flat gel only")
+    if lookups < 1:
+        raise WrongUse(f"{lookups} look-ups find nothing; say 1 or more")
+    (count, width), size = patches.codes.shape, len(patches.inside)
+    pixels = int(np.count_nonzero(patches.inside))
+    basis = (pixels, pixels) if patches.basis is None else patches.basis.shape
+    shapes = (basis, patches.mean.shape, patches.inside.shape)
+    if count < 1 or shapes != ((width, pixels), (pixels,), (size, size)):
+        raise WrongUse(f"codes {patches.codes.shape} with basis, mean and mask of shapes {shapes} do not fit")
+    if patches.cover.shape != (count, pixels) or patches.cover.dtype != np.uint8:
+        raise WrongUse(
+            f"covers {patches.cover.dtype} {patches.cover.shape} are to be uint8 {(count, pixels)}"
+        )
+    if not (np.isfinite(patches.mean).all() and patches.pitch > 0.0):
+        raise WrongUse("a mean of heights that is not finite, or a pitch that is not positive")

@@ -1,0 +1,204 @@
+"""Writing the touch of an ObjectFile: codes and their graph, the perceptron's graph, their self-tests."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from onnx import ModelProto
+
+from harness.basics.arrays import AnyArray, FloatArray, IntArray
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import validate
+from harness.bench.sensor import TactileSensor
+from harness.objectfile.entries import Domain, Input, NetworkEntry, Provenance, Tensor
+from harness.objectfile.file import ObjectFile, file_entry, with_part
+from harness.objectfile.network_part import SELF_TEST_VALUES, NetworkPart, network_entry, spread
+from harness.objectfile.touch.nodes import SurfaceNodes, nodes_bytes
+from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
+from harness.sim.optics.tactile_calibration import GelSkirt
+
+CODES = "touch.onnx"
+NODES = "touch_nodes.npy"
+PERCEPTRON = "touch_perceptron.onnx"
+
+_SELF_TEST_ROWS = 4
+_SELF_TEST_DEPTH = 1e-3
+_TOLERANCE = 1e-4
+"""Of the self-test, of the greatest depth: a hundred times what float32 loses, a tenth of a micrometre."""
+
+
+@dataclass(frozen=True, eq=False)
+class CodesPart:
+    """Codes to be written.
+
+    Attributes:
+        graph: ``touch_graph.codes_graph``.
+        nodes: the places of the codes.
+        most_off: m, of ``touch_nodes.signatures``, that a press may be from its node.
+        measured: its errors, by a name with its unit.
+    """
+
+    graph: ModelProto
+    nodes: SurfaceNodes
+    most_off: float
+    measured: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class PerceptronPart:
+    """The paper's network to be written.
+
+    Attributes:
+        graph: ``touch_perceptron.perceptron_graph``.
+        least: ``(9,)`` of each input (``touch_perceptron.pixel_domain``).
+        most: ``(9,)``.
+        measured: its errors, by a name with its unit.
+    """
+
+    graph: ModelProto
+    least: FloatArray
+    most: FloatArray
+    measured: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class TouchPart:
+    """A touch to be written.
+
+    Attributes:
+        sensor: a flat gel.
+        skirt: of the gel.
+        depths: m, least and greatest that may be asked.
+        most_tilt: rad.
+        near_surface: m, the farthest from the surface that a press may be.
+        provenance: of the touch.
+        codes: one level; None for the other alone.
+        perceptron: the other.
+    """
+
+    sensor: TactileSensor
+    skirt: GelSkirt
+    depths: tuple[float, float]
+    most_tilt: float
+    near_surface: float
+    provenance: Provenance
+    codes: CodesPart | None = None
+    perceptron: PerceptronPart | None = None
+
+
+def with_touch(of: ObjectFile, part: TouchPart) -> ObjectFile:
+    """The ObjectFile with this touch written into it.
+
+    Raises:
+        WrongUse: there are neither codes nor a perceptron, or numbers that cannot be.
+        DataRefused: a graph that must not be run, or that takes or gives something else than touch.
+    """
+    if part.codes is None and part.perceptron is None:
+        raise WrongUse("a touch needs codes or a perceptron; give one of them")
+    contents: dict[str, bytes] = {}
+    described = {
+        "gel": GelEntry.of(part.sensor, part.skirt),
+        "depth_m": part.depths,
+        "most_tilt_rad": part.most_tilt,
+        "near_surface_m": part.near_surface,
+        "codes": None if part.codes is None else _codes(part, part.codes, contents),
+        "perceptron": None if part.perceptron is None else _perceptron(part.perceptron, contents),
+        "provenance": part.provenance,
+    }
+    entry = validate(described, TouchEntry, f"the touch of {of.description.name}")
+    return with_part(of, "touch", entry, contents)
+
+
+def codes_tensors(
+    count: int, reach: float, sensor: TactileSensor
+) -> tuple[tuple[Input, Input], tuple[Tensor]]:
+    """What every graph of codes takes and gives.
+
+    Args:
+        count: of nodes.
+        reach: m, the farthest that the gel's centre may be from its node.
+        sensor: gives rows and columns.
+    """
+    limits = np.ones((3, 4))
+    limits[:, 3] = reach
+    most = tuple(limits.ravel().tolist())
+    node = Input(
+        name="node",
+        dtype="int64",
+        shape=("n", 1),
+        unit="1",
+        meaning="whose code is taken, counted from 0, as in the file of nodes",
+        domain=Domain(low=(0.0,), high=(count - 1.0,)),
+        normaliser="in the graph",
+    )
+    pose = Input(
+        name="node_from_gel",
+        dtype="float64",
+        shape=("n", 3, 4),
+        unit="m",
+        meaning="the gel's pose: the upper rows of a rigid transform",
+        frame="node",
+        domain=Domain(low=tuple(-each for each in most), high=most),
+        normaliser="in the graph",
+    )
+    maps = Tensor(
+        name="maps",
+        dtype="float32",
+        shape=("n", sensor.rows, sensor.columns),
+        unit="m",
+        meaning="how far the gel is pressed in",
+        frame="gel",
+    )
+    return (node, pose), (maps,)
+
+
+def perceptron_tensors(least: FloatArray, most: FloatArray) -> tuple[tuple[Input], tuple[Tensor]]:
+    """What the paper's network takes and gives."""
+    pixel = Input(
+        name="pixel",
+        dtype="float64",
+        shape=("n", 9),
+        unit="m, m, m, rad, 1, 1, m, pixel, pixel",
+        meaning="place x y z, tilt, cosine and sine of its azimuth, depth, row, column",
+        frame="object",
+        domain=Domain(low=tuple(least.tolist()), high=tuple(most.tolist())),
+        normaliser="in the graph",
+    )
+    depth = Tensor(
+        name="depth",
+        dtype="float32",
+        shape=("n", 1),
+        unit="m",
+        meaning="how far the gel is pressed in",
+        frame="gel",
+    )
+    return (pixel,), (depth,)
+
+
+def _codes(part: TouchPart, codes: CodesPart, contents: dict[str, bytes]) -> CodesEntry:
+    count = len(codes.nodes)
+    inputs, outputs = codes_tensors(count, codes.most_off + part.depths[1], part.sensor)
+    chosen = np.linspace(0, count - 1, _SELF_TEST_ROWS).astype(np.int64)[:, None]
+    poses = np.tile(np.eye(4)[:3], (_SELF_TEST_ROWS, 1, 1))
+    poses[:, 2, 3] = _SELF_TEST_DEPTH
+    asked = {"node": chosen, "node_from_gel": poses}
+    contents[NODES] = nodes_bytes(codes.nodes)
+    written = NetworkPart(CODES, codes.graph, inputs, outputs, asked, _TOLERANCE, codes.measured, _seen)
+    network = network_entry(written, contents)
+    return CodesEntry(network=network, nodes=file_entry(NODES, contents[NODES]), most_off_m=codes.most_off)
+
+
+def _perceptron(part: PerceptronPart, contents: dict[str, bytes]) -> NetworkEntry:
+    inputs, outputs = perceptron_tensors(part.least, part.most)
+    shares = np.random.default_rng(0).random((SELF_TEST_VALUES, len(part.least)))
+    asked = {"pixel": part.least + shares * (part.most - part.least)}
+    return network_entry(
+        NetworkPart(PERCEPTRON, part.graph, inputs, outputs, asked, _TOLERANCE, part.measured, _seen),
+        contents,
+    )
+
+
+def _seen(found: AnyArray) -> IntArray:
+    """Half of the places where most is to be seen: most of a map is zero."""
+    deepest = np.argsort(found, kind="stable")[-SELF_TEST_VALUES // 2 :: 4]
+    return np.unique(np.concatenate([spread(found), deepest]))

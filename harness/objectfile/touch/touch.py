@@ -1,0 +1,216 @@
+"""The touch of an ObjectFile: from presses on the object to the surface of the gel.
+
+Three levels of one quantity: ``codes`` (``touch.onnx``), ``perceptron`` (the network of ObjectFolder
+2.0, ``touch_perceptron.onnx``) and ``reference``, the rasteriser on ``mesh.ply``, which the others are
+measured against. All refuse what they were not made for.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
+
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
+from harness.basics.geometry import inverse
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.surface_search import SurfaceSearch
+from harness.objectfile.touch.nodes import NodeSearch, nodes_from
+from harness.objectfile.touch.pixels import pixel_queries
+from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
+from harness.sim.gel.gel import deform, over_range
+from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
+from harness.sim.gel.presses import Presses
+
+if TYPE_CHECKING:
+    from harness.objectfile.runtime import Network
+    from harness.objectfile.touch.compiled import CompiledCodes
+
+TouchLevel = Literal["codes", "perceptron", "reference"]
+
+CHUNK = 16
+"""Maps to a run: more are no faster, and take memory."""
+
+_EDGE = 1e-9
+"""Relative: what is at the very limit counts as within it."""
+
+
+class Maps(Protocol):
+    """A way from presses to maps."""
+
+    def __call__(self, presses: Presses) -> AnyArray:
+        """``(n, rows, columns)`` m."""
+
+
+@dataclass(frozen=True, eq=False)
+class CodeMaps:
+    """Maps from codes of the surface.
+
+    Attributes:
+        network: the graph of codes, run as it is or compiled.
+        nodes: where the codes belong.
+    """
+
+    network: "Network | CompiledCodes"
+    nodes: NodeSearch
+
+    def __call__(self, presses: Presses) -> AnyArray:
+        """``(n, rows, columns)`` m; refuses a press that no code is near."""
+        return self.network(self.nodes.queries(presses))["maps"]
+
+
+@dataclass(frozen=True, eq=False)
+class PerceptronMaps:
+    """Maps from the perceptron, pixel by pixel."""
+
+    network: "Network"
+    gel: GelEntry
+
+    def __call__(self, presses: Presses) -> AnyArray:
+        """``(n, rows, columns)`` m; refuses a yaw, of which the network knows nothing."""
+        maps = np.empty((len(presses), self.gel.rows, self.gel.columns), np.float32)
+        for number in range(len(presses)):
+            asked = pixel_queries(presses[number : number + 1], self.gel.sensor)
+            maps[number] = self.network({"pixel": asked[0]})["depth"].reshape(maps.shape[1:])
+        return maps
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceMaps:
+    """Maps from the rasteriser and the skirt."""
+
+    raster: RasterMesh
+    gel: GelEntry
+
+    def __call__(self, presses: Presses) -> AnyArray:
+        """``(n, rows, columns)`` m, no press held deeper than the gel is thick."""
+        sensor = self.gel.sensor
+        gap = height_maps(self.raster, inverse(presses.object_from_gel), sensor)
+        return deform(over_range(penetration(gap, sensor), sensor)[0], self.gel.skirt)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectTouch:
+    """What a gel shows when it is pressed onto one object.
+
+    Attributes:
+        level: where the maps come from.
+        entry: what ``object.json`` says: the gel, and what may be asked.
+        surface: the object's; presses are to be on it.
+        maps: of presses that were looked at.
+    """
+
+    level: TouchLevel
+    entry: TouchEntry
+    surface: SurfaceSearch
+    maps: Maps
+
+    @property
+    def measured(self) -> Mapping[str, float]:
+        """Errors of the level, by names with units; none of the reference."""
+        match self.level:
+            case "codes" if self.entry.codes is not None:
+                return self.entry.codes.network.measured
+            case "perceptron" if self.entry.perceptron is not None:
+                return self.entry.perceptron.measured
+        return {}
+
+    def at(self, presses: Presses) -> FloatArray:
+        """``(n, rows, columns)`` m of indentation of the gel, positive into it.
+
+        Raises:
+            OutOfDomain: a depth, tilt or place that the level was not made for; the worst is named.
+            DataRefused: a map that is not finite.
+        """
+        self._require(presses)
+        gel = self.entry.gel
+        found = np.empty((len(presses), gel.rows, gel.columns))
+        for first in range(0, len(presses), CHUNK):
+            found[first : first + CHUNK] = self.maps(presses[first : first + CHUNK])
+        if not np.isfinite(found).all():
+            bad = int(np.count_nonzero(~np.isfinite(found).all(axis=(1, 2))))
+            raise DataRefused(
+                f"the touch's {self.level} gives numbers that are not finite for {bad} of "
+                f"{len(presses)} presses; build it again, or take its other level"
+            )
+        return found
+
+    def _require(self, presses: Presses) -> None:
+        low, high = self.entry.depth_m
+        depths, tilts, most = presses.depths, presses.tilts, self.entry.most_tilt_rad
+        if ((depths < low * (1.0 - _EDGE)) | (depths > high * (1.0 + _EDGE))).any():
+            raise OutOfDomain(
+                f"a press {_span(depths * 1e3)} mm deep was asked of the "
+                f"touch's {self.level}, which knows {low * 1e3:g} to {high * 1e3:g} mm; press within that, "
+                "or simulate it with `touchstone sim touch`"
+            )
+        if ((tilts < 0.0) | (tilts > most * (1.0 + _EDGE))).any():
+            raise OutOfDomain(
+                f"a tilt of {_span(np.degrees(tilts))} deg was asked of "
+                f"the touch's {self.level}, which knows 0 to {np.degrees(most):g} deg; lean less, or "
+                "simulate it with `touchstone sim touch`"
+            )
+        self.surface.require_within(presses.points, self.entry.near_surface_m, f"the touch's {self.level}")
+
+
+def _span(values: FloatArray) -> str:
+    low, high = f"{values.min():.4g}", f"{values.max():.4g}"
+    return low if low == high else f"{low} to {high}"
+
+
+def open_touch(
+    of: ObjectFile, level: TouchLevel = "codes", threads: int = 1, compiled: bool = True
+) -> ObjectTouch:
+    """The touch of an object at a level.
+
+    Args:
+        of: an object that has a touch.
+        level: ``"codes"``, ``"perceptron"`` or ``"reference"``.
+        threads: that a network, or a batch of presses, may use.
+        compiled: codes in loops made for their graph, where it is one that ``touch_graph`` makes; False runs
+            the graph as it is, as other programs do.
+
+    Raises:
+        DataRefused: the object has no touch, or not at that level; or a file of it is damaged.
+        WrongUse: an unknown level.
+    """
+    entry, name = of.description.touch, of.description.name
+    if entry is None:
+        raise DataRefused(f"{name} has no touch; add it with `touchstone object build --only touch`")
+    maps: Maps
+    match level:
+        case "reference":
+            maps = ReferenceMaps(RasterMesh(of.mesh), entry.gel)
+        case "codes" if entry.codes is not None:
+            maps = _codes(of, entry, entry.codes, threads, compiled)
+        case "perceptron" if entry.perceptron is not None:
+            from harness.objectfile.runtime import open_network
+
+            network = open_network(of.read(entry.perceptron), entry.perceptron, threads)
+            maps = PerceptronMaps(network, entry.gel)
+        case "codes" | "perceptron":
+            raise DataRefused(f"the touch of {name} has no {level}; take another level, or build it again")
+        case _:
+            raise WrongUse(f"no level {level!r} of a touch; there is codes, perceptron, reference")
+    return ObjectTouch(level, entry, SurfaceSearch(of.mesh), maps)
+
+
+def _codes(of: ObjectFile, touch: TouchEntry, entry: CodesEntry, threads: int, compiled: bool) -> CodeMaps:
+    nodes = nodes_from(of.read(entry.nodes), entry.nodes.file)
+    asked = entry.network.inputs[0].domain
+    if asked.high is None or asked.high[0] != len(nodes) - 1:
+        raise DataRefused(
+            f"{entry.nodes.file} has {len(nodes)} nodes, its graph another number; build it again"
+        )
+    data, search = of.read(entry.network), NodeSearch(nodes, entry.most_off_m)
+    if compiled:
+        # Graphs are heavy to read, and the reference needs none of it.
+        from harness.objectfile.touch.compiled import compiled_codes
+
+        found = compiled_codes(data, entry.network, touch.gel.sensor, touch.gel.skirt, threads)
+        if found is not None:
+            return CodeMaps(found, search)
+    from harness.objectfile.runtime import open_network
+
+    return CodeMaps(open_network(data, entry.network, threads), search)

@@ -1,0 +1,1 @@
+"""Whether an ObjectFile is whole and says what it claims."""

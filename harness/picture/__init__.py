@@ -1,0 +1,1 @@
+"""Pictures as light: pinhole, exposure, masks, and how far one picture is from another."""

@@ -1,0 +1,259 @@
+"""How a camera exposed what it saw, beside a simulated picture of the same: gain and offset of each channel.
+
+In linear light ``live = gain * simulated + offset``, fitted over pixels that are sure to show the object and
+that the camera could measure. Bright spots and shadows that the simulation leaves out are outliers.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
+from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.robust_fit import TUKEY, robust_fit, scatter
+from harness.basics.toml_file import nearest
+from harness.picture.exposure_error import BLOCK, Together, group_variance, mistaken_light, together
+from harness.picture.srgb import LINEAR_OF_BYTE
+
+ExposureKind = Literal["gain-offset", "gain", "none"]
+KINDS: tuple[ExposureKind, ...] = get_args(ExposureKind)
+
+DARKEST, BRIGHTEST = 2, 250
+"""Grey levels that a camera measures; JPEG smears black and white by some levels."""
+
+LEAST_PIXELS = 200
+LEAST_BLOCKS = 8
+"""Blocks of which each holds a part of the pixels: errors are told by how these disagree."""
+
+CHANNELS = ("red", "green", "blue")
+
+_LEAST_SCATTER = 1.0 / 255.0 / np.sqrt(12.0)
+"""Of a grey level's rounding, in linear light, where the slope of sRGB is one."""
+
+_LEAST_SPREAD = 1e-3
+"""Linear light that simulated pixels must spread over for gain and offset to be told apart."""
+
+_SURE = 3.0
+"""Standard errors that a gain must be above zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExposureFit:
+    """Gain and offset of each channel, red, green and blue, and what they are off by.
+
+    Attributes:
+        kind: what was fitted; of what was not the error is zero.
+        gain: ``(3,)`` linear light of the picture for one of the simulation.
+        offset: ``(3,)`` linear light where the simulation is black.
+        gain_error: ``(3,)`` one standard deviation, with ``attenuation``.
+        offset_error: the same.
+        balance_error: ``(3,)`` one standard deviation of the gain over green's, relative; zero for green.
+        attenuation: ``(3,)`` of it, what the simulation's own errors may have made the gain smaller by.
+        scatter: ``(3,)`` robust standard deviation of what is left, linear light.
+        pixels: ``(3,)`` that were fitted.
+        saturated: ``(3,)`` that were asked for, and left out as black or white.
+        outliers: ``(3,)`` share of the fitted that have no weight.
+    """
+
+    kind: ExposureKind
+    gain: FloatArray
+    offset: FloatArray
+    gain_error: FloatArray
+    offset_error: FloatArray
+    balance_error: FloatArray
+    attenuation: FloatArray
+    scatter: FloatArray
+    pixels: AnyArray
+    saturated: AnyArray
+    outliers: FloatArray
+
+    def __post_init__(self) -> None:
+        errors = (self.gain_error, self.offset_error, self.balance_error, self.attenuation)
+        for each in (self.gain, self.offset, *errors):
+            read_only(each)
+
+    @property
+    def stops(self) -> float:
+        """Exposure: powers of two in green."""
+        return float(np.log2(self.gain[1]))
+
+    @property
+    def balance(self) -> FloatArray:
+        """White balance: ``(3,)`` gains over green's."""
+        over_green: FloatArray = self.gain / self.gain[1]
+        return over_green
+
+    def exposed(self, light: FloatArray, alpha: FloatArray | float = 1.0) -> FloatArray:
+        """``(..., 3)`` simulated light as this camera exposes it, multiplied by coverage as it is given."""
+        given: FloatArray = self.gain * light + self.offset * np.asarray(alpha)[..., None]
+        return given
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """One channel's ``(gain, offset)``, how much each group moves them, and what a wrong simulation may."""
+
+    values: FloatArray
+    moved: FloatArray
+    biased: FloatArray
+    scatter: float
+    pixels: int
+    saturated: int
+    outliers: float
+
+
+def exposure_kind(text: str) -> ExposureKind:
+    """What is to be fitted.
+
+    Raises:
+        WrongUse: no such thing.
+    """
+    for kind in KINDS:
+        if text == kind:
+            return kind
+    raise WrongUse(f"nothing to fit is called {text!r}; {nearest(text, KINDS)}")
+
+
+def fit_exposure(
+    live: ByteArray, simulated: FloatArray, where: BoolArray, kind: ExposureKind = "gain-offset"
+) -> ExposureFit:
+    """Fit gain and offset of each channel.
+
+    Standard errors are by blocks of 16 x 16 pixels and by shades, which may disagree for any reason: noise, a
+    highlight, a network's patch, a colour that JPEG rounded. The simulation's own errors make gains smaller,
+    as errors of any abscissa do; what they may have done, if they are all that is left beyond the noise of
+    single pixels, is counted as an error and not corrected.
+
+    Args:
+        live: ``(rows, columns, 3)`` RGB in sRGB.
+        simulated: ``(rows, columns, 3)`` linear light of what covers the pixel wholly.
+        where: ``(rows, columns)`` pixels that show the object and nothing else.
+        kind: gain and offset; the gain alone; or none, which says what is left without a fit.
+
+    Raises:
+        DataRefused: pictures of two sizes, light that is not finite, too few pixels that are neither black
+            nor white, a simulated object of one brightness, or no light of it in the live picture.
+    """
+    _require_alike(live, simulated, where)
+    groups = together(where, simulated[where])
+    found = [
+        _channel(live[..., k][where], simulated[..., k][where], where, groups, kind, name)
+        for k, name in enumerate(CHANNELS)
+    ]
+    values, biased = np.array([each.values for each in found]), np.array([each.biased for each in found])
+    moved = np.array([each.moved for each in found])
+    errors = np.sqrt(np.array([group_variance(each, groups) for each in moved]) + biased**2)
+    # Of a balance both gains may be too small, by chance one more than the other.
+    relative, loss = moved[:, :, 0] / values[:, 0, None], biased[:, 0] / values[:, 0]
+    apart = group_variance((relative - relative[1]).T, groups)
+    balance = np.sqrt(apart + loss**2 + loss[1] ** 2)
+    balance[1] = 0.0
+    return ExposureFit(
+        kind=kind,
+        gain=values[:, 0],
+        offset=values[:, 1],
+        gain_error=errors[:, 0],
+        offset_error=errors[:, 1],
+        balance_error=balance,
+        attenuation=biased[:, 0],
+        scatter=np.array([each.scatter for each in found]),
+        pixels=np.array([each.pixels for each in found]),
+        saturated=np.array([each.saturated for each in found]),
+        outliers=np.array([each.outliers for each in found]),
+    )
+
+
+def _require_alike(live: ByteArray, simulated: FloatArray, where: BoolArray) -> None:
+    if live.shape != simulated.shape or live.shape != (*where.shape, 3):
+        raise DataRefused(
+            f"a live picture of {live.shape}, a simulated one of {simulated.shape} and a mask of "
+            f"{where.shape} cannot be compared; give them one size in pixels"
+        )
+    if live.dtype != np.uint8:
+        raise DataRefused(f"a live picture of {live.dtype}; 8 bits a channel, as cameras send, are wanted")
+    wrong = np.count_nonzero(~np.isfinite(simulated))
+    if wrong:
+        raise DataRefused(
+            f"{wrong} of {simulated.size} values of the simulated picture are not finite; check its object "
+            "with `touchstone object verify`"
+        )
+
+
+def _channel(
+    levels: ByteArray, light: FloatArray, where: BoolArray, groups: Together, kind: ExposureKind, name: str
+) -> _Channel:
+    measured = (levels >= DARKEST) & (levels <= BRIGHTEST)
+    _require_enough(levels, measured, groups.block[groups.group], name)
+    live, x = LINEAR_OF_BYTE[levels[measured]], light[measured]
+    _require_told(x, kind, name)
+    pixels, saturated = live.size, levels.size - live.size
+    if kind == "none":
+        left, still = scatter(live - x), np.zeros((len(groups), 2))
+        return _Channel(np.array([1.0, 0.0]), still, np.zeros(2), left, pixels, saturated, 0.0)
+    design = np.column_stack([x, np.ones_like(x)]) if kind == "gain-offset" else x[:, None]
+    fit = robust_fit(design, live, groups.group[measured], len(groups), _LEAST_SCATTER)
+    if fit is None:
+        raise DataRefused(
+            f"{name}: its pixels are mostly outliers to any gain and offset; check object, pose and light"
+        )
+    _require_light(fit.values, group_variance(fit.moved, groups), name)
+    values, moved = np.zeros(2), np.zeros((len(groups), 2))
+    values[: fit.values.size], moved[:, : fit.values.size] = fit.values, fit.moved
+    seen = where.copy()
+    seen[where] = measured
+    wrong = mistaken_light(live - design @ fit.values, seen, TUKEY * fit.scale)
+    return _Channel(
+        values, moved, _biased(wrong, x, values[0], kind), fit.scale, pixels, saturated, fit.outliers
+    )
+
+
+def _biased(wrong: float, light: FloatArray, gain: float, kind: ExposureKind) -> FloatArray:
+    """``(2,)`` what gain and offset are moved by if a variance of live light is the simulation's doing.
+
+    A line turns about the middle of its pixels: with a gain too small goes an offset too large.
+    """
+    middle = float(light.mean()) if kind == "gain-offset" else 0.0
+    loss = wrong / gain / float(np.mean((light - middle) ** 2))
+    return np.array([loss, loss * middle])
+
+
+def _require_enough(levels: ByteArray, measured: BoolArray, blocks: AnyArray, name: str) -> None:
+    count, parts = int(measured.sum()), np.unique(blocks[measured]).size
+    if levels.size < LEAST_PIXELS or np.unique(blocks).size < LEAST_BLOCKS:
+        raise DataRefused(
+            f"the object covers {levels.size} whole pixels in {np.unique(blocks).size} blocks of {BLOCK} x "
+            f"{BLOCK}; {LEAST_PIXELS} in {LEAST_BLOCKS} are needed to fit an exposure: go nearer, take a "
+            "larger picture, or check that the camera's pose shows the object"
+        )
+    if count < LEAST_PIXELS or parts < LEAST_BLOCKS:
+        dark, bright = int((levels < DARKEST).sum()), int((levels > BRIGHTEST).sum())
+        raise DataRefused(
+            f"{name}: of {levels.size} pixels of the object {bright} are saturated (above {BRIGHTEST} of "
+            f"255) and {dark} black (below {DARKEST}); {count} in {parts} blocks are left and {LEAST_PIXELS} "
+            f"in {LEAST_BLOCKS} needed: {'shorten' if bright > dark else 'lengthen'} the exposure"
+        )
+
+
+def _require_told(light: FloatArray, kind: ExposureKind, name: str) -> None:
+    if kind == "gain-offset" and float(light.std()) < _LEAST_SPREAD:
+        raise DataRefused(
+            f"{name}: the simulated object is of one brightness, {light.mean():.3g} with a spread of "
+            f"{light.std():.1g} (at least {_LEAST_SPREAD:g}), so gain and offset cannot be told apart; fit "
+            "the gain alone, or light it from another side"
+        )
+    if kind == "gain" and float(light.mean()) < _LEAST_SPREAD:
+        raise DataRefused(
+            f"{name}: the simulated object is black ({light.mean():.1g} of 1), so no gain can be told"
+        )
+
+
+def _require_light(values: FloatArray, variance: FloatArray, name: str) -> None:
+    # A simulation's errors make a gain smaller, never one of nothing: they are no doubt that there is light.
+    error = float(np.sqrt(variance[0]))
+    if not values[0] > _SURE * error:
+        raise DataRefused(
+            f"{name}: the live picture does not get brighter where the simulated one does (gain "
+            f"{values[0]:.3g} +- {error:.2g}, to be {_SURE:g} of these above zero); check object, pose and "
+            "light, or fit the gain alone"
+        )

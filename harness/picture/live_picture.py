@@ -1,0 +1,138 @@
+"""A camera's picture beside the simulated one of the same pose: masks, exposure, and what is left."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray
+from harness.basics.errors import DataRefused
+from harness.picture.exposure_fit import ExposureFit, ExposureKind, fit_exposure
+from harness.picture.image_metrics import mean_square, psnr, ssim
+from harness.picture.linear_image import LinearImage
+from harness.picture.object_mask import SILHOUETTE, mask_by_background, mask_by_colours, overlap
+from harness.picture.srgb import LINEAR_OF_BYTE, bytes_from_linear
+
+_WHOLE = 0.999
+"""Share of a pixel that the object covers where the pixel shows nothing else."""
+
+_EDGE = 1
+"""Pixels inside the outline that are not fitted: lenses and JPEG mix in what is beside them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Apart:
+    """How far two pictures are apart over the object's silhouette.
+
+    Attributes:
+        psnr_db: in dB; infinite where they are the same.
+        ssim: mean of the structural similarity of its pixels.
+        rms_grey: root of the mean square, grey levels.
+    """
+
+    psnr_db: float
+    ssim: float
+    rms_grey: float
+
+
+@dataclass(frozen=True, eq=False)
+class LiveComparison:
+    """A live picture and the simulated one, exposed alike.
+
+    Attributes:
+        live: ``(rows, columns, 3)`` RGB.
+        simulated: the same, exposed as the camera did, before the bench: its picture where there is one, else
+            the live picture itself, so that nothing but the object differs.
+        silhouette: ``(rows, columns)`` the object's pixels in the simulation.
+        mask: ``(rows, columns)`` the object's pixels in the live picture.
+        masked_by: ``"background"`` or ``"colours"``.
+        overlap: of both, 0 to 1 (IoU).
+        exposure: the fit.
+        fitted: how far they are apart over the silhouette.
+        unfitted: the same before anything was fitted.
+        seconds: s on the clock by stage.
+    """
+
+    live: ByteArray
+    simulated: ByteArray
+    silhouette: BoolArray
+    mask: BoolArray
+    masked_by: str
+    overlap: float
+    exposure: ExposureFit
+    fitted: Apart
+    unfitted: Apart
+    seconds: Mapping[str, float]
+
+
+def compare_live(
+    live: ByteArray,
+    image: LinearImage,
+    background: ByteArray | None = None,
+    kind: ExposureKind = "gain-offset",
+) -> LiveComparison:
+    """Compare a camera's picture with the simulated one.
+
+    The exposure is fitted over the silhouette without its edge, whatever the mask says, so that neither
+    depends on the other.
+
+    Args:
+        live: ``(rows, columns, 3)`` RGB in sRGB.
+        image: simulated, by the same camera.
+        background: the bench without the object; None where nobody took that picture.
+        kind: what is fitted.
+
+    Raises:
+        DataRefused: as of ``fit_exposure``, of ``mask_by_background`` and of ``mask_by_colours``.
+    """
+    begun = time.perf_counter()
+    _require_size(live, image)
+    silhouette = image.alpha >= SILHOUETTE
+    inside = ndimage.binary_erosion(image.alpha >= _WHOLE, iterations=_EDGE)
+    light = image.colour / np.maximum(image.alpha, SILHOUETTE)[..., None]
+    exposure = fit_exposure(live, light, inside, kind)
+    fitted_at = time.perf_counter()
+    if background is None:
+        mask, by = mask_by_colours(live, silhouette), "colours"
+    else:
+        mask, by = mask_by_background(live, background, silhouette), "background"
+    masked_at = time.perf_counter()
+    behind = LINEAR_OF_BYTE[live if background is None else background]
+    simulated = _before(exposure.exposed(image.colour, image.alpha), image.alpha, behind)
+    plain = _before(image.colour, image.alpha, behind)
+    fitted, unfitted = (_apart(live, each, silhouette) for each in (simulated, plain))
+    ended = time.perf_counter()
+    return LiveComparison(
+        live=live,
+        simulated=simulated,
+        silhouette=silhouette,
+        mask=mask,
+        masked_by=by,
+        overlap=overlap(silhouette, mask),
+        exposure=exposure,
+        fitted=fitted,
+        unfitted=unfitted,
+        seconds={"fit": fitted_at - begun, "mask": masked_at - fitted_at, "difference": ended - masked_at},
+    )
+
+
+def _require_size(live: ByteArray, image: LinearImage) -> None:
+    if live.shape != image.colour.shape:
+        raise DataRefused(
+            f"the live picture is {live.shape[1]} x {live.shape[0]} pixels and the simulated one "
+            f"{image.alpha.shape[1]} x {image.alpha.shape[0]}; give the camera that took it"
+        )
+
+
+def _before(colour: FloatArray, alpha: FloatArray, behind: FloatArray) -> ByteArray:
+    return bytes_from_linear(np.clip(colour, 0.0, None) + (1.0 - alpha)[..., None] * behind)
+
+
+def _apart(live: ByteArray, simulated: ByteArray, where: BoolArray) -> Apart:
+    return Apart(
+        psnr(live, simulated, where),
+        ssim(live, simulated, where),
+        float(np.sqrt(mean_square(live, simulated, where))),
+    )

@@ -1,0 +1,133 @@
+"""A run is a folder: what was asked, what was read, and nothing an estimate does not need.
+
+``run.json`` says what the run is; ``steps/NNN.mcap`` hold the readings. A step is on disk
+whole or not at all, and the first step that is not is where a run resumes.
+"""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from harness.basics.errors import RecordingDamaged, WrongUse
+from harness.bench.reading import Reading
+from harness.recording.step_file import Step, StepRecord, read_step, sync_folder, write_step
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class RunHeader:
+    """What a run is, written once before anything moves.
+
+    Attributes:
+        experiment: its name on the command line.
+        scene: the resolved scene, as JSON values.
+        station: the resolved station, as JSON values.
+        plan: the steps that were planned, and how, as JSON values.
+        files: content hashes of the files copied into the folder, by name.
+        versions: of the project, its git commit and the libraries that shape numbers.
+        seed: of everything random in the run.
+        mock: how the mocked bench was started; None at a real bench.
+        clock_offset_ns: wall clock minus bench clock.
+        created: wall time, ISO 8601.
+        schema: of this file.
+    """
+
+    experiment: str
+    scene: Mapping[str, Any]
+    station: Mapping[str, Any]
+    plan: Mapping[str, Any]
+    files: Mapping[str, str]
+    versions: Mapping[str, str]
+    seed: int
+    mock: Mapping[str, Any] | None
+    clock_offset_ns: int
+    created: str
+    schema: int = field(default=SCHEMA)
+
+
+class Recording:
+    """A run folder, open for reading and for committing further steps."""
+
+    def __init__(self, folder: Path) -> None:
+        """Open an existing run; ``RecordingDamaged`` or ``WrongUse`` where it is none."""
+        self.folder = folder
+        self.header = _read_header(folder / "run.json")
+
+    @classmethod
+    def create(cls, folder: Path, header: RunHeader) -> "Recording":
+        """Make the folder and its ``run.json``; refuses a folder that holds a run already."""
+        require_unused(folder)
+        (folder / "steps").mkdir(parents=True, exist_ok=True)
+        write_text_whole(folder / "run.json", json.dumps(asdict(header), indent=1, allow_nan=False))
+        return cls(folder)
+
+    @property
+    def truth_path(self) -> Path:
+        """Where a mock world writes what is true: beside the run, where no estimate looks."""
+        return self.folder.with_name(self.folder.name + ".truth.json")
+
+    @property
+    def committed(self) -> int:
+        """How many steps are on disk; ``RecordingDamaged`` where one is missing in between."""
+        found = sorted(int(path.stem) for path in (self.folder / "steps").glob("[0-9]*.mcap"))
+        if found != list(range(len(found))):
+            missing = sorted(set(range(len(found))) - set(found))
+            raise RecordingDamaged(f"{self.folder}: step {missing[0]} is missing but later steps are there")
+        return len(found)
+
+    def commit(self, step: Step, readings: Sequence[Reading], seconds: float) -> None:
+        """Put a performed step on the disk, whole."""
+        if step.index != self.committed:
+            raise ValueError(f"step {step.index} cannot follow {self.committed} committed steps")
+        by_name = {reading.channel.name: reading for reading in readings}
+        write_step(self._path(step.index), StepRecord(step, by_name, seconds), self.header.clock_offset_ns)
+
+    def step(self, index: int) -> StepRecord:
+        """Step ``index`` as it was performed."""
+        record = read_step(self._path(index), self.header.clock_offset_ns)
+        if record.step.index != index:
+            raise RecordingDamaged(f"{self._path(index)} says it is step {record.step.index}")
+        return record
+
+    def steps(self) -> list[StepRecord]:
+        """Every committed step in order."""
+        return [self.step(index) for index in range(self.committed)]
+
+    def _path(self, index: int) -> Path:
+        return self.folder / "steps" / f"{index:03d}.mcap"
+
+
+def require_unused(folder: Path) -> None:
+    """Refuse a folder that holds a run, before anything in it is touched."""
+    if (folder / "run.json").exists():
+        raise WrongUse(f"{folder} holds a run already; resume it with --resume, or name another folder")
+
+
+def write_text_whole(path: Path, text: str) -> None:
+    """Write a text file aside, flush it, rename it: readers see the old one or the new one."""
+    part = path.with_name(f".{path.name}.part")
+    with part.open("w", encoding="utf-8") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+    part.replace(path)
+    sync_folder(path.parent)
+
+
+def _read_header(path: Path) -> RunHeader:
+    if not path.exists():
+        raise WrongUse(f"{path.parent} is not a run: it has no run.json; give the folder that a run wrote")
+    try:
+        fields = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise RecordingDamaged(f"{path}: not JSON ({error})") from error
+    if fields.get("schema") != SCHEMA:
+        raise RecordingDamaged(f"{path}: schema {fields.get('schema')!r}; this version reads {SCHEMA}")
+    try:
+        return RunHeader(**fields)
+    except TypeError as error:
+        raise RecordingDamaged(f"{path}: {error}") from error

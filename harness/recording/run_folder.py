@@ -1,0 +1,209 @@
+"""The files that a run carries so that it can be estimated again from the folder alone."""
+
+import datetime as dt
+import importlib.metadata
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.basics.clock import ClockOffset
+from harness.basics.errors import RecordingDamaged, WrongUse
+from harness.basics.mesh import Mesh
+from harness.bench.acquisition import AcquisitionCalibration
+from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.station_file import Station, station_from_json
+from harness.effects.scene_object import known_file
+from harness.objectfile.entries import DESCRIPTION
+from harness.objectfile.file import ObjectFile, copied
+from harness.recording.recording import Recording, RunHeader, require_unused
+from harness.sim.optics.lit_calibration import read_calibration, shadow_of
+from harness.sim.optics.tactile_calibration import (
+    TactileCalibration,
+    save_calibration,
+    shipped_calibration,
+)
+
+OBJECT, CALIBRATION, ACQUISITION = "object.npz", "calibration.npz", "acquisition.json"
+OBJECTFILE = "objectfile"
+"""The folder of the object's ObjectFile within that of a run."""
+
+_DESCRIBED = f"{OBJECTFILE}/{DESCRIPTION}"
+
+_NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-python-headless", "mujoco", "touchstone-lab")
+
+
+def station_calibration(station: Station) -> TactileCalibration:
+    """The calibration of a station's gel: a file, or one that comes with the package.
+
+    Raises:
+        CalibrationRefused: it is missing or damaged.
+        WrongUse: the station's light casts shadows, and the calibration has none.
+    """
+    named = station.gel.calibration
+    found = read_calibration(Path(named)) if named.endswith(".npz") else shipped_calibration(named)
+    if station.gel.casts_shadow and shadow_of(found) is None:
+        raise WrongUse(
+            f"the station {station.title!r} has gel.casts_shadow = true, and the presses of its calibration "
+            f"({named}) showed no shadow; set it to false, or calibrate with `touchstone calibrate taxim` by "
+            "presses that show one"
+        )
+    return found
+
+
+def station_acquisition(scene: SceneFile, station: Station) -> AcquisitionCalibration | None:
+    """The calibration of the hammer's box; None where the scene asks for no sound.
+
+    Raises:
+        WrongUse: the scene asks for sound and the station has no hammer.
+        CalibrationRefused: it is missing, damaged, or not one.
+    """
+    if not scene.sensors.sound:
+        return None
+    if station.hammer is None:
+        raise WrongUse(
+            f"the scene asks for sound, and the station {station.title!r} has no [hammer]; add one, or set "
+            "sensors.sound = false in the scene"
+        )
+    return station.hammer.acquisition
+
+
+def create_run(
+    folder: Path,
+    experiment: str,
+    scene: SceneFile,
+    station: Station,
+    mesh: Mesh,
+    calibration: TactileCalibration,
+    plan: Mapping[str, Any],
+    seed: int,
+    mock: Mapping[str, Any] | None,
+    acquisition: AcquisitionCalibration | None = None,
+) -> Recording:
+    """Make a run folder with everything an estimate will need; refuses one that holds a run.
+
+    Args:
+        folder: of the run.
+        experiment: its name on the command line.
+        scene: resolved.
+        station: resolved.
+        mesh: of the object as the estimator is to know it, in metres.
+        calibration: of the gel, as the estimator is to know it.
+        plan: of the experiment, JSON values.
+        seed: of everything random.
+        mock: how the mocked bench is started; None at a real one.
+        acquisition: of the hammer's box; None for a run without sound.
+
+    Raises:
+        WrongUse: the folder holds a run; or the scene is heard and names an ObjectFile of another object.
+        DataRefused: that ObjectFile is damaged.
+    """
+    of = known_file(scene, mesh) if scene.sensors.sound else None
+    require_unused(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    np.savez(folder / OBJECT, vertices=mesh.vertices, faces=mesh.faces)
+    save_calibration(calibration, folder / CALIBRATION)
+    carried = [OBJECT, CALIBRATION]
+    if acquisition is not None:
+        acquisition.save(folder / ACQUISITION)
+        carried.append(ACQUISITION)
+    if of is not None:
+        copied(of, folder / OBJECTFILE, of.description.sound_files)
+        carried.append(_DESCRIBED)
+    header = RunHeader(
+        experiment=experiment,
+        scene=scene.model_dump(mode="json", by_alias=True),
+        station=station.model_dump(mode="json", by_alias=True),
+        plan=plan,
+        files={name: _hash(folder / name) for name in carried},
+        versions=versions(),
+        seed=seed,
+        mock=mock,
+        clock_offset_ns=round(ClockOffset.measure().seconds * 1e9),
+        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+    )
+    return Recording.create(folder, header)
+
+
+@dataclass(frozen=True, eq=False)
+class RunFiles:
+    """A recording with what it carries, read on first use and checked against the hashes in ``run.json``."""
+
+    recording: Recording
+
+    @cached_property
+    def scene(self) -> SceneFile:
+        """As it was resolved when the run was made."""
+        return scene_from_json(self.recording.header.scene, f"{self.recording.folder}/run.json")
+
+    @cached_property
+    def station(self) -> Station:
+        """As it was resolved when the run was made."""
+        return station_from_json(self.recording.header.station, f"{self.recording.folder}/run.json")
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The object as the estimator knows it."""
+        with np.load(self._checked(OBJECT), allow_pickle=False) as archive:
+            return Mesh(archive["vertices"], archive["faces"])
+
+    @cached_property
+    def calibration(self) -> TactileCalibration:
+        """The gel's colours as the estimator knows them."""
+        return read_calibration(self._checked(CALIBRATION))
+
+    @cached_property
+    def acquisition(self) -> AcquisitionCalibration | None:
+        """What the hammer's box says; None for a run without sound."""
+        if ACQUISITION not in self.recording.header.files:
+            return None
+        return AcquisitionCalibration.load(self._checked(ACQUISITION))
+
+    @cached_property
+    def objectfile(self) -> ObjectFile:
+        """What the scene's ObjectFile said of the object's sound when the run was made.
+
+        Raises:
+            WrongUse: the scene named none, or was not to be heard.
+            DataRefused: it is damaged.
+        """
+        if _DESCRIBED not in self.recording.header.files:
+            raise WrongUse(
+                f"{self.recording.folder} carries no ObjectFile, as its scene named none or was not to be "
+                "heard; take sound.shapes = elements"
+            )
+        return ObjectFile.open(self._checked(_DESCRIBED).parent)
+
+    def _checked(self, name: str) -> Path:
+        path = self.recording.folder / name
+        wanted = self.recording.header.files.get(name)
+        if not path.exists() or _hash(path) != wanted:
+            raise RecordingDamaged(f"{path} is missing or is not the file this run was recorded with")
+        return path
+
+
+def versions() -> dict[str, str]:
+    """Of what shapes the numbers, and the commit of the checkout with + where it was changed."""
+    found = {name: importlib.metadata.version(name) for name in _NUMBERS_COME_FROM}
+    return {**found, "git": git_commit()}
+
+
+def git_commit() -> str:
+    """Short hash of the checkout, + where it was changed; "unknown" where there is none."""
+    described = subprocess.run(
+        ["git", "describe", "--always", "--dirty=+", "--abbrev=12"],  # noqa: S607 - whichever git is installed
+        cwd=Path(__file__).parent,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return described.stdout.strip() or "unknown"
+
+
+def _hash(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,92 @@
+"""Perform an experiment step by step, committing each, and stop when told to."""
+
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+from typing import Protocol, TypeVar
+
+from harness.basics.clock import now
+from harness.bench.reading import Reading
+from harness.recording.recording import Recording
+from harness.recording.step_file import Step
+
+B = TypeVar("B", contravariant=True)
+
+
+class Experiment(Protocol[B]):
+    """What a session needs of an experiment on a bench of type ``B``."""
+
+    def steps(self, recording: Recording) -> Iterator[Step]:
+        """The steps still to perform; may look at what has been recorded so far."""
+
+    def perform(self, step: Step, bench: B) -> Sequence[Reading]:
+        """Touch the hardware; everything read is returned, nothing else is kept."""
+
+
+class Progress(Protocol):
+    """Told as steps begin and end."""
+
+    def began(self, step: Step) -> None:
+        """A step is about to be performed."""
+
+    def ended(self, step: Step, seconds: float) -> None:
+        """A step is on the disk."""
+
+
+class Interrupt:
+    """Ctrl-C once: end after the step. Twice: stop the arm now."""
+
+    def __init__(self, stop_arm: "StopArm") -> None:
+        self.requested = threading.Event()
+        self._stop_arm = stop_arm
+
+    def __call__(self, _signal: int, _frame: FrameType | None) -> None:
+        """Handle SIGINT."""
+        if self.requested.is_set():
+            self._stop_arm()
+            raise KeyboardInterrupt
+        self.requested.set()
+
+
+class StopArm(Protocol):
+    """Stops the arm from any thread and in any state."""
+
+    def __call__(self) -> None:
+        """Stop now."""
+
+
+@contextmanager
+def interruptible(stop_arm: StopArm) -> Iterator[Interrupt]:
+    """Take over Ctrl-C for the length of a session (in the main thread; elsewhere it stays as it is)."""
+    interrupt = Interrupt(stop_arm)
+    if threading.current_thread() is not threading.main_thread():
+        yield interrupt
+        return
+    previous = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield interrupt
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def perform(
+    experiment: Experiment[B], bench: B, recording: Recording, stop_arm: StopArm, progress: Progress
+) -> bool:
+    """Perform and commit every remaining step; False where Ctrl-C ended it early.
+
+    A step that fails is not committed and its exception goes on to the caller; the steps
+    before it stay on the disk.
+    """
+    with interruptible(stop_arm) as interrupt:
+        for step in experiment.steps(recording):
+            if interrupt.requested.is_set():
+                return False
+            progress.began(step)
+            start = now()
+            readings = experiment.perform(step, bench)
+            seconds = now() - start
+            recording.commit(step, readings, seconds)
+            progress.ended(step, seconds)
+    return not interrupt.requested.is_set()

@@ -1,0 +1,136 @@
+"""One step of a run as one MCAP file: on disk whole, or not at all."""
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import RecordingDamaged
+from harness.bench.reading import Channel, Reading
+from harness.recording.codecs import codec_of
+
+
+@dataclass(frozen=True)
+class Step:
+    """One indivisible piece of an experiment: all of it is performed and recorded, or none.
+
+    Attributes:
+        index: from 0, without gaps.
+        kind: what is done, for example ``"press"``.
+        parameters: what was asked for, JSON values with the unit in the key.
+    """
+
+    index: int
+    kind: str
+    parameters: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """A step as it was performed.
+
+    Attributes:
+        step: what was asked for.
+        readings: by channel name.
+        seconds: how long it took on the bench.
+    """
+
+    step: Step
+    readings: Mapping[str, Reading]
+    seconds: float
+
+
+def write_step(path: Path, record: StepRecord, clock_offset_ns: int) -> None:
+    """Write beside ``path``, flush to the disk, then rename: a crash leaves the whole file or none."""
+    part = path.with_name(f".{path.name}.part")
+    with part.open("wb") as stream:
+        # JPEG does not compress again; the numbers are few.
+        writer = Writer(stream, compression=CompressionType.NONE)
+        writer.start(profile="", library="touchstone")
+        for reading in record.readings.values():
+            _write_reading(writer, reading, clock_offset_ns)
+        described = {"step": asdict(record.step), "seconds": record.seconds}
+        writer.add_metadata("touchstone.step", {"json": json.dumps(described, allow_nan=False)})
+        writer.finish()  # type: ignore[no-untyped-call]  # mcap leaves it unannotated
+        stream.flush()
+        os.fsync(stream.fileno())
+    part.replace(path)
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush a folder's entries to the disk, so that a rename survives a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _write_reading(writer: Writer, reading: Reading, clock_offset_ns: int) -> None:
+    codec = codec_of(reading.channel)
+    name, encoding, data = codec.schema
+    schema_id = writer.register_schema(name=name, encoding=encoding, data=data)
+    channel_id = writer.register_channel(
+        topic=reading.channel.name,
+        message_encoding=codec.encoding,
+        schema_id=schema_id,
+        metadata={"channel": json.dumps(asdict(reading.channel))},
+    )
+    for index, time in enumerate(reading.times):
+        wall_ns = round(float(time) * 1e9) + clock_offset_ns
+        writer.add_message(
+            channel_id=channel_id,
+            log_time=wall_ns,
+            publish_time=wall_ns,
+            sequence=index,
+            data=codec.encode(reading, index, wall_ns),
+        )
+
+
+def read_step(path: Path, clock_offset_ns: int) -> StepRecord:
+    """The step of a file; ``RecordingDamaged`` naming the file where it does not read back."""
+    try:
+        with path.open("rb") as stream:
+            reader = make_reader(stream, validate_crcs=True)
+            described = next(json.loads(m.metadata["json"]) for m in reader.iter_metadata())
+            messages = list(reader.iter_messages(log_time_order=False))
+    except (McapError, StopIteration, KeyError, ValueError, OSError) as error:
+        raise RecordingDamaged(
+            f"{path}: not a complete step ({type(error).__name__}: {error}); "
+            "delete this file and every later step, then resume the run"
+        ) from error
+    step = Step(**described["step"])
+    readings = _readings(
+        ((c.metadata["channel"], m.log_time, m.data) for _, c, m in messages), clock_offset_ns
+    )
+    return StepRecord(step, readings, float(described["seconds"]))
+
+
+def _readings(messages: Iterable[tuple[str, int, bytes]], clock_offset_ns: int) -> dict[str, Reading]:
+    grouped: dict[str, list[tuple[int, bytes]]] = {}
+    for channel_text, log_time, data in messages:
+        grouped.setdefault(channel_text, []).append((log_time, data))
+    readings = (_reading(_channel(text), samples, clock_offset_ns) for text, samples in grouped.items())
+    return {reading.channel.name: reading for reading in readings}
+
+
+def _channel(text: str) -> Channel:
+    fields = json.loads(text)
+    return Channel(**{**fields, "shape": tuple(fields["shape"])})
+
+
+def _reading(channel: Channel, samples: list[tuple[int, bytes]], clock_offset_ns: int) -> Reading:
+    codec = codec_of(channel)
+    decoded: list[tuple[AnyArray, bytes]] = [codec.decode(data, channel) for _, data in samples]
+    times = np.array([(wall_ns - clock_offset_ns) / 1e9 for wall_ns, _ in samples])
+    encoded = tuple(data for _, data in decoded) if decoded[0][1] else ()
+    return Reading(channel, times, np.array([value for value, _ in decoded]), encoded)

@@ -1,0 +1,143 @@
+"""Error against seconds of every setting, the front marked; and error against the number of contacts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from harness.cost.curve import Point, front
+from harness.report.figures.marks import key, number_marks
+from harness.report.figures.style import SOFT, blank, styled
+
+_COLOURS = ("#1b3fae", "#c2410c", "#0f766e", "#8a2d79", "#9d6b00")
+_DASHES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
+"""Line and mark of each round of the colours, so that no two of twenty curves look alike."""
+
+_DOMINATED = 0.45
+_TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
+
+
+def cost_chart(points: Sequence[Point], families: Sequence[str], title: str, stale: bool) -> Figure:
+    """Every setting with its 90 % intervals; dominated ones pale, the front joined, numbered and named.
+
+    Args:
+        points: of one condition, at least one.
+        families: the dials each combination of whose levels gets a colour.
+        title: over the drawing.
+        stale: whether the curve no longer holds; written across it.
+    """
+    best = front(points)
+    with styled():
+        figure = blank(10.4, 4.9)
+        figure.set_layout_engine("constrained")
+        axes = figure.add_subplot()
+        for number, name in enumerate(dict.fromkeys(family_of(p, families) for p in points)):
+            mine = [point for point in points if family_of(point, families) == name]
+            colour = _COLOURS[number % len(_COLOURS)]
+            _marks(axes, [p for p in mine if p not in best], colour, f"{name}, dominated", pale=True)
+            _marks(axes, [p for p in mine if p in best], colour, f"{name}, on the front", pale=False)
+        at = np.array([(p.seconds.value, 1e3 * p.error.value) for p in best])
+        axes.plot(*at.T, color=SOFT, lw=1.0, zorder=1)
+        if stale:
+            axes.text(
+                0.5, 0.5, "STALE", transform=axes.transAxes, fontsize=64, color="#c2410c", alpha=0.16,
+                ha="center", va="center", rotation=18, fontweight="bold",
+            )  # fmt: skip
+        axes.set_title(title, fontsize=11)
+        axes.set_xlabel("seconds of CPU time, from readings to answer (geometric mean, 90 % interval)")
+        axes.set_ylabel("error in mm (mean, each at most 20 mm; 90 % interval)")
+        _logarithmic(axes)
+        axes.legend(loc="best", frameon=False, fontsize=8)  # named: see charts.py
+        key(axes, [f"{number}  {point.name}" for number, point in enumerate(best, start=1)])
+        number_marks(figure, axes, at, [str(number) for number in range(1, len(best) + 1)])
+    return figure
+
+
+def family_of(point: Point, families: Sequence[str]) -> str:
+    """The levels of some dials, for the legend; a dial that a point does not name is left out."""
+    return ", ".join(str(point.levels[name]) for name in families if name in point.levels)
+
+
+def contacts_chart(curves: Sequence[tuple[str, Sequence[tuple[int, Point]]]]) -> Figure:
+    """Error and seconds of some settings against the number of contacts.
+
+    Args:
+        curves: by name of the setting: the number of contacts and the point measured with them.
+    """
+    with styled():
+        figure = blank(8.2, 3.6)
+        figure.set_layout_engine("constrained")
+        left, right = figure.subplots(1, 2)
+        for number, (name, points) in enumerate(curves):
+            around, own = divmod(number, len(_COLOURS))
+            colour, counts = _COLOURS[own], [count for count, _ in points]
+            dash, mark = _DASHES[around % len(_DASHES)]
+            for axes, values, scale in (
+                (left, [p.error for _, p in points], 1e3),
+                (right, [p.seconds for _, p in points], 1.0),
+            ):
+                middle = [scale * v.value for v in values]
+                below = [scale * (v.value - v.low) for v in values]
+                above = [scale * (v.high - v.value) for v in values]
+                axes.errorbar(
+                    counts,
+                    middle,
+                    yerr=(below, above),
+                    marker=mark,
+                    ls=dash,
+                    color=colour,
+                    capsize=2,
+                    label=name,
+                )
+        for axes, said in ((left, "error in mm"), (right, "seconds of CPU time")):
+            axes.set_yscale("log")
+            axes.yaxis.set_major_locator(LogLocator(subs=_TICKS))
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axes.yaxis.set_minor_formatter(NullFormatter())
+            axes.set_xticks(sorted({count for _, points in curves for count, _ in points}))
+            axes.set_xlabel("contacts")
+            axes.set_ylabel(said)
+            axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)
+        figure.legend(
+            *left.get_legend_handles_labels(), loc="outside lower center", frameon=False, fontsize=8
+        )
+    return figure
+
+
+def _marks(axes: Axes, points: Sequence[Point], colour: str, label: str, pale: bool) -> None:
+    if not points:
+        return
+    x, y = [p.seconds.value for p in points], [1e3 * p.error.value for p in points]
+    axes.errorbar(
+        x,
+        y,
+        xerr=(
+            [p.seconds.value - p.seconds.low for p in points],
+            [p.seconds.high - p.seconds.value for p in points],
+        ),
+        yerr=(
+            [1e3 * (p.error.value - p.error.low) for p in points],
+            [1e3 * (p.error.high - p.error.value) for p in points],
+        ),
+        fmt="o",
+        ms=4 if pale else 8,
+        mfc="white" if pale else colour,
+        color=colour,
+        alpha=_DOMINATED if pale else 1.0,
+        elinewidth=0.7,
+        label=label,
+        zorder=2 if pale else 3,
+    )
+
+
+def _logarithmic(axes: Axes) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=_TICKS))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+    axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)
+    axes.set_axisbelow(True)

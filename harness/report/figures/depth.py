@@ -1,0 +1,64 @@
+"""A press read from a live picture: what the camera saw, how deep the gel is, and how sure that is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray
+from harness.report.figures.style import INK, blank, styled
+
+_WIDTH, _TITLES = 3.8, 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class DepthPictures:
+    """What is shown.
+
+    Attributes:
+        image: ``(rows, columns, 3)`` RGB.
+        height: ``(rows, columns)`` metres of indentation.
+        sigma: ``(rows, columns)`` metres, one standard deviation.
+        contact: ``(rows, columns)``; outlined.
+        trusted: ``(rows, columns)``; elsewhere the slope was held or doubtful, which is hatched.
+        pitch: metres a pixel.
+    """
+
+    image: ByteArray
+    height: FloatArray
+    sigma: FloatArray
+    contact: BoolArray
+    trusted: BoolArray
+    pitch: float
+
+
+def depth_figure(shown: DepthPictures) -> Figure:
+    """Live picture, indentation in mm, and one standard deviation of it in micrometres."""
+    rows, columns = shown.height.shape
+    half = 0.5e3 * shown.pitch * np.array([columns, rows])
+    extent = (-half[0], half[0], half[1], -half[1])
+    with styled():
+        figure = blank(3 * _WIDTH + 1.2, _WIDTH * rows / columns + _TITLES)
+        figure.set_layout_engine("constrained")
+        live, height, sigma = np.asarray(figure.subplots(1, 3))
+        live.imshow(shown.image, extent=extent)
+        live.set_title("live", fontsize=10)
+        drawn = height.imshow(1e3 * shown.height, cmap="viridis", extent=extent, interpolation="nearest")
+        figure.colorbar(drawn, ax=height, shrink=0.85, label="mm")
+        height.set_title("indentation", fontsize=10)
+        drawn = sigma.imshow(1e6 * shown.sigma, cmap="magma", extent=extent, interpolation="nearest")
+        figure.colorbar(drawn, ax=sigma, shrink=0.85, label="um")
+        sigma.set_title("one standard deviation; dots: slope not trusted", fontsize=10)
+        x, y = (shown.pitch * 1e3 * (np.arange(size) + 0.5 - 0.5 * size) for size in (columns, rows))
+        if shown.contact.any() and not shown.contact.all():
+            height.contour(
+                x, y, shown.contact.astype(np.float64), levels=[0.5], colors="white", linewidths=1.0
+            )
+        doubtful = ~shown.trusted & shown.contact
+        if doubtful.any():
+            row, column = np.nonzero(doubtful)
+            sigma.plot(x[column], y[row], ls="none", marker=".", ms=1.5, color="white")
+        for axes in (live, height, sigma):
+            axes.set_xlabel("gel x, mm", fontsize=8, color=INK)
+        live.set_ylabel("gel y, mm", fontsize=8, color=INK)
+    return figure

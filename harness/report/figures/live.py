@@ -1,0 +1,77 @@
+"""A camera's picture, the simulated one exposed alike, and their difference, side by side."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from harness.basics.arrays import BoolArray
+from harness.picture.live_picture import LiveComparison
+from harness.report.figures.style import ANSWER, TOOL, blank, styled, titled_picture
+from harness.report.figures.tiles import DIFFERENCE_GAIN, difference
+
+_WIDTH, _WORDS = 4.0, 0.95
+
+_MARGIN = 0.35
+"""Of the object's box, shown on each side of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class LivePictures:
+    """What is shown of a comparison.
+
+    Attributes:
+        found: the comparison.
+        words: under each of the three pictures.
+    """
+
+    found: LiveComparison
+    words: tuple[str, str, str]
+
+
+def live_figure(shown: LivePictures) -> Figure:
+    """Live with both outlines, simulated, and live less simulated: the part of the pictures about the object.
+
+    Raises:
+        ValueError: pictures of other shapes.
+    """
+    found = shown.found
+    shapes = {found.live.shape, found.simulated.shape}
+    if len(shapes) != 1 or {found.silhouette.shape, found.mask.shape} != {found.live.shape[:2]}:
+        raise ValueError(f"pictures of {shapes} with masks of {found.silhouette.shape}, {found.mask.shape}")
+    near = _about(found.mask | found.silhouette)
+    live_part, simulated_part = found.live[near], found.simulated[near]
+    rows, columns = live_part.shape[:2]
+    with styled():
+        figure = blank(3 * _WIDTH, _WIDTH * rows / columns + _WORDS)
+        figure.set_layout_engine("constrained")
+        live, simulated, left = np.asarray(figure.subplots(1, 3)).tolist()
+        titled_picture(live, live_part, "live", shown.words[0])
+        _outline(live, found.silhouette[near], ANSWER)
+        _outline(live, found.mask[near], TOOL)
+        titled_picture(simulated, simulated_part, "simulated, as exposed", shown.words[1])
+        titled_picture(
+            left,
+            difference(live_part, simulated_part),
+            f"live - simulated, x {DIFFERENCE_GAIN:g}",
+            shown.words[2],
+        )
+    return figure
+
+
+def _about(mask: BoolArray) -> tuple[slice, slice]:
+    """The rows and columns that show a mask and what is around it; all where it is empty."""
+    if not mask.any():
+        return slice(None), slice(None)
+    shown = []
+    for axis in (1, 0):
+        places = np.flatnonzero(mask.any(axis=axis))
+        margin = 1 + int(_MARGIN * (places[-1] - places[0] + 1))
+        shown.append(slice(max(0, int(places[0]) - margin), int(places[-1]) + 1 + margin))
+    return shown[0], shown[1]
+
+
+def _outline(axes: Axes, mask: BoolArray, colour: str) -> None:
+    if mask.any() and not mask.all():
+        axes.contour(mask, levels=[0.5], colors=[colour], linewidths=0.8)

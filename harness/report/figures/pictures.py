@@ -1,0 +1,267 @@
+"""Pictures of the bench, of the contacts and of the posterior, with their labels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import apply
+from harness.basics.mesh import Mesh
+from harness.picture.pinhole import Pinhole
+from harness.report.data import Bench, Contact, Part
+from harness.report.figures.camera import look_at
+from harness.report.figures.props import CLAY
+from harness.report.figures.shading import Shot
+from harness.report.figures.style import ANSWER, DPI, HEAT, INK, TOOL, TRUTH, blank
+from harness.report.values import Missing, Posterior
+
+_ELEVATION = np.radians(28.0)
+_STEEPEST = np.radians(85.0)
+_KERNEL = 2.5e-3
+_PITCH = 1.25e-3
+_LIFT = 3e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """The object seen from the side of the answer and from the opposite one.
+
+    Attributes:
+        shots: the two views.
+        size: metres, diagonal of the object's box.
+    """
+
+    shots: tuple[Shot, Shot]
+    size: float
+
+
+def object_sides(mesh: Mesh, towards: FloatArray, pixels: int) -> Sides:
+    """Two views of the object, the first with ``(3,)`` point ``towards`` in front.
+
+    Args:
+        mesh: metres, object frame.
+        towards: metres, a point of the object.
+        pixels: rows and columns of each view.
+    """
+    offset = towards - mesh.bounds.mean(axis=0)
+    bearing = float(np.arctan2(offset[1], offset[0])) if np.hypot(*offset[:2]) > 1e-4 else np.radians(-60.0)
+    # Half a radian aside, so that a tool axis is seen as a line and not as a point.
+    cameras = [_framing(mesh, bearing + turn, pixels) for turn in (0.5, 0.5 + np.pi)]
+    part = (Part(mesh, np.eye(4), CLAY),)
+    return Sides((Shot(part, cameras[0]), Shot(part, cameras[1])), mesh.diagonal)
+
+
+def close_up(mesh: Mesh, place: FloatArray, away: FloatArray, width: float, pixels: int) -> Shot:
+    """A view of the object about a point of it.
+
+    Args:
+        mesh: metres, object frame.
+        place: ``(3,)`` metres, in the middle.
+        away: ``(3,)`` from the point to the eye, of any length but zero.
+        width: metres across the picture at the point.
+        pixels: rows and columns.
+    """
+    azimuth = float(np.arctan2(away[1], away[0]))
+    elevation = float(np.arctan2(away[2], np.hypot(away[0], away[1])))
+    # From straight above there would be no telling which way is up.
+    camera = look_at(place, azimuth, np.clip(elevation, -_STEEPEST, _STEEPEST), width, pixels, pixels)
+    return Shot((Part(mesh, np.eye(4), CLAY),), camera)
+
+
+def _framing(mesh: Mesh, azimuth: float, pixels: int) -> Pinhole:
+    """A square view that the object fills but for a margin for the tool axes."""
+    focus, width = mesh.bounds.mean(axis=0), mesh.diagonal
+    camera = look_at(focus, azimuth, _ELEVATION, width, pixels, pixels)
+    seen = camera.project(mesh.vertices)[0] / pixels
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    aside = (0.5 * (low + high) - 0.5) * width
+    focus = focus + aside @ camera.camera_from_object[:2, :3]
+    return look_at(focus, azimuth, _ELEVATION, 1.22 * width * float((high - low).max()), pixels, pixels)
+
+
+class Heat:
+    """Colours a surface by the density of a posterior relative to its peak.
+
+    The density is that of the weighted places, blurred by 2.5 mm on a grid about them.
+    """
+
+    def __init__(self, posterior: Posterior) -> None:
+        weights = posterior.weights / posterior.weights.max()
+        kept = weights > 1e-5
+        places = posterior.points[kept]
+        self._low = places.min(axis=0) - 4.0 * _KERNEL
+        cells = np.ceil((places.max(axis=0) + 4.0 * _KERNEL - self._low) / _PITCH).astype(int) + 2
+        self._grid = np.zeros(cells)
+        at = (places - self._low) / _PITCH
+        nearest = np.round(at).astype(int)
+        np.add.at(self._grid, tuple(nearest.T), weights[kept])
+        self._grid = gaussian_filter(self._grid, _KERNEL / _PITCH, mode="constant", truncate=3.5)
+        self._peak = max(float(self._density(places).max()), 1e-300)
+
+    def __call__(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Colours and opacities of ``(n, 3)`` points in metres, object frame."""
+        level = np.sqrt(np.clip(self._density(points) / self._peak, 0.0, 1.0))
+        return np.asarray(HEAT(level)[:, :3]), np.clip(4.0 * level, 0.0, 1.0)
+
+    def _density(self, points: FloatArray) -> FloatArray:
+        at = (points - self._low) / _PITCH
+        return np.asarray(map_coordinates(self._grid, at.T, order=1, mode="constant"))
+
+
+def bench_figure(bench: Bench) -> Figure:
+    """Bench and object, the tool axis of every contact drawn into it."""
+    camera = look_at(bench.focus, np.radians(-118.0), np.radians(22.0), bench.width, 680, 1040)
+    shot = Shot(bench.parts, camera)
+    figure, axes = _canvas(camera)
+    picture = shot.picture()
+    axes.imshow(picture)
+    for base_from_gel in bench.base_from_gels:
+        _tool_axis(axes, shot, base_from_gel, "", 0.05, 7.5)
+    _crop(figure, axes, picture)
+    return figure
+
+
+def contacts_figure(sides: Sides, contacts: tuple[Contact, ...]) -> Figure:
+    """The object from two sides with the tool axis of every contact."""
+    figure, both = _row(2, 5.4)
+    for axes, shot in zip(both, sides.shots, strict=True):
+        axes.imshow(shot.picture())
+        for contact in contacts:
+            if not isinstance(contact.object_from_gel, Missing):
+                _tool_axis(axes, shot, contact.object_from_gel, str(contact.number), 0.14 * sides.size, 9.0)
+            if contact.truth is not None:
+                _mark(axes, shot, contact.truth, "*", TRUTH, 130.0)
+    return figure
+
+
+def posterior_strip(sides: Sides, contacts: tuple[Contact, ...]) -> Figure:
+    """The posterior after each contact, seen from both sides, one column a contact."""
+    shown = [contact for contact in contacts if isinstance(contact.posterior, Posterior)]
+    figure = blank(2.0 * len(shown), 4.25)
+    grid = np.asarray(figure.subplots(2, len(shown), squeeze=False))
+    figure.subplots_adjust(0.0, 0.0, 1.0, 0.94, 0.02, 0.02)
+    for column, contact in enumerate(shown):
+        grid[0, column].set_title(f"after contact {contact.number}", fontsize=10)
+        heat = Heat(_of(contact))
+        for row, shot in enumerate(sides.shots):
+            _posterior_on(grid[row, column], shot, contact, heat, 34.0)
+    return figure
+
+
+def posterior_figure(sides: Sides, contact: Contact) -> Figure:
+    """The posterior after one contact, large."""
+    figure, both = _row(2, 5.4)
+    heat = Heat(_of(contact))
+    for axes, shot in zip(both, sides.shots, strict=True):
+        _posterior_on(axes, shot, contact, heat, 150.0)
+    return figure
+
+
+def _of(contact: Contact) -> Posterior:
+    assert isinstance(contact.posterior, Posterior)
+    return contact.posterior
+
+
+def _posterior_on(axes: Axes, shot: Shot, contact: Contact, heat: Heat, size: float) -> None:
+    posterior = _of(contact)
+    axes.imshow(shot.picture(0, heat))
+    axes.set_axis_off()
+    for place in posterior.modes[1:]:
+        _mark(axes, shot, place, "o", INK, 0.45 * size, hollow=True)
+    _mark(axes, shot, posterior.estimate, "P", ANSWER, size)
+    if contact.truth is not None:
+        _mark(axes, shot, contact.truth, "*", TRUTH, 1.3 * size)
+
+
+def _tool_axis(
+    axes: Axes, shot: Shot, world_from_gel: FloatArray, label: str, length: float, size: float
+) -> None:
+    """An arrow from the sensor to the contact; pale where the object hides it."""
+    ends = apply(world_from_gel, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -length]]))
+    pixels = shot.camera.project(ends)[0]
+    hidden = bool(shot.hidden(ends[:1], 2.0 * _LIFT)[0])
+    strength = 0.3 if hidden else 1.0
+    axes.annotate(
+        "",
+        xy=tuple(pixels[0]),
+        xytext=tuple(pixels[1]),
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": TOOL,
+            "lw": 1.3,
+            "alpha": strength,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        },
+    )
+    if not label:
+        return
+    axes.text(
+        float(pixels[1, 0]),
+        float(pixels[1, 1]),
+        label,
+        fontsize=size,
+        color="white",
+        alpha=max(strength, 0.55),
+        ha="center",
+        va="center",
+        bbox={
+            "boxstyle": "circle,pad=0.22",
+            "fc": TOOL,
+            "ec": "white",
+            "lw": 0.8,
+            "alpha": max(strength, 0.45),
+        },
+    )
+
+
+def _mark(
+    axes: Axes, shot: Shot, place: FloatArray, marker: str, colour: str, size: float, hollow: bool = False
+) -> None:
+    """A marker on the object; pale where it lies on the far side."""
+    pixel = shot.camera.project(place[None])[0][0]
+    strength = 0.25 if bool(shot.hidden(place[None], _LIFT)[0]) else 1.0
+    fill = "none" if hollow else colour
+    axes.scatter(
+        float(pixel[0]),
+        float(pixel[1]),
+        s=size,
+        marker=marker,
+        c=fill,
+        edgecolors=colour if hollow else "white",
+        linewidths=1.1,
+        alpha=strength,
+        zorder=5,
+    )
+
+
+def _canvas(camera: Pinhole) -> tuple[Figure, Axes]:
+    figure = blank(camera.width / DPI, camera.height / DPI)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    return figure, axes
+
+
+def _row(count: int, height: float) -> tuple[Figure, list[Axes]]:
+    figure = blank(height * count, height)
+    row = list(np.asarray(figure.subplots(1, count, squeeze=False))[0])
+    figure.subplots_adjust(0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
+    for axes in row:
+        axes.set_axis_off()
+    return figure, row
+
+
+def _crop(figure: Figure, axes: Axes, picture: FloatArray) -> None:
+    """Show only the part of a picture that is not white, with a margin."""
+    filled = np.any(picture < 0.995, axis=2)
+    if not filled.any():
+        return
+    rows, columns = np.flatnonzero(np.any(filled, axis=1)), np.flatnonzero(np.any(filled, axis=0))
+    left, right = max(columns[0] - 12, 0), min(columns[-1] + 12, filled.shape[1])
+    top, bottom = max(rows[0] - 30, 0), min(rows[-1] + 12, filled.shape[0])
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
+    figure.set_size_inches(8.4, 8.4 * (bottom - top) / (right - left))

@@ -1,0 +1,160 @@
+"""One press in pictures: its height map, its colours, what it changed, and what a live camera saw of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from harness.basics.arrays import ByteArray, FloatArray
+from harness.report.figures.style import blank, styled, titled_picture
+from harness.report.figures.tiles import DIFFERENCE_GAIN, difference
+
+_WIDTH, _TITLES = 3.6, 0.62
+
+
+@dataclass(frozen=True, eq=False)
+class TouchPictures:
+    """What is shown of a press.
+
+    Attributes:
+        heights: ``(rows, columns)`` metres of indentation.
+        image: ``(rows, columns, 3)`` RGB, simulated.
+        background: the same of the untouched gel.
+        live: the same, seen by a camera; None without.
+        pitch: metres a pixel.
+        words: under the height map, the picture, its change, the live picture, live against simulated, live
+            against the background.
+    """
+
+    heights: FloatArray
+    image: ByteArray
+    background: ByteArray
+    live: ByteArray | None
+    pitch: float
+    words: tuple[str, ...]
+
+
+def touch_figure(shown: TouchPictures) -> Figure:
+    """A row of the simulated press, and a row of the live one under it where there is one.
+
+    Raises:
+        ValueError: pictures of other shapes, or heights that are not finite.
+    """
+    _check(shown)
+    rows, columns = shown.heights.shape
+    down = 1 if shown.live is None else 2
+    with styled():
+        figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES))
+        figure.set_layout_engine("constrained")
+        grid = np.asarray(figure.subplots(down, 3, squeeze=False))
+        _heights(figure, grid[0, 0], shown)
+        titled_picture(grid[0, 1], shown.image, "simulated", shown.words[1])
+        _difference(grid[0, 2], shown.image, shown.background, "simulated - background", shown.words[2])
+        if shown.live is not None:
+            titled_picture(grid[1, 0], shown.live, "live", shown.words[3])
+            _difference(grid[1, 1], shown.live, shown.image, "live - simulated", shown.words[4])
+            _difference(grid[1, 2], shown.live, shown.background, "live - background", shown.words[5])
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class LevelPictures:
+    """A press by one level of an object's touch, beside the rasteriser's.
+
+    Attributes:
+        level: its name.
+        heights: ``(rows, columns)`` metres of indentation of the gel.
+        image: ``(rows, columns, 3)`` RGB.
+        background: the same of the untouched gel.
+        reference: heights and picture by the rasteriser; None where that is the level.
+        pitch: metres a pixel.
+        words: under the height map, and under the differences.
+    """
+
+    level: str
+    heights: FloatArray
+    image: ByteArray
+    background: ByteArray
+    reference: tuple[FloatArray, ByteArray] | None
+    pitch: float
+    words: tuple[str, str]
+
+
+def levels_figure(shown: LevelPictures) -> Figure:
+    """A row of the level's press, and under it how far it is from the rasteriser's.
+
+    Raises:
+        ValueError: pictures of other shapes, or heights that are not finite.
+    """
+    _check(TouchPictures(shown.heights, shown.image, shown.background, None, shown.pitch, ("", "", "")))
+    rows, columns = shown.heights.shape
+    down = 1 if shown.reference is None else 2
+    with styled():
+        figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES))
+        figure.set_layout_engine("constrained")
+        grid = np.asarray(figure.subplots(down, 3, squeeze=False))
+        low, high = min(0.0, float(shown.heights.min())), max(1e-6, float(shown.heights.max()))
+        _map(figure, grid[0, 0], 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")
+        grid[0, 0].set_title(f"indentation, {shown.level}", fontsize=10)
+        titled_picture(grid[0, 1], shown.image, shown.level, "")
+        _difference(grid[0, 2], shown.image, shown.background, f"{shown.level} - background", "")
+        if shown.reference is not None:
+            heights, image = shown.reference
+            apart = 1e6 * (shown.heights - heights)
+            most = max(1e-3, float(np.abs(apart).max()))
+            _map(figure, grid[1, 0], apart, shown.pitch, (-most, most), "um", "RdBu_r")
+            grid[1, 0].set_title(f"indentation, {shown.level} - rasteriser", fontsize=10)
+            titled_picture(grid[1, 1], image, "rasteriser", "")
+            _difference(grid[1, 2], shown.image, image, f"{shown.level} - rasteriser", "")
+        figure.supxlabel("\n".join(shown.words[:down]), fontsize=8)
+    return figure
+
+
+def _heights(figure: Figure, axes: Axes, shown: TouchPictures) -> None:
+    low, high = min(0.0, float(shown.heights.min())), max(1e-6, float(shown.heights.max()))
+    _map(figure, axes, 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")
+    axes.set_title("indentation", fontsize=10)
+    axes.set_xlabel(f"gel x in mm\n{shown.words[0]}", fontsize=8)
+
+
+def _map(
+    figure: Figure,
+    axes: Axes,
+    values: FloatArray,
+    pitch: float,
+    limits: tuple[float, float],
+    unit: str,
+    colours: str = "viridis",
+) -> None:
+    rows, columns = values.shape
+    half = 0.5e3 * pitch * np.array([columns, rows])
+    drawn = axes.imshow(
+        values,
+        cmap=colours,
+        vmin=limits[0],
+        vmax=limits[1],
+        extent=(-half[0], half[0], half[1], -half[1]),
+        interpolation="nearest",
+    )
+    axes.set_xlabel("gel x in mm", fontsize=8)
+    axes.set_ylabel("gel y in mm", fontsize=8)
+    axes.tick_params(labelsize=7)
+    bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=24)
+    bar.set_label(unit, fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+
+
+def _difference(axes: Axes, of: ByteArray, less: ByteArray, title: str, words: str) -> None:
+    titled_picture(axes, difference(of, less), f"{title}, x {DIFFERENCE_GAIN:g}", words)
+
+
+def _check(shown: TouchPictures) -> None:
+    wanted = (*shown.heights.shape, 3)
+    pictures = [shown.image, shown.background, *([] if shown.live is None else [shown.live])]
+    if any(picture.shape != wanted for picture in pictures) or not np.isfinite(shown.heights).all():
+        raise ValueError(
+            f"pictures of {[p.shape for p in pictures]} for finite heights of {shown.heights.shape}"
+        )
+    if len(shown.words) < (3 if shown.live is None else 6):
+        raise ValueError(f"{len(shown.words)} captions; each picture has one")

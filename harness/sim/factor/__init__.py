@@ -1,0 +1,1 @@
+"""Sparse symmetric systems: elimination order, LDL^T, solves."""

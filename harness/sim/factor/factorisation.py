@@ -1,0 +1,172 @@
+"""``L D L^T`` of a sparse symmetric matrix: solves for blocks, and how many eigenvalues are below zero.
+
+Pivots are taken on the diagonal in the plan's order, without exchanges: always stable where the
+matrix is positive definite, and measured by ``growth`` where it is not.
+"""
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import scipy.sparse as sp
+
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.errors import MeshRefused, WrongUse
+from harness.sim.factor.blas_calls import blas_addresses
+from harness.sim.factor.dense_elimination import DONE
+from harness.sim.factor.eight_wide import EIGHT
+from harness.sim.factor.elimination import Elimination
+from harness.sim.factor.kernels import OUTSIDE, factorise
+from harness.sim.factor.solve_kernels import solve
+
+SparseColumns: TypeAlias = "sp.csc_array[Any]"
+
+_LOST = 1e-13
+"""Of its diagonal entry, below which a pivot is rounding: about 500 units of the last place."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pivots:
+    """What the elimination of a symmetric matrix says of its eigenvalues.
+
+    Attributes:
+        values: ``(u,)`` diagonal of ``D``, in the plan's order.
+        growth: the largest ``sum_j L_ij^2 |d_j| / |A_ii|``, by which the matrix that was in fact
+            factorised may be further from the given one than rounding; 1 for a positive definite one.
+    """
+
+    values: FloatArray
+    growth: float
+
+    @property
+    def negative(self) -> int:
+        """How many eigenvalues are below zero (Sylvester's law of inertia)."""
+        return int(np.count_nonzero(self.values < 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """The factors of one matrix.
+
+    Attributes:
+        plan: of the elimination.
+        panels: the columns of ``L``, supernode by supernode.
+        pivots: ``D``.
+    """
+
+    plan: Elimination
+    panels: FloatArray
+    pivots: Pivots
+
+    def solve(self, block: FloatArray) -> FloatArray:
+        """``(u, b)``: what the matrix turns into ``block``, ``(u, b)`` float64.
+
+        Raises:
+            WrongUse: another shape or type.
+        """
+        unknowns = len(self.plan.order)
+        if block.ndim != 2 or block.shape[0] != unknowns or block.dtype != np.float64:
+            raise WrongUse(
+                f"a block of shape {block.shape} and type {block.dtype} was to be solved; it must be "
+                f"({unknowns}, columns) of float64"
+            )
+        solved, places = np.empty(block.shape), _places(self.plan)
+        for begin in range(0, block.shape[1], EIGHT):
+            part = block[:, begin : begin + EIGHT]
+            eight = np.zeros((unknowns, EIGHT))
+            eight[:, : part.shape[1]] = part[self.plan.order]
+            solve(self.plan, self.panels, places, self.pivots.values, eight)
+            solved[self.plan.order, begin : begin + EIGHT] = eight[:, : part.shape[1]]
+        return solved
+
+
+def factorised(matrix: SparseColumns, plan: Elimination) -> Factor:
+    """The factors of a symmetric matrix, both halves given.
+
+    Raises:
+        MeshRefused: a pivot is zero to rounding, as at a node that no element holds.
+        WrongUse: not float64, or entries outside the plan.
+    """
+    panels = np.empty(plan.stored)
+    pivots, bad = _eliminated(matrix, plan, panels, _places(plan))
+    if bad is not None:
+        raise MeshRefused(
+            f"the stiffness of the object cannot be factorised: unknown {bad} has a pivot below {_LOST:g} of "
+            "its diagonal entry; its volume mesh has a node that no element holds, or an element without "
+            "volume: mesh the object again"
+        )
+    return Factor(plan, panels, pivots)
+
+
+def inertia(matrix: SparseColumns, plan: Elimination) -> Pivots | None:
+    """The pivots alone, in the memory of one panel; None where one is zero to rounding.
+
+    A matrix that is singular has such a pivot; one that is not may have it, as its pivots are not
+    exchanged, and another shift then has none.
+
+    Raises:
+        WrongUse: not float64, or entries outside the plan.
+    """
+    largest = int((plan.widths * (plan.widths + plan.heights)).max(initial=0))
+    places = np.zeros(len(plan.children), dtype=np.int64)
+    pivots, bad = _eliminated(matrix, plan, np.empty(largest), places)
+    return pivots if bad is None else None
+
+
+def _places(plan: Elimination) -> IntArray:
+    """Where each panel begins."""
+    return np.concatenate([[0], np.cumsum(plan.widths * (plan.widths + plan.heights))])
+
+
+def _eliminated(
+    matrix: SparseColumns, plan: Elimination, panels: FloatArray, places: IntArray
+) -> tuple[Pivots, int | None]:
+    """The pivots, and the unknown at which they ended early."""
+    _check(matrix, plan)
+    unknowns, high = len(plan.order), plan.widths + plan.heights
+    diagonal = np.abs(matrix.diagonal())[plan.order]
+    values, sums = np.empty(unknowns), np.zeros(unknowns)
+    bad = factorise(
+        blas_addresses(),
+        matrix.data,
+        matrix.indices,
+        matrix.indptr,
+        plan,
+        panels,
+        places,
+        _LOST * diagonal,
+        values,
+        sums,
+        np.empty(int((plan.widths * high).max(initial=1))),
+        np.empty(int((plan.heights**2).max(initial=1))),
+        np.empty(_deepest(plan)),
+    )
+    if bad == OUTSIDE:
+        raise WrongUse("the matrix has entries where its plan has none; make the plan of its own pattern")
+    if bad != DONE:
+        return Pivots(values, np.inf), int(plan.order[bad])
+    growth = np.divide(sums, diagonal, out=np.full(unknowns, np.inf), where=diagonal > 0.0)
+    return Pivots(values, float(growth.max(initial=1.0))), None
+
+
+def _deepest(plan: Elimination) -> int:
+    """Numbers that the fronts take at most while they wait."""
+    waiting: list[int] = []
+    held = most = 0
+    for left, count in zip((plan.heights**2).tolist(), plan.children.tolist(), strict=True):
+        for _ in range(count):
+            held -= waiting.pop()
+        if left:
+            waiting.append(left)
+            held += left
+        most = max(most, held)
+    return max(most, 1)
+
+
+def _check(matrix: SparseColumns, plan: Elimination) -> None:
+    unknowns = len(plan.order)
+    if matrix.shape != (unknowns, unknowns) or matrix.dtype != np.float64:
+        raise WrongUse(
+            f"a matrix of shape {matrix.shape} and type {matrix.dtype} was to be factorised by a plan for "
+            f"({unknowns}, {unknowns}) of float64"
+        )

@@ -1,0 +1,206 @@
+"""Loops of a multifrontal ``L D L^T`` without exchanges.
+
+Duff and Reid, The Multifrontal Solution of Indefinite Sparse Symmetric Linear Equations, ACM
+TOMS 9(3), 1983. Each supernode is a dense panel ``(k + r, k)``, column by column: its own rows,
+then the rows below. What it takes from the rows below is the front ``(r, r)`` that its parent adds.
+"""
+
+import numpy as np
+
+from harness.basics.arrays import AnyArray, FloatArray, IntArray
+from harness.basics.compiled import compiled
+from harness.sim.factor.dense_elimination import DONE, eliminate, subtract_lower
+from harness.sim.factor.elimination import Elimination
+
+OUTSIDE = -2
+"""Instead of a column: the matrix has an entry where the plan has none."""
+
+
+@compiled
+def _subtract_front(
+    routines: IntArray,
+    panel: FloatArray,
+    at: int,
+    wide: int,
+    high: int,
+    pivots: FloatArray,
+    scaled: FloatArray,
+    front: FloatArray,
+) -> None:
+    """``front -= L D L^T`` of the rows below a panel that is eliminated."""
+    rest = high - wide
+    for j in range(wide):
+        column = at + j * high + wide
+        for i in range(rest):
+            scaled[j * rest + i] = panel[column + i] * pivots[j]
+    subtract_lower(routines, rest, rest, wide, panel, at + wide, high, scaled, rest, front, 0, rest)
+
+
+@compiled
+def _add_original(
+    data: FloatArray,
+    indices: AnyArray,
+    indptr: AnyArray,
+    plan: Elimination,
+    first: int,
+    wide: int,
+    high: int,
+    where: IntArray,
+    panel: FloatArray,
+    at: int,
+) -> int:
+    """Put the matrix's own entries into a panel; returns DONE or OUTSIDE."""
+    for j in range(wide):
+        column = plan.order[first + j]
+        for p in range(indptr[column], indptr[column + 1]):
+            row = plan.rank[indices[p]]
+            if row >= first + j:
+                if where[row] < 0:
+                    return OUTSIDE
+                panel[at + j * high + where[row]] += data[p]
+    return DONE
+
+
+@compiled
+def _add_front(
+    stack: FloatArray,
+    from_: int,
+    size: int,
+    places: IntArray,
+    wide: int,
+    high: int,
+    panel: FloatArray,
+    at: int,
+    front: FloatArray,
+) -> None:
+    """Add what a child left, its row ``i`` at ``places[i]`` of the parent."""
+    rest = high - wide
+    for j in range(size):
+        place, column = places[j], from_ + j * size
+        if place < wide:
+            to = at + place * high
+            for i in range(j, size):
+                panel[to + places[i]] += stack[column + i]
+        else:
+            to = (place - wide) * rest - wide
+            for i in range(j, size):
+                front[to + places[i]] += stack[column + i]
+
+
+@compiled
+def _grow(
+    panel: FloatArray,
+    at: int,
+    wide: int,
+    high: int,
+    pivots: FloatArray,
+    first: int,
+    rows: IntArray,
+    sums: FloatArray,
+) -> None:
+    """Add ``sum_j L_ij^2 |d_j|`` of a panel to every row's."""
+    here = np.zeros(high)
+    for j in range(wide):
+        size, column = abs(pivots[j]), at + j * high
+        here[j] += size
+        for i in range(j + 1, high):
+            here[i] += size * panel[column + i] * panel[column + i]
+    for i in range(wide):
+        sums[first + i] += here[i]
+    for i in range(len(rows)):
+        sums[rows[i]] += here[wide + i]
+
+
+@compiled
+def _add_children(
+    plan: Elimination,
+    s: int,
+    waiting: IntArray,
+    depth: int,
+    top: int,
+    stack: FloatArray,
+    where: IntArray,
+    places: IntArray,
+    panel: FloatArray,
+    at: int,
+    front: FloatArray,
+) -> tuple[int, int]:
+    """Add what the children of a supernode left; returns what of the stack is left."""
+    wide = plan.firsts[s + 1] - plan.firsts[s]
+    high = wide + plan.starts[s + 1] - plan.starts[s]
+    for _ in range(plan.children[s]):
+        depth -= 1
+        begin = plan.starts[waiting[depth]]
+        size = plan.starts[waiting[depth] + 1] - begin
+        top -= size * size
+        for i in range(size):
+            places[i] = where[plan.rows[begin + i]]
+        _add_front(stack, top, size, places, wide, high, panel, at, front)
+    return depth, top
+
+
+@compiled
+def factorise(
+    routines: IntArray,
+    data: FloatArray,
+    indices: AnyArray,
+    indptr: AnyArray,
+    plan: Elimination,
+    panels: FloatArray,
+    panel_at: IntArray,
+    least: FloatArray,
+    pivots: FloatArray,
+    sums: FloatArray,
+    work: FloatArray,
+    front: FloatArray,
+    stack: FloatArray,
+) -> int:
+    """Fill ``panels``, ``pivots`` and ``sums``; returns DONE, OUTSIDE or the column without a pivot.
+
+    Args:
+        routines: of ``blas_addresses``.
+        data: of the whole matrix, column by column.
+        indices: its rows.
+        indptr: where its columns begin.
+        plan: of the elimination.
+        panels: where the supernodes' panels go.
+        panel_at: ``(s,)`` where each begins; it may be one place for all.
+        least: ``(u,)`` sizes that a pivot must be above.
+        pivots: ``(u,)``, written.
+        sums: ``(u,)`` zeros, to which ``sum_j L_ij^2 |d_j|`` is added.
+        work: of the largest panel.
+        front: of the largest front.
+        stack: of the most that fronts take at once.
+    """
+    where = np.full(len(plan.order), -1, np.int64)
+    places = np.empty(len(plan.order), np.int64)
+    waiting = np.empty(len(plan.firsts), np.int64)
+    depth, top = 0, 0
+    for s in range(len(plan.children)):
+        first, wide = plan.firsts[s], plan.firsts[s + 1] - plan.firsts[s]
+        under = plan.rows[plan.starts[s] : plan.starts[s + 1]]
+        rest = len(under)
+        high, at, end = wide + rest, panel_at[s], first + wide
+        panels[at : at + high * wide] = 0.0
+        front[: rest * rest] = 0.0
+        where[first:end] = np.arange(wide)
+        for i in range(rest):
+            where[under[i]] = wide + i
+        if _add_original(data, indices, indptr, plan, first, wide, high, where, panels, at) != DONE:
+            return OUTSIDE
+        depth, top = _add_children(
+            plan, s, waiting, depth, top, stack, where, places, panels, at, front
+        )  # fmt: skip
+        where[first:end] = -1
+        for i in range(rest):
+            where[under[i]] = -1
+        bad = eliminate(routines, panels, at, high, wide, pivots[first:end], least[first:end], work)
+        if bad != DONE:
+            return int(first + bad)
+        _grow(panels, at, wide, high, pivots[first:end], first, under, sums)
+        if rest > 0:
+            _subtract_front(routines, panels, at, wide, high, pivots[first:end], work, front)
+            stack[top : top + rest * rest] = front[: rest * rest]
+            waiting[depth] = s
+            depth, top = depth + 1, top + rest * rest
+    return DONE

@@ -1,0 +1,1 @@
+"""What a press does to a gel: height maps, skirt, pressure, force, printed markers."""

@@ -1,0 +1,236 @@
+"""With how much force an object is pressed into a gel, from how deep it reaches, and how well that is known.
+
+Two levels. ``layer`` solves the contact with an elastic layer on its plate, as many contacts as there
+are and whatever their shape. ``winkler`` takes each contact alone, as an elastic foundation (Johnson,
+Contact Mechanics, 1985, section 4.3) with the springs of least energy on that layer: pressure goes as the
+depth, and force as the volume that the object takes. Both are linear and without friction.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.ndimage import find_objects, label
+
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
+from harness.basics.errors import OutOfDomain
+from harness.sim.gel.contact_pressure import SETTLED, Pressure, contact_pressure, spring_pressure
+from harness.sim.gel.elastic import GelElastic
+from harness.sim.gel.given_heights import require_clear
+from harness.sim.gel.layer_compliance import disc_stiffness
+
+ForceLevel = Literal["winkler", "layer"]
+
+PARTS = ("modulus", "poisson", "thickness", "squares", "theory")
+"""What an uncertainty is put together from; ``theory`` of a measured table is its scatter."""
+
+THEORY = {"winkler": 0.10, "layer": 0.05}
+"""Shares. ``layer``: what four published forces on a GelSight Mini scatter by around it, to half its
+thickness (``tests/harness/sim/gel/test_published_force.py``). ``winkler``: what it is off ``layer`` by, of
+balls, rods, edges and faces (``tests/benchmarks/touch/bench_force.py``)."""
+
+
+CHECKED = (0.5, 0.4)
+"""Depth in thicknesses, and in radii of the contact, to which those four presses went: beyond, a gel is no
+longer linear, and nobody has shown by how much."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForce:
+    """The forces of some presses.
+
+    Attributes:
+        newtons: ``(n,)``, along the gel's normal; exactly 0 without contact.
+        uncertainty: ``(n,)`` N, one standard deviation.
+        shares: ``(n, len(PARTS))`` what it is put together from, as shares of the force.
+        pressure: ``(n, rows, columns)`` Pa.
+        centre: ``(n, 2)`` metres, where the force acts, x and y in ``gel``; NaN without contact.
+        lower_bound: ``(n,)`` whether the contact reaches the border: there is more of it than is seen.
+        depth_share: ``(n,)`` how deep the press is, in thicknesses.
+        strain: ``(n,)`` how deep it is, in radii of a disc of the area that the object takes; 0 without
+            contact.
+    """
+
+    newtons: FloatArray
+    uncertainty: FloatArray
+    shares: FloatArray
+    pressure: FloatArray
+    centre: FloatArray
+    lower_bound: BoolArray
+    depth_share: FloatArray
+    strain: FloatArray
+
+    @property
+    def beyond_checked(self) -> BoolArray:
+        """``(n,)`` whether a press is deeper, or steeper, than any by which the theory was checked."""
+        return np.asarray((self.depth_share > CHECKED[0]) | (self.strain > CHECKED[1]))
+
+    @classmethod
+    def of(
+        cls, depth: FloatArray, pressure: FloatArray, shares: FloatArray, pitch: float, thickness: float
+    ) -> "ContactForce":
+        """Put together from the pressures; arguments as the attributes and ``contact_force``."""
+        newtons = pressure.sum(axis=(1, 2)) * pitch**2
+        edge = np.ones(depth.shape[1:], dtype=np.bool_)
+        edge[1:-1, 1:-1] = False
+        return cls(
+            read_only(newtons),
+            read_only(newtons * np.sqrt((shares**2).sum(axis=1))),
+            read_only(shares),
+            read_only(pressure),
+            read_only(_centres(pressure, pitch)),
+            read_only(np.asarray((depth[:, edge] > 0.0).any(axis=1))),
+            read_only(depth.max(axis=(1, 2)) / thickness),
+            read_only(_strains(depth, pitch)),
+        )
+
+
+def contact_force(
+    depth: FloatArray,
+    pitch: float,
+    thickness: float,
+    gel: GelElastic,
+    level: ForceLevel = "layer",
+    cells: int = 1,
+) -> ContactForce:
+    """The force of each press.
+
+    Args:
+        depth: ``(n, rows, columns)`` metres, 0 or more: how deep the object reaches into the untouched gel.
+        pitch: metres a pixel.
+        thickness: metres of the gel; infinite for a half-space.
+        gel: how stiff it is.
+        level: how it is computed.
+        cells: pixels to a square, each way.
+
+    Raises:
+        OutOfDomain: another shape, a depth that is negative or not finite, or a press deeper than the gel is
+            thick; pressures that do not settle, which no press was found to do.
+    """
+    require_depths(depth, thickness)
+    found = [_one(np.asarray(each, dtype=np.float64), pitch, thickness, gel, level, cells) for each in depth]
+    shares = np.array([shares for _, shares in found]).reshape(-1, len(PARTS))
+    pressure = np.array([pressure for pressure, _ in found]).reshape(depth.shape)
+    return ContactForce.of(depth, pressure, shares, pitch, thickness)
+
+
+def require_depths(depth: FloatArray, thickness: float) -> None:
+    """Raise ``OutOfDomain`` for what is no press of a gel, or one that reaches its plate or the sensor."""
+    if depth.ndim != 3 or 0 in depth.shape[1:]:
+        raise OutOfDomain(f"depths are {depth.shape}; forces are computed of (n, rows, columns)")
+    if not (np.isfinite(depth).all() and (depth >= 0.0).all()):
+        raise OutOfDomain(
+            "a depth is negative or not a number, and no force is known there; give 0 where the object does "
+            "not reach"
+        )
+    deepest = float(depth.max(initial=0.0))
+    require_clear(deepest, thickness)
+    if deepest > thickness:
+        raise OutOfDomain(
+            f"the press is {deepest * 1e3:.3g} mm deep and the gel {thickness * 1e3:g} mm thick; no force is "
+            "computed of an object that reaches the plate: press less, or ask for no force"
+        )
+
+
+def _one(
+    depth: FloatArray, pitch: float, thickness: float, gel: GelElastic, level: ForceLevel, cells: int
+) -> tuple[FloatArray, tuple[float, ...]]:
+    """Pressure of every pixel, and the shares of its uncertainty."""
+    if not depth.any():
+        return np.zeros(depth.shape), (0.0,) * len(PARTS)
+    fine, coarse = (_pressed(depth, pitch, thickness, gel, level, cells * by) for by in (1, 2))
+    whole = fine.sum()
+    squares = abs(coarse.sum() - whole) / whole
+    return fine, (gel.young_share, *_known(depth, pitch, thickness, gel), squares, THEORY[level])
+
+
+def _pressed(
+    depth: FloatArray, pitch: float, thickness: float, gel: GelElastic, level: ForceLevel, cells: int
+) -> FloatArray:
+    """Pa of every pixel, by squares of ``cells`` pixels a side."""
+    merged, side = _merged(depth, cells), pitch * cells
+    if level == "winkler":
+        pascals = _foundation(merged, side, thickness, gel)
+    else:
+        pascals = _settled(contact_pressure(merged, side, thickness, gel))
+    # A square at the border may reach past the picture: what it carries is put on the pixels that are seen.
+    spread = pascals.repeat(cells, axis=0).repeat(cells, axis=1)[: depth.shape[0], : depth.shape[1]]
+    whole = spread.sum()
+    return np.asarray(spread * (pascals.sum() * cells**2 / whole if whole > 0.0 else 1.0))
+
+
+def _settled(found: Pressure) -> FloatArray:
+    if found.left > SETTLED:
+        raise OutOfDomain(
+            f"the pressures did not settle in {found.turns} turns: {found.left:.2g} of the energy is left, "
+            f"and the limit is {SETTLED:g}; take larger squares, --level touch.force_cells=4, or "
+            "--level touch.force=winkler"
+        )
+    return found.pascals
+
+
+def _merged(depth: FloatArray, cells: int) -> FloatArray:
+    """Means over squares of pixels; outside of the picture nothing presses."""
+    if cells == 1:
+        return depth
+    rows, columns = depth.shape
+    padded = np.pad(depth, ((0, -rows % cells), (0, -columns % cells)))
+    return block_means(padded, cells)
+
+
+def _foundation(depth: FloatArray, side: float, thickness: float, gel: GelElastic) -> FloatArray:
+    """Pa: every contact on springs of its own."""
+    parts, pascals = _contacts(depth), np.zeros(depth.shape)
+    for k, box in enumerate(find_objects(parts)):
+        alone = np.where(parts[box] == k + 1, depth[box], 0.0)
+        pascals[box] += spring_pressure(alone, side, thickness, gel)
+    return pascals
+
+
+def _contacts(depth: FloatArray) -> IntArray:
+    """``(rows, columns)`` the number of each contact from 1, corners held together; 0 beside."""
+    return np.asarray(label(depth > 0.0, structure=np.ones((3, 3)))[0])
+
+
+def _by_discs(depth: FloatArray, pitch: float, thickness: float, gel: GelElastic) -> float:
+    """N, roughly: every contact as an evenly pressed disc of its area."""
+    parts = _contacts(depth).ravel()
+    areas = np.bincount(parts)[1:] * pitch**2
+    volumes = np.bincount(parts, depth.ravel())[1:] * pitch**2
+    radii = np.sqrt(areas / np.pi)
+    stiff = [disc_stiffness(float(radius / thickness), gel.poisson) * gel.plane / radius for radius in radii]
+    return float(volumes @ np.array(stiff))
+
+
+def _known(depth: FloatArray, pitch: float, thickness: float, gel: GelElastic) -> tuple[float, float]:
+    """Shares of the force by which Poisson's ratio and the thickness may be off, of discs as wide."""
+
+    def force(poisson: float, thick: float) -> float:
+        return _by_discs(depth, pitch, thick, replace(gel, poisson=poisson))
+
+    here = force(gel.poisson, thickness)
+    low, high = max(0.0, gel.poisson - gel.poisson_sigma), min(0.5, gel.poisson + gel.poisson_sigma)
+    by_poisson = (force(high, thickness) - force(low, thickness)) / here if high > low else 0.0
+    steps = (high - low) / gel.poisson_sigma if gel.poisson_sigma > 0.0 else 1.0
+    if not np.isfinite(thickness) or gel.thickness_share == 0.0:
+        return abs(by_poisson) / steps, 0.0
+    thinner, thicker = (thickness * np.exp(sign * gel.thickness_share) for sign in (-1.0, 1.0))
+    by_thickness = (force(gel.poisson, thinner) - force(gel.poisson, thicker)) / (2.0 * here)
+    return abs(by_poisson) / steps, abs(by_thickness)
+
+
+def _strains(depth: FloatArray, pitch: float) -> FloatArray:
+    radius = pitch * np.sqrt(np.count_nonzero(depth, axis=(1, 2)) / np.pi)
+    deepest: FloatArray = depth.max(axis=(1, 2))
+    strains: FloatArray = np.divide(deepest, radius, out=np.zeros_like(radius), where=radius > 0.0)
+    return strains
+
+
+def _centres(pressure: FloatArray, pitch: float) -> FloatArray:
+    _, rows, columns = pressure.shape
+    y, x = (np.arange(n) + 0.5 - n / 2.0 for n in (rows, columns))
+    whole = pressure.sum(axis=(1, 2))
+    moments = np.stack([(pressure * x).sum(axis=(1, 2)), (pressure * y[:, None]).sum(axis=(1, 2))], axis=-1)
+    centres = np.full(moments.shape, np.nan)
+    centres[whole > 0.0] = pitch * moments[whole > 0.0] / whole[whole > 0.0, None]
+    return centres

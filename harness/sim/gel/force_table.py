@@ -1,0 +1,127 @@
+"""Forces measured on a gel, by how much of it an object takes: a JSON file, read between its rows only.
+
+An arm presses an object of one kind, reads its force sensor, and writes how deep it was, or how much
+volume it took of the gel. A table by depth holds for that very object; one by volume is nearly the
+same for objects of like breadth.
+"""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from scipy.interpolate import PchipInterpolator
+
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import CalibrationRefused, OutOfDomain
+from harness.basics.named_file import require_file
+from harness.recording.recording import write_text_whole
+
+Above = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Said = Annotated[str, Field(min_length=1)]
+
+_UNITS = {"depth_m": (1e3, "mm deep"), "volume_m3": (1e9, "mm^3 of the gel taken")}
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class ForceRow(_Strict):
+    """What was measured at one depth.
+
+    Attributes:
+        at: metres, or cubic metres, by the table's ``of``.
+        force_n: N, mean of the readings.
+        sigma_n: N, one standard deviation of a press from that mean: the scatter of repeated presses, with
+            the force sensor's own uncertainty.
+    """
+
+    at: Above
+    force_n: Above
+    sigma_n: Above
+
+
+class ForceTable(_Strict):
+    """Forces of one gel and one kind of object, least first.
+
+    Attributes:
+        schema_number: of the file.
+        sensor: make.
+        serial: of the very gel.
+        indenter: what was pressed, in words.
+        made_from: the readings.
+        of: what ``at`` is: the deepest pixel, or the volume between the object and the untouched gel.
+        rows: both ``at`` and ``force_n`` rise.
+    """
+
+    schema_number: Literal[1] = Field(alias="schema")
+    sensor: Said
+    serial: str
+    indenter: Said
+    made_from: Said
+    of: Literal["depth_m", "volume_m3"]
+    rows: Annotated[list[ForceRow], Field(min_length=3)]
+
+    @model_validator(mode="after")
+    def _rises(self) -> "ForceTable":
+        for k, (one, other) in enumerate(pairwise(self.rows)):
+            if other.at <= one.at or other.force_n <= one.force_n:
+                raise ValueError(
+                    f"row {k + 2} ({other.at:g}, {other.force_n:g} N) does not lie above row {k + 1} "
+                    f"({one.at:g}, {one.force_n:g} N): a deeper press takes more force; sort the rows, and "
+                    "press again what does not rise"
+                )
+        return self
+
+    def at(self, measure: float) -> tuple[float, float]:
+        """N and its standard deviation; nothing pressed is no force, and known.
+
+        Args:
+            measure: metres or cubic metres, by ``of``.
+
+        Raises:
+            OutOfDomain: more than the last row.
+        """
+        rows = [(0.0, 0.0, 0.0), *((row.at, row.force_n, row.sigma_n) for row in self.rows)]
+        at, force, sigma = np.array(rows).T
+        if not 0.0 <= measure <= at[-1]:
+            scale, words = _UNITS[self.of]
+            raise OutOfDomain(
+                f"the press is {measure * scale:.4g} {words} and the table of forces ends at "
+                f"{at[-1] * scale:.4g}; nothing is read beyond it: press less, or measure deeper presses"
+            )
+        # Cubics that pass every row and rise wherever the rows do (Fritsch and Butland, 1984).
+        return float(PchipInterpolator(at, force)(measure)), float(np.interp(measure, at, sigma))
+
+    def measure(self, depth: FloatArray, pitch: float) -> float:
+        """What the table goes by, of one press ``(rows, columns)`` metres."""
+        return float(depth.max() if self.of == "depth_m" else depth.sum() * pitch**2)
+
+
+def write_force_table(table: ForceTable, path: Path) -> None:
+    """Write the file, whole or not at all."""
+    write_text_whole(path, json.dumps(table.model_dump(by_alias=True), indent=1, allow_nan=False) + "\n")
+
+
+def read_force_table(path: Path) -> ForceTable:
+    """Read the file, strictly.
+
+    Raises:
+        WrongUse: there is no such file.
+        CalibrationRefused: not what ``write_force_table`` writes.
+    """
+    require_file(path, "table of forces")
+    try:
+        return ForceTable.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise CalibrationRefused(f"{path} does not read as a table of forces: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "all of it"
+        said = first["msg"].removeprefix("Value error, ")
+        raise CalibrationRefused(
+            f"{path} is no table of forces: {where}: {said}; docs/touch_force.md shows one"
+        ) from error

@@ -1,0 +1,142 @@
+"""Where the dots of one gel are, as they were measured: a JSON file that simulators and trackers read.
+
+A sensor's description has a grid of dots, centred and straight (``harness.bench.sensor.MarkerGrid``). A
+print is off by a pixel, turned by a degree, and a dot is missing here and there; this file has every dot of
+the very gel.
+"""
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.errors import CalibrationRefused, OutOfDomain, WrongUse
+from harness.bench.sensor import MarkerGrid
+from harness.recording.recording import write_text_whole
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Above = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Count = Annotated[int, Field(gt=0)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class MarkerDot(_Strict):
+    """One dot of a resting gel.
+
+    Attributes:
+        row: of the grid, downwards from 0.
+        column: of the grid, to the right from 0.
+        x_px: pixels, column of its middle in the picture.
+        y_px: pixels, row.
+        sigma_px: pixels, one standard uncertainty of either.
+        radius_px: pixels.
+    """
+
+    row: Annotated[int, Field(ge=0)]
+    column: Annotated[int, Field(ge=0)]
+    x_px: Finite
+    y_px: Finite
+    sigma_px: Above
+    radius_px: Above
+
+
+class MarkerFile(_Strict):
+    """Every dot of a gel.
+
+    Attributes:
+        schema_number: of the file.
+        sensor: make.
+        serial: of the very gel.
+        made_from: the pictures, by their hash.
+        picture_rows: pixels.
+        picture_columns: pixels.
+        pitch_m: m a pixel; None where nothing told it.
+        ink: share of the light that a dot gives back.
+        rows: of the grid.
+        columns: of the grid.
+        spacing_px: pixels from dot to dot.
+        turned_rad: rad, of the grid's rows in the picture.
+        dots: those that are in the picture.
+    """
+
+    schema_number: Literal[1] = Field(alias="schema")
+    sensor: str
+    serial: str
+    made_from: str
+    picture_rows: Count
+    picture_columns: Count
+    pitch_m: Above | None
+    ink: Annotated[float, Field(ge=0.0, le=1.0)]
+    rows: Count
+    columns: Count
+    spacing_px: Above
+    turned_rad: Finite
+    dots: Annotated[list[MarkerDot], Field(min_length=1)]
+
+    @property
+    def places(self) -> FloatArray:
+        """``(dots, 2)`` pixels (column, row)."""
+        return read_only(np.array([(dot.x_px, dot.y_px) for dot in self.dots]))
+
+    @property
+    def radius(self) -> float:
+        """Pixels, median over the dots."""
+        return float(np.median([dot.radius_px for dot in self.dots]))
+
+    def in_gel(self, pitch: float | None = None) -> FloatArray:
+        """``(dots, 2)`` metres, x and y in ``gel``.
+
+        Args:
+            pitch: m a pixel, where the file has none or another is wanted.
+
+        Raises:
+            OutOfDomain: no pitch is known.
+        """
+        scale = self._pitch(pitch)
+        middle = 0.5 * np.array([self.picture_columns, self.picture_rows]) - 0.5
+        return read_only((self.places - middle) * scale)
+
+    def grid(self, pitch: float | None = None) -> MarkerGrid:
+        """The centred, straight grid that comes nearest, for a sensor's description; raises as ``in_gel``."""
+        scale = self._pitch(pitch)
+        return MarkerGrid(self.rows, self.columns, self.spacing_px * scale, self.radius * scale)
+
+    def _pitch(self, pitch: float | None) -> float:
+        scale = self.pitch_m if pitch is None else pitch
+        if scale is None:
+            raise OutOfDomain(
+                "no millimetres a pixel are known of these dots; calibrate them with --pitch, or with "
+                "--spacing of the print"
+            )
+        return scale
+
+
+def write_markers(markers: MarkerFile, path: Path) -> None:
+    """Write the file, whole or not at all."""
+    write_text_whole(path, json.dumps(markers.model_dump(by_alias=True), indent=1, allow_nan=False) + "\n")
+
+
+def read_markers(path: Path) -> MarkerFile:
+    """Read the file, strictly.
+
+    Raises:
+        WrongUse: missing, or none that may be read.
+        CalibrationRefused: not what ``write_markers`` writes.
+    """
+    try:
+        return MarkerFile.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise CalibrationRefused(
+            f"{path} is no file of markers: {where or 'all of it'}: {first['msg']}; give what `touchstone "
+            "calibrate markers` wrote"
+        ) from error

@@ -1,0 +1,133 @@
+"""Where a gel is when it is pressed onto a place of an object.
+
+The press is named by the place, not by the highest pixel: the line through the gel's centre along its
+z axis meets the surface at the place, ``depth`` behind the undeformed gel. So depth, tilt and yaw
+mean the same on every surface, and a map changes smoothly with each of them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.geometry import frame_facing, inverse, rotation_about, transform
+from harness.basics.mesh import Mesh
+from harness.sim.solid.surface_measure import nearest_on_surface
+
+MOST_MOVED = 2e-3
+"""Metres between a contact as it is asked for and the surface: farther is another frame or unit."""
+
+MOST_TILT = np.radians(60.0)
+"""rad; beyond it the housing is on the object before the gel."""
+
+_CREASE = np.cos(np.radians(40.0))
+"""Of the angle between two faces, from which on they meet in an edge and not in a bend."""
+
+_Z = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPlace:
+    """A place of a surface.
+
+    Attributes:
+        point: ``(3,)`` metres, in the object's frame, on the surface.
+        normal: ``(3,)`` unit, outward, smooth over bends.
+        moved: metres from where it was asked for.
+    """
+
+    point: FloatArray
+    normal: FloatArray
+    moved: float
+
+
+def contact_place(mesh: Mesh, asked: FloatArray, most: float = MOST_MOVED) -> ContactPlace:
+    """The place of a surface nearest to ``(3,)`` metres in the object's frame.
+
+    Raises:
+        WrongUse: it is not three finite numbers.
+        OutOfDomain: it is farther than ``most`` metres; the distance is named.
+    """
+    point = np.asarray(asked, dtype=np.float64)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise WrongUse(f"a contact at {asked} is no place; give three finite numbers, x y z in metres")
+    place, face = _nearest(mesh, point)
+    moved = float(np.linalg.norm(place - point))
+    if moved > most:
+        raise OutOfDomain(
+            f"the contact ({point[0]:g}, {point[1]:g}, {point[2]:g}) m is {moved * 1e3:.4g} mm off the "
+            f"surface; the limit is {most * 1e3:g} mm{_hint(mesh, point, most)}"
+        )
+    normal = _smooth_normal(mesh, place, face)
+    if not normal.any():
+        raise OutOfDomain("the surface has no normal at the contact; move it off the sliver of a face")
+    return ContactPlace(read_only(place), read_only(normal), moved)
+
+
+def gel_from_object(place: ContactPlace, depth: float, tilt: float, azimuth: float, yaw: float) -> FloatArray:
+    """``(4, 4)``: the object in the frame of a gel that is pressed onto a place.
+
+    The untilted gel looks straight into the surface, its x axis where ``geometry.frame_facing`` puts
+    it. The gel's own z axis is then leant by ``tilt`` towards the tangent direction at ``azimuth`` from
+    that x axis (towards its y axis), about the place; last, the gel is turned by ``yaw`` about its z axis.
+
+    Args:
+        place: on the surface.
+        depth: metres from the undeformed gel to the place along the gel's z axis; below 0 the gel is clear.
+        tilt: rad between the gel's z axis and the inward normal, 0 to ``MOST_TILT``.
+        azimuth: rad, the direction the gel's z axis leans to.
+        yaw: rad.
+
+    Raises:
+        WrongUse: a number that is not finite, or a tilt out of its range.
+    """
+    if not np.isfinite([depth, tilt, azimuth, yaw]).all():
+        raise WrongUse(f"depth {depth}, tilt {tilt}, azimuth {azimuth}, yaw {yaw}: give finite numbers")
+    if not 0.0 <= tilt <= MOST_TILT:
+        raise WrongUse(
+            f"a tilt of {np.degrees(tilt):g} deg; give 0 to {np.degrees(MOST_TILT):g} deg, and the side with "
+            "--azimuth"
+        )
+    upright = frame_facing(-place.normal, 0.0)
+    across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    turned = upright @ rotation_about(across, tilt) @ rotation_about(_Z, yaw)
+    return read_only(inverse(transform(turned, place.point + depth * turned[:, 2])))
+
+
+def _nearest(mesh: Mesh, point: FloatArray) -> tuple[FloatArray, int]:
+    low, high = mesh.bounds
+    # No place of the surface is farther than the far corner of its box.
+    reach = float(np.linalg.norm(np.maximum(np.abs(point - low), np.abs(point - high)))) * (1.0 + 1e-9)
+    places, faces = nearest_on_surface(mesh, point[None], np.zeros((1, 3)), np.array([reach]))
+    return places[0], int(faces[0])
+
+
+def _hint(mesh: Mesh, point: FloatArray, most: float) -> str:
+    place, _ = _nearest(mesh, point * 1e-3)
+    if np.linalg.norm(place - point * 1e-3) <= most:
+        return "; read as millimetres it would be on it: write metres"
+    return "; give a point of the surface, in metres in the mesh file's frame"
+
+
+def _smooth_normal(mesh: Mesh, place: FloatArray, face: int) -> FloatArray:
+    """Between the normals at the face's corners, each over the faces that bend into this one (Phong)."""
+    own = mesh.face_normals[face]
+    near: IntArray = np.flatnonzero(mesh.face_normals @ own > _CREASE)
+    weighted = mesh.face_normals[near] * mesh.face_areas[near, None]
+    at_corners = np.stack(
+        [weighted[(mesh.faces[near] == vertex).any(axis=1)].sum(axis=0) for vertex in mesh.faces[face]]
+    )
+    lengths = np.linalg.norm(at_corners, axis=1, keepdims=True)
+    if not (lengths > 0.0).all():
+        return np.asarray(own)
+    blend = _shares(mesh.corners[face], place) @ (at_corners / lengths)
+    normal: FloatArray = blend / np.linalg.norm(blend)
+    return normal
+
+
+def _shares(corners: FloatArray, place: FloatArray) -> FloatArray:
+    """``(3,)`` how much of each corner a place on a triangle is made of."""
+    edges = np.stack([corners[1] - corners[0], corners[2] - corners[0]], axis=1)
+    second, third = np.linalg.lstsq(edges, place - corners[0], rcond=None)[0]
+    return np.array([1.0 - second - third, second, third])

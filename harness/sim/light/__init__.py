@@ -1,0 +1,1 @@
+"""What a scene camera sees of an object: appearance, visibility, shading."""

@@ -1,0 +1,204 @@
+"""Pictures without noise: exact visibility, matt surfaces, light straight from its source.
+
+Every pixel is the mean over places in it that lie as a lattice does and share no column and no row, so that
+an edge is caught as finely along the pixels as across them (``harness.sim.light.pixel_places``). What they
+leave unknown is told by their quarters, every fourth place. Error in places so spread goes with their number
+to the power of 3/4: of all together it is that of a quarter over the root of eight.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.faces.ray_mesh import RayMesh
+from harness.picture.linear_image import LinearImage
+from harness.picture.pinhole import DirectionalLight, Pinhole
+from harness.sim.light.appearance import Appearance
+from harness.sim.light.lambert import Places, irradiance, places_seen, radiance, sees_light
+from harness.sim.light.pixel_places import QUARTERS, pixel_places, quarter_counts
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a camera sees of an object, before any light.
+
+    Attributes:
+        camera: that looks.
+        samples: a side of a pixel.
+        pixel: ``(n,)`` index, row by row, of each sample that meets the object.
+        quarter: ``(n,)`` which quarter of its pixel's samples it is of, 0 to 3.
+        depth: ``(n,)`` m, z in the camera's frame.
+        places: ``(n)`` of the surface.
+    """
+
+    camera: Pinhole
+    samples: int
+    pixel: IntArray
+    quarter: IntArray
+    depth: FloatArray
+    places: Places
+
+
+@dataclass(frozen=True, eq=False)
+class DirectImage:
+    """A picture with what is known of it.
+
+    Attributes:
+        image: linear light, coverage and depth.
+        normal: ``(rows, columns, 3)`` unit, object's frame, mean over what is covered; zero elsewhere.
+        noise: linear light, root mean square over pixels and channels: what more samples would change;
+            None for one sample a pixel, which tells nothing of it.
+        alpha_noise: the same of coverage.
+        samples: a side of a pixel.
+        seconds: by what was done.
+    """
+
+    image: LinearImage
+    normal: FloatArray
+    noise: float | None
+    alpha_noise: float | None
+    samples: int
+    seconds: Mapping[str, float]
+
+
+class LitObject:
+    """An object prepared once for any number of pictures; read-only and safe to share by threads.
+
+    Attributes:
+        appearance: of its surface.
+        rays: through its faces.
+    """
+
+    appearance: Appearance
+    rays: RayMesh
+
+    def __init__(self, appearance: Appearance) -> None:
+        """Sort the faces; errors as of ``RayMesh``."""
+        self.appearance = appearance
+        self.rays = RayMesh(appearance.mesh)
+
+    def seen(self, camera: Pinhole, samples: int) -> Seen:
+        """Follow the camera's rays.
+
+        Args:
+            camera: anywhere, inside the object too.
+            samples: a side of a pixel, 1 to 64.
+
+        Raises:
+            OutOfDomain: fewer or more samples.
+        """
+        parts = [self._seen_at(camera, *each) for each in pixel_places(samples)]
+        pixel, quarter, face, weights, away, depth = (
+            np.concatenate(column) for column in zip(*parts, strict=True)
+        )
+        places = places_seen(self.appearance, face, weights, away)
+        return Seen(camera, samples, pixel, quarter, depth, places)
+
+    def _seen_at(
+        self, camera: Pinhole, offset: tuple[float, float], quarter: int
+    ) -> tuple[IntArray, IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+        directions = camera.directions(offset).reshape(-1, 3)
+        hits = self.rays.first_hits(camera.eye, directions)
+        met = np.flatnonzero(hits.face >= 0)
+        away = directions[met]
+        depth = hits.distance[met] * (away @ camera.forward)
+        return met, np.full(len(met), quarter), hits.face[met], hits.weights[met], away, depth
+
+    def falling(self, seen: Seen, lights: Sequence[DirectionalLight]) -> FloatArray:
+        """``(n, lights)`` irradiance of each sample by each light, with nothing in its way."""
+        size = self.appearance.mesh.diagonal
+        columns = [irradiance(seen.places, light, size) for light in lights]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(seen.places), 0))
+
+    def shadowed(self, seen: Seen, lights: Sequence[DirectionalLight], falling: FloatArray) -> FloatArray:
+        """``falling`` without the light that something is in the way of."""
+        free = [
+            sees_light(self.rays, seen.places, light, falling[:, k] > 0.0) for k, light in enumerate(lights)
+        ]
+        return falling * np.stack(free, axis=1) if free else falling
+
+    def render(
+        self,
+        camera: Pinhole,
+        lights: Sequence[DirectionalLight],
+        samples: int = 4,
+        shadow: bool = True,
+    ) -> DirectImage:
+        """One picture.
+
+        Args:
+            camera: anywhere.
+            lights: from far away; without any the object is black.
+            samples: a side of a pixel, 1 to 64.
+            shadow: whether the object is in its own light's way.
+
+        Raises:
+            OutOfDomain: fewer or more samples.
+        """
+        clock = _Clock()
+        seen = self.seen(camera, samples)
+        clock.lap("hits")
+        falling = self.falling(seen, lights)
+        clock.lap("light")
+        if shadow:
+            falling = self.shadowed(seen, lights, falling)
+            clock.lap("shadow")
+        return gathered(seen, falling, clock)
+
+
+class _Clock:
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._since = time.perf_counter()
+
+    def lap(self, done: str) -> None:
+        now = time.perf_counter()
+        self.seconds[done], self._since = now - self._since, now
+
+
+def gathered(seen: Seen, falling: FloatArray, clock: _Clock | None = None) -> DirectImage:
+    """The picture of what falls on the samples, ``(n, lights)``."""
+    clock = clock or _Clock()
+    light = radiance(seen.places, falling.sum(axis=1))
+    quarters = _summed(seen, np.column_stack([light, np.ones(len(light))]))
+    every = seen.samples**2
+    total = quarters.sum(axis=0)
+    colour, covered = total[..., :3], total[..., 3]
+    hit = np.where(covered > 0.0, covered, 1.0)
+    depth = _summed(seen, seen.depth[:, None]).sum(axis=0)[..., 0] / hit
+    image = LinearImage(
+        read_only(colour / every),
+        read_only(covered / every),
+        read_only(np.where(covered > 0.0, depth, np.inf)),
+    )
+    normal = read_only(_mean_direction(_summed(seen, seen.places.normals).sum(axis=0)))
+    noise, alpha_noise = (
+        _left_unknown(quarters[..., each], seen.samples) for each in (slice(3), slice(3, 4))
+    )
+    clock.lap("gather")
+    return DirectImage(image, normal, noise, alpha_noise, seen.samples, MappingProxyType(dict(clock.seconds)))
+
+
+def _summed(seen: Seen, values: FloatArray) -> FloatArray:
+    """``(4, rows, columns, channels)`` sums of the samples' ``(n, channels)``, by quarters."""
+    camera = seen.camera
+    at = seen.quarter * camera.pixels + seen.pixel
+    sums = [np.bincount(at, values[:, k], QUARTERS * camera.pixels) for k in range(values.shape[1])]
+    return np.asarray(np.stack(sums, axis=-1).reshape(QUARTERS, camera.height, camera.width, -1), np.float64)
+
+
+def _left_unknown(quarters: FloatArray, samples: int) -> float | None:
+    """Error of the quarters' mean, root mean square over the picture; None where a quarter is empty."""
+    if samples == 1:
+        return None
+    means = quarters / np.array(quarter_counts(samples))[:, None, None, None]
+    return float(np.sqrt(np.mean(np.var(means, axis=0, ddof=1)) / 8.0))
+
+
+def _mean_direction(total: FloatArray) -> FloatArray:
+    length = np.linalg.norm(total, axis=-1, keepdims=True)
+    return np.asarray(total / np.where(length > 0.0, length, 1.0))

@@ -1,0 +1,1 @@
+"""Free vibration of a solid: stiffness, mass, Lanczos, modes."""

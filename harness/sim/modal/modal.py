@@ -1,0 +1,233 @@
+"""From a surface and a material to the modes of the object."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import MeshRefused
+from harness.basics.materials import Material
+from harness.basics.mesh import Mesh
+from harness.basics.store import Store, digest
+from harness.sim.modal.modes import Modes
+from harness.sim.modal.snap import snapped, straightened
+from harness.sim.modal.solve import Elasticity, check_limit, solve_mesh
+from harness.sim.modal.stage_seconds import timed
+from harness.sim.solid.filled import filled
+from harness.sim.solid.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
+from harness.sim.solid.modal_mesh import QuadraticMesh, least_determinant, middles_of, quadratic_mesh
+from harness.sim.solid.surface_measure import enclosed_volume, thin_wall
+from harness.sim.solid.tetrahedra import Tetrahedra
+
+VERSION = 4
+"""Raised with every change of what is computed here, so that stored modes are dropped."""
+
+HEARING = 20e3
+"""Hz: the limit where nobody asks for another."""
+
+ELEMENT_SHARE = 0.35
+"""Of the shortest wave of the object below the limit, the default edge of an element."""
+
+_VOLUME_GATE = 0.03
+"""Relative: frequencies of bending follow the wall, and so the volume."""
+
+
+def modes_of(
+    mesh: Mesh,
+    material: Material,
+    limit: float = HEARING,
+    edge: float | None = None,
+    most: int | None = None,
+    store: Store | None = None,
+) -> Modes:
+    """The modes of an object given by its closed surface.
+
+    Args:
+        mesh: closed, outward, in metres.
+        material: of all of it.
+        limit: Hz, above zero.
+        edge: m, longest edge of an element; None for ``default_edge``.
+        most: modes at most, the lowest; None for all up to the limit.
+        store: where results are kept; None to compute.
+
+    Raises:
+        WrongUse: a limit, an edge or a count that cannot be.
+        MeshRefused: a surface that cannot be filled, or a volume mesh that cannot be solved.
+    """
+    return solved_once(mesh, material, limit, edge, most, store)[0]
+
+
+def solved_once(
+    mesh: Mesh, material: Material, limit: float, edge: float | None, most: int | None, store: Store | None
+) -> tuple[Modes, bool]:
+    """``modes_of``, and whether the modes were in the store; their seconds are then of that time."""
+    edge = default_edge(mesh, material, limit, most) if edge is None else edge
+    key = digest(["modes", VERSION, mesh.vertices, mesh.faces, material, float(limit), float(edge), most])
+    kept = store.get(key) if store is not None else None
+    if isinstance(kept, Mapping):
+        return from_arrays(kept), True
+    spent: dict[str, float] = {}
+    with timed(spent, "tetrahedra"):
+        # Not from the store: kept cells would have no seconds of their own to say.
+        inside, _ = filled(mesh, edge, None)
+    solved = solve_modes(inside, material, limit, mesh, most=most, spent=spent)
+    if store is not None:
+        store.put(key, to_arrays(solved))
+    return solved, False
+
+
+def default_edge(
+    mesh: Mesh, material: Material, limit: float, most: int | None = None, share: float = ELEMENT_SHARE
+) -> float:
+    """Metres: an element's edge as a share of the shortest wave in the object below the limit.
+
+    The wave is that of bending in a wall of the object's thickness or, if shorter, of shear.
+    With ``most`` modes the limit is no higher than where a plate of that area and wall has as
+    many (its modal density is ``sqrt(3) area / (wall speed)``; Cremer, Heckl and Petersson,
+    Structure-Borne Sound, 3rd edition, 2005).
+    """
+    check_limit(limit, most)
+    wall = thin_wall(mesh, 0.5)
+    if most is not None:
+        middle = 0.5 * float(mesh.face_areas.sum())
+        limit = min(limit, 1.5 * most * wall * _plate_speed(material) / (np.sqrt(3.0) * middle))
+    bending = bending_wave(material, wall, limit)
+    shear = np.sqrt(0.5 * material.young / ((1.0 + material.poisson) * material.density)) / limit
+    return float(min(share * min(bending, shear), 0.2 * mesh.diagonal))
+
+
+def bending_wave(material: Material, wall: float, frequency: float) -> float:
+    """Metres from crest to crest of a wave that bends a thin wall at a frequency in Hz.
+
+    Args:
+        material: of the wall.
+        wall: m, its thickness; small against the wave.
+        frequency: above zero.
+    """
+    return float(np.sqrt(np.pi * wall * _plate_speed(material) / (np.sqrt(3.0) * frequency)))
+
+
+def _plate_speed(material: Material) -> float:
+    """Metres in a second, of a wave that stretches a thin wall."""
+    return float(np.sqrt(material.young / (material.density * (1.0 - material.poisson**2))))
+
+
+def solve_modes(
+    tetrahedra: Tetrahedra,
+    material: Material | Elasticity,
+    limit: float = HEARING,
+    surface: Mesh | None = None,
+    most: int | None = None,
+    spent: Mapping[str, float] | None = None,
+    undeformed: Tetrahedra | None = None,
+) -> Modes:
+    """The modes of a volume mesh.
+
+    Args:
+        tetrahedra: of the object.
+        material: of all of it, or cell by cell.
+        limit: Hz, above zero.
+        surface: onto which the nodes of the volume mesh's surface are moved; None for as it is.
+        most: modes at most, the lowest; None for all up to the limit.
+        spent: s that earlier stages took (``stage_seconds.timed``), to be listed.
+        undeformed: the same cells where ``surface`` belongs to them, if ``tetrahedra`` were moved
+            away from it since; None if they were not.
+
+    Raises:
+        WrongUse: a limit or a count that cannot be, or elasticity that is not one.
+        MeshRefused: the system cannot be solved.
+    """
+    cells = len(tetrahedra.cells)
+    elasticity = Elasticity.uniform(material, cells) if isinstance(material, Material) else material
+    with threadpool_limits(limits=1, user_api="blas"):
+        seconds = {"tetrahedra": 0.0, **(spent or {})}
+        with timed(seconds, "assembly"):
+            mesh = curved(tetrahedra, surface, undeformed or tetrahedra)
+        return solve_mesh(mesh, elasticity, limit, most, spent=seconds).modes
+
+
+def curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra) -> QuadraticMesh:
+    """Ten-node cells on ``surface``, moved on to where the tetrahedra are now.
+
+    Args:
+        tetrahedra: as they are to be solved.
+        surface: as in ``solve_modes``.
+        undeformed: the cells where ``surface`` belongs to them; ``tetrahedra`` if they never moved.
+
+    Raises:
+        MeshRefused: unused nodes, inverted elements, or another volume than the surface encloses.
+    """
+    _check_cells(undeformed)
+    mesh = quadratic_mesh(undeformed.nodes, undeformed.cells)
+    if surface is not None:
+        mesh = snapped(mesh, surface)
+        _check_volume(mesh, surface)
+    if undeformed is tetrahedra:
+        return mesh
+    way = np.zeros_like(mesh.nodes)
+    way[: len(tetrahedra.nodes)] = tetrahedra.nodes - undeformed.nodes
+    way[len(tetrahedra.nodes) :] = middles_of(way, mesh.cells, len(way))[len(tetrahedra.nodes) :]
+    moved = straightened(QuadraticMesh(mesh.nodes + way, mesh.cells, mesh.faces))
+    if least_determinant(moved).min() <= 0.0:
+        raise MeshRefused("the deformation turns an element inside out; deform the object less")
+    return moved
+
+
+def _check_cells(tetrahedra: Tetrahedra) -> None:
+    unused = len(tetrahedra.nodes) - len(np.unique(tetrahedra.cells))
+    inverted = int(np.count_nonzero(tetrahedra.volumes <= 0.0))
+    if unused or inverted:
+        raise MeshRefused(
+            f"the volume mesh has {unused} nodes that no element holds and {inverted} inverted elements; "
+            "make it with sim.solid.tetrahedra.tetrahedra, which leaves out the ones and turns the others"
+        )
+
+
+def held_volume(mesh: QuadraticMesh) -> float:
+    """m^3 that curved cells hold, as their mass is integrated."""
+    slopes = shape_slopes(MASS_POINTS)
+    return float((determinants(mesh.nodes, mesh.cells, slopes) @ MASS_WEIGHTS).sum() / 6.0)
+
+
+def _check_volume(mesh: QuadraticMesh, surface: Mesh) -> None:
+    got = held_volume(mesh)
+    wanted = enclosed_volume(surface)
+    if not abs(got - wanted) <= _VOLUME_GATE * wanted:
+        raise MeshRefused(
+            f"the elements hold {got * 1e6:.4g} cm^3 where the surface encloses {wanted * 1e6:.4g}, more "
+            f"than {_VOLUME_GATE:.0%} apart; say a smaller element edge, or repair the surface"
+        )
+
+
+def to_arrays(modes: Modes) -> dict[str, AnyArray]:
+    """What a store can keep."""
+    numbers = ("limit", "mass", "rigid", "nodes", "elements", "residual")
+    arrays = ("frequencies", "points", "normals", "faces", "shapes")
+    kept: dict[str, Any] = {name: vars(modes)[name] for name in arrays}
+    kept |= {name: np.array(vars(modes)[name]) for name in numbers}
+    return kept | {f"seconds.{stage}": np.array(took) for stage, took in modes.seconds.items()}
+
+
+def from_arrays(kept: Mapping[str, AnyArray]) -> Modes:
+    """What ``to_arrays`` made, again."""
+    seconds = {
+        name.removeprefix("seconds."): float(took)
+        for name, took in kept.items()
+        if name.startswith("seconds.")
+    }
+    return Modes(
+        frequencies=kept["frequencies"],
+        points=kept["points"],
+        normals=kept["normals"],
+        faces=kept["faces"],
+        shapes=kept["shapes"],
+        limit=float(kept["limit"]),
+        mass=float(kept["mass"]),
+        rigid=int(kept["rigid"]),
+        nodes=int(kept["nodes"]),
+        elements=int(kept["elements"]),
+        residual=float(kept["residual"]),
+        seconds=seconds,
+    )

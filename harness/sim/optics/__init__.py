@@ -1,0 +1,1 @@
+"""What the camera behind a gel sees, and back again: colour, shadows, depth."""

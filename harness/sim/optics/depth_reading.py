@@ -1,0 +1,132 @@
+"""A live picture read: the gel's surface, its error at every pixel, and its points in the frame of a tool."""
+
+from dataclasses import dataclass
+from time import process_time
+
+import numpy as np
+
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
+from harness.basics.errors import DataRefused
+from harness.basics.geometry import apply
+from harness.picture.square_pixels import aspect_stated, made_square
+from harness.sim.optics.contact_depth import Depth, read_depth
+from harness.sim.optics.inverse import Detection
+from harness.sim.optics.inverse_error import ColourError, height_errors
+from harness.sim.optics.tactile_calibration import TactileCalibration, with_background
+
+
+@dataclass(frozen=True, eq=False)
+class DepthReading:
+    """What one press did to the gel.
+
+    Attributes:
+        image: ``(rows, columns, 3)`` RGB that was read, its pixels square.
+        height: ``(rows, columns)`` metres of indentation, 0 or more.
+        sigma: ``(rows, columns)`` metres, one standard deviation of each height.
+        depth: the reading with all it says of itself.
+        pitch: metres a pixel.
+        aspect: by which the picture was made square; 1 where it was.
+        seconds: of the processor, reading and its error.
+    """
+
+    image: ByteArray
+    height: FloatArray
+    sigma: FloatArray
+    depth: Depth
+    pitch: float
+    aspect: float
+    seconds: tuple[float, float]
+
+    @property
+    def contact(self) -> BoolArray:
+        """``(rows, columns)`` where the object surely shapes the gel."""
+        return np.asarray(self.depth.read.contact[0])
+
+    @property
+    def trusted(self) -> BoolArray:
+        """``(rows, columns)`` where the colour was explained by a slope within the calibration's range."""
+        return np.asarray(self.depth.read.trusted[0])
+
+    @property
+    def anchored(self) -> bool:
+        """Whether some of the gel was at rest in view; if not, heights are counted from their least."""
+        return bool(self.depth.read.anchored[0])
+
+    @property
+    def deepest(self) -> tuple[int, int]:
+        """Row and column of the deepest pixel."""
+        row, column = np.unravel_index(int(np.argmax(self.height)), self.height.shape)
+        return int(row), int(column)
+
+    def points(self, frame_from_gel: FloatArray | None = None) -> FloatArray:
+        """``(n, 3)`` metres: the gel's surface at the pixels of the contact, in the order of its rows.
+
+        Args:
+            frame_from_gel: ``(4, 4)``, of the tool; None for points in the gel's own frame (x along columns,
+                y along rows, z out of the sensor), whose origin is the centre of the untouched surface.
+        """
+        rows, columns = self.height.shape
+        row, column = np.nonzero(self.contact)
+        x = (column + 0.5 - 0.5 * columns) * self.pitch
+        y = (row + 0.5 - 0.5 * rows) * self.pitch
+        # Pushed in, the surface lies behind where it rested, and z points out.
+        points = np.column_stack([x, y, -self.height[row, column]])
+        return points if frame_from_gel is None else apply(frame_from_gel, points)
+
+
+def read_press(
+    frames: ByteArray,
+    calibration: TactileCalibration,
+    detection: Detection,
+    background: ByteArray | None = None,
+    assumed: ColourError | None = None,
+) -> DepthReading:
+    """Read one press as a camera gave it.
+
+    Args:
+        frames: ``(n, rows, columns, 3)`` RGB, of one press that was held still; their mean is read.
+        calibration: with a smooth model and a table of the same presses, of a flat gel.
+        detection: what counts as a change; one that is ``drifting`` also asks for the light of the moment.
+        background: ``(rows, columns, 3)`` RGB of the untouched gel as it looks now; None for the
+            calibration's.
+        assumed: what colours are off by; None for the usual.
+
+    Raises:
+        DataRefused: no frames, or of another shape or type than the calibration's.
+        CalibrationRefused: a calibration with no smooth model, or a table of too few bins.
+    """
+    _check(frames, background, calibration)
+    aspect = aspect_stated(calibration.header.made_from)
+    mean = np.rint(made_square(frames, aspect).mean(axis=0)).astype(np.uint8)
+    by = calibration
+    if background is not None:
+        by = with_background(calibration, made_square(background, aspect))
+    began = process_time()
+    depth = read_depth(mean[None], by, detection)
+    read_in = process_time() - began
+    usual = assumed if assumed is not None else ColourError()
+    sigma = height_errors(mean[None], depth, usual)[0].sigma
+    stated_in = process_time() - began - read_in
+    return DepthReading(
+        read_only(mean),
+        read_only(depth.read.height[0]),
+        read_only(sigma),
+        depth,
+        by.header.pitch,
+        aspect,
+        (read_in, stated_in),
+    )
+
+
+def _check(frames: ByteArray, background: ByteArray | None, calibration: TactileCalibration) -> None:
+    wanted = calibration.background.shape
+    if frames.ndim != 4 or len(frames) == 0 or frames.dtype != np.uint8 or frames.shape[1:] != wanted:
+        raise DataRefused(
+            f"the frames are {frames.dtype} {frames.shape}; this calibration reads uint8 (n, *{wanted}), at "
+            "least one: give the camera's own pictures, not cropped or scaled"
+        )
+    if background is not None and background.shape != wanted:
+        raise DataRefused(
+            f"the background is {background.shape[1]} x {background.shape[0]} pixels and the calibration's "
+            f"{wanted[1]} x {wanted[0]}; give the camera's own picture, not cropped"
+        )

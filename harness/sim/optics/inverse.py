@@ -1,0 +1,209 @@
+"""From tactile images back to the shape of the gel: colour to slope, slope to height.
+
+The answer is the gel's surface as the camera sees it, its skirt around the contact included:
+compare it with ``gel.deform`` of a prediction, not with the prediction itself.
+"""
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from scipy import ndimage
+
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
+from harness.basics.errors import CalibrationRefused, DataRefused
+from harness.sim.optics.poisson import anchored_heights, free_heights
+from harness.sim.optics.slope_kernels import normals_from_colour
+from harness.sim.optics.tactile_calibration import TactileCalibration
+
+_NARROW, _WIDE = 5, 25
+_RIDGE = 16.0
+_DISTRUST = 0.1
+_MOSTLY = 0.5
+_LEAST_REST = 20
+"""Pixels of a quiet region that can be told from a chance calm."""
+
+_FLOOR = 0.05
+"""Pixels of height, one sigma, where the gel is at rest."""
+
+_CORRELATED = 2.0
+"""Slope errors of neighbours are alike: the calibration's, not the camera's. Chosen so that two
+thirds of the pixels of rendered presses lie within one sigma under another calibration."""
+
+_SUNKEN = 3.0
+"""Pixels of height: nothing of a pressed gel lies lower than its rest, but for the slopes' errors."""
+
+_SAME_LEVEL = 1.5
+"""Pixels of height within which quiet regions are taken to lie at the same level, the rest."""
+
+
+@dataclass(frozen=True)
+class Detection:
+    """From how many grey levels on a change of colour is the gel's; lengths over the channels.
+
+    A face tilted by one degree changes the colour by about one grey level, and so does the
+    camera's noise: the mean over a window is what is compared.
+
+    Attributes:
+        quiet: mean of 5 x 5 pixels below which the gel may be at rest.
+        strong: mean of 5 x 5 pixels that shows a contact.
+        wide: mean of 25 x 25 pixels that shows one too, for flat faces hardly tilted.
+        drifting: whether the light may have changed since the calibration's background was
+            taken; the change that most of the picture shares is then taken out, and with it
+            the tilt of a face that fills most of it. Better: a fresh background.
+    """
+
+    quiet: float = 2.5
+    strong: float = 8.0
+    wide: float = 2.5
+    drifting: bool = False
+
+
+STEADY = Detection()
+"""For a background taken just before the contact, by the light of the contact."""
+
+DRIFTING = Detection(quiet=6.0, strong=20.0, wide=12.0, drifting=True)
+"""For a background of another day: the published presses differ from theirs by so much far from the ball."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inversion:
+    """What the pictures say the gel did.
+
+    Attributes:
+        height: ``(n, rows, columns)`` metres of indentation, 0 or more, zero outside the imprint.
+        contact: ``(n, rows, columns)`` where the object surely shapes the gel (deeper than the
+            skirt's core share of the deepest point).
+        imprint: ``(n, rows, columns)`` where the gel moved at all.
+        trusted: ``(n, rows, columns)`` where the colour was explained by a slope within the
+            calibration's range; elsewhere the slope was held or doubtful.
+        error: ``(n, rows, columns)`` metres, one sigma estimated from colour noise and the
+            calibration's own residual.
+        anchored: ``(n,)`` whether some of the gel was at rest in view; if not, heights are
+            counted from their least.
+        seconds: for all of them.
+    """
+
+    height: FloatArray
+    contact: BoolArray
+    imprint: BoolArray
+    trusted: BoolArray
+    error: FloatArray
+    anchored: BoolArray
+    seconds: float
+
+
+def invert(images: ByteArray, calibration: TactileCalibration, detection: Detection = STEADY) -> Inversion:
+    """Recover the surface of a flat gel from pictures of it.
+
+    Args:
+        images: ``(n, rows, columns, 3)`` RGB.
+        calibration: with a smooth model.
+        detection: what counts as a change.
+
+    Raises:
+        DataRefused: images of another shape or type than the calibration's.
+        CalibrationRefused: the calibration has only a table.
+    """
+    shape = calibration.background.shape
+    if images.ndim != 4 or images.shape[1:] != shape or images.dtype != np.uint8:
+        raise DataRefused(
+            f"images are {images.dtype} {images.shape}; this calibration reads uint8 (n, *{shape})"
+        )
+    if len(calibration.smooth) == 0:
+        raise CalibrationRefused(
+            "this calibration has no smooth model to invert; fit it again from its presses"
+        )
+    began = perf_counter()
+    answers = [_invert_one(image, calibration, detection) for image in images]
+    height, contact, imprint, trusted, error, anchored = (
+        np.array([answer[k] for answer in answers]).reshape(len(images), *([] if k == 5 else shape[:2]))
+        for k in range(6)
+    )
+    return Inversion(
+        read_only(height),
+        read_only(contact.astype(np.bool_)),
+        read_only(imprint.astype(np.bool_)),
+        read_only(trusted.astype(np.bool_)),
+        read_only(error),
+        read_only(anchored.astype(np.bool_)),
+        perf_counter() - began,
+    )
+
+
+_Answer = tuple[FloatArray, BoolArray, BoolArray, BoolArray, FloatArray, bool]
+
+
+def _invert_one(image: ByteArray, calibration: TactileCalibration, detection: Detection) -> _Answer:
+    header = calibration.header
+    change = image.astype(np.float64) - calibration.background
+    if detection.drifting:
+        change = _without_drift(change, detection)
+    strength = _strength(change, _NARROW)
+    quiet = strength < detection.quiet
+    if strength.max() < detection.strong and _strength(change, _WIDE).max() < detection.wide:
+        nothing = np.zeros(quiet.shape)
+        nowhere = np.zeros(quiet.shape, np.bool_)
+        return nothing, nowhere, nowhere, ~nowhere, nothing + _rest_error(header.pitch), True
+    noise = header.residual_rms
+    normal, fit = np.empty((*quiet.shape, 2)), np.empty((*quiet.shape, 2))
+    normals_from_colour(change, calibration.smooth, header.slope_limit, noise, _RIDGE, normal, fit)
+    flatness = np.sqrt(1.0 - normal[..., 0] ** 2 - normal[..., 1] ** 2)
+    right, down = -normal[..., 0] / flatness, -normal[..., 1] / flatness
+    trusted = (fit[..., 0] < 3.0 * noise) & (flatness > np.sqrt(1.0 - (0.98 * header.slope_limit) ** 2))
+    heights = free_heights(down, right)
+    rest = _resting(heights, quiet)
+    level = float(heights[rest].mean()) if rest.any() else float(heights.min())
+    heights -= level
+    if rest.any():
+        anchored_heights(heights, down, right, np.where(trusted, 1.0, _DISTRUST), rest)
+    height = np.maximum(heights, 0.0) * header.pitch
+    contact = height > header.skirt.core * height.max()
+    spread = fit[..., 1] / flatness**3 * np.hypot(1.0, np.maximum(fit[..., 0], 0.2 * noise))
+    return height, contact, ~rest, trusted, _error(spread, rest, header.pitch), bool(rest.any())
+
+
+def _without_drift(change: FloatArray, detection: Detection) -> FloatArray:
+    hardly = np.sqrt((change**2).sum(axis=2)) < detection.wide
+    if hardly.mean() < _MOSTLY:
+        return change
+    still: FloatArray = change - np.median(change[hardly], axis=0)
+    return still
+
+
+def _strength(change: FloatArray, window: int) -> FloatArray:
+    smooth = ndimage.uniform_filter(change, size=(window, window, 1), mode="nearest")
+    strength: FloatArray = np.sqrt((smooth**2).sum(axis=2))
+    return strength
+
+
+def _resting(heights: FloatArray, quiet: BoolArray) -> BoolArray:
+    """The quiet regions at the lowest level; quiet regions above it are flat parts of the contact."""
+    inner = ndimage.binary_erosion(quiet, iterations=2, border_value=1)
+    labels, count = ndimage.label(inner)
+    if count == 0:
+        return np.zeros(quiet.shape, np.bool_)
+    names = np.arange(1, count + 1)
+    sizes = ndimage.sum_labels(inner, labels, names)
+    levels = ndimage.mean(heights, labels, names)
+    large = sizes >= _LEAST_REST
+    if not large.any():
+        return np.zeros(quiet.shape, np.bool_)
+    lowest = levels[large].min()
+    if lowest > np.percentile(heights, 2) + _SUNKEN:
+        return np.zeros(quiet.shape, np.bool_)
+    at_rest = np.concatenate([[False], levels < lowest + _SAME_LEVEL])
+    resting: BoolArray = at_rest[labels]
+    return resting
+
+
+def _rest_error(pitch: float) -> float:
+    return _FLOOR * pitch
+
+
+def _error(spread: FloatArray, rest: BoolArray, pitch: float) -> FloatArray:
+    # Independent slope errors add up along the way from where the height is known.
+    way = ndimage.distance_transform_edt(~rest) if rest.any() else np.full(rest.shape, float(max(rest.shape)))
+    variance = ndimage.uniform_filter(spread**2, size=2 * _NARROW + 1, mode="nearest")
+    error: FloatArray = pitch * np.hypot(_FLOOR, np.where(rest, 0.0, np.sqrt(variance * way) * _CORRELATED))
+    return error

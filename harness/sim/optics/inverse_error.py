@@ -1,0 +1,243 @@
+"""How far a recovered height may be off, pixel by pixel: errors of colour carried through the solve.
+
+Two errors of colour make a height wrong. The camera's noise differs from pixel to pixel and hardly adds up.
+The calibration's misfit is the same wherever the gel has the same slope, so it adds up along every face;
+it is drawn as a random smooth function of the normal. Each draw becomes an error of slope by the linear
+part of the colour's inversion, and an error of height by the very least squares that gave the heights,
+on blocks of pixels, for errors of height are smooth. The spread of the draws is the standard deviation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, map_coordinates, uniform_filter, zoom
+
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
+from harness.basics.errors import DataRefused
+from harness.sim.optics.contact_depth import Depth
+from harness.sim.optics.poisson import anchored_heights, free_heights
+from harness.sim.optics.shading import shades
+from harness.sim.optics.slope_kernels import normals_from_colour
+from harness.sim.optics.tactile_calibration import TactileCalibration
+
+_RIDGE = 16.0
+"""Grey levels squared: as the inversion's own."""
+
+_HELD = 0.98
+"""Share of the slope limit from which a slope was held there."""
+
+_DISTRUST = 0.1
+"""Weight of slopes that are not trusted, as in the solve for the heights."""
+
+_NODES = 49
+"""Of the plane of normals, a side."""
+
+_SOLVED = 80
+"""Blocks along the longer side: errors of height are smooth, and a solve costs as the cube of this."""
+
+_STRANGE = 2.0
+"""Times the calibration's residual from which a colour is none of its presses', but dirt or a shadow."""
+
+_WINDOW = 5
+_FLOOR = 0.05
+"""Pixels of height, one sigma, where the gel is at rest."""
+
+
+@dataclass(frozen=True)
+class ColourError:
+    """What colours are off by.
+
+    Attributes:
+        camera: grey levels rms, from pixel to pixel.
+        alike: sine of the slope over which the calibration's misfit is alike (a Gaussian's sigma).
+        share: of the calibration's residual that is misfit, and not texture or noise.
+        dimming: share by which a contact may be darker or brighter than the calibration's were.
+        draws: how many; the spread of 32 is known to an eighth.
+    """
+
+    camera: float = 1.5
+    alike: float = 0.15
+    share: float = 0.4
+    dimming: float = 0.3
+    draws: int = 32
+
+
+USUAL = ColourError()
+
+
+@dataclass(frozen=True, eq=False)
+class HeightErrors:
+    """Equally likely errors of one recovered surface.
+
+    Attributes:
+        draws: ``(draws, rows, columns)`` metres.
+        floor: metres, one sigma, added to all of them.
+    """
+
+    draws: FloatArray
+    floor: float
+
+    @property
+    def sigma(self) -> FloatArray:
+        """``(rows, columns)`` metres, one standard deviation of each pixel's height."""
+        return np.asarray(np.hypot(np.sqrt(np.mean(self.draws**2, axis=0)), self.floor))
+
+    def sigma_without(self, terms: FloatArray, inside: BoolArray) -> FloatArray:
+        """The same where some of the error has been fitted away, as a comparison with a known shape does.
+
+        Args:
+            terms: ``(n, terms)`` what was fitted at the pixels of ``inside``: ones for an offset, say.
+            inside: ``(rows, columns)``.
+
+        Returns:
+            ``(n,)`` metres.
+        """
+        basis = np.linalg.qr(terms)[0]
+        there = self.draws[:, inside]
+        left = there - (there @ basis) @ basis.T
+        return np.asarray(np.hypot(np.sqrt(np.mean(left**2, axis=0)), self.floor))
+
+
+def height_errors(
+    images: ByteArray, depth: Depth, assumed: ColourError = USUAL, seed: int = 0
+) -> tuple[HeightErrors, ...]:
+    """Errors that the heights of ``depth`` may have, one answer a picture.
+
+    Args:
+        images: ``(n, rows, columns, 3)`` that were read.
+        depth: what ``read_depth`` made of them.
+        assumed: what colours are off by.
+        seed: of the draws; the same one gives the same answer.
+
+    Raises:
+        DataRefused: other images than were read, or fewer than two draws.
+    """
+    if images.shape[:3] != depth.read.height.shape:
+        raise DataRefused(
+            f"images are {images.shape} and the heights {depth.read.height.shape}; give the pictures that "
+            "were read"
+        )
+    if assumed.draws < 2:
+        raise DataRefused(f"{assumed.draws} draws were asked for; a spread needs at least 2")
+    rng = np.random.default_rng(seed)
+    return tuple(
+        _errors(images[k], by, depth.dimming[k], depth.read.trusted[k], ~depth.read.imprint[k], assumed, rng)
+        for k, by in enumerate(depth.calibrations)
+    )
+
+
+def _errors(
+    image: ByteArray,
+    by: TactileCalibration,
+    dimming: FloatArray,
+    trusted: BoolArray,
+    rest: BoolArray,
+    assumed: ColourError,
+    rng: np.random.Generator,
+) -> HeightErrors:
+    pitch, shape = by.header.pitch, rest.shape
+    if rest.all():
+        return HeightErrors(read_only(np.zeros((assumed.draws, *shape))), _FLOOR * pitch)
+    block = max(1, int(np.ceil(max(shape) / _SOLVED)))
+    still = _blocks(rest.astype(np.float64), block) > 0.5
+    weight = np.where(_blocks(trusted.astype(np.float64), block) > 0.5, 1.0, _DISTRUST)
+    slopes = _Slopes(image, by, dimming, still, block, assumed)
+    draws = np.empty((assumed.draws, *shape))
+    for k in range(assumed.draws):
+        down, right = slopes.drawn(rng)
+        coarse = free_heights(down, right)
+        if still.any():
+            coarse -= coarse[still].mean()
+            anchored_heights(coarse, down, right, weight, still)
+        draws[k] = _widened(coarse, block, shape) * (block * pitch)
+    return HeightErrors(read_only(draws), _FLOOR * pitch)
+
+
+class _Slopes:
+    """Draws errors of the slope on blocks of pixels, given how the colour at their middle was explained."""
+
+    def __init__(
+        self,
+        image: ByteArray,
+        by: TactileCalibration,
+        dimming: FloatArray,
+        still: BoolArray,
+        block: int,
+        assumed: ColourError,
+    ) -> None:
+        header = by.header
+        change = image.astype(np.float64) - by.background
+        normal, fit = np.empty((*change.shape[:2], 2)), np.empty((*change.shape[:2], 2))
+        noise = header.residual_rms
+        normals_from_colour(change, by.smooth, header.slope_limit, noise, _RIDGE, normal, fit)
+        rows, columns = change.shape[:2]
+        place = np.minimum(np.argwhere(~still) * block + block // 2, (rows - 1, columns - 1))
+        self._where, self._camera, self._alike = ~still, assumed.camera / block, assumed.alike
+        self._dimming = assumed.dimming * dimming[place[:, 0], place[:, 1]].T
+        self._normal = normal[place[:, 0], place[:, 1]]
+        shade, slope = np.empty((len(place), 3)), np.empty((len(place), 3, 2))
+        shades(by.smooth, self._normal, place, rows, columns, shade, slope)
+        bent = np.einsum("pca,pcb->pab", slope, slope) + _RIDGE * np.eye(2)
+        self._gain = np.linalg.solve(bent, slope.transpose(0, 2, 1))
+        # Two of three colours are taken up by the slope: what is left over shows a third of the error.
+        # The filter's running sum may leave a little below zero where nothing is left over.
+        around = uniform_filter(fit[..., 0] ** 2, _WINDOW, mode="nearest")
+        left = np.sqrt(3.0 * np.maximum(around, 0.0))
+        left = left[place[:, 0], place[:, 1]]
+        self._misfit = np.where(left > _STRANGE * noise, left, assumed.share * noise)
+        size = np.hypot(*self._normal.T)
+        held = size > _HELD * header.slope_limit
+        # Held at the limit, the sine may be anything from there to one.
+        self._beyond = np.where(
+            held, (1.0 - header.slope_limit) / np.sqrt(12.0) / np.maximum(size, 1e-9), 0.0
+        )
+        self._flat = np.sqrt(np.maximum(1.0 - size**2, 1e-4))
+
+    def drawn(self, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+        """One error of the slope, down and right, ``(blocks down, blocks right)`` each."""
+        fields = _functions_of_normal(rng, self._normal, self._alike)
+        colour = self._misfit * fields[:3] + rng.normal(0.0, self._camera, (3, len(self._flat)))
+        colour += rng.normal() * self._dimming
+        by_colour = np.einsum("pac,cp->ap", self._gain, colour)
+        normal = self._normal.T
+        moved = by_colour + normal * (self._beyond * fields[3])
+        along = (normal * moved).sum(axis=0) / self._flat**2
+        right, down = -(moved + normal * along) / self._flat
+        return self._spread(down), self._spread(right)
+
+    def _spread(self, values: FloatArray) -> FloatArray:
+        picture = np.zeros(self._where.shape)
+        picture[self._where] = values
+        return picture
+
+
+def _functions_of_normal(rng: np.random.Generator, normal: FloatArray, alike: float) -> FloatArray:
+    """``(4, n)`` of variance one: four smooth random functions of ``(n, 2)`` normals."""
+    width = alike * 0.5 * (_NODES - 1)
+    noise = gaussian_filter(rng.normal(size=(4, _NODES, _NODES)), (0.0, width, width), mode="wrap")
+    noise /= np.sqrt(np.mean(gaussian_filter(_impulse(), width, mode="wrap") ** 2)) * _NODES
+    at = 0.5 * (normal.T + 1.0) * (_NODES - 1)
+    return np.stack([map_coordinates(one, at, order=1, mode="nearest") for one in noise])
+
+
+def _impulse() -> FloatArray:
+    impulse = np.zeros((_NODES, _NODES))
+    impulse[_NODES // 2, _NODES // 2] = 1.0
+    return impulse
+
+
+def _blocks(picture: FloatArray, block: int) -> FloatArray:
+    """Means over blocks, the picture's edge repeated where the last ones reach beyond it."""
+    rows, columns = picture.shape
+    padded = np.pad(picture, ((0, -rows % block), (0, -columns % block)), mode="edge")
+    means: FloatArray = padded.reshape(-(-rows // block), block, -(-columns // block), block).mean(
+        axis=(1, 3)
+    )
+    return means
+
+
+def _widened(coarse: FloatArray, block: int, shape: tuple[int, ...]) -> FloatArray:
+    if block == 1:
+        return coarse
+    wide = zoom(coarse, block, order=1, mode="nearest", grid_mode=True)
+    return np.asarray(wide[: shape[0], : shape[1]])

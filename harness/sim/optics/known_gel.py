@@ -1,0 +1,161 @@
+"""The gel that a press is drawn on: a make by its name, a calibration of ours or a published one."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from harness.basics.arrays import ByteArray
+from harness.basics.errors import CalibrationRefused, WrongUse
+from harness.basics.toml_file import nearest
+from harness.bench.sensor import GELSIGHT_R15, TactileSensor
+from harness.picture.square_pixels import aspect_stated, made_square
+from harness.sim.optics.lit_calibration import read_calibration, shadow_of
+from harness.sim.optics.pressed_gel import Gel
+from harness.sim.optics.published_pack import SHADOWS, TABLE, PublishedPack, is_published, read_published
+from harness.sim.optics.tactile_calibration import (
+    TactileCalibration,
+    shipped_calibration,
+    with_background,
+)
+
+_SAME_PITCH = 0.01
+"""Relative: pitches this near are of the same make."""
+
+
+@dataclass(frozen=True)
+class Make:
+    """A make of tactile camera.
+
+    Attributes:
+        sensor: its geometry.
+        calibration: name of the one that comes with the package; None where there is none.
+    """
+
+    sensor: TactileSensor
+    calibration: str | None = None
+
+
+MAKES = {
+    "gelsight-r1.5": Make(GELSIGHT_R15, "gelsight_r15_bench"),
+    "taxim-gelsight": Make(TactileSensor("GelSight of Taxim", 480, 640, 0.0295e-3, 5.0e-3)),
+}
+"""By the name an operator gives. Taxim's gel is as thick as the dome of its published height map."""
+
+DEFAULT_MAKE = "gelsight-r1.5"
+
+
+def known_gel(
+    make: str | None,
+    calibration: str | None,
+    *,
+    pitch: float | None = None,
+    thickness: float | None = None,
+    background: ByteArray | None = None,
+    shadow: bool | None = None,
+) -> Gel:
+    """Put a gel together from what an operator says of it.
+
+    Args:
+        make: a key of ``MAKES``; None to go by the calibration, or for the default one.
+        calibration: a file of ours, a published folder or the name of a shipped one; None for the make's.
+        pitch: metres a pixel, where neither the make nor the calibration says it.
+        thickness: metres of the gel, in place of the make's.
+        background: ``(rows, columns, 3)`` RGB of the untouched gel as its camera gives it, in place of the
+            calibration's; made square as the calibration's presses were.
+        shadow: whether it casts shadows; None to go by whether a table of them comes with the calibration.
+
+    Raises:
+        WrongUse: an unknown make, or numbers that are missing or contradict each other.
+        CalibrationRefused: a calibration that is missing, damaged or of another camera.
+    """
+    known = _make(make, calibration)
+    pack = _pack(known, calibration, pitch, background)
+    sensor = _sensor(known, pack.calibration, pitch, thickness)
+    if shadow and pack.shadow is None:
+        raise WrongUse(
+            "--shadow needs a table of shadows: a calibration whose presses showed some, or "
+            f"{SHADOWS[0]} beside {TABLE} in --calibration FOLDER"
+        )
+    table = None if shadow is False else pack.shadow
+    return Gel(replace(sensor, casts_shadow=table is not None), pack.calibration, pack.rest, table)
+
+
+def _make(name: str | None, calibration: str | None) -> Make | None:
+    if name is None:
+        return None if calibration is not None else MAKES[DEFAULT_MAKE]
+    if name not in MAKES:
+        raise WrongUse(f"no sensor {name!r}; {nearest(name, MAKES)}")
+    return MAKES[name]
+
+
+def _pack(
+    make: Make | None, calibration: str | None, pitch: float | None, background: ByteArray | None
+) -> PublishedPack:
+    if calibration is not None and is_published(Path(calibration)):
+        stated = pitch if make is None else (pitch or make.sensor.pitch)
+        if stated is None:
+            raise WrongUse(
+                f"{calibration} does not say how large a pixel is; say --pitch 0.0295mm, or the make with "
+                "--sensor"
+            )
+        return read_published(Path(calibration), stated, background)
+    own = _own(make, calibration)
+    if background is None:
+        return PublishedPack(own, None, shadow_of(own))
+    if background.shape != own.background.shape:
+        raise CalibrationRefused(
+            f"the background is {background.shape[0]} x {background.shape[1]} pixels and the calibration "
+            f"{own.rows} x {own.columns}; give the camera's own picture, not cropped"
+        )
+    square = made_square(background, aspect_stated(own.header.made_from))
+    return PublishedPack(with_background(own, square), None, shadow_of(own))
+
+
+def _own(make: Make | None, calibration: str | None) -> TactileCalibration:
+    if calibration is None:
+        assert make is not None
+        if make.calibration is None:
+            raise WrongUse(
+                f"no calibration comes with {make.sensor.name}; give one with --calibration FILE_OR_FOLDER"
+            )
+        return shipped_calibration(make.calibration)
+    path = Path(calibration)
+    if path.is_dir():
+        raise CalibrationRefused(f"{path} has no {TABLE}; a published calibration is a folder that has one")
+    if not path.exists() and path.suffix == "":
+        return shipped_calibration(calibration)
+    return read_calibration(path)
+
+
+def _sensor(
+    make: Make | None, calibration: TactileCalibration, pitch: float | None, thickness: float | None
+) -> TactileSensor:
+    found = calibration.header.pitch
+    if pitch is not None and abs(pitch / found - 1.0) > _SAME_PITCH:
+        raise WrongUse(
+            f"--pitch {pitch * 1e3:g} mm contradicts the calibration, which was made at {found * 1e3:g} mm; "
+            "leave --pitch out"
+        )
+    sensor = _like(calibration) if make is None else make.sensor
+    if sensor is None:
+        if thickness is None:
+            raise WrongUse(
+                f"no known sensor has {calibration.rows} x {calibration.columns} pixels of {found * 1e3:g} "
+                "mm; say how thick the gel is, --thickness 2.5mm"
+            )
+        name = calibration.header.sensor
+        return TactileSensor(name, calibration.rows, calibration.columns, found, thickness)
+    if abs(sensor.pitch / found - 1.0) > _SAME_PITCH:
+        raise WrongUse(
+            f"{sensor.name} has pixels of {sensor.pitch * 1e3:g} mm and the calibration was made at "
+            f"{found * 1e3:g} mm; give the sensor's own, or leave --sensor out"
+        )
+    return sensor if thickness is None else replace(sensor, gel_thickness=thickness)
+
+
+def _like(calibration: TactileCalibration) -> TactileSensor | None:
+    for make in MAKES.values():
+        sensor, pitch = make.sensor, calibration.header.pitch
+        same_shape = (sensor.rows, sensor.columns) == (calibration.rows, calibration.columns)
+        if same_shape and abs(sensor.pitch / pitch - 1.0) <= _SAME_PITCH:
+            return sensor
+    return None

@@ -1,0 +1,172 @@
+"""What the camera behind the gel sees: colour from slope, at three levels.
+
+``exact`` is Taxim's table in double precision; ``fast`` the same table in single precision
+with a polynomial for the arctangent (a pixel differs where its slope lies on the edge of a bin,
+and then by the table's own step); ``smooth`` the polynomial of ``harness.sim.optics.shading``, without bins,
+and with the light of a press where the calibration has it (``harness.sim.optics.lit_calibration``).
+All of them add to the background the change against the untouched gel, so that no contact
+gives the background bit for bit. All see the same surface, held to a grid far below any sensor's noise
+(``harness.sim.optics.kernels.GRID``), so that rounding chooses no colour.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from harness.basics.arrays import ByteArray, FloatArray, IntArray, read_only
+from harness.basics.errors import CalibrationRefused, OutOfDomain
+from harness.sim.optics.fast import PADDED, change_fast, draw_fast, padded
+from harness.sim.optics.kernels import (
+    change_exactly,
+    change_smoothly,
+    draw_exactly,
+    draw_lit,
+    draw_smoothly,
+    to_pixels,
+)
+from harness.sim.optics.lit_calibration import LitCalibration
+from harness.sim.optics.tactile_calibration import Float32Array, TactileCalibration
+
+OpticsLevel = Literal["exact", "fast", "smooth"]
+
+
+@dataclass(frozen=True, eq=False)
+class TactileImages:
+    """Pictures and what they cannot show.
+
+    Attributes:
+        images: ``(n, rows, columns, 3)`` RGB.
+        saturated: ``(n,)`` values clipped to 0 or 255.
+        extrapolated: ``(n,)`` pixels steeper than any press of the calibration, drawn as the
+            steepest it knows.
+    """
+
+    images: ByteArray
+    saturated: IntArray
+    extrapolated: IntArray
+
+
+class Optics:
+    """A calibration made ready to draw at one level; read-only and safe to share by threads.
+
+    Args:
+        calibration: of the sensor.
+        level: how exactly.
+        rest: ``(rows, columns)`` metres, the untouched gel's height towards the camera; flat if None.
+
+    Raises:
+        CalibrationRefused: ``smooth`` was asked of a calibration that has only a table.
+        OutOfDomain: a rest surface of another shape, or not finite.
+    """
+
+    calibration: TactileCalibration
+    level: OpticsLevel
+
+    def __init__(
+        self, calibration: TactileCalibration, level: OpticsLevel, rest: FloatArray | None = None
+    ) -> None:
+        shape = calibration.background.shape[:2]
+        if level not in ("exact", "fast", "smooth"):
+            raise OutOfDomain(f"no optics level {level!r}; there are exact, fast, smooth")
+        if level == "smooth" and len(calibration.smooth) == 0:
+            raise CalibrationRefused(
+                "this calibration has no smooth model; ask for exact or fast, or fit it again"
+            )
+        if rest is not None and (rest.shape != shape or not np.isfinite(rest).all()):
+            raise OutOfDomain(f"the rest surface is {rest.shape}, not finite or not the camera's {shape}")
+        self.calibration = calibration
+        self.level = level
+        self._rest = np.zeros(shape) if rest is None else np.asarray(rest, dtype=np.float64)
+
+    def render(self, indentation: FloatArray) -> TactileImages:
+        """Pictures of pressed gels.
+
+        Args:
+            indentation: ``(n, rows, columns)`` metres of the gel's surface towards the camera,
+                as ``gel.deform`` gives it.
+
+        Raises:
+            OutOfDomain: another shape than the camera's, or a height that is not finite.
+        """
+        self._refuse(indentation)
+        images = np.empty((*indentation.shape, 3), np.uint8)
+        counts = np.empty((len(indentation), 2), np.int64)
+        for n, pressed in enumerate(indentation):
+            counts[n] = self._draw(self._surface(pressed), images[n])
+        return TactileImages(read_only(images), read_only(counts[:, 0]), read_only(counts[:, 1]))
+
+    def _surface(self, pressed: FloatArray) -> FloatArray:
+        """``(rows, columns)`` the gel's height in pixels, on the grid."""
+        surface = np.empty(self._rest.shape)
+        to_pixels(self._rest, pressed, 1.0 / self.calibration.header.pitch, surface)
+        return surface
+
+    def _draw(self, z: FloatArray, image: ByteArray) -> tuple[int, int]:
+        known = self.calibration
+        if self.level == "exact":
+            return draw_exactly(z, self._table, self._base, self._steepest, image)
+        if self.level == "fast":
+            return draw_fast(z, known.bins, self._padded, self._base_fast, self._steepest, image)
+        if isinstance(known, LitCalibration):
+            light = known.light * known.header.pitch
+            return draw_lit(
+                z, z - self._untouched, known.slopes, light, self._base, known.header.slope_limit, image
+            )
+        return draw_smoothly(z, known.smooth, self._base, known.header.slope_limit, image)
+
+    @property
+    def _steepest(self) -> float:
+        limit = self.calibration.header.slope_limit
+        return limit / np.sqrt(1.0 - limit * limit) if limit < 1.0 else np.inf
+
+    @cached_property
+    def _table(self) -> FloatArray:
+        return self.calibration.table.astype(np.float64)
+
+    @cached_property
+    def _padded(self) -> Float32Array:
+        return padded(self.calibration.table)
+
+    @property
+    def _slopes(self) -> FloatArray:
+        known = self.calibration
+        return known.slopes if isinstance(known, LitCalibration) else known.smooth
+
+    @cached_property
+    def _untouched(self) -> FloatArray:
+        return self._surface(np.zeros_like(self._rest))
+
+    @cached_property
+    def _base(self) -> FloatArray:
+        # Background less what the untouched gel's own slope would add: no contact adds it back.
+        change = np.empty(self.calibration.background.shape)
+        z = self._untouched
+        if self.level == "exact":
+            change_exactly(z, self._table, change)
+        else:
+            change_smoothly(z, self._slopes, self.calibration.header.slope_limit, change)
+        base: FloatArray = self.calibration.background - change
+        return base
+
+    @cached_property
+    def _base_fast(self) -> Float32Array:
+        rows, columns = self._rest.shape
+        change = np.empty((rows, columns, PADDED), np.float32)
+        change_fast(self._untouched, self.calibration.bins, self._padded, change)
+        base = np.zeros_like(change)
+        base[..., :3] = self.calibration.background - change[..., :3]
+        return base
+
+    def _refuse(self, indentation: FloatArray) -> None:
+        shape = self.calibration.background.shape[:2]
+        if indentation.ndim != 3 or indentation.shape[1:] != shape:
+            raise OutOfDomain(
+                f"heights are {indentation.shape}; this camera's are (n, {shape[0]}, {shape[1]})"
+            )
+        bad = ~np.isfinite(indentation).all(axis=(1, 2))
+        if bad.any():
+            raise OutOfDomain(
+                f"the heights of contact {int(np.argmax(bad))} are not finite; there is no such gel"
+            )

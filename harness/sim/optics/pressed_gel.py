@@ -1,0 +1,67 @@
+"""A gel that can be pressed: its sensor, and all that is known of it."""
+
+from dataclasses import dataclass, replace
+
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import DataRefused
+from harness.bench.sensor import TactileSensor
+from harness.picture.square_pixels import aspect_stated
+from harness.sim.gel.elastic import NOT_MEASURED, GelElastic
+from harness.sim.gel.force_table import ForceTable
+from harness.sim.gel.marker_file import MarkerFile
+from harness.sim.optics.shadow import ShadowTable
+from harness.sim.optics.tactile_calibration import TactileCalibration
+
+
+@dataclass(frozen=True, eq=False)
+class Gel:
+    """A sensor and all that is known of its gel.
+
+    Attributes:
+        sensor: its geometry; whether it casts shadows is said by ``shadow``.
+        calibration: of its colours.
+        rest: ``(rows, columns)`` metres, the untouched surface towards the camera; None for the sensor's.
+        shadow: of its light; None for one that casts none.
+        noise: grey levels, sigma of the camera's; 0 for none.
+        seed: of the noise.
+        dots: printed on it, as they were measured; None for the sensor's own grid, if it has one.
+        elastic: how stiff it is.
+        forces: measured on it; None where nobody did.
+    """
+
+    sensor: TactileSensor
+    calibration: TactileCalibration
+    rest: FloatArray | None = None
+    shadow: ShadowTable | None = None
+    noise: float = 0.0
+    seed: int = 0
+    dots: MarkerFile | None = None
+    elastic: GelElastic = NOT_MEASURED
+    forces: ForceTable | None = None
+
+    def __post_init__(self) -> None:
+        seen = (self.calibration.rows, self.calibration.columns)
+        if seen != (self.sensor.rows, self.sensor.columns):
+            raise DataRefused(
+                f"the calibration is of {seen[0]} x {seen[1]} pixels and {self.sensor.name} has "
+                f"{self.sensor.rows} x {self.sensor.columns}; give the sensor's own calibration"
+            )
+        if self.dots is not None:
+            self._require_own_dots(self.dots)
+
+    @property
+    def aspect(self) -> float:
+        """A pixel's height over its width in what the camera gives: live pictures are made square by it."""
+        return aspect_stated(self.calibration.header.made_from)
+
+    def with_dots(self, dots: MarkerFile) -> "Gel":
+        """The same gel with the dots measured on it; ``DataRefused`` for those of another picture."""
+        return replace(self, sensor=replace(self.sensor, markers=dots.grid(self.sensor.pitch)), dots=dots)
+
+    def _require_own_dots(self, dots: MarkerFile) -> None:
+        seen, own = (dots.picture_rows, dots.picture_columns), (self.sensor.rows, self.sensor.columns)
+        if seen != own:
+            raise DataRefused(
+                f"the dots were measured in a picture of {seen[0]} x {seen[1]} pixels and {self.sensor.name} "
+                f"has {own[0]} x {own[1]}; measure them at the sensor's own resolution"
+            )

@@ -1,0 +1,155 @@
+"""Shadows that a contact throws over the gel under grazing light, from a measured table.
+
+Taxim's construction (Si and Yuan, 2022, section III-C): every pixel on the contact's rim throws
+a fan of rays outwards along its slope; along each the colour is held down to what a pin of
+that depth was seen to leave. For sensors whose light grazes; others need no such effect.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.basics.errors import CalibrationRefused, OutOfDomain
+from harness.sim.optics.shadow_kernels import CHANNELS, Lists, throw
+from harness.sim.optics.tactile_calibration import Float32Array
+
+RIM = 4
+"""Pixels to each side by which the rim of a contact reaches past it."""
+
+Beyond = Literal["hold", "skip"]
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowTable:
+    """What pins pressed into the gel were seen to throw.
+
+    Attributes:
+        directions: ``(d,)`` rad, evenly spaced over a turn: the middle of a list's fan. The k-th list is of
+            slopes that fall in directions from k spacings to k + 1.
+        lengths: ``(3, d, k)`` how many samples each channel, direction and depth has.
+        values: the samples, one list after another in the order of ``lengths``: grey levels
+            against the untouched gel, outwards from the pin.
+        shallowest: metres, the depth at which the first of the ``k`` rows begins.
+        depth_step: metres from row to row, above zero.
+        sample_step: pixels between samples.
+        fan: rad to either side of the slope's direction that are shaded too.
+        fan_step: rad between rays.
+    """
+
+    directions: FloatArray
+    lengths: IntArray
+    values: FloatArray
+    shallowest: float
+    depth_step: float = 0.1e-3
+    sample_step: float = 1.25
+    fan: float = 0.1
+    fan_step: float = 0.05
+
+    def __post_init__(self) -> None:
+        if self.lengths.ndim != 3 or self.lengths.shape[:2] != (3, len(self.directions)):
+            raise CalibrationRefused(
+                f"shadow lists are {self.lengths.shape}, for {len(self.directions)} directions"
+            )
+        if int(self.lengths.sum()) != len(self.values) or not np.isfinite(self.values).all():
+            raise CalibrationRefused(
+                f"the shadow lists have {int(self.lengths.sum())} samples; {len(self.values)} came"
+            )
+        if not (self.depth_step > 0.0 and self.sample_step > 0.0 and self.fan_step > 0.0):
+            raise CalibrationRefused(
+                f"shadows in steps of {self.depth_step:g} m, {self.sample_step:g} px and "
+                f"{self.fan_step:g} rad cannot be: all three are above zero; fit the calibration again"
+            )
+
+    @cached_property
+    def longest(self) -> IntArray:
+        """``(d, k)`` samples of the longest of the three channels' lists."""
+        return read_only(np.ascontiguousarray(self.lengths.max(axis=0)).astype(np.int64))
+
+    @cached_property
+    def levels(self) -> FloatArray:
+        """``(d, k, samples, CHANNELS)`` the lists of all channels side by side, +inf beyond their ends."""
+        levels = np.full((*self.lengths.shape[1:], int(self.lengths.max(initial=0)), CHANNELS), np.inf)
+        lists = np.split(self.values, np.cumsum(self.lengths.ravel())[:-1])
+        for (c, d, k), one in zip(np.ndindex(self.lengths.shape), lists, strict=True):
+            levels[d, k, : len(one), c] = one
+        return read_only(levels)
+
+    @cached_property
+    def levels_single(self) -> Float32Array:
+        """``levels`` in single precision."""
+        single: Float32Array = self.levels.astype(np.float32)
+        return read_only(single)
+
+    @cached_property
+    def rays(self) -> FloatArray:
+        """``(d, rays, samples, 2)`` pixels down and along from the rim to each sample; NaN of no ray."""
+        fans = [np.arange(one - self.fan, one + self.fan, self.fan_step) for one in self.directions]
+        samples = int(self.lengths.max(initial=0))
+        rays = np.full((len(fans), max(len(fan) for fan in fans), samples, 2), np.nan)
+        for d, fan in enumerate(fans):
+            across = self.sample_step * np.stack([np.sin(fan), np.cos(fan)], axis=-1)
+            rays[d, : len(fan)] = np.arange(samples)[None, :, None] * across[:, None, :]
+        return read_only(rays)
+
+    def lists(self, levels: FloatArray | Float32Array) -> Lists:
+        """What the loops take, with ``levels`` or ``levels_single``."""
+        step = float(self.directions[1] - self.directions[0])
+        return levels, self.longest, self.rays, (self.shallowest, self.depth_step, step)
+
+
+def rim(core: BoolArray) -> BoolArray:
+    """``(rows, columns)`` the ring of four pixels around a contact, from which shadows are thrown."""
+    wide = cv2.dilate(core.view(np.uint8), np.ones((2 * RIM + 1, 2 * RIM + 1), np.uint8))
+    ring: BoolArray = np.asarray(wide, dtype=np.bool_) & ~core
+    return ring
+
+
+def cast_shadows(
+    change: FloatArray,
+    indentation: FloatArray,
+    surface: FloatArray,
+    core: BoolArray,
+    table: ShadowTable,
+    *,
+    beyond: Beyond = "hold",
+) -> tuple[FloatArray, FloatArray]:
+    """Darken the change of colour by the shadows of every contact.
+
+    Args:
+        change: ``(n, rows, columns, 3)`` grey levels against the untouched gel.
+        indentation: ``(n, rows, columns)`` metres; chooses the row of the table.
+        surface: ``(n, rows, columns)`` the gel's height in pixels, its own dome included; it throws
+            shadows only downhill.
+        core: ``(n, rows, columns)`` where the object touches.
+        table: of the sensor, channels in the order of ``change``.
+        beyond: what a rim pixel does whose depth is not in the table: ``"hold"`` takes the
+            nearest row, ``"skip"`` throws no shadow, as the published program does.
+
+    Returns:
+        The changed colours, and ``(n,)`` the share of rim pixels whose depth was not in the table.
+        A contact without a core is handed on to the bit.
+
+    Raises:
+        OutOfDomain: no such policy, or shapes that disagree.
+    """
+    if beyond not in ("hold", "skip"):
+        raise OutOfDomain(f"no way {beyond!r} of leaving the shadow table; there are hold, skip")
+    if not change.shape[:-1] == indentation.shape == surface.shape == core.shape:
+        raise OutOfDomain(
+            f"colours {change.shape}, heights {indentation.shape} and core {core.shape} disagree"
+        )
+    lists = table.lists(table.levels)
+    shaded, outside = change.copy(), np.zeros(len(change))
+    for n in range(len(change)):
+        ring = rim(core[n])
+        if not ring.any():
+            continue
+        floor = np.full((*ring.shape, CHANNELS), np.inf)
+        thrown, missing = throw(floor, surface[n], indentation[n], ring, lists, beyond == "hold")
+        np.minimum(shaded[n], floor[..., :3], out=shaded[n])
+        outside[n] = missing / thrown
+    return read_only(shaded), read_only(outside)

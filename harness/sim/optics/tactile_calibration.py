@@ -1,0 +1,256 @@
+"""The calibration artefact of a tactile camera: one ``.npz`` without pickles, hashed and dated."""
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile, is_zipfile
+
+import numpy as np
+import numpy.typing as npt
+
+from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
+from harness.basics.errors import CalibrationRefused
+
+SCHEMA = 1
+CHANNEL_ORDER = "RGB"
+NORMAL_DEGREE = 5
+POSITION_DEGREE = 2
+TABLE_TERMS = 6
+
+Float32Array = npt.NDArray[np.float32]
+
+_SHIPPED = Path(__file__).parent / "data"
+
+
+@dataclass(frozen=True)
+class GelSkirt:
+    """How a gel hangs from what presses it: blurs repeated with the core put back.
+
+    The constants of Taxim (Si and Yuan, 2022) and ObjectFolder 2.0, in pixels of the sensor.
+
+    Attributes:
+        kernels: odd widths in pixels of the Gaussian blurs, widest first.
+        final: odd width in pixels of the last blur, over the core too.
+        core: share of the greatest penetration above which the object shapes the gel.
+    """
+
+    kernels: tuple[int, ...] = (11, 5)
+    final: int = 5
+    core: float = 0.2
+
+
+@dataclass(frozen=True)
+class CalibrationHeader:
+    """What a calibration says of itself.
+
+    Attributes:
+        sensor: make.
+        serial: of the very sensor.
+        date: ISO 8601, of the fit.
+        made_from: the presses it was fitted to.
+        licence: of those presses.
+        pitch: metres a pixel.
+        ball_radius: metres, of the ball that was pressed.
+        slope_limit: sine of the steepest slope supported by the presses; steeper ones read as this.
+        held_out_db: median PSNR in decibels over presses left out of the fit, smooth model.
+        held_out_table_db: the same, table.
+        residual_rms: grey levels, of the smooth model over the presses.
+        condition: of the normalised least-squares problem.
+        skirt: of the gel.
+        schema: of the file.
+        channel_order: of every image and coefficient.
+    """
+
+    sensor: str
+    serial: str
+    date: str
+    made_from: str
+    licence: str
+    pitch: float
+    ball_radius: float
+    slope_limit: float
+    held_out_db: float
+    held_out_table_db: float
+    residual_rms: float
+    condition: float
+    skirt: GelSkirt = field(default_factory=GelSkirt)
+    schema: int = SCHEMA
+    channel_order: str = CHANNEL_ORDER
+
+
+@dataclass(frozen=True, eq=False)
+class TactileCalibration:
+    """How a gel's slope becomes colour.
+
+    Slope magnitude m in [0, pi/2) and direction d in (-pi, pi] of the gel surface, its height
+    growing towards the camera, index the table (Si and Yuan, Taxim, 2022, section III):
+    row ``floor(m / (pi/2 / (bins - 1)))``, column ``floor((d + pi) / (2 pi / (bins - 1)))``.
+
+    Attributes:
+        header: provenance and quality.
+        background: ``(rows, columns, 3)`` what the camera sees of the untouched gel.
+        table: ``(bins, bins, 6, 3)`` grey levels per (x^2, y^2, xy, x, y, 1), x and y in pixels.
+        support: ``(bins, bins)`` whether presses reached the bin.
+        smooth: ``(20 * 6, 3)`` coefficients of the polynomial of ``harness.sim.optics.shading``;
+            ``(0, 3)`` where only a table is known.
+    """
+
+    header: CalibrationHeader
+    background: ByteArray
+    table: Float32Array
+    support: BoolArray
+    smooth: FloatArray
+
+    def __post_init__(self) -> None:
+        _check(self)
+        for name, array in self.arrays.items():
+            object.__setattr__(self, name, read_only(np.ascontiguousarray(array)))
+
+    @property
+    def arrays(self) -> dict[str, AnyArray]:
+        """Every array by its name in the file."""
+        return {
+            "background": self.background,
+            "table": self.table,
+            "support": self.support,
+            "smooth": self.smooth,
+        }
+
+    @property
+    def rows(self) -> int:
+        """Pixels."""
+        return int(self.background.shape[0])
+
+    @property
+    def columns(self) -> int:
+        """Pixels."""
+        return int(self.background.shape[1])
+
+    @property
+    def bins(self) -> int:
+        """Rows and columns of the table."""
+        return int(self.table.shape[0])
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of header and arrays: the identity of this calibration in a recording."""
+        digest = hashlib.sha256(_header_text(self.header).encode())
+        for name, array in sorted(self.arrays.items()):
+            digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+            digest.update(array.tobytes())
+        return digest.hexdigest()
+
+
+def shipped_calibration(name: str) -> TactileCalibration:
+    """A calibration that comes with the package.
+
+    Args:
+        name: ``"gelsight_r15_bench"`` or ``"gelsight_r15_world"``: one sensor, disjoint presses.
+
+    Raises:
+        CalibrationRefused: no such name.
+    """
+    names = sorted(path.stem for path in _SHIPPED.glob("*.npz"))
+    if name not in names:
+        raise CalibrationRefused(f"no shipped calibration {name!r}; there are {', '.join(names)}")
+    return load_calibration(_SHIPPED / f"{name}.npz")
+
+
+def save_calibration(calibration: TactileCalibration, path: Path) -> None:
+    """Write a calibration; the same one gives the same bytes.
+
+    Args:
+        calibration: what to write.
+        path: ending in ``.npz``.
+    """
+    text = json.dumps({"header": asdict(calibration.header), "sha256": calibration.sha256}, sort_keys=True)
+    arrays: dict[str, Any] = dict(calibration.arrays)
+    np.savez_compressed(path, header=np.array(text), **arrays)
+
+
+def load_calibration(path: Path) -> TactileCalibration:
+    """Read a calibration, strictly.
+
+    Raises:
+        CalibrationRefused: missing, of another schema, incomplete, or not what was written.
+    """
+    if path.is_file() and not is_zipfile(path):
+        raise CalibrationRefused(
+            f"{path} does not read as a calibration: it is no .npz archive; give what touchstone calibrate "
+            "taxim wrote"
+        )
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            found = {name: archive[name] for name in archive.files}
+    except (OSError, EOFError, ValueError, BadZipFile) as error:
+        raise CalibrationRefused(f"{path} does not read as a calibration: {error}") from error
+    wanted = {"header", "background", "table", "support", "smooth"}
+    if set(found) != wanted:
+        raise CalibrationRefused(f"{path} holds {sorted(found)} where a calibration holds {sorted(wanted)}")
+    header, sha256 = _parse(str(found.pop("header")), path)
+    calibration = TactileCalibration(header, **found)
+    if calibration.sha256 != sha256:
+        raise CalibrationRefused(
+            f"{path} is not what was written: its contents hash to {calibration.sha256[:12]}"
+        )
+    return calibration
+
+
+def with_background(calibration: TactileCalibration, background: ByteArray) -> TactileCalibration:
+    """The same colours over another picture of the untouched gel, ``(rows, columns, 3)`` RGB."""
+    return replace(calibration, background=background)
+
+
+def _header_text(header: CalibrationHeader) -> str:
+    return json.dumps(asdict(header), sort_keys=True)
+
+
+def _parse(text: str, path: Path) -> tuple[CalibrationHeader, str]:
+    try:
+        outer = json.loads(text)
+        inner = dict(outer["header"])
+        if inner["schema"] != SCHEMA:
+            raise CalibrationRefused(
+                f"{path} has schema {inner['schema']}; this version reads {SCHEMA}: fit it again"
+            )
+        if set(inner) != {item.name for item in fields(CalibrationHeader)}:
+            raise CalibrationRefused(f"{path} has header keys {sorted(inner)}; fit it again")
+        skirt = inner.pop("skirt")
+        inner["skirt"] = GelSkirt(tuple(skirt["kernels"]), skirt["final"], skirt["core"])
+        return CalibrationHeader(**inner), str(outer["sha256"])
+    except (json.JSONDecodeError, KeyError, TypeError) as error:
+        raise CalibrationRefused(f"{path} has no readable header: {error!r}") from error
+
+
+def _check(calibration: TactileCalibration) -> None:
+    header, bins = calibration.header, len(calibration.table)
+    wanted: list[tuple[str, AnyArray, tuple[int, ...], str]] = [
+        ("background", calibration.background, (calibration.rows, calibration.columns, 3), "uint8"),
+        ("table", calibration.table, (bins, bins, TABLE_TERMS, 3), "float32"),
+        ("support", calibration.support, (bins, bins), "bool"),
+        ("smooth", calibration.smooth, (len(calibration.smooth), 3), "float64"),
+    ]
+    for name, array, shape, kind in wanted:
+        if array.shape != shape or array.dtype.name != kind:
+            raise CalibrationRefused(
+                f"{name} is {array.dtype} {array.shape}; a calibration holds {kind} {shape}"
+            )
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            raise CalibrationRefused(f"{name} holds numbers that are not finite; fit the calibration again")
+    if len(calibration.smooth) not in (0, smooth_terms()):
+        raise CalibrationRefused(
+            f"smooth has {len(calibration.smooth)} terms; there are {smooth_terms()}, or none"
+        )
+    if header.channel_order != CHANNEL_ORDER:
+        raise CalibrationRefused(f"channel order {header.channel_order!r} was declared; only RGB is read")
+    if not (header.pitch > 0.0 and 0.0 < header.slope_limit <= 1.0):
+        raise CalibrationRefused(f"pitch {header.pitch} m and slope limit {header.slope_limit} cannot be")
+
+
+def smooth_terms() -> int:
+    """How many coefficients a channel of the smooth model has."""
+    normals = (NORMAL_DEGREE + 1) * (NORMAL_DEGREE + 2) // 2 - 1
+    return normals * (POSITION_DEGREE + 1) * (POSITION_DEGREE + 2) // 2

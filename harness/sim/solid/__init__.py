@@ -1,0 +1,1 @@
+"""From any mesh file to a solid: intake, repair, walls, tetrahedra, elements."""

@@ -1,0 +1,67 @@
+"""A surface filled once: the same tetrahedra whenever the same filling is asked for again.
+
+fTetWild puts the faces of the surface in an order that it draws from the machine's entropy, which no
+option of it changes: two fillings of one surface have other cells, and as many only about. Kept by what
+they were made from, one machine has one answer.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from harness.basics.mesh import Mesh
+from harness.basics.store import Store, digest
+from harness.sim.solid.modal_kernels import EDGES
+from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedra, tetrahedralize
+
+VERSION = 2
+"""Raised with every change of how a surface is filled, so that what is kept is dropped."""
+
+_LONGER = 1.25
+"""Of the edge asked for, the edges' root mean square beyond which the surface is filled again."""
+
+_STRICTER = 10.0
+"""fTetWild's own default of the energy at which it stops; it takes about twice as long."""
+
+
+def filled(
+    mesh: Mesh, edge: float, store: Store | None, envelope: float | None = None
+) -> tuple[Tetrahedra, bool]:
+    """The tetrahedra of ``tetrahedralize``, from the store if they are there.
+
+    Args:
+        mesh: closed, outward, in metres.
+        edge: m, longest edge aimed at.
+        store: where they are kept; None to fill.
+        envelope: m, how far cells may leave the surface, see ``tetrahedralize``; None for its own.
+
+    Returns:
+        The tetrahedra, and whether they were kept.
+
+    Raises:
+        WrongUse: an edge or an envelope that cannot be.
+        MeshRefused: a surface that cannot be filled.
+    """
+    told = [] if envelope is None else [float(envelope)]
+    key = digest(["filled", VERSION, mesh.vertices, mesh.faces, float(edge), *told])
+    kept = store.get(key) if store is not None else None
+    if isinstance(kept, Mapping):
+        return tetrahedra(kept["nodes"], kept["cells"]), True
+    found = _fine(mesh, edge, envelope)
+    if store is not None:
+        store.put(key, {"nodes": found.nodes, "cells": found.cells})
+    return found, False
+
+
+def _fine(mesh: Mesh, edge: float, envelope: float | None) -> Tetrahedra:
+    """Filled, and once more where it stopped with edges much longer than asked for."""
+    found = tetrahedralize(mesh, edge, envelope)
+    if _typical_edge(found) <= _LONGER * edge:
+        return found
+    return tetrahedralize(mesh, edge, envelope, _STRICTER)
+
+
+def _typical_edge(of: Tetrahedra) -> float:
+    """Metres: root mean square over the edges of all cells."""
+    ends = of.nodes[of.cells[:, EDGES]]
+    return float(np.sqrt(((ends[:, :, 0] - ends[:, :, 1]) ** 2).sum(axis=2).mean()))

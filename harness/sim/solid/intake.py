@@ -1,0 +1,256 @@
+"""Any mesh file, made into an object one can touch, or refused with a reason."""
+
+import hashlib
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from harness.basics.errors import MeshRefused, WrongUse
+from harness.basics.mesh import Mesh
+from harness.sim.solid.mesh_holes import fill_holes, join_bodies
+from harness.sim.solid.mesh_read import RawMesh, read_mesh
+from harness.sim.solid.mesh_repair import (
+    Surface,
+    boundary_edges,
+    drop_collapsed,
+    drop_duplicates,
+    drop_flat,
+    drop_specks,
+    is_watertight,
+    orient,
+    weld,
+)
+
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+"""Metres in one unit of a mesh file, by the unit's name."""
+
+_ASKED_ABOUT = ("m", "cm", "mm")
+_SMALLEST, _LARGEST = 5e-3, 2.0
+_SOLID_FILL, _SOLID_VOLUME = 0.6, 1e-4
+
+
+@dataclass(frozen=True)
+class IntakeReport:
+    """What was in the file and what was done to it.
+
+    Attributes:
+        file: its name.
+        sha256: hash of its bytes.
+        units: the unit its numbers were taken in.
+        units_from: "asked", "declared by the file" or "the only reading of its size".
+        scale: factor applied after the unit.
+        vertices_before: in the file.
+        faces_before: in the file.
+        vertices: handed on.
+        faces: handed on.
+        bodies: separate pieces handed on.
+        watertight: whether every edge joins two faces.
+        longest_side: metres.
+        area: square metres of surface.
+        volume: cubic metres enclosed; None where the surface is not closed.
+        wall: metres of wall the operator stated, or None.
+        repairs: what was done, in order.
+        warnings: what the operator should look at.
+        seconds: how long it took.
+    """
+
+    file: str
+    sha256: str
+    units: str
+    units_from: str
+    scale: float
+    vertices_before: int
+    faces_before: int
+    vertices: int
+    faces: int
+    bodies: int
+    watertight: bool
+    longest_side: float
+    area: float
+    volume: float | None
+    wall: float | None
+    repairs: tuple[str, ...]
+    warnings: tuple[str, ...]
+    seconds: float
+
+    def mass(self, density: float) -> float | None:
+        """Kilograms at ``density`` kg/m^3; None where neither a wall nor a closed surface says.
+
+        With a wall, a closed surface is the outside of a shell and an open one its middle.
+        """
+        if self.wall is not None:
+            return density * self.wall * self.area
+        return None if self.volume is None else density * self.volume
+
+
+@dataclass(frozen=True, eq=False)
+class Intake:
+    """An object's surface in metres, and how it came about."""
+
+    mesh: Mesh
+    report: IntakeReport
+
+
+def take_in(path: Path, units: str | None, scale: float = 1.0, wall: float | None = None) -> Intake:
+    """Read, weld, clean, orient and measure a mesh.
+
+    Args:
+        path: any file trimesh or meshio reads.
+        units: "m", "cm", "mm" or "in"; None to take the unit the file declares, or the only
+            one that gives a size between 5 mm and 2 m.
+        scale: factor on top of the unit, greater than zero.
+        wall: metres, the wall thickness of a hollow thing of which the file has the outside.
+
+    Returns:
+        The mesh in metres in the file's own frame, outward, and a report.
+
+    Raises:
+        WrongUse: an unknown unit, a bad scale or wall, or two readings of the size.
+        MeshRefused: nothing in the file can stand for an object.
+    """
+    begun = time.perf_counter()
+    _check_arguments(units, scale, wall)
+    raw = read_mesh(path)
+    surface = _cleaned(raw, path.name)
+    unit, source = _unit(units, raw.unit, surface.size, path.name)
+    surface.vertices = surface.vertices * (METRES[unit] * scale)
+    _check_size(surface.size, unit, scale, path.name)
+    pieces, watertight = _closed(surface)
+    drop_flat(surface)
+    mesh = Mesh(surface.vertices, surface.faces)
+    longest = float((mesh.bounds[1] - mesh.bounds[0]).max())
+    _check_wall(wall, mesh)
+    report = IntakeReport(
+        file=path.name,
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        units=unit,
+        units_from=source,
+        scale=scale,
+        vertices_before=len(raw.vertices),
+        faces_before=len(raw.faces),
+        vertices=len(mesh.vertices),
+        faces=len(mesh.faces),
+        bodies=pieces,
+        watertight=watertight,
+        longest_side=longest,
+        area=float(mesh.face_areas.sum()),
+        volume=_volume(mesh) if watertight else None,
+        wall=wall,
+        repairs=tuple(surface.repairs),
+        warnings=_warnings(mesh, watertight, pieces, wall),
+        seconds=time.perf_counter() - begun,
+    )
+    return Intake(mesh, report)
+
+
+def _check_arguments(units: str | None, scale: float, wall: float | None) -> None:
+    if units is not None and units not in METRES:
+        raise WrongUse(f"unknown unit {units!r} for a mesh; say one of {', '.join(METRES)}")
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise WrongUse(f"a scale of {scale:g} makes no object; say a number greater than 0")
+    if wall is not None and not (np.isfinite(wall) and wall > 0.0):
+        raise WrongUse(
+            f"a wall of {wall * 1e3:g} mm is none; say a thickness greater than 0, or leave it out"
+        )
+
+
+def _cleaned(raw: RawMesh, name: str) -> Surface:
+    """Welded, without collapsed or repeated faces and specks; still in the file's unit."""
+    surface = Surface(raw.vertices, raw.faces)
+    surface.keep(np.ones(len(raw.faces), dtype=np.bool_))
+    bad = int(np.count_nonzero(~np.isfinite(surface.vertices).all(axis=1)))
+    if bad:
+        raise MeshRefused(
+            f"{name}: {bad} of {len(surface.vertices)} vertices are not finite numbers; export it again"
+        )
+    if surface.size == 0.0:
+        raise MeshRefused(f"{name}: all {len(surface.faces)} faces lie in one point; export it again")
+    weld(surface)
+    drop_collapsed(surface)
+    drop_duplicates(surface)
+    _check_surface(surface, name)
+    drop_specks(surface)
+    return surface
+
+
+def _check_surface(surface: Surface, name: str) -> None:
+    area = float(surface.areas().sum())
+    if len(surface.faces) < 4 or not area > 1e-13 * surface.size**2:
+        raise MeshRefused(
+            f"{name}: {len(surface.faces)} faces with a total area of {area:.1e} (size {surface.size:.3g}) "
+            "remain after welding; at least 4 faces with an area make an object"
+        )
+
+
+def _closed(surface: Surface) -> tuple[int, bool]:
+    orient(surface)
+    fill_holes(surface)
+    pieces = join_bodies(surface)
+    return pieces, is_watertight(surface.faces)
+
+
+def _unit(asked: str | None, declared: str | None, size: float, name: str) -> tuple[str, str]:
+    if asked is not None:
+        return asked, "asked"
+    if declared is not None:
+        return declared, "declared by the file"
+    readings = [unit for unit in _ASKED_ABOUT if _SMALLEST <= size * METRES[unit] <= _LARGEST]
+    if len(readings) == 1:
+        return readings[0], "the only reading of its size"
+    if not readings:
+        raise MeshRefused(
+            f"{name}: the longest side is {size:.4g}; read as m, cm or mm that is never between "
+            f"{_SMALLEST * 1e3:g} mm and {_LARGEST:g} m; check the file"
+        )
+    said = " or ".join(f"{size:.4g} {unit} ({size * METRES[unit]:.3g} m)" for unit in readings)
+    ways = " or ".join(f"--units {unit}" for unit in readings)
+    raise WrongUse(f"{name}: the longest side is {size:.4g}: {said}? say {ways}")
+
+
+def _check_size(size: float, unit: str, scale: float, name: str) -> None:
+    if not _SMALLEST <= size <= _LARGEST:
+        raise MeshRefused(
+            f"{name}: read in {unit} at scale {scale:g} the longest side is {size:.4g} m, outside "
+            f"{_SMALLEST * 1e3:g} mm to {_LARGEST:g} m; say other units or another scale"
+        )
+
+
+def _check_wall(wall: float | None, mesh: Mesh) -> None:
+    thinnest = float((mesh.bounds[1] - mesh.bounds[0]).min())
+    if wall is not None and thinnest > 0.0 and wall > 0.5 * thinnest:
+        raise WrongUse(
+            f"a wall of {wall * 1e3:g} mm is more than half of the object's thinnest side, "
+            f"{thinnest * 1e3:.3g} mm; say a thinner wall, or leave it out for a solid"
+        )
+
+
+def _volume(mesh: Mesh) -> float:
+    a, b, c = mesh.corners[:, 0], mesh.corners[:, 1], mesh.corners[:, 2]
+    return float(np.einsum("ij,ij->i", a - mesh.vertices[0], np.cross(b - a, c - a)).sum() / 6.0)
+
+
+def _warnings(mesh: Mesh, watertight: bool, pieces: int, wall: float | None) -> tuple[str, ...]:
+    said = []
+    if not watertight:
+        rim = len(boundary_edges(mesh.faces))
+        said.append(f"the surface is open ({rim} rim edges): touch is right, mass and sound need a wall")
+    if pieces > 1:
+        said.append(f"{pieces} separate pieces are taken as one rigid object")
+    if wall is None and _looks_filled(mesh):
+        said.append(
+            "the surface encloses nearly its whole outline: if the thing is hollow (can, bottle, pitcher) "
+            "this is a scan of its outside; its mass and sound will be those of a solid unless --wall says so"
+        )
+    return tuple(said)
+
+
+def _looks_filled(mesh: Mesh) -> bool:
+    """Large and filling most of its convex hull, as vessels scanned from outside do."""
+    try:
+        hull = float(ConvexHull(mesh.vertices).volume)
+    except QhullError:
+        return False
+    return hull > _SOLID_VOLUME and _volume(mesh) > _SOLID_FILL * hull

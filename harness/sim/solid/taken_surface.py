@@ -1,0 +1,53 @@
+"""The surface that a user names: a file's, or one of our own objects'."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
+from harness.bench.scene import BUILTIN
+from harness.objects.household import build
+from harness.sim.solid.intake import take_in
+from harness.sim.solid.walls import walled
+
+
+@dataclass(frozen=True, eq=False)
+class TakenSurface:
+    """A closed surface around an object's material.
+
+    Attributes:
+        mesh: in metres.
+        units: of the file's numbers; metres of a built-in object.
+        said: what was done to the mesh and what to look at.
+    """
+
+    mesh: Mesh
+    units: str
+    said: tuple[str, ...]
+
+
+def surface_of(mesh: str, units: str | None, wall: float | None) -> TakenSurface:
+    """The surface of an object's material.
+
+    Args:
+        mesh: a file of a surface, or ``builtin:`` and a name.
+        units: of the file's numbers; None to take the only ones that make sense.
+        wall: m, of a hollow thing of which the file has the outside.
+
+    Raises:
+        MeshRefused: a mesh that cannot stand for an object.
+        WrongUse: no such file or built-in object; units or a wall that cannot be.
+    """
+    if mesh.startswith(BUILTIN):
+        return _builtin(mesh, units, wall)
+    intake = take_in(Path(mesh), units, wall=wall)
+    said = (*intake.report.repairs, *intake.report.warnings)
+    return TakenSurface(walled(intake.mesh, wall), intake.report.units, said)
+
+
+def _builtin(mesh: str, units: str | None, wall: float | None) -> TakenSurface:
+    if wall is not None:
+        raise WrongUse(f"{mesh} has its walls; leave --wall out")
+    if units not in (None, "m"):
+        raise WrongUse(f"{mesh} is in metres and not in {units}; leave --units out")
+    return TakenSurface(build(mesh.removeprefix(BUILTIN)), "m", ())

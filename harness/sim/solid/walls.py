@@ -1,0 +1,134 @@
+"""The solid of a hollow thing of which the mesh is only the outside, or only the middle."""
+
+import numpy as np
+from manifold3d import Manifold
+
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
+from harness.basics.errors import MeshRefused
+from harness.basics.faces.nearest_kernels import column_crossings
+from harness.basics.mesh import Mesh
+from harness.objects.solid import from_manifold, outward, signed_volume
+from harness.sim.solid.mesh_repair import boundary_edges
+from harness.sim.solid.surface_measure import nearest_on_surface
+
+_CELLS_OF_WALL, _CELLS_OF_SIZE = 1.5, 1.0 / 60.0
+"""Walls, and shares of the diagonal, to a cell of the grid in which a cavity is found."""
+
+_MM = 1e-3
+
+
+def walled(mesh: Mesh, wall: float | None) -> Mesh:
+    """The surface of the material itself.
+
+    Args:
+        mesh: outward; closed, the outside of the thing, or open, the middle of its wall.
+        wall: m, thickness of the wall; None for a mesh that already is the material's surface.
+
+    Returns:
+        A closed surface, outward. A closed mesh gains a cavity at ``wall`` beneath it, with no
+        opening, since the mesh has none; an open one is thickened by half a wall to each side.
+
+    Raises:
+        MeshRefused: the wall is so thick that no cavity is left.
+    """
+    if wall is None:
+        return mesh
+    if len(boundary_edges(mesh.faces)):
+        return _thickened(mesh, wall)
+    return _joined(mesh, _cavity(mesh, wall))
+
+
+def _thickened(mesh: Mesh, wall: float) -> Mesh:
+    """Both sides of an open surface, joined along its rim."""
+    offset = 0.5 * wall * mesh.vertex_normals
+    count = len(mesh.vertices)
+    rim = _directed_rim(mesh.faces)
+    a, b = rim[:, 0], rim[:, 1]
+    sides = [np.stack(side, axis=1) for side in ((b, a, a + count), (b, a + count, b + count))]
+    faces = np.concatenate([mesh.faces, mesh.faces[:, ::-1] + count, *sides])
+    return outward(Mesh(np.concatenate([mesh.vertices + offset, mesh.vertices - offset]), faces))
+
+
+def _directed_rim(faces: IntArray) -> IntArray:
+    """``(e, 2)``: edges of one face only, as that face walks them."""
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    _, which, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return np.asarray(edges[counts[which.ravel()] == 1])
+
+
+def _cavity(mesh: Mesh, wall: float) -> Mesh:
+    """The surface of all that lies deeper than ``wall`` m, seen from within the solid."""
+    cell = min(_CELLS_OF_WALL * wall, _CELLS_OF_SIZE * mesh.diagonal)
+    low, high = mesh.bounds
+    counts = np.ceil((high - low) / cell).astype(np.int64) + 3
+    origin = low - cell
+    depth = _depths(mesh, origin, cell, counts, wall)
+    inside = Manifold.level_set(
+        _Sampled(depth / _MM, origin / _MM, cell / _MM),
+        [*(low / _MM), *(high / _MM)],
+        cell / _MM,
+        wall / _MM,
+    )
+    if inside.is_empty() or inside.volume() < 1e-6 * abs(signed_volume(mesh)) / _MM**3:
+        raise MeshRefused(
+            f"a wall of {wall * 1e3:g} mm leaves no cavity in the object; say a thinner wall, or leave it "
+            "out for a solid"
+        )
+    smooth = from_manifold(inside.simplify(0.02 * wall / _MM))
+    return Mesh(smooth.vertices * _MM, smooth.faces[:, ::-1])
+
+
+def _depths(mesh: Mesh, origin: FloatArray, cell: float, counts: IntArray, wall: float) -> FloatArray:
+    """Metres beneath the surface at the corners of a grid; outside below zero, far away held."""
+    axes = [origin[axis] + cell * np.arange(counts[axis]) for axis in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    far = wall + 3.0 * cell
+    places, faces = nearest_on_surface(
+        mesh, points, np.broadcast_to([0.0, 0.0, 1.0], points.shape).copy(), np.full(len(points), far)
+    )
+    gap = np.where(faces >= 0, np.linalg.norm(points - places, axis=1), far)
+    return np.where(_inside(mesh, origin, cell, counts), gap.reshape(counts), -gap.reshape(counts))
+
+
+def _inside(mesh: Mesh, origin: FloatArray, cell: float, counts: IntArray) -> BoolArray:
+    """Which corners of the grid the surface encloses, by where vertical lines cross it."""
+    nudge = cell * np.array([1.1e-5, 1.7e-5])
+    line, height, sign = column_crossings(
+        mesh.corners, origin[:2] + nudge, np.array([cell, cell]), counts[:2].copy()
+    )
+    # A point is wound as often as faces above it look up less those that look down.
+    above = np.zeros((counts[0] * counts[1], counts[2] + 1), dtype=np.int64)
+    level = np.clip(np.ceil((height - origin[2]) / cell).astype(np.int64), 0, counts[2])
+    np.add.at(above, (line, level), sign)
+    winding = above.sum(axis=1, keepdims=True) - np.cumsum(above, axis=1)
+    return np.asarray(winding[:, : counts[2]].reshape(counts) >= 1)
+
+
+class _Sampled:
+    """A field on a grid, linear between its corners, read point by point."""
+
+    def __init__(self, field: FloatArray, origin: FloatArray, cell: float) -> None:
+        self.field = field.tolist()
+        self.origin = origin.tolist()
+        self.cell = cell
+        self.last = [side - 2 for side in field.shape]
+
+    def __call__(self, x: float, y: float, z: float) -> float:
+        """The field at a point; beyond the grid, its value at the border."""
+        (i, u), (j, v), (k, w) = (self._place(axis, at) for axis, at in enumerate((x, y, z)))
+        total = 0.0
+        for a, share_a in ((i, 1.0 - u), (i + 1, u)):
+            for b, share_b in ((j, 1.0 - v), (j + 1, v)):
+                row = self.field[a][b]
+                total += share_a * share_b * (row[k] * (1.0 - w) + row[k + 1] * w)
+        return total
+
+    def _place(self, axis: int, at: float) -> tuple[int, float]:
+        along = (at - self.origin[axis]) / self.cell
+        index = min(max(int(along), 0), self.last[axis])
+        return index, min(max(along - index, 0.0), 1.0)
+
+
+def _joined(outside: Mesh, cavity: Mesh) -> Mesh:
+    vertices = np.concatenate([outside.vertices, cavity.vertices])
+    return Mesh(vertices, np.concatenate([outside.faces, cavity.faces + len(outside.vertices)]))

@@ -1,0 +1,1 @@
+"""From modes and a strike to the pressure at a microphone."""

@@ -1,0 +1,81 @@
+"""How loud each mode is in the open, from the way the surface moves."""
+
+from typing import Literal
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
+from harness.sim.modal.modes import Modes
+
+AIR_DENSITY = 1.204
+"""kg/m^3, of dry air at 20 C and 101.325 kPa (ISO 2533)."""
+
+SPEED_OF_SOUND = 343.2
+"""m/s, likewise."""
+
+_DIRECTIONS = 24
+
+RadiationLevel = Literal["bound", "monopoles"]
+
+
+def radiation(modes: Modes, distance: float, level: RadiationLevel = "monopoles") -> FloatArray:
+    """``(m,)`` Pa sqrt(kg) / (N s): the pressure at a distance of each mode, for a unit gain.
+
+    Times the gain at the struck point (``Modes.gains``) it is the amplitude that ``ring`` takes.
+    A mode's surface accelerates by ``w`` times its shape for a unit impulse.
+
+    Args:
+        modes: of the object.
+        distance: m from the object's middle, above zero.
+        level: ``"bound"`` as if the whole surface moved out together, by its rms normal
+            acceleration, which nothing exceeds; ``"monopoles"`` as if every piece of the surface
+            were a source of its own in free air, rms over all directions, so that parts that move
+            against each other cancel (Rayleigh's integral without baffle; the shadow of the
+            object on its own sound is left out).
+
+    Raises:
+        WrongUse: a distance that is not above zero, or an unknown level.
+    """
+    if not (np.isfinite(distance) and distance > 0.0):
+        raise WrongUse(f"a microphone {distance:g} m from the object hears nothing; say a distance above 0")
+    omega = 2.0 * np.pi * modes.frequencies
+    areas = _node_areas(modes)
+    outward = np.einsum("nmd,nd->nm", modes.shapes, modes.normals)
+    per_volume = AIR_DENSITY * omega / (4.0 * np.pi * distance)
+    match level:
+        case "bound":
+            total = areas.sum()
+            return np.asarray(per_volume * total * np.sqrt(areas @ outward**2 / total))
+        case "monopoles":
+            return np.asarray(per_volume * _flow(modes, areas[:, None] * outward, omega / SPEED_OF_SOUND))
+    raise WrongUse(f"no radiation level {level!r}; say 'bound' or 'monopoles'")
+
+
+def _flow(modes: Modes, flow: FloatArray, wavenumbers: FloatArray) -> FloatArray:
+    """``(m,)``: rms over directions of ``(n, m)`` flows added up with their delays."""
+    middle = modes.points.mean(axis=0)
+    ahead = (modes.points - middle) @ _sphere(_DIRECTIONS).T
+    total = np.zeros(len(wavenumbers))
+    for mode, wavenumber in enumerate(wavenumbers):
+        phase = wavenumber * ahead
+        total[mode] = np.mean((flow[:, mode] @ np.cos(phase)) ** 2 + (flow[:, mode] @ np.sin(phase)) ** 2)
+    return np.sqrt(total)
+
+
+def _node_areas(modes: Modes) -> FloatArray:
+    """``(n,)`` m^2: a third of the faces at each node."""
+    areas = np.zeros(len(modes.points))
+    faces = Mesh(modes.points, modes.faces)
+    for corner in range(3):
+        np.add.at(areas, modes.faces[:, corner], faces.face_areas / 3.0)
+    return areas
+
+
+def _sphere(count: int) -> FloatArray:
+    """``(count, 3)`` unit directions, evenly spread on a spiral."""
+    height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(count)
+    radius = np.sqrt(1.0 - height**2)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)

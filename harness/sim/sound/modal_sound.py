@@ -1,0 +1,227 @@
+"""The pressure of struck modes: any force history, any number of strikes, exact to rounding.
+
+A mode of undamped frequency ``f`` and damping ``d`` answers an impulse with
+``(w / w_d) exp(-d t) sin(w_d t)``, ``w = 2 pi f`` and ``w_d = sqrt(w^2 - d^2)``. For any mode one
+can hear the factor ``w / w_d`` is one; it carries the answer through ``d = w``, where the sine
+becomes ``w t exp(-d t)``, to ``d > w``, where it becomes a hyperbolic sine.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import oaconvolve
+
+from harness.basics.arrays import AnyArray, BoolArray, FloatArray
+from harness.basics.errors import WrongUse
+
+_BLOCK = 256
+"""Samples: the tables are this long in one direction and duration / block in the other."""
+
+_HEAVY = 0.5
+"""Of critical damping: a mode beyond it is over in a few periods and is summed directly."""
+
+_LOWEST = -650.0
+"""Exponent below which an answer is zero rather than a number that slows every sum (1e-282)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strikes:
+    """Blows on one object.
+
+    Attributes:
+        points: ``(k, 3)`` m, in the object's frame, on its surface.
+        directions: ``(k, 3)`` unit, of the force on the object.
+        force: ``(k, t)`` N.
+        rate: samples per second.
+    """
+
+    points: FloatArray
+    directions: FloatArray
+    force: FloatArray
+    rate: float
+
+
+def audible(frequencies: FloatArray, rate: float) -> BoolArray:
+    """``(m,)``: the modes below half of ``rate``; a sampled sound has no room for the others."""
+    return np.asarray(frequencies < 0.5 * rate)
+
+
+def is_heavy(frequencies: FloatArray, dampings: FloatArray) -> BoolArray:
+    """``(m,)``: the modes damped by more than half of critical: short, or no wave at all."""
+    return np.asarray(dampings > _HEAVY * 2.0 * np.pi * frequencies)
+
+
+def half_sine(rate: float, duration: float, peak: float) -> FloatArray:
+    """``(t,)`` N, a blow of ``duration`` s that rises to ``peak`` N and falls as half a sine.
+
+    Raises:
+        WrongUse: a rate or a duration that is not above zero.
+    """
+    check_rate(rate)
+    if not (np.isfinite(duration) and duration > 0.0):
+        raise WrongUse(f"a blow of {duration:g} s is none; say a duration above 0")
+    times = np.arange(int(np.floor(duration * rate)) + 1) / rate
+    pulse: FloatArray = peak * np.sin(np.pi * times / duration)
+    return pulse
+
+
+def impulse_response(
+    times: FloatArray, frequencies: FloatArray, dampings: FloatArray, quadrature: bool = False
+) -> FloatArray:
+    """``(m, t)``: what each mode answers to a unit impulse, through every damping.
+
+    Args:
+        times: ``(t,)`` s, zero or more.
+        frequencies: ``(m,)`` Hz, undamped, above zero.
+        dampings: ``(m,)`` 1/s, zero or more.
+        quadrature: for the cosine in place of the sine.
+    """
+    w, d = 2.0 * np.pi * frequencies[:, None], dampings[:, None]
+    split = np.sqrt(np.abs((w - d) * (w + d)))
+    over = d > w
+    # The slower of the two decays is d - split, written so that nothing is lost where d is large.
+    slow = np.where(over, w**2 / (d + split), d)
+    decay = np.exp(np.maximum(-slow * times, _LOWEST))
+    if quadrature:
+        return decay * np.where(over, 0.5 * (1.0 + np.exp(np.maximum(-2.0 * split * times, _LOWEST))),
+                                np.cos(split * times))  # fmt: skip
+    grown = np.where(split > 0.0, split, 1.0)
+    rising = -np.expm1(np.maximum(-2.0 * split * times, _LOWEST)) / (2.0 * grown)
+    waving = times * np.sinc(split * times / np.pi)
+    answer: FloatArray = w * decay * np.where(over & (split > 0.0), rising, waving)
+    return answer
+
+
+def ring(
+    frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray, force: FloatArray, rate: float
+) -> FloatArray:
+    """The sum of modes that a force sets ringing.
+
+    Each sample of the force counts as an impulse of ``force / rate``.
+
+    Args:
+        frequencies: ``(m,)`` Hz, undamped; those at or above half of ``rate`` are left out
+            (``audible`` says which).
+        dampings: ``(m,)`` 1/s.
+        amplitudes: ``(k, m)`` pressure (or whatever is wanted) per N s. A complex one turns the
+            answer's phase: its imaginary part goes with the cosine.
+        force: ``(k, t)`` N.
+        rate: samples per second.
+
+    Returns:
+        ``(k, t)``; silence where every mode is left out or no force acts.
+
+    Raises:
+        WrongUse: shapes that do not belong together, or numbers that are not finite.
+    """
+    _check(frequencies, dampings, amplitudes, force, rate)
+    heard = audible(frequencies, rate)
+    heavy = heard & is_heavy(frequencies, dampings)
+    light = heard & ~heavy
+    sound = _blocks(frequencies[light], dampings[light], amplitudes[:, light], force, rate)
+    if heavy.any():
+        sound += _direct(frequencies[heavy], dampings[heavy], amplitudes[:, heavy], force, rate)
+    return sound
+
+
+def _blocks(
+    frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray, force: FloatArray, rate: float
+) -> FloatArray:
+    """Underdamped modes: tables of one block, and the modes' states from block to block.
+
+    Within a block the answer to its own force is a short convolution; the answer to all earlier
+    force is each mode's state, turning and decaying. Both are matrix products.
+    """
+    count, samples = force.shape
+    if len(frequencies) == 0 or samples == 0:
+        return np.zeros((count, samples))
+    split = np.sqrt((2.0 * np.pi * frequencies) ** 2 - dampings**2)
+    exponents = (-dampings + 1j * split) / rate
+    weights = amplitudes * (2.0 * np.pi * frequencies / split) / rate
+    cosines = np.imag(amplitudes) / rate
+    parts = np.real(weights) + 1j * cosines
+    blocks = -(-samples // _BLOCK)
+    padded = np.zeros((count, blocks, _BLOCK))
+    padded.reshape(count, -1)[:, :samples] = force
+    table = _powers(exponents, np.arange(_BLOCK))
+    own = np.imag(parts @ table)
+    entering = padded @ table[:, ::-1].T
+    state = np.zeros((count, len(exponents)), dtype=np.complex128)
+    states = np.empty((count, blocks, len(exponents)), dtype=np.complex128)
+    jump = _powers(exponents, np.array([_BLOCK]))[:, 0]
+    advance = _powers(exponents, np.array([1]))[:, 0]
+    for block in range(blocks):
+        states[:, block] = state * advance
+        state = state * jump + entering[:, block]
+        state[np.abs(state) < np.exp(_LOWEST)] = 0.0
+    sound = np.empty((count, blocks, _BLOCK))
+    for strike in range(count):
+        held = parts[strike] * states[strike]
+        sound[strike] = held.real @ table.imag + held.imag @ table.real
+        sound[strike] += padded[strike] @ _shifted(own[strike])
+    return sound.reshape(count, -1)[:, :samples]
+
+
+def _powers(exponents: AnyArray, steps: AnyArray) -> AnyArray:
+    """``(m, t)``: ``exp(exponent * step)``, zero where it would be smaller than a normal number."""
+    arguments = exponents[:, None] * steps
+    powers: AnyArray = np.exp(arguments)
+    powers[arguments.real < _LOWEST] = 0.0
+    return powers
+
+
+def _shifted(kernel: FloatArray) -> FloatArray:
+    """``(b, b)``: row ``i`` is the kernel from column ``i`` on."""
+    later = np.arange(len(kernel)) - np.arange(len(kernel))[:, None]
+    return np.where(later >= 0, kernel[np.maximum(later, 0)], 0.0)
+
+
+def _direct(
+    frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray, force: FloatArray, rate: float
+) -> FloatArray:
+    """Modes near or beyond critical damping, whose answer is short or no wave at all."""
+    times = np.arange(force.shape[1]) / rate
+    kernels = np.real(amplitudes) @ impulse_response(times, frequencies, dampings) / rate
+    if np.iscomplexobj(amplitudes):
+        kernels += np.imag(amplitudes) @ impulse_response(times, frequencies, dampings, True) / rate
+    answered: FloatArray = oaconvolve(force, kernels, axes=1)[:, : force.shape[1]]
+    return answered
+
+
+def _check(
+    frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray, force: FloatArray, rate: float
+) -> None:
+    check_rate(rate)
+    if force.ndim != 2 or len(amplitudes) != len(force):
+        raise WrongUse(
+            f"amplitudes {amplitudes.shape} and force {force.shape} do not belong together; they are "
+            "(k, m) and (k, t)"
+        )
+    if not np.isfinite(force).all():
+        raise WrongUse("a force is not a finite number; nothing rings")
+    check_modes(frequencies, dampings, amplitudes)
+
+
+def check_modes(frequencies: FloatArray, dampings: FloatArray, amplitudes: AnyArray) -> None:
+    """Refuse modes that cannot ring.
+
+    Raises:
+        WrongUse: shapes other than ``(m,)``, ``(m,)`` and ``(k, m)``, numbers that are not finite,
+            a frequency that is not above zero or a damping below zero.
+    """
+    modes = (len(frequencies),)
+    if dampings.shape != modes or amplitudes.ndim != 2 or amplitudes.shape[1:] != modes:
+        raise WrongUse(
+            f"{len(frequencies)} frequencies, dampings {dampings.shape} and amplitudes {amplitudes.shape} do "
+            "not belong together; they are (m,), (m,) and (k, m)"
+        )
+    if not all(np.isfinite(part).all() for part in (frequencies, dampings, amplitudes)):
+        raise WrongUse("a frequency, damping or amplitude is not a finite number; nothing rings")
+    if (frequencies <= 0.0).any() or (dampings < 0.0).any():
+        raise WrongUse("a mode has a frequency above 0 and a damping of 0 or more; rigid modes do not ring")
+
+
+def check_rate(rate: float) -> None:
+    """Refuse a rate that is not above zero, with ``WrongUse``."""
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise WrongUse(f"{rate:g} samples per second make no sound; say a rate above 0")

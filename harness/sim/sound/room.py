@@ -1,0 +1,75 @@
+"""A room around the bench: the direct sound, and a diffuse tail that dies away."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import oaconvolve
+
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+
+_DECAY = 3.0 * np.log(10.0)
+"""Of the amplitude's logarithm over one reverberation time: 60 dB."""
+
+
+@dataclass(frozen=True)
+class RoomField:
+    """What a room adds to a sound; ``room_response`` says what the numbers mean.
+
+    Attributes:
+        t60: s.
+        direct_to_reverberant_db: dB.
+        seed: of the tail.
+        length: s of response.
+    """
+
+    t60: float
+    direct_to_reverberant_db: float
+    seed: int
+    length: float = 0.5
+
+    def response(self, rate: float) -> FloatArray:
+        """``(t,)`` at a rate in samples per second."""
+        return room_response(rate, self.t60, self.direct_to_reverberant_db, self.seed, self.length)
+
+
+def room_response(
+    rate: float, t60: float, direct_to_reverberant_db: float, seed: int, length: float
+) -> FloatArray:
+    """``(t,)``: what a microphone in a room receives of a unit impulse; sample 0 is the direct sound.
+
+    Gaussian noise under an exponential (Polack, La transmission de l'energie sonore dans les
+    salles, 1988): right for the late sound of any room, without the first echoes of one.
+
+    Args:
+        rate: samples per second.
+        t60: s for the tail to fall by 60 dB; zero for the open.
+        direct_to_reverberant_db: energy of the direct sound over that of the tail.
+        seed: of the tail.
+        length: s of response.
+
+    Raises:
+        WrongUse: a rate or length that is not above zero, or a time below zero.
+    """
+    if not (np.isfinite(rate) and rate > 0.0 and np.isfinite(length) and length > 0.0):
+        raise WrongUse(f"a room's response of {length:g} s at {rate:g} samples per second is none")
+    if not (np.isfinite(t60) and t60 >= 0.0 and np.isfinite(direct_to_reverberant_db)):
+        raise WrongUse(
+            f"a reverberation time of {t60:g} s at {direct_to_reverberant_db:g} dB is none; say a time of 0 "
+            "or more and a finite level"
+        )
+    response = np.zeros(max(int(np.ceil(length * rate)), 1))
+    response[0] = 1.0
+    if t60 == 0.0 or len(response) == 1:
+        return response
+    times = np.arange(1, len(response)) / rate
+    noise = np.random.default_rng(seed).standard_normal(len(times))
+    tail = noise * np.exp(np.maximum(-_DECAY * times / t60, -600.0))
+    response[1:] = tail * np.sqrt(10.0 ** (-direct_to_reverberant_db / 10.0) / (tail @ tail))
+    return response
+
+
+def reverberated(pressure: FloatArray, response: FloatArray) -> FloatArray:
+    """``(k, t)`` Pa in the room, of ``(k, t)`` Pa in the open; what sounds on after the end is cut."""
+    heard: FloatArray = oaconvolve(pressure, response[None], axes=1)[:, : pressure.shape[1]]
+    return heard

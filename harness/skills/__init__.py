@@ -1,0 +1,1 @@
+"""What an arm does at a bench: choose places, plan, press, strike."""

@@ -1,0 +1,205 @@
+"""The steps of a localization run: travel, touch, press, read, retreat; strike where sound is asked for.
+
+Everything a step needs is in its parameters, planned and rehearsed before the first one moves.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import BenchFault, NotTouched
+from harness.basics.geometry import transform
+from harness.bench.device import Arm
+from harness.bench.reading import Reading
+from harness.bench.station import PRESS, Bench
+from harness.bench.travel import Way, travel
+from harness.recording.recording import Recording
+from harness.recording.step_file import Step
+from harness.skills.first_touch import first_touch
+from harness.skills.strike import Ask, StrikeMotion, strike, strike_by_hand
+from harness.twin.motion import PlannedContact
+
+FRAMES_PER_CONTACT = 3
+"""Frames kept of each press: enough to see whether the gel was still."""
+
+SETTLE = 0.3
+"""s between the end of the press and the first frame: the gel creeps for about that long."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMotion:
+    """One contact, ready to be performed.
+
+    Attributes:
+        start: ``(6,)`` rad, where the travel was planned to start.
+        travel: ``(n, 6)`` rad, joint way points from there to the stand-off.
+        base_from_stand_off: ``(4, 4)`` of the flange.
+        axis: ``(3,)`` unit in base: the way the gel is pressed.
+        search: m from the stand-off to where the gel would first touch the nominal surface.
+        press: m to press on after the first touch.
+    """
+
+    start: FloatArray
+    travel: FloatArray
+    base_from_stand_off: FloatArray
+    axis: FloatArray
+    search: float
+    press: float
+
+    @classmethod
+    def planned(cls, contact: PlannedContact, flange_from_gel: FloatArray, press: float) -> "ContactMotion":
+        """The motion of a planned contact whose last ``press`` metres are in the gel."""
+        axis = (contact.base_from_stand_off @ flange_from_gel)[:3, 2]
+        search = contact.stand_off - press
+        return cls(contact.start, contact.travel, contact.base_from_stand_off, axis, search, press)
+
+    def to_parameters(self) -> dict[str, Any]:
+        """As JSON values, with the unit in each key."""
+        return {
+            "start_rad": self.start.tolist(),
+            "travel_rad": self.travel.tolist(),
+            "base_from_stand_off": self.base_from_stand_off.tolist(),
+            "axis_in_base": self.axis.tolist(),
+            "search_m": self.search,
+            "press_m": self.press,
+        }
+
+    @classmethod
+    def from_parameters(cls, parameters: Mapping[str, Any]) -> "ContactMotion":
+        """The motion that ``to_parameters`` wrote."""
+        arrays = {name: np.asarray(parameters[name], dtype=np.float64) for name in _ARRAYS}
+        return cls(
+            arrays["start_rad"],
+            arrays["travel_rad"].reshape(-1, 6),
+            arrays["base_from_stand_off"],
+            arrays["axis_in_base"],
+            float(parameters["search_m"]),
+            float(parameters["press_m"]),
+        )
+
+
+_ARRAYS = ("start_rad", "travel_rad", "base_from_stand_off", "axis_in_base")
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """How fast the arm may go in each phase of a contact (SI).
+
+    Attributes:
+        travel: rad/s of the fastest joint between contacts.
+        travel_acceleration: rad/s^2.
+        approach: m/s within reach of the object.
+        press: m/s once the gel touches.
+        retreat: m/s away from the object.
+        acceleration: m/s^2 of every straight line.
+        touch_force: N that end the search; the press is measured from where half of it was met.
+        overtravel: m beyond the nominal surface before a touch is given up.
+    """
+
+    travel: float = 0.9
+    travel_acceleration: float = 1.2
+    approach: float = 0.010
+    press: float = 0.005
+    retreat: float = 0.040
+    acceleration: float = 0.2
+    touch_force: float = 0.3
+    overtravel: float = 0.008
+
+
+class ContactLocalization:
+    """Presses the gel where the plan says, and hands on what was read there.
+
+    Args:
+        way: used where the arm is not where a step's travel was planned from: at the start of a
+            session, and when a run is resumed.
+        speeds: of the motions.
+        ask: shows a person what to do, where the station has one strike; None where nobody is there.
+    """
+
+    def __init__(self, way: Way, speeds: Speeds | None = None, ask: Ask | None = None) -> None:
+        self.way = way
+        self.speeds = speeds or Speeds()
+        self.ask = ask
+
+    def steps(self, recording: Recording) -> Iterator[Step]:
+        """The planned contacts that are not yet on the disk."""
+        for index, parameters in enumerate(recording.header.plan["contacts"]):
+            if index >= recording.committed:
+                yield Step(index, "press", parameters)
+
+    def perform(self, step: Step, bench: Bench) -> Sequence[Reading]:
+        """One contact; the arm ends at the stand-off it approached from, or where its strike began."""
+        motion = ContactMotion.from_parameters(step.parameters)
+        arm = bench.arm
+        bench.mark(step.index, -1)
+        self._travel(motion, bench)
+        arm.zero_force()
+        began = arm.state().time
+        self._touch(step, motion, arm)
+        moved = self._press(motion, arm, began)
+        bench.pause(SETTLE)
+        bench.mark(step.index, PRESS)
+        image = self._read(bench, motion)
+        history = arm.history(arm.state().time - began)
+        self._line(arm, motion.base_from_stand_off, "retreat")
+        return (image, *history, *self._strike(step, moved, bench))
+
+    def _strike(self, step: Step, moved: float, bench: Bench) -> tuple[Reading, ...]:
+        """The hammer where the gel was; nothing where the scene asks for no sound."""
+        if bench.hammer is None:
+            return ()
+        if "strike" not in step.parameters:
+            return strike_by_hand(step.index, bench, self.ask)
+        motion = StrikeMotion.from_parameters(step.parameters["strike"])
+        self._travel(motion, bench)
+        return strike(motion, step.index, moved, bench)
+
+    def _travel(self, motion: ContactMotion | StrikeMotion, bench: Bench) -> None:
+        speeds = self.speeds
+        travel(bench, motion.start, motion.travel, self.way, speeds.travel, speeds.travel_acceleration)
+
+    def _press(self, motion: ContactMotion, arm: Arm, began: float) -> float:
+        """On to the planned depth behind the first touch, wherever the search came to rest.
+
+        Returns:
+            m by which the touch was farther than planned.
+        """
+        state = arm.state()
+        search = arm.history(state.time - began)
+        touched = first_touch(search, motion.axis, 0.5 * self.speeds.touch_force)
+        further = motion.press - (float(state.base_from_flange[:3, 3] @ motion.axis) - touched)
+        self._line(
+            arm, _moved(motion.base_from_stand_off, state.base_from_flange, further * motion.axis), "press"
+        )
+        return touched - float(motion.base_from_stand_off[:3, 3] @ motion.axis) - motion.search
+
+    def _read(self, bench: Bench, motion: ContactMotion) -> Reading:
+        """The frames; where the camera fails the arm is well, and does not stay pressed on the object."""
+        try:
+            return bench.gel.read(FRAMES_PER_CONTACT, timeout=3.0)
+        except BenchFault:
+            self._line(bench.arm, motion.base_from_stand_off, "retreat")
+            raise
+
+    def _touch(self, step: Step, motion: ContactMotion, arm: Arm) -> None:
+        travel = motion.search + self.speeds.overtravel
+        if arm.move_until_contact(motion.axis, self.speeds.approach, self.speeds.touch_force, travel):
+            return
+        self._line(arm, motion.base_from_stand_off, "retreat")
+        raise NotTouched(
+            f"contact {step.index + 1}: the gel travelled {travel * 1e3:.0f} mm and met nothing "
+            f"({self.speeds.touch_force} N would have been a touch); check that the object stands where the "
+            "scene's [object.pose] says, then resume the run"
+        )
+
+    def _line(self, arm: Arm, base_from_flange: FloatArray, phase: Literal["press", "retreat"]) -> None:
+        speed = self.speeds.press if phase == "press" else self.speeds.retreat
+        arm.move_line(base_from_flange, speed, self.speeds.acceleration)
+
+
+def _moved(attitude: FloatArray, position: FloatArray, by: FloatArray) -> FloatArray:
+    """The planned attitude (a measured one would carry its noise into the press) at a measured place."""
+    return transform(attitude[:3, :3], position[:3, 3] + by)

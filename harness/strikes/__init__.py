@@ -1,0 +1,1 @@
+"""Measured strikes: blows, transfer functions, and the modes identified from them."""

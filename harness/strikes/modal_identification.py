@@ -1,0 +1,226 @@
+"""Modes of a struck object from what was measured: frequencies, dampings, and how well they are known.
+
+Either from a free decay, the response after the blow is over, or from measured transfer functions.
+Both are lines that poles explain (`harness.strikes.pole_fit`). How many poles there are is decided thus:
+modes are added where what is left of the lines stands above the noise about it, with a stated chance of a
+false alarm, and all poles are refined together after each round, until nothing stands out. What a
+misfit of a strong mode leaves beside it, a non-linearity or a support that gives way, is no mode: where
+the model explains all but a stated share of a line's power, nothing is added.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.fft import rfft, rfftfreq
+from threadpoolctl import threadpool_limits
+
+from harness.basics.arrays import AnyArray, BoolArray, FloatArray, read_only
+from harness.basics.clipping import is_clipped
+from harness.basics.errors import DataRefused, WrongUse
+from harness.strikes.pole_fit import ComplexArray, Lines, PoleFit, fit_poles
+from harness.strikes.pole_search import Search, new_poles
+
+_LEAST_SAMPLES = 64
+_LINES_A_MODE = 6
+"""Or modes could follow the noise of a short record."""
+
+_ROUNDING = 1e-13
+"""Of the strongest line: what is left below it is arithmetic."""
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedMode:
+    """One mode, as measured.
+
+    Attributes:
+        frequency: Hz, undamped.
+        damping: 1/s; noise can bring that of a sharp peak below zero.
+        frequency_sigma: Hz, one standard deviation, by what the fit left about the peak.
+        damping_sigma: 1/s.
+        level: dB of its power in the band against the strongest mode's.
+        lines: ``(k, f)`` what it adds to each line of the band.
+    """
+
+    frequency: float
+    damping: float
+    frequency_sigma: float
+    damping_sigma: float
+    level: float
+    lines: ComplexArray
+
+    @property
+    def ratio(self) -> float:
+        """Damping ratio; one at critical damping."""
+        return self.damping / (2.0 * np.pi * self.frequency)
+
+    @property
+    def ratio_sigma(self) -> float:
+        """One standard deviation of ``ratio``."""
+        return self.damping_sigma / (2.0 * np.pi * self.frequency)
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What was found.
+
+    Attributes:
+        modes: by ascending frequency.
+        frequencies: ``(f,)`` Hz, of the lines that were fitted.
+        residual: ``(k, f)`` of them that no mode explains.
+        unexplained: share of the lines' power in ``residual``.
+        full: whether more modes stood out than were asked for.
+        clipped: ``(k,)`` channels that read their greatest value again and again: what they say of dampings
+            and of harmonics is not to be trusted.
+    """
+
+    modes: tuple[IdentifiedMode, ...]
+    frequencies: FloatArray
+    residual: ComplexArray
+    unexplained: float
+    full: bool
+    clipped: BoolArray
+
+
+def modes_of_decay(decays: AnyArray, rate: float, search: Search | None = None) -> Identified:
+    """The modes of free decays of one structure.
+
+    Seconds grow with the lines of the band and the square of the modes: say the band of interest.
+
+    Args:
+        decays: ``(k, t)`` responses after the force has ended, of several blows or several places; any unit,
+            one of all.
+        rate: samples per second.
+        search: how modes are looked for.
+
+    Raises:
+        DataRefused: silence, values that are not finite, or too few.
+        WrongUse: a rate or a band that cannot be.
+    """
+    search = search or Search()
+    signals = np.atleast_2d(np.asarray(decays, np.float64))
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise WrongUse(f"a rate of {rate:g} samples per second; say one above 0")
+    _check(signals, "the decay", "sample")
+    samples = signals.shape[1]
+    inner = slice(1, (samples + 1) // 2)
+    lines = Lines(rfftfreq(samples, 1.0 / rate)[inner], rfft(signals)[:, inner], rate)
+    rounding = float(np.finfo(np.asarray(decays).dtype).eps) if np.asarray(decays).dtype.kind == "f" else 0.0
+    found = _identified(_banded(lines, search), search, max(rounding * np.sqrt(samples), _ROUNDING))
+    return replace(found, clipped=read_only(np.array([is_clipped(signal) for signal in signals])))
+
+
+def modes_of_response(
+    frequencies: FloatArray, responses: ComplexArray, search: Search | None = None, decay: float = 0.0
+) -> Identified:
+    """The modes of measured transfer functions of one structure.
+
+    Accelerance or mobility: receptance grows without end towards 0 Hz where the structure is free, which
+    no skirt follows.
+
+    Args:
+        frequencies: ``(f,)`` Hz, evenly spaced; a line at 0 Hz is left out.
+        responses: ``(k, f)``, one row a pair of places.
+        search: how modes are looked for.
+        decay: 1/s of an exponential window that was put on forces and responses; dampings are freed of it.
+
+    Raises:
+        DataRefused: silence, values that are not finite, too few, or lines that are not evenly spaced.
+        WrongUse: a band that cannot be.
+    """
+    search = search or Search()
+    values = np.atleast_2d(np.asarray(responses, np.complex128))
+    _check(values, "the transfer function", "line")
+    steps = np.diff(frequencies)
+    if values.shape[1] != len(frequencies) or np.ptp(steps) > 1e-6 * steps.mean():
+        raise DataRefused(
+            f"{values.shape[1]} lines at {len(frequencies)} frequencies, {steps.min():g} to {steps.max():g} "
+            "Hz apart; a response is read on evenly spaced frequencies, one a line"
+        )
+    inner = frequencies > 0.0
+    lines = Lines(np.asarray(frequencies, np.float64)[inner], values[:, inner], None)
+    found = _identified(_banded(lines, search), search, _ROUNDING)
+    return replace(found, modes=tuple(_without(mode, decay) for mode in found.modes)) if decay else found
+
+
+def _without(mode: IdentifiedMode, decay: float) -> IdentifiedMode:
+    """A mode whose pole an exponential window has moved: back, at the same damped frequency."""
+    omega, damping = 2.0 * np.pi * mode.frequency, mode.damping - decay
+    squared = omega**2 - mode.damping**2 + damping**2
+    return replace(mode, frequency=float(np.sqrt(max(squared, 0.0)) / (2.0 * np.pi)), damping=damping)
+
+
+def _check(values: AnyArray, what: str, each: str) -> None:
+    if values.ndim != 2 or values.shape[1] < _LEAST_SAMPLES:
+        raise DataRefused(
+            f"{what} has shape {values.shape}; it must be (channels, {each}s), with at least "
+            f"{_LEAST_SAMPLES} {each}s"
+        )
+    if not np.isfinite(values).all():
+        raise DataRefused(
+            f"{what} holds values that are not finite; leave the channel out or calibrate again"
+        )
+    if not (values != values[:, :1]).any():
+        raise DataRefused(f"{what} is silent: every {each} has one value; there is nothing to identify")
+
+
+def _banded(lines: Lines, search: Search) -> Lines:
+    high = float(lines.frequencies[-1]) if search.high is None else search.high
+    kept = lines.between(search.low, high)
+    if len(kept.frequencies) < _LEAST_SAMPLES // 2:
+        raise WrongUse(
+            f"{search.low:g} to {high:g} Hz holds {len(kept.frequencies)} lines {lines.step:g} Hz apart; "
+            f"say a band of {_LEAST_SAMPLES // 2} and more"
+        )
+    return kept
+
+
+def _identified(lines: Lines, search: Search, rounding: float) -> Identified:
+    # The products are too small for a second core, which would wait for them where anything else runs.
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _searched(lines, search, rounding)
+
+
+def _searched(lines: Lines, search: Search, rounding: float) -> Identified:
+    fit = fit_poles(lines, np.zeros(0), np.zeros(0), search.skirt)
+    most = min(search.most, len(lines.frequencies) // _LINES_A_MODE)
+    full = False
+    while not full:
+        new = new_poles(lines, fit, search, rounding)
+        room = most - len(fit.omegas)
+        full = len(new) > room
+        if len(new) == 0 or room == 0:
+            break
+        omegas = np.concatenate([fit.omegas, [omega for omega, _ in new[:room]]])
+        decays = np.concatenate([fit.decays, [decay for _, decay in new[:room]]])
+        fit = fit_poles(lines, omegas, decays, search.skirt)
+    return _told(lines, fit, full)
+
+
+def _told(lines: Lines, fit: PoleFit, full: bool) -> Identified:
+    powers = np.sum(np.abs(fit.model) ** 2, axis=(1, 2))
+    loudest = float(powers.max(initial=0.0))
+    count = len(fit.omegas)
+    edges = 2.0 * np.pi * lines.frequencies[[0, -1]]
+    sigmas = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    inside = (fit.omegas >= edges[0]) & (fit.omegas <= edges[1]) & (powers > 0.0)
+    modes = [
+        IdentifiedMode(
+            frequency=float(fit.omegas[k] / (2.0 * np.pi)),
+            damping=float(fit.decays[k]),
+            frequency_sigma=float(fit.omegas[k] / (2.0 * np.pi) * sigmas[k]),
+            damping_sigma=float(fit.omegas[k] * sigmas[count + k]),
+            level=float(10.0 * np.log10(powers[k] / loudest)),
+            lines=read_only(fit.model[k]),
+        )
+        for k in np.argsort(fit.omegas)
+        if inside[k]
+    ]
+    whole = float(np.sum(np.abs(lines.values) ** 2))
+    return Identified(
+        tuple(modes),
+        read_only(lines.frequencies),
+        read_only(fit.residual),
+        float(np.sum(np.abs(fit.residual) ** 2)) / whole,
+        full,
+        read_only(np.zeros(len(lines.values), np.bool_)),
+    )

@@ -1,0 +1,1 @@
+"""The mocked bench without sockets, in simulated time."""

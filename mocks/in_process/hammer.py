@@ -1,0 +1,145 @@
+"""The hammer without a cable, in simulated time: the counts that the box would have sent."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.bench.acquisition_channels import (
+    CLOCK,
+    CLOCK_FIELDS,
+    FLAG_FIELDS,
+    FLAGS,
+    FORCE,
+    PRESSURE,
+    block_channel,
+    judge,
+)
+from harness.bench.device import Health
+from harness.bench.reading import Channel, Reading
+from harness.bench.station_sections import HammerSection
+from mocks.daq.strike_counts import SKEW, StrikeCounts
+from mocks.in_process.arm import InProcessArm
+from mocks.in_process.simulated_motion import Stage
+
+BLOCK = 500
+"""Samples in a recorded block."""
+
+_REST = 2500
+
+
+@dataclass(frozen=True, eq=False)
+class Fired:
+    """The newest firing.
+
+    Attributes:
+        time: s on the simulated bench clock.
+        base_from_flange: ``(4, 4)``, where the flange was.
+        step: of the run.
+        sample: of the step.
+    """
+
+    time: float
+    base_from_flange: FloatArray
+    step: int
+    sample: int
+
+
+class InProcessHammer:
+    """An ``ImpactHammer`` that is fired by an output of the arm.
+
+    Args:
+        strikes: what the box reads.
+        arm: whose output fires the striker.
+        output: which of the tool's.
+        stage: simulated time, step and sample.
+        section: of the station: rate, threshold, calibration.
+
+    Attributes:
+        fired: what was struck last, for a microphone of its own; None where the last capture had no blow.
+    """
+
+    def __init__(
+        self, strikes: StrikeCounts, arm: InProcessArm, output: int, stage: Stage, section: HammerSection
+    ) -> None:
+        self._strikes = strikes
+        self._arm = arm
+        self._output = output
+        self._stage = stage
+        self._rate = section.rate
+        calibration = section.acquisition
+        self._threshold = round(section.threshold / calibration.newtons_per_count)
+        self._full_scale = calibration.full_scale_counts
+        self._identity = f"{section.model} {section.serial} in process"
+        self._idle = strikes.idle()
+        self.fired: Fired | None = None
+
+    def open(self) -> None:
+        """Nothing to connect."""
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def capture(
+        self, fire: Callable[[], None], before: float, after: float, timeout: float
+    ) -> tuple[Reading, ...]:
+        """Call ``fire()`` and return what the box reads around the strike; see ``ImpactHammer``."""
+        switched = len(self._arm.rises)
+        fire()
+        fired = [rise for rise in self._arm.rises[switched:] if rise.output == self._output]
+        count = -(-round((before + after) * self._rate) // BLOCK) * BLOCK
+        quiet = self._idle_counts(count)
+        record, self.fired = quiet, None
+        if fired:
+            pose, step, sample = fired[-1].base_from_flange, self._stage.step, self._stage.sample
+            record = np.concatenate([quiet, self._strikes.record(pose, step, sample), quiet])
+            self.fired = Fired(self._stage.time, pose, step, sample)
+        level = np.median(self._idle[:_REST, 0]) + self._threshold
+        reached = np.flatnonzero(record[:, 0] >= level)
+        began = self._stage.time - count / self._rate
+        if not len(reached):
+            self._stage.pause(timeout)
+            return self._readings(quiet, self._stage.time - count / self._rate)
+        first = int(reached[0]) - round(before * self._rate)
+        start = began + first / self._rate
+        self._stage.time = start + count / self._rate
+        return self._readings(record[first : first + count], start)
+
+    def health(self) -> Health:
+        """Every sample, on time."""
+        return Health("hammer", self._identity, self._rate, 0, None, "simulated time")
+
+    def _idle_counts(self, count: int) -> AnyArray:
+        return self._idle[np.arange(count) % len(self._idle)]
+
+    def _readings(self, counts: AnyArray, start: float) -> tuple[Reading, ...]:
+        flags = judge(counts[:, 0], counts[:, 1], self._threshold, self._full_scale, self._full_scale)
+        onset = -1 if flags.silent else flags.onset
+        said = {
+            "onset": onset,
+            "overload": flags.overload,
+            "double_hit": flags.double_hit,
+            "silent": flags.silent,
+            "threshold": self._threshold,
+        }
+        at = start + max(0, onset) / self._rate
+        edges = np.array([0.0, float(len(counts))])
+        return (
+            self._blocks(FORCE, counts[:, 0], start),
+            self._blocks(PRESSURE, counts[:, 1], start + SKEW / self._rate),
+            Reading(
+                Channel(CLOCK, "1", (len(CLOCK_FIELDS),), "float64"),
+                start + edges / self._rate,
+                np.stack([edges, np.zeros(2)], axis=1),
+            ),
+            Reading(
+                Channel(FLAGS, "1", (len(FLAG_FIELDS),), "float64"),
+                np.array([at]),
+                np.array([[float(said[field]) for field in FLAG_FIELDS]]),
+            ),
+        )
+
+    def _blocks(self, name: str, counts: AnyArray, start: float) -> Reading:
+        times = start + np.arange(0, len(counts), BLOCK) / self._rate
+        return Reading(block_channel(name, BLOCK, self._rate), times, counts.reshape(-1, BLOCK))

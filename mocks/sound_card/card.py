@@ -1,0 +1,246 @@
+"""A sound card without hardware: PipeWire, private to this program, with one microphone on it.
+
+What is played into the card's null sink comes out of its virtual source, which PortAudio
+lists by name like any other microphone (PipeWire's documentation: "Virtual devices", the
+factories ``support.null-audio-sink`` and ``adapter``, and its ALSA plug-in). No session bus, no
+display and no settings of the user are touched: sockets, settings and state lie in a folder
+that is removed at the end, and no real device is opened.
+
+PipeWire carries 32-bit floats, so the upper 24 bits of a sample pass unchanged. Rate and
+channel count are the same from end to end, hence nothing is resampled, mixed or dithered.
+"""
+
+import contextlib
+import ctypes
+import ctypes.util
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from harness.basics.arrays import AnyArray
+from harness.basics.clock import now
+from harness.basics.errors import BenchFault
+from mocks.sound_card.player import AT_ONCE, HEADER
+from mocks.sound_card.settings import MICROPHONE, SPEAKER, ports, settings, sound_devices
+
+PACKAGES = "pipewire wireplumber pipewire-alsa libportaudio2"
+"""What Debian and Ubuntu call what is needed."""
+
+_PROGRAMS = ("pipewire", "wireplumber", "pw-link")
+_PLUGIN = "libasound_module_pcm_pipewire.so"
+_START_TIMEOUT = 15.0
+_END_TIMEOUT = 2.0
+_LOOK_PERIOD = 0.05
+_PR_SET_PDEATHSIG = 1
+_PUNCTUAL = -10
+_LIBC = ctypes.CDLL(None)
+
+
+def why_not() -> str:
+    """Why no sound card can be mocked on this machine, in a sentence; empty where one can."""
+    if sys.platform != "linux":
+        return f"PipeWire needs Linux, and this is {sys.platform}"
+    missing = [program for program in _PROGRAMS if shutil.which(program) is None]
+    missing += [] if any(Path("/usr").glob(f"lib*/**/alsa-lib/{_PLUGIN}")) else ["PipeWire's ALSA plug-in"]
+    missing += [] if ctypes.util.find_library("portaudio") else ["PortAudio"]
+    if missing:
+        return f"{', '.join(missing)} not installed; on Debian: apt-get install {PACKAGES}"
+    return ""
+
+
+class SoundCard:
+    """PipeWire with one null sink, its sound led to one microphone; a context manager.
+
+    Its processes end when this object is stopped, and with the process that started them, by
+    whatever means that ends (prctl(2), PR_SET_PDEATHSIG; start it from the main thread).
+
+    Args:
+        rate: samples a second.
+        channels: 1 or 2.
+        quantum: samples that PipeWire hands over at a time; a busy computer is late for small ones.
+        under: folder in which the card's own is made; None for the system's.
+
+    Attributes:
+        microphone: its name among PortAudio's devices.
+        environment: what a process that opens it must have in its environment.
+    """
+
+    microphone = MICROPHONE
+
+    def __init__(
+        self, rate: int = 48000, channels: int = 1, quantum: int = 2048, under: Path | None = None
+    ) -> None:
+        if channels not in (1, 2):
+            raise ValueError(f"a mocked sound card has 1 or 2 channels, not {channels}")
+        self.rate = rate
+        self.channels = channels
+        self.environment: dict[str, str] = {}
+        self._quantum = quantum
+        self._under = under
+        self._folder: Path | None = None
+        self._children: list[subprocess.Popen[bytes]] = []
+
+    def __enter__(self) -> "SoundCard":
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def start(self) -> None:
+        """Begin, and wait until the microphone can be opened; does nothing if it has begun.
+
+        Raises:
+            BenchFault: it cannot be mocked here, or did not start.
+        """
+        if self._folder is not None:
+            return
+        reason = why_not()
+        if reason:
+            raise BenchFault(f"no sound card can be mocked here: {reason}")
+        self._folder = Path(tempfile.mkdtemp(prefix="sound-card-", dir=self._under))
+        try:
+            self._begin(self._folder)
+        except BaseException:
+            self.stop()
+            raise
+
+    def stop(self) -> None:
+        """End every process and remove every file; does nothing if it has not begun."""
+        for child in reversed(self._children):
+            child.terminate()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                child.wait(_END_TIMEOUT)
+            child.kill()
+            child.wait()
+            for pipe in filter(None, (child.stdin, child.stdout)):
+                with contextlib.suppress(OSError):
+                    pipe.close()
+        self._children = []
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder = None
+
+    def unplug(self) -> None:
+        """Take the card away while it is listened to."""
+        for child in self._children:
+            child.kill()
+
+    def play(self, counts: AnyArray, at: float = AT_ONCE) -> None:
+        """Let the microphone hear these samples; else it is silent.
+
+        Args:
+            counts: ``(samples, channels)`` int32, of which the upper 24 bits are heard.
+            at: s on the bench clock, at which the sink is to take the first of them, to a fraction of a
+                sample; it must be far enough ahead. ``AT_ONCE`` for after what was played before, every
+                sample as it is; ``MEANWHILE`` for these to be repeated while nothing else is played.
+
+        Raises:
+            ValueError: another shape or type.
+            BenchFault: the card is not there.
+        """
+        if counts.dtype != np.int32 or counts.ndim != 2 or counts.shape[1] != self.channels:
+            raise ValueError(
+                f"int32 of shape (n, {self.channels}) is played, not {counts.dtype} {counts.shape}"
+            )
+        player = self._children[-1] if self._children else None
+        if player is None or player.stdin is None:
+            raise BenchFault("the mocked sound card was played on before it was started")
+        try:
+            player.stdin.write(HEADER.pack(at, counts.nbytes) + counts.tobytes())
+            player.stdin.flush()
+        except OSError as broken:
+            raise BenchFault("the mocked sound card is gone") from broken
+
+    def stumbles(self) -> int:
+        """How often since the last call the player came late, so that a gap was heard in what it played."""
+        player = self._children[-1] if self._children else None
+        if player is None or player.stdout is None:
+            return 0
+        os.set_blocking(player.stdout.fileno(), False)
+        return len(player.stdout.read() or b"")
+
+    def _begin(self, folder: Path) -> None:
+        """PipeWire, then its session manager, then the link, then the player."""
+        config, devices, socket = folder / "card.conf", folder / "devices.conf", folder / "pipewire-0"
+        config.write_text(settings(self.rate, self.channels, self._quantum))
+        devices.write_text(sound_devices(socket, self.rate, self.channels))
+        self.environment = {"ALSA_CONFIG_PATH": str(devices)}
+        self._spawn(["pipewire", "-c", str(config)])
+        self._wait(socket.exists, "PipeWire made no socket")
+        self._spawn(["wireplumber", *_policy_only()])
+        outputs, inputs = ports(self.channels)
+        wanted = {*outputs, *inputs}
+        self._wait(lambda: wanted <= set(self._run(["pw-link", "-io"]).split()), "PipeWire made no sink")
+        for output, into in zip(outputs, inputs, strict=True):
+            self._run(["pw-link", output, into])
+        player = self._spawn([sys.executable, "-m", "mocks.sound_card.player", *self._player_arguments()])
+        if player.stdout is None or player.stdout.read(1) != b".":
+            raise BenchFault(f"the mocked sound card's player did not start: {self._last_words()}")
+
+    def _player_arguments(self) -> list[str]:
+        return [SPEAKER, str(self.rate), str(self.channels), str(self._quantum)]
+
+    def _spawn(self, command: list[str]) -> "subprocess.Popen[bytes]":
+        log = self._log().open("ab")
+        with log:
+            child = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                env=self._surroundings(),
+                preexec_fn=_die_with_parent,
+            )
+        self._children.append(child)
+        return child
+
+    def _run(self, command: list[str]) -> str:
+        done = subprocess.run(command, env=self._surroundings(), capture_output=True, text=True, check=False)
+        return done.stdout
+
+    def _surroundings(self) -> dict[str, str]:
+        """The environment of the card's processes: nothing of the user's session is in it."""
+        folder = str(self._folder)
+        kept = {name: os.environ[name] for name in ("PATH", "LD_LIBRARY_PATH", "HOME") if name in os.environ}
+        private = ("XDG_RUNTIME_DIR", "XDG_CONFIG_HOME", "XDG_STATE_HOME", "PIPEWIRE_RUNTIME_DIR")
+        root = str(Path(__file__).parents[2])
+        return {**kept, **dict.fromkeys(private, folder), "PYTHONPATH": root, **self.environment}
+
+    def _wait(self, there: Callable[[], bool], complaint: str) -> None:
+        deadline = now() + _START_TIMEOUT
+        while not there():
+            ended = [child for child in self._children if child.poll() is not None]
+            if ended or now() > deadline:
+                raise BenchFault(f"the mocked sound card did not start: {complaint}: {self._last_words()}")
+            time.sleep(_LOOK_PERIOD)
+
+    def _log(self) -> Path:
+        assert self._folder is not None
+        return self._folder / "log"
+
+    def _last_words(self) -> str:
+        lines = self._log().read_text(errors="replace").strip().splitlines()
+        return lines[-1] if lines else "it said nothing"
+
+
+def _policy_only() -> tuple[str, str]:
+    """Have WirePlumber link streams and leave devices alone: a file until 0.4, a profile from 0.5."""
+    command = [str(shutil.which("wireplumber")), "--version"]
+    stated = subprocess.run(command, capture_output=True, text=True, check=False).stdout
+    return ("-c", "policy.conf") if "libwireplumber 0.4" in stated else ("-p", "policy")
+
+
+def _die_with_parent() -> None:
+    """In the child: ask Linux for an end when the parent ends, and to be served before others."""
+    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, _PUNCTUAL)

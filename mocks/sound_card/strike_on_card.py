@@ -1,0 +1,144 @@
+"""Strikes heard by a sound card: the box plays the force and the card the sound, at one moment."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.clock import now
+from harness.basics.errors import WrongUse
+from harness.basics.resampling import resample
+from harness.bench.station_file import Station
+from mocks.daq.strike_counts import StrikeCounts
+from mocks.shared_pose import Firing
+from mocks.sound_card.card import SoundCard
+from mocks.sound_card.counts import CardConverter
+from mocks.sound_card.player import MEANWHILE
+
+AHEAD = 0.3
+"""s from when a strike is computed to when it begins: a sound card asks for its samples that early."""
+
+_WORD = 32
+_IDLE = 2.0
+
+
+@dataclass(frozen=True)
+class Wire:
+    """How a sound card is wired.
+
+    Attributes:
+        rate: samples a second.
+        channels: of the card.
+        channel: with the microphone.
+        converter: of that channel.
+        sound_rate: Hz, at which the world makes its sound.
+    """
+
+    rate: int
+    channels: int
+    channel: int
+    converter: CardConverter
+    sound_rate: float
+
+    def samples(self, pressure: FloatArray, noise: np.random.Generator) -> AnyArray:
+        """``(n, channels)`` int32 of ``(t,)`` Pa: their upper bits are the converter's counts."""
+        count = int((len(pressure) - 1) / self.sound_rate * self.rate)
+        heard = resample(pressure, 0.0, self.sound_rate, np.arange(count) / self.rate, float(self.rate))
+        counts = self.converter.counts(heard, noise)
+        shift = _WORD - 1 - int(self.converter.full_scale).bit_length()
+        played = np.zeros((len(counts), self.channels), np.int32)
+        played[:, self.channel] = np.left_shift(counts, shift)
+        return played
+
+
+def plug_in_card(station: Station, folder: Path) -> tuple[SoundCard, Wire]:
+    """A sound card, playing, with the station's microphone on it.
+
+    Args:
+        station: with a microphone of its own.
+        folder: in which the card makes its own.
+
+    Raises:
+        BenchFault: no sound card can be mocked on this computer, and why.
+        WrongUse: the station's microphone is on the hammer's box, or there is no hammer.
+    """
+    section, hammer = station.own_microphone, station.hammer
+    if section is None or hammer is None:
+        raise WrongUse(f"the station {station.title!r} has no microphone on a sound card; none is mocked")
+    channels, rate = section.channels or 1, round(section.rate or 0.0)
+    card = SoundCard(rate, channels, under=folder)
+    card.start()
+    converter = CardConverter.of(hammer.acquisition)
+    return card, Wire(rate, channels, section.channel or 0, converter, hammer.rate)
+
+
+class StrikesOnCard:
+    """What inputs 0 and 1 of the hammer's box are at, while the card plays what the microphone hears.
+
+    A strike is computed beside the box's loop, then begins on both at one scan of the box, ``AHEAD``
+    s later: in front of the blow a record is quiet, and a little more of that changes nothing.
+
+    Args:
+        strikes: of the run, the box's input 1 being shorted.
+        firing: the newest firing.
+        card: that plays.
+        wire: of the card.
+        scans: number of a scan of the box, its bench time in s, and scans a second; of now.
+    """
+
+    def __init__(
+        self,
+        strikes: StrikeCounts,
+        firing: Callable[[], Firing],
+        card: SoundCard,
+        wire: Wire,
+        scans: Callable[[], tuple[int, float, float]],
+    ) -> None:
+        self._strikes = strikes
+        self._firing = firing
+        self._card = card
+        self._wire = wire
+        self._scans = scans
+        self._idle = strikes.idle()
+        self._seen = firing().number
+        self._playing: tuple[int, AnyArray] = (0, self._idle[:0])
+        self._thread: threading.Thread | None = None
+
+    def begin(self) -> None:
+        """Let the card play what is always heard."""
+        quiet = self._strikes.sound.idle(_IDLE)
+        noise = self._strikes.sound.converter_noise(-1, -1).spawn(1)[0]
+        self._card.play(self._wire.samples(quiet, noise), MEANWHILE)
+
+    def __call__(self, first: int, count: int) -> AnyArray:
+        """Counts of ``count`` scans from ``first``."""
+        self._look()
+        numbers = np.arange(first, first + count)
+        counts: AnyArray = self._idle[numbers % len(self._idle)].copy()
+        begin, record = self._playing
+        here = (numbers >= begin) & (numbers < begin + len(record))
+        counts[here] = record[numbers[here] - begin]
+        return counts
+
+    def _look(self) -> None:
+        """Begin to compute a strike that was fired."""
+        firing = self._firing()
+        busy = self._thread is not None and self._thread.is_alive()
+        if firing.number != self._seen and not busy:
+            self._seen = firing.number
+            self._thread = threading.Thread(target=self._strike, args=(firing,), daemon=True)
+            self._thread.start()
+
+    def _strike(self, firing: Firing) -> None:
+        sound = self._strikes.sound
+        truth = sound.strike(firing.base_from_flange, firing.step, firing.sample)
+        record = self._strikes.read(truth, firing.step, firing.sample)
+        noise = sound.converter_noise(firing.step, firing.sample).spawn(1)[0]
+        samples = self._wire.samples(truth.pressure, noise)
+        number, time, rate = self._scans()
+        begin = number + int(np.ceil((now() + AHEAD - time) * rate))
+        self._playing = begin, record
+        self._card.play(samples, time + (begin - number) / rate)

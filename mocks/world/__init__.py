@@ -1,0 +1,1 @@
+"""The one world behind all mocks: it holds the truth."""

@@ -1,0 +1,176 @@
+"""One run's reality gap, drawn from its distributions and the run's seed.
+
+Every number is keyed by what it belongs to: the run, the step or the sample. The order in
+which numbers are asked for, and how often, changes nothing, so a rerun reads the same values
+whatever its timing.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.geometry import rotation_about, rotation_from_vector, transform
+from harness.bench.gap import Gap
+from mocks.world.mesh import ShapeDeviation
+
+# What a stream of numbers is for; each stays what it is when another is added.
+_OBJECT, _SENSOR, _GEL, _SHAPE, _SHADING, _ARM, _TILT, _OFFSET, _PIXELS, _CAMERA = range(10)
+
+_VERTICAL = np.array([0.0, 0.0, 1.0])
+_SHADING_SHARE = 0.15
+"""Of the picture's width: the length over which shading varies."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunDraw:
+    """What differs from nominal for a whole run.
+
+    Attributes:
+        position: ``(3,)`` metres, of the object in base.
+        yaw: rad, of the object about the vertical.
+        tilt: ``(2,)`` rad, of the object about base x and y.
+        sensor_tilt: ``(2,)`` rad, of the gel about its x and y.
+        image_yaw: rad, of the gel about its z.
+        gel_centre: ``(3,)`` metres, of the gel in its nominal frame.
+        pitch: length of gel that a pixel shows from column to column, over its nominal length.
+        aspect: a pixel's height over its width.
+        height_gain: true indentation over what the calibration's gel would show.
+        scale: true size of the object over its nominal size.
+    """
+
+    position: FloatArray
+    yaw: float
+    tilt: FloatArray
+    sensor_tilt: FloatArray
+    image_yaw: float
+    gel_centre: FloatArray
+    pitch: float
+    aspect: float
+    height_gain: float
+    scale: float
+
+    @property
+    def object_rotation(self) -> FloatArray:
+        """``(3, 3)``, of the object in base."""
+        tilted: FloatArray = rotation_from_vector(np.array([*self.tilt, 0.0]))
+        return tilted @ rotation_about(_VERTICAL, self.yaw)
+
+    @property
+    def gel_from_true_gel(self) -> FloatArray:
+        """``(4, 4)``: where the gel really is, in its nominal frame."""
+        tilted: FloatArray = rotation_from_vector(np.array([*self.sensor_tilt, 0.0]))
+        return transform(tilted @ rotation_about(_VERTICAL, self.image_yaw), self.gel_centre)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactDraw:
+    """What differs for one contact.
+
+    Attributes:
+        arm_error: ``(3,)`` metres in base, of the flange against what is reported.
+        along_tool: metres, in addition, along the tool.
+        gel_rotation: ``(3, 3)``, of the gel in its own frame.
+        height_offset: metres of indentation.
+    """
+
+    arm_error: FloatArray
+    along_tool: float
+    gel_rotation: FloatArray
+    height_offset: float
+
+
+class GapDraw:
+    """The draws of one run.
+
+    Args:
+        gap: the distributions.
+        seed: of the run, zero or more.
+    """
+
+    def __init__(self, gap: Gap, seed: int) -> None:
+        self.gap = gap
+        self._seed = seed
+        self._contacts: dict[int, ContactDraw] = {}
+
+    @cached_property
+    def run(self) -> RunDraw:
+        """The draws that hold for the whole run."""
+        thing, sensor = self.gap.object, self.gap.sensor
+        of_object, of_sensor, of_gel = self.random(_OBJECT), self.random(_SENSOR), self.random(_GEL)
+        of_camera = self.random(_CAMERA)
+        return RunDraw(
+            position=read_only(thing.position * of_object.standard_normal(3)),
+            yaw=thing.yaw * of_object.standard_normal(),
+            tilt=read_only(thing.tilt * of_object.standard_normal(2)),
+            sensor_tilt=read_only(sensor.tilt * of_sensor.standard_normal(2)),
+            image_yaw=sensor.image_yaw * of_sensor.standard_normal(),
+            gel_centre=read_only(sensor.gel_centre * of_sensor.standard_normal(3)),
+            pitch=1.0 + sensor.pitch * of_camera.standard_normal(),
+            aspect=1.0 + sensor.aspect * of_camera.standard_normal(),
+            height_gain=1.0 + self.gap.gel.height_gain * of_gel.standard_normal(),
+            scale=1.0 + self.gap.shape.scale * self.random(_SHAPE, 0).standard_normal(),
+        )
+
+    def contact(self, step: int) -> ContactDraw:
+        """The draws of one contact."""
+        if step not in self._contacts:
+            arm, sensor = self.random(_ARM, step), self.gap.sensor
+            tilt = sensor.tilt_per_contact * self.random(_TILT, step).standard_normal(2)
+            self._contacts[step] = ContactDraw(
+                arm_error=read_only(self.gap.arm.translation * arm.standard_normal(3)),
+                along_tool=self.gap.arm.along_tool * arm.standard_normal(),
+                gel_rotation=read_only(rotation_from_vector(np.array([*tilt, 0.0]))),
+                height_offset=self.gap.gel.height_offset * self.random(_OFFSET, step).standard_normal(),
+            )
+        return self._contacts[step]
+
+    def deviation(self, centre: FloatArray) -> ShapeDeviation:
+        """How the object's shape differs; scaling leaves ``centre``, ``(3,)`` metres, in place."""
+        shape, random = self.gap.shape, self.random(_SHAPE, 1)
+        return ShapeDeviation.draw(self.run.scale, centre, shape.deviation, shape.deviation_length, random)
+
+    def shading(self, rows: int, columns: int) -> FloatArray:
+        """``(rows, columns)`` metres of indentation, smooth, the same in every picture of a run."""
+        rough = self.random(_SHADING).standard_normal((rows, columns))
+        smooth = gaussian_filter(rough, _SHADING_SHARE * columns, mode="wrap")
+        return read_only(self.gap.gel.shading * (smooth - smooth.mean()) / smooth.std())
+
+    def pixel_noise(self, rows: int, columns: int, step: int, sample: int) -> FloatArray:
+        """``(rows, columns)`` metres of indentation, independent from pixel to pixel and sample to sample."""
+        noise = self.random(_PIXELS, step, sample).standard_normal((rows, columns))
+        return read_only(self.gap.gel.pixel_noise * noise)
+
+    def summary(self) -> Mapping[str, Any]:
+        """The run's draws in SI, for the report."""
+        run = self.run
+        return {
+            "gap": self.gap.title,
+            "object_position_m": run.position.tolist(),
+            "object_yaw_rad": run.yaw,
+            "object_tilt_rad": run.tilt.tolist(),
+            "object_scale": run.scale,
+            "shape_deviation_m": self.gap.shape.deviation,
+            "sensor_tilt_rad": run.sensor_tilt.tolist(),
+            "image_yaw_rad": run.image_yaw,
+            "gel_centre_m": run.gel_centre.tolist(),
+            "pitch_over_nominal": run.pitch,
+            "aspect": run.aspect,
+            "height_gain": run.height_gain,
+            "gel_skirt_m": self.gap.gel.skirt,
+            "calibration": self.gap.gel.calibration,
+        }
+
+    def random(self, purpose: int, *key: int) -> np.random.Generator:
+        """The stream of numbers of one purpose (sound's own are in ``mocks.world.sound_draw``).
+
+        Args:
+            purpose: what the numbers are for.
+            key: what they belong to; steps and samples count from -1.
+        """
+        spawn_key = (purpose, *(number + 1 for number in key))
+        return np.random.Generator(np.random.Philox(np.random.SeedSequence(self._seed, spawn_key=spawn_key)))

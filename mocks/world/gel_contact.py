@@ -1,0 +1,174 @@
+"""How far an object has come into the gel, and how hard the gel pushes back.
+
+The gel is a bed of independent springs (Winkler): pressure is the modulus of the bed times
+the local indentation. A coarse grid suffices for a force, so that the controller can ask for
+it in every cycle; the picture is made elsewhere, on the sensor's own pixels.
+"""
+
+import numba
+import numpy as np
+
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.mesh import Mesh
+
+BED_MODULUS = 1.5e7
+"""N/m^3: a soft gel, 37 kPa over 2.5 mm of thickness; 2 mm over the whole window take 9 N."""
+
+CELL = 8.0e-3
+"""Metres, edge of the boxes into which faces are sorted."""
+
+_LARGEST_GRID = 2_000_000
+
+
+class GelContact:
+    """A rectangle of gel against one mesh.
+
+    Args:
+        mesh: of the object, in its frame.
+        window: metres (x, y) of the gel's surface.
+        spacing: metres between the springs.
+        reach: metres behind the gel's surface within which a surface of the object is felt.
+    """
+
+    def __init__(self, mesh: Mesh, window: tuple[float, float], spacing: float, reach: float) -> None:
+        self._corners = mesh.corners
+        self._starts, self._members, self._origin, self._shape = _sorted_into_boxes(mesh)
+        self._counts = (round(window[0] / spacing), round(window[1] / spacing))
+        self._pitch = (window[0] / self._counts[0], window[1] / self._counts[1])
+        self._reach = reach
+        self._half = np.array([window[0] / 2, window[1] / 2])
+        self._centre = mesh.bounds.mean(axis=0)
+        gel_radius = float(np.hypot(*self._half)) + reach
+        self._radius = mesh.diagonal / 2 + gel_radius
+
+    def indentation(self, object_from_gel: FloatArray) -> FloatArray:
+        """``(y, x)`` metres, how far each spring is pressed in; zero where it is not touched."""
+        columns, rows = self._counts
+        depth = np.zeros((rows, columns))
+        if float(np.linalg.norm(object_from_gel[:3, 3] - self._centre)) < self._radius:
+            low, high = self._box(object_from_gel)
+            _rasterize(
+                self._corners,
+                self._starts,
+                self._members,
+                self._shape,
+                low,
+                high,
+                np.ascontiguousarray(object_from_gel),
+                self._pitch[0],
+                self._pitch[1],
+                self._reach,
+                depth,
+            )
+        return depth
+
+    def wrench(self, object_from_gel: FloatArray) -> FloatArray:
+        """``(6,)`` N and N m that the object exerts on the gel, at the gel's origin, in gel."""
+        pressure = BED_MODULUS * self.indentation(object_from_gel)
+        area = self._pitch[0] * self._pitch[1]
+        columns, rows = self._counts
+        x = (np.arange(columns) + 0.5 - columns / 2) * self._pitch[0]
+        y = (np.arange(rows) + 0.5 - rows / 2) * self._pitch[1]
+        push = float(pressure.sum()) * area
+        about_x = -float(pressure.sum(axis=1) @ y) * area
+        about_y = float(pressure.sum(axis=0) @ x) * area
+        return np.array([0.0, 0.0, -push, about_x, about_y, 0.0])
+
+    def _box(self, object_from_gel: FloatArray) -> tuple[IntArray, IntArray]:
+        """First and last box, in each direction, that the pressed part of the gel may share."""
+        centre = object_from_gel[:3, :3] @ np.array([0.0, 0.0, -self._reach / 2]) + object_from_gel[:3, 3]
+        half = np.abs(object_from_gel[:3, :3]) @ np.array([*self._half, self._reach / 2])
+        low = np.floor((centre - half - self._origin) / CELL).astype(np.int64)
+        high = np.floor((centre + half - self._origin) / CELL).astype(np.int64)
+        return np.maximum(low, 0), np.minimum(high, self._shape - 1)
+
+
+def _sorted_into_boxes(mesh: Mesh) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
+    """Faces by the boxes of edge ``CELL`` that their bounds touch, as starts and members."""
+    origin = mesh.bounds[0] - CELL / 2
+    shape = np.ceil((mesh.bounds[1] + CELL / 2 - origin) / CELL).astype(np.int64)
+    if int(np.prod(shape)) > _LARGEST_GRID:
+        raise ValueError(f"an object of {mesh.diagonal:.2f} m is larger than any that the gel could touch")
+    low = np.floor((mesh.corners.min(axis=1) - origin) / CELL).astype(np.int64)
+    high = np.floor((mesh.corners.max(axis=1) - origin) / CELL).astype(np.int64)
+    starts, members = _fill(low, high, shape)
+    return starts, members, origin, shape
+
+
+@numba.njit(cache=True, nogil=True)
+def _fill(low: IntArray, high: IntArray, shape: IntArray) -> tuple[IntArray, IntArray]:
+    boxes = shape[0] * shape[1] * shape[2]
+    starts = np.zeros(boxes + 1, dtype=np.int64)
+    for face in range(len(low)):
+        for i in range(low[face, 0], high[face, 0] + 1):
+            for j in range(low[face, 1], high[face, 1] + 1):
+                for k in range(low[face, 2], high[face, 2] + 1):
+                    starts[(i * shape[1] + j) * shape[2] + k + 1] += 1
+    for box in range(boxes):
+        starts[box + 1] += starts[box]
+    members = np.empty(starts[boxes], dtype=np.int64)
+    filled = starts[:-1].copy()
+    for face in range(len(low)):
+        for i in range(low[face, 0], high[face, 0] + 1):
+            for j in range(low[face, 1], high[face, 1] + 1):
+                for k in range(low[face, 2], high[face, 2] + 1):
+                    box = (i * shape[1] + j) * shape[2] + k
+                    members[filled[box]] = face
+                    filled[box] += 1
+    return starts, members
+
+
+@numba.njit(cache=True, nogil=True)
+def _rasterize(
+    corners: FloatArray,
+    starts: IntArray,
+    members: IntArray,
+    shape: IntArray,
+    low: IntArray,
+    high: IntArray,
+    object_from_gel: FloatArray,
+    pitch_x: float,
+    pitch_y: float,
+    reach: float,
+    depth: FloatArray,
+) -> None:
+    """Deepest surface behind each spring's rest position, into ``depth``."""
+    rotation, offset = object_from_gel[:3, :3], object_from_gel[:3, 3]
+    rows, columns = depth.shape
+    x, y, z = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(low[0], high[0] + 1):
+        for j in range(low[1], high[1] + 1):
+            for k in range(low[2], high[2] + 1):
+                box = (i * shape[1] + j) * shape[2] + k
+                for slot in range(starts[box], starts[box + 1]):
+                    face = members[slot]
+                    for corner in range(3):
+                        dx = corners[face, corner, 0] - offset[0]
+                        dy = corners[face, corner, 1] - offset[1]
+                        dz = corners[face, corner, 2] - offset[2]
+                        z[corner] = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
+                        # In units of the grid, with spring (0, 0) at the origin.
+                        x[corner] = (
+                            rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
+                        ) / pitch_x + (columns - 1) / 2
+                        y[corner] = (
+                            rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
+                        ) / pitch_y + (rows - 1) / 2
+                    if min(z[0], z[1], z[2]) >= 0.0 or max(z[0], z[1], z[2]) < -reach:
+                        continue
+                    area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
+                    if area >= 0.0:  # seen from behind, or edge on: the front is met first
+                        continue
+                    first = max(0, int(np.ceil(min(x[0], x[1], x[2]))))
+                    last = min(columns - 1, int(np.floor(max(x[0], x[1], x[2]))))
+                    top = max(0, int(np.ceil(min(y[0], y[1], y[2]))))
+                    bottom = min(rows - 1, int(np.floor(max(y[0], y[1], y[2]))))
+                    for row in range(top, bottom + 1):
+                        for column in range(first, last + 1):
+                            u = ((x[1] - column) * (y[2] - row) - (x[2] - column) * (y[1] - row)) / area
+                            v = ((x[2] - column) * (y[0] - row) - (x[0] - column) * (y[2] - row)) / area
+                            w = 1.0 - u - v
+                            if u >= -1e-9 and v >= -1e-9 and w >= -1e-9:
+                                pressed = -(u * z[0] + v * z[1] + w * z[2])
+                                if pressed <= reach and pressed > depth[row, column]:
+                                    depth[row, column] = pressed

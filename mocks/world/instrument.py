@@ -1,0 +1,89 @@
+"""The true object of a run as something that sounds: its modes, how they decay, how loud each is.
+
+The volume mesh is another one than any estimator's: other surface, other elements. It is made
+once for an object; a run's own wall and material move its nodes and fill its cells.
+"""
+
+from collections.abc import Mapping
+
+from harness.basics.materials import Material, material
+from harness.basics.mesh import Mesh
+from harness.basics.store import Store, default_folder, digest
+from harness.bench.scene import SceneFile
+from harness.sim.modal.modal import default_edge, from_arrays, solve_modes, to_arrays
+from harness.sim.modal.modes import Modes, dampings
+from harness.sim.modal.solve import Elasticity
+from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedra, tetrahedralize
+from harness.sim.solid.walls import walled
+from harness.sim.sound.modal_radiation import radiation
+from mocks.world.gap_draw import GapDraw
+from mocks.world.modes import perturbed, uneven
+from mocks.world.sound import Instrument
+from mocks.world.sound_draw import SoundDraw
+from mocks.world.world import World
+
+VERSION = 1
+"""Raised with every change of what is computed here, so that stored modes are dropped."""
+
+LIMIT = 10e3
+"""Hz: a blow of 0.2 ms has a tenth of its force left at 6 kHz, and a thirtieth here."""
+
+FINER = 0.85
+"""Of the edge that an estimator's elements have where nobody asks for another."""
+
+FIELD_LENGTH = 40e-3
+"""m over which the true material varies."""
+
+DISTANCE = 0.25
+"""m from the object to the microphone."""
+
+
+def instrument_of(world: World, scene: SceneFile, draw: GapDraw) -> Instrument:
+    """The true object's modes and how loud each is at the microphone.
+
+    Args:
+        world: of the run.
+        scene: names the material, and the wall of a hollow thing scanned as a solid.
+        draw: of the run.
+
+    Raises:
+        MeshRefused: an object that cannot be filled with elements.
+    """
+    made_of = material(scene.object.material)
+    solid = walled(world.nominal, scene.object.wall)
+    edge = FINER * default_edge(solid, made_of, LIMIT)
+    modes = _modes(solid, made_of, edge, SoundDraw(draw), Store(default_folder()))
+    return Instrument(modes, dampings(modes.frequencies, made_of), radiation(modes, DISTANCE))
+
+
+def _modes(solid: Mesh, made_of: Material, edge: float, draw: SoundDraw, store: Store) -> Modes:
+    """The modes of one run's object, kept by everything that they depend on."""
+    fields = draw.material_random()
+    wall, poisson, sigma = draw.wall_change, draw.poisson_change, draw.elastic_field
+    # The first numbers of the stream stand for the stream; without fields all runs share their modes.
+    told = [wall, poisson, sigma, FIELD_LENGTH, draw.material_random().standard_normal(4) if sigma else 0.0]
+    key = digest(["world modes", VERSION, solid.vertices, solid.faces, made_of, LIMIT, edge, *told])
+    kept = store.get(key)
+    if isinstance(kept, Mapping):
+        return from_arrays(kept)
+    drawn = _filled(solid, edge, store)
+    made = perturbed(drawn, wall) if wall else drawn
+    elasticity = (
+        uneven(made, made_of, sigma, FIELD_LENGTH, fields, poisson)
+        if sigma or poisson
+        else Elasticity.uniform(made_of, len(made.cells))
+    )
+    solved = solve_modes(made, elasticity, LIMIT, solid, undeformed=drawn)
+    store.put(key, to_arrays(solved))
+    return solved
+
+
+def _filled(solid: Mesh, edge: float, store: Store) -> Tetrahedra:
+    """The world's volume mesh of an object."""
+    key = digest(["world tetrahedra", VERSION, solid.vertices, solid.faces, edge])
+    kept = store.get(key)
+    if isinstance(kept, Mapping):
+        return tetrahedra(kept["nodes"], kept["cells"])
+    filled = tetrahedralize(solid, edge)
+    store.put(key, {"nodes": filled.nodes, "cells": filled.cells})
+    return filled

@@ -1,0 +1,226 @@
+"""What the world's hammer does to the true object, and what the microphone hears of it.
+
+A strike is a half sine of force at the place where the hammer really meets the object. Every mode
+that it moves there rings, decays, and reaches the microphone by a way of its own: a gain and a
+phase that nobody knows, the same in every strike of a run unless the gap says that something moved.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray, read_only
+from harness.bench.gap import Gap
+from harness.sim.modal.modes import Modes
+from harness.sim.sound.modal_sound import ring
+from harness.sim.sound.room import reverberated, room_response
+from mocks.world.gap_draw import GapDraw
+from mocks.world.sound_draw import Blow, SoundDraw
+from mocks.world.world import Met, World
+
+LISTEN = 0.6
+"""s of a record behind the blow: ambient noise goes on for ever, an object has rung out by then."""
+
+MIDDLING_OVER = 0.5
+"""s over which the level of a strike is taken that the signal-to-noise ratio speaks of."""
+
+STROKE = 20.0e-3
+"""m that the striker comes out; what it does not meet by then it does not strike."""
+
+_PLACES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Instrument:
+    """The true object as something that sounds.
+
+    Attributes:
+        modes: of the true object, by the places of the nominal one.
+        dampings: ``(m,)`` 1/s, of its material.
+        levels: ``(m,)`` Pa for each unit of a mode's ringing, as ``harness.sim.sound.modal_sound.ring``
+            makes it of a force in N and a gain in 1/sqrt(kg), at the microphone.
+    """
+
+    modes: Modes
+    dampings: FloatArray
+    levels: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """Where a strike goes.
+
+    Attributes:
+        blow: as drawn.
+        met: where it meets the object; None where it does not.
+        direction_in_object: ``(3,)`` unit, the way of the blow.
+    """
+
+    blow: Blow
+    met: Met | None
+    direction_in_object: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class StrikeTruth:
+    """One strike as it was, before any instrument has read it.
+
+    Attributes:
+        rate: Hz.
+        force: ``(t,)`` N, from the switching of the striker's output on.
+        pressure: ``(t,)`` Pa at the microphone, at the same times, ambient noise included.
+        aim: where it went.
+    """
+
+    rate: float
+    force: FloatArray
+    pressure: FloatArray
+    aim: Aim
+
+
+class WorldSound:
+    """The sound of one run.
+
+    Args:
+        world: of the same run.
+        instrument: the true object's modes.
+        gap: distributions; the same as the world's.
+        seed: of the run.
+        flange_from_hammer: ``(4, 4)``, as the station states it.
+        rate: Hz, at which force and pressure are wanted.
+
+    Attributes:
+        frequencies: ``(m,)`` Hz, true.
+        dampings: ``(m,)`` 1/s, true.
+        noise: Pa, deviation of the ambient noise.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        instrument: Instrument,
+        gap: Gap,
+        seed: int,
+        flange_from_hammer: FloatArray,
+        rate: float,
+    ) -> None:
+        self._world = world
+        self._modes = instrument.modes
+        self._draw = SoundDraw(GapDraw(gap, seed))
+        self._flange_from_hammer = flange_from_hammer
+        self._rate = rate
+        self._room = self._room_of(gap)
+        # Frequencies of a body go with one over its size.
+        self.frequencies = self._draw.frequencies(instrument.modes.frequencies / world.scale)
+        self.dampings = self._draw.dampings(instrument.dampings)
+        self._levels = instrument.levels * self._draw.gains(len(instrument.levels))
+        self.noise = self._middling_level(gap) * 10.0 ** (-gap.sound.signal_to_noise / 20.0)
+
+    @property
+    def force_gain(self) -> float:
+        """What the force cell reads for each newton, against its calibration."""
+        return self._draw.force_gain
+
+    def strike(self, base_from_flange: FloatArray, step: int, sample: int) -> StrikeTruth:
+        """Fire the striker with the flange reported at a pose.
+
+        Args:
+            base_from_flange: ``(4, 4)``, as the controller believes.
+            step: of the run.
+            sample: of the step.
+        """
+        aim = self.aim(base_from_flange, step, sample)
+        blow = aim.blow
+        times = np.arange(round((blow.throw + LISTEN) * self._rate)) / self._rate
+        force, pressure = np.zeros(len(times)), np.zeros(len(times))
+        if aim.met is not None:
+            force = _force(times, blow)
+            pressure = self._heard(force, aim.met, aim.direction_in_object, step, sample)
+        ambient = self.noise * self._draw.noise(len(times), 1, step, sample)[:, 0]
+        heard = read_only(pressure + ambient)
+        return StrikeTruth(self._rate, read_only(force), heard, aim)
+
+    def aim(self, base_from_flange: FloatArray, step: int, sample: int) -> Aim:
+        """Where a strike of ``strike`` goes, without its sound."""
+        blow = self._draw.blow(step, sample)
+        tip = self._flange_from_hammer @ blow.hammer_from_true_hammer
+        met = self._world.met_by(base_from_flange, tip, step, STROKE) if blow.impulse > 0.0 else None
+        direction = self._world.direction_in_object(base_from_flange, tip, step)
+        return Aim(blow, met, read_only(direction))
+
+    def idle(self, seconds: float) -> FloatArray:
+        """``(t,)`` Pa of ambient noise."""
+        return read_only(self.noise * self._draw.idle_noise(round(seconds * self._rate), 1)[:, 0])
+
+    def converter_noise(self, step: int, sample: int) -> np.random.Generator:
+        """The noise of the box's converter during one strike; between strikes step and sample are -1."""
+        return self._draw.converter_noise(step, sample)
+
+    def differences(self) -> Mapping[str, Any]:
+        """What sounds differently from what is believed, for the report."""
+        modes = self._modes
+        return {
+            **self._draw.summary(),
+            "noise_pa": self.noise,
+            "modes": len(modes.frequencies),
+            "modal_nodes": modes.nodes,
+            "modal_elements": modes.elements,
+            "frequencies_hz": self.frequencies.tolist(),
+        }
+
+    def _heard(
+        self, force: FloatArray, met: Met, direction: FloatArray, step: int, sample: int
+    ) -> FloatArray:
+        gains = self._modes.gains(met.nominal[None], direction[None])[0]
+        amplitudes = gains * self._levels * self._draw.strike_gains(len(gains), step, sample)
+        rung = ring(self.frequencies, self.dampings, amplitudes[None], force[None], self._rate)[0]
+        heard: FloatArray = rung if self._room is None else reverberated(rung[None], self._room)[0]
+        return heard
+
+    def _room_of(self, gap: Gap) -> FloatArray | None:
+        time = gap.sound.reverberation_time
+        if time == 0.0:
+            return None
+        level = gap.sound.direct_to_reverberant
+        return room_response(self._rate, time, level, self._draw.room_seed, min(time, LISTEN))
+
+    def _middling_level(self, gap: Gap) -> float:
+        """Pa rms of the median over the surface of strikes along the normal, without cross terms of modes."""
+        modes, pulse = self._modes, gap.sound.pulse
+        chosen = np.linspace(0, len(modes.points) - 1, min(_PLACES, len(modes.points))).astype(np.int64)
+        gains = np.einsum("kmd,kd->km", modes.shapes[chosen], modes.normals[chosen])
+        first = np.abs(gains * self._levels) * self._draw.nominal_impulse * _spectrum(self.frequencies, pulse)
+        below = self.frequencies < 0.5 * self._rate
+        decays = 2.0 * self.dampings[below] * MIDDLING_OVER
+        powers = 0.5 * first[:, below] ** 2 @ (-np.expm1(-decays) / decays)
+        room = 1.0
+        if self._room is not None:
+            room += 10.0 ** (-gap.sound.direct_to_reverberant / 10.0)
+        return float(np.sqrt(room * np.median(powers)))
+
+
+def _force(times: FloatArray, blow: Blow) -> FloatArray:
+    """``(t,)`` N: a half sine, and perhaps a second, smaller one."""
+    force = _half_sine(times - blow.throw, blow.pulse, blow.impulse)
+    if blow.bounce is not None:
+        force = force + _half_sine(
+            times - blow.throw - blow.bounce, blow.pulse, blow.bounce_share * blow.impulse
+        )
+    return force
+
+
+def _half_sine(times: FloatArray, length: float, impulse: float) -> FloatArray:
+    inside = (times > 0.0) & (times < length)
+    peak = impulse * np.pi / (2.0 * length)
+    return np.where(inside, peak * np.sin(np.pi * np.where(inside, times, 0.0) / length), 0.0)
+
+
+def _spectrum(frequencies: FloatArray, length: float) -> FloatArray:
+    """Share of a half sine's impulse at each frequency."""
+    turns = frequencies * length
+    apart = 1.0 - 4.0 * turns**2
+    near = np.abs(apart) < 1e-6  # at f = 1 / (2 length) both go to zero: pi / 4
+    share: FloatArray = np.where(near, np.pi / 4, np.abs(np.cos(np.pi * turns) / np.where(near, 1.0, apart)))
+    return share

@@ -1,0 +1,289 @@
+"""The one world behind all mocks: it holds the truth, and says what each instrument reads.
+
+Everything is a function of where the controller believes the flange to be, the step and the
+sample; the world keeps no clock and no state, so a rerun reads the same values.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.geometry import apply, inverse, transform, translation
+from harness.basics.mesh import Mesh
+from harness.bench.gap import Gap
+from harness.bench.sensor import TactileSensor
+from harness.sim.gel.height_map import RasterMesh, depth_image, penetration
+from mocks.camera.picture_grid import PictureGrid
+from mocks.camera.scene_view import Body, SceneView, box
+from mocks.world.gap_draw import GapDraw
+from mocks.world.gel import WorldGel
+from mocks.world.gel_contact import GelContact
+from mocks.world.mesh import nearest_face, shares_of_corners, split_long_edges
+
+LONGEST_EDGE = 5.0e-3
+"""Metres, in the world's own tessellation: short beside the length over which shape deviates."""
+
+CUT = 0.9
+"""Of the longest edge of a mesh with shorter ones: some are cut always, so that no tessellation is shared."""
+
+SPRING_SPACING = 0.75e-3
+REACH = 10.0e-3
+"""Metres behind the gel's surface beyond which nothing is felt: deeper than any gel is thick."""
+
+BESIDE = 50.0e-3
+"""Metres behind the gel's surface where the sensor's body ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """The scene camera: ``base_from_camera`` ``(4, 4)``, pixels, and focal length in pixels."""
+
+    base_from_camera: FloatArray
+    rows: int
+    columns: int
+    focal_length: float
+
+
+@dataclass(frozen=True)
+class Furniture:
+    """What the scene camera sees beside the object: metres, in base."""
+
+    table_height: float = 0.0
+    table_size: tuple[float, float] = (1.6, 1.6)
+    pedestal_width: float = 0.06
+
+
+@dataclass(frozen=True, eq=False)
+class NominalBench:
+    """The bench as the scene and the station state it.
+
+    Attributes:
+        mesh: of the object, on a tessellation that nobody else uses.
+        base_from_object: ``(4, 4)``.
+        flange_from_gel: ``(4, 4)``.
+        sensor: the make of the gel.
+        calibration: of the gel that estimators believe in: the name of a shipped one, or a path.
+        camera: the scene camera, None where there is none.
+        furniture: around the object.
+    """
+
+    mesh: Mesh
+    base_from_object: FloatArray
+    flange_from_gel: FloatArray
+    sensor: TactileSensor
+    calibration: str
+    camera: Camera | None = None
+    furniture: Furniture = Furniture()
+
+
+@dataclass(frozen=True, eq=False)
+class Met:
+    """Where something meets the true object.
+
+    Attributes:
+        point: ``(3,)`` m in the object's frame, on the true surface.
+        nominal: ``(3,)`` m, the same material point on the nominal surface.
+    """
+
+    point: FloatArray
+    nominal: FloatArray
+
+
+class World:
+    """The truth of one run.
+
+    Args:
+        bench: nominal.
+        gap: distributions of what differs from it.
+        seed: of the run.
+
+    Attributes:
+        sensor: the gel as it was made: the make's, but for its pitch.
+        nominal: the object's drawing, on the world's own tessellation.
+        mesh: the true object, in its own frame; the same faces.
+        scale: of the true object.
+        base_from_object: ``(4, 4)``, where it truly stands.
+        background: ``(rows, columns, 3)``, the picture of the untouched gel.
+    """
+
+    def __init__(self, bench: NominalBench, gap: Gap, seed: int) -> None:
+        if bench.sensor.markers is not None or bench.sensor.casts_shadow:
+            raise NotImplementedError("mocks.world.world: printed markers and shadows in the gel")
+        self._bench = bench
+        self._draw = GapDraw(gap, seed)
+        self._flange_from_gel: dict[int, FloatArray] = {}
+        self._grid = PictureGrid.drawn(bench.sensor, self._draw.run.pitch, self._draw.run.aspect)
+        self.sensor = self._grid.sensor
+        edges = bench.mesh.corners - np.roll(bench.mesh.corners, 1, axis=1)
+        longest = float(np.linalg.norm(edges, axis=-1).max())
+        self.nominal = split_long_edges(bench.mesh, min(LONGEST_EDGE, CUT * longest))
+        self._deviation = self._draw.deviation(self.nominal.bounds.mean(axis=0))
+        self.scale = self._draw.run.scale
+        self.mesh = Mesh(self._deviation.applied(self.nominal.vertices), self.nominal.faces)
+        self.base_from_object = read_only(self._placed())
+        self._object_from_base = inverse(self.base_from_object)
+        self._raster = RasterMesh(self.mesh)
+        self._middle = apply(self.base_from_object, self.mesh.bounds.mean(axis=0)[None])[0]
+        tool = float(np.linalg.norm(bench.flange_from_gel[:3, 3]))
+        self._touching_distance = self.mesh.diagonal / 2 + tool + float(np.hypot(*self.sensor.window)) + REACH
+        steeper = bench.sensor.pitch / self._grid.mean_pitch
+        self._gel = WorldGel(self.sensor, gap.gel, bench.calibration, steeper)
+        self.background = self._gel.background
+        self._shading = self._draw.shading(self.sensor.rows, self.sensor.columns)
+        self._contact = GelContact(self.mesh, self.sensor.window, SPRING_SPACING, REACH)
+
+    def tactile_image(self, base_from_flange: FloatArray, step: int, sample: int) -> ByteArray:
+        """What the gel's camera sees, ``(rows, columns, 3)`` uint8, RGB; without contact, the background."""
+        penetration = self._indentation(base_from_flange, step)
+        if not penetration.any():
+            return self.background.copy()
+        offset = self._draw.contact(step).height_offset
+        noise = self._draw.pixel_noise(self.sensor.rows, self.sensor.columns, step, sample)
+        return self._gel.picture(penetration, self._draw.run.height_gain, offset + self._shading + noise)
+
+    def contact_wrench(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        """``(6,)`` N and N m that the object exerts at the flange, in base."""
+        offset = base_from_flange[:3, 3] - self._middle
+        if float(offset @ offset) > self._touching_distance**2:
+            return np.zeros(6)
+        flange_from_gel = self._true_flange_from_gel(step)
+        base_from_gel = self._true_base_from_flange(base_from_flange, step) @ flange_from_gel
+        in_gel = self._contact.wrench(self._object_from_base @ base_from_gel)
+        rotation = base_from_gel[:3, :3]
+        force = rotation @ in_gel[:3]
+        x, y, z = base_from_flange[:3, :3] @ flange_from_gel[:3, 3]
+        turning = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # np.cross takes 40 us
+        return np.concatenate([force, rotation @ in_gel[3:] + turning @ force])
+
+    def penetration(self, base_from_flange: FloatArray, step: int) -> float:
+        """Metres that the object reaches into the gel at the deepest pixel; zero without contact."""
+        return float(self._indentation(base_from_flange, step).max())
+
+    def true_contact(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        """The point touched, ``(3,)`` metres: a material point, given where it is on the nominal surface.
+
+        It is the point first met by the line through the gel's centre along the gel's z axis; where
+        that line meets nothing within the gel's thickness, the surface point nearest to the centre.
+        """
+        object_from_gel = self._object_from_gel(base_from_flange, step)
+        met = self._first_met(object_from_gel, -BESIDE, self.sensor.gel_thickness)
+        if met is not None:
+            return met.nominal
+        face, in_object = nearest_face(self.mesh, object_from_gel[:3, 3])
+        return self._nominal_point(face, in_object)
+
+    def met_by(
+        self, base_from_flange: FloatArray, flange_from_tip: FloatArray, step: int, stroke: float
+    ) -> Met | None:
+        """Where a tip that comes out along its z axis by ``stroke`` m meets the object, if it does.
+
+        Args:
+            base_from_flange: ``(4, 4)``, as the controller reports it.
+            flange_from_tip: ``(4, 4)``, where the tip really is on the flange.
+            step: of the run.
+            stroke: m.
+        """
+        return self._first_met(self._object_from_tip(base_from_flange, flange_from_tip, step), 0.0, stroke)
+
+    def direction_in_object(
+        self, base_from_flange: FloatArray, flange_from_tip: FloatArray, step: int
+    ) -> FloatArray:
+        """``(3,)`` unit: the z axis of the tip of ``met_by``, in the object's frame."""
+        direction: FloatArray = self._object_from_tip(base_from_flange, flange_from_tip, step)[:3, 2]
+        return direction
+
+    def differences(self) -> Mapping[str, Any]:
+        """What the world does differently from the nominal bench, for the report."""
+        return {
+            **self._draw.summary(),
+            "mesh_vertices": len(self.mesh.vertices),
+            "mesh_faces": len(self.mesh.faces),
+            "optics_level": "exact",
+            "calibration_sha256": self._gel.calibration.sha256,
+        }
+
+    def scene_image(self, base_from_flange: FloatArray) -> ByteArray:
+        """What the scene camera sees, ``(rows, columns, 3)`` uint8, RGB."""
+        if self._view is None:
+            raise ValueError("this scene has no camera; ask for none of its pictures")
+        width, height = self.sensor.housing
+        length = float(self._bench.flange_from_gel[2, 3])
+        tool = box((width, height, length), (0.0, 0.0, -length / 2))
+        return self._view.picture([Body(tool, base_from_flange @ self._bench.flange_from_gel, (70, 90, 200))])
+
+    @cached_property
+    def _view(self) -> SceneView | None:
+        camera = self._bench.camera
+        if camera is None:
+            return None
+        furniture = self._bench.furniture
+        vertices = apply(self.base_from_object, self.mesh.vertices)
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        (x, y, _), lowest, top = 0.5 * (low + high), float(low[2]), furniture.table_height
+        fixed = [Body(self.mesh, self.base_from_object, (225, 205, 170))]
+        table = box((*furniture.table_size, 0.02), (0.0, 0.0, top - 0.01))
+        fixed.append(Body(split_long_edges(table, 0.1), np.eye(4), (120, 110, 100)))
+        if lowest > top:
+            width = furniture.pedestal_width
+            foam = box((width, width, lowest - top), (x, y, 0.5 * (lowest + top)))
+            fixed.append(Body(foam, np.eye(4), (90, 90, 95)))
+        return SceneView(camera.base_from_camera, camera.rows, camera.columns, camera.focal_length, fixed)
+
+    def _placed(self) -> FloatArray:
+        """``base_from_object``: turned and moved about the middle of the object."""
+        middle = apply(self._bench.base_from_object, self.nominal.bounds.mean(axis=0)[None])[0]
+        run = self._draw.run
+        moved = translation(middle + run.position) @ transform(run.object_rotation, np.zeros(3))
+        placed: FloatArray = moved @ translation(-middle) @ self._bench.base_from_object
+        return placed
+
+    def _true_flange_from_gel(self, step: int) -> FloatArray:
+        if step not in self._flange_from_gel:
+            tilt = transform(self._draw.contact(step).gel_rotation, np.zeros(3))
+            true = self._bench.flange_from_gel @ self._draw.run.gel_from_true_gel @ tilt
+            self._flange_from_gel[step] = read_only(true)
+        return self._flange_from_gel[step]
+
+    def _true_base_from_flange(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        """Where the flange is; the controller believes it to be at ``base_from_flange``."""
+        contact = self._draw.contact(step)
+        along_tool = base_from_flange[:3, :3] @ self._bench.flange_from_gel[:3, 2]
+        true = base_from_flange.copy()
+        true[:3, 3] += contact.arm_error + contact.along_tool * along_tool
+        return true
+
+    def _object_from_gel(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        base_from_gel = self._true_base_from_flange(base_from_flange, step) @ self._true_flange_from_gel(step)
+        object_from_gel: FloatArray = self._object_from_base @ base_from_gel
+        return object_from_gel
+
+    def _object_from_tip(
+        self, base_from_flange: FloatArray, flange_from_tip: FloatArray, step: int
+    ) -> FloatArray:
+        true = self._true_base_from_flange(base_from_flange, step)
+        object_from_tip: FloatArray = self._object_from_base @ true @ flange_from_tip
+        return object_from_tip
+
+    def _first_met(self, object_from_tool: FloatArray, near: float, far: float) -> Met | None:
+        """What the line along a tool's z axis meets first between two depths, in m."""
+        met = depth_image(self._raster, inverse(object_from_tool), 1e-6, 1, 1, near=near, far=far)
+        face = int(met.face[0, 0])
+        if face < 0:
+            return None
+        point = apply(object_from_tool, np.array([[0.0, 0.0, met.depth[0, 0]]]))[0]
+        return Met(point, self._nominal_point(face, point))
+
+    def _nominal_point(self, face: int, point: FloatArray) -> FloatArray:
+        """Where a material point of a true face is on the nominal surface."""
+        nominal: FloatArray = shares_of_corners(self.mesh, face, point) @ self.nominal.corners[face]
+        return nominal
+
+    def _indentation(self, base_from_flange: FloatArray, step: int) -> FloatArray:
+        gel_from_object = inverse(self._object_from_gel(base_from_flange, step))
+        gaps = self._grid.gaps(self._raster, gel_from_object)
+        indentation: FloatArray = penetration(gaps[None], self.sensor)[0]
+        return indentation

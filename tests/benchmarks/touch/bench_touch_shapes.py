@@ -1,0 +1,259 @@
+"""What the levels of ``touch.shapes`` cost and lose: error in um and in the picture, against seconds.
+
+``python tests/benchmarks/touch/bench_touch_shapes.py mug bowl [--objectfile FOLDER] [--presses 200]
+[--repeat 9]`` presses at random places that were never coded, with every level in one run. Without a folder,
+codes are made and written first. Seconds are CPU time of one thread for each map, from presses to the gel's
+surface, median and quartiles; the last rows are maps a second on two threads, by the clock and for each
+second of a core, of which a busy machine gives less than two. The perceptron's seconds do not depend on its
+weights: where the file has none, they are measured with random ones and no error is shown.
+Rows that cost nothing stand beside: one map for each coded place, and the untouched gel.
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from threadpoolctl import threadpool_limits
+
+from harness.authoring.touch.data import DEPTHS, MOST_TILT, draw_presses, reference_maps
+from harness.authoring.touch.profiles import touch_profile
+from harness.authoring.touch.touch import OFF, spaced_codes
+from harness.basics.arrays import AnyArray, ByteArray, FloatArray
+from harness.basics.materials import material
+from harness.bench.sensor import GELSIGHT_R15
+from harness.effects.touch_drawing import optics
+from harness.objectfile.entries import Provenance
+from harness.objectfile.file import ObjectFile, create_object
+from harness.objectfile.graph import MlpWeights
+from harness.objectfile.runtime import Network
+from harness.objectfile.surface_search import SurfaceSearch
+from harness.objectfile.touch.graph import codes_graph
+from harness.objectfile.touch.nodes import nodes_from
+from harness.objectfile.touch.part import PERCEPTRON, CodesPart, TouchPart, perceptron_tensors, with_touch
+from harness.objectfile.touch.perceptron import paper_normaliser, perceptron_graph, pixel_domain
+from harness.objectfile.touch.touch import (
+    CHUNK,
+    CodeMaps,
+    Maps,
+    ObjectTouch,
+    PerceptronMaps,
+    open_touch,
+)
+from harness.objectfile.touch_entries import GelEntry
+from harness.objects.household import MATERIALS, build
+from harness.picture.image_metrics import mean_square, psnr, ssim
+from harness.sim.gel.height_map import RasterMesh
+from harness.sim.gel.presses import Presses
+from harness.sim.optics.tactile_calibration import shipped_calibration
+
+CALIBRATION = shipped_calibration("gelsight_r15_bench")
+SKIRT = CALIBRATION.header.skirt
+SEED = 11
+PAPER = [189, 256, 256, 256, 256, 256 + 189, 256, 256, 256]
+"""Numbers that each layer of the paper's network takes."""
+
+
+def main() -> None:
+    """One table for each object."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("objects", nargs="*", metavar="OBJECT", help=f"built in: {', '.join(MATERIALS)}")
+    parser.add_argument("--objectfile", type=Path)
+    parser.add_argument("--profile", default="standard")
+    parser.add_argument("--presses", type=int, default=200)
+    parser.add_argument("--repeat", type=int, default=9)
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder, threadpool_limits(limits=1):
+        for name in asked.objects or ["mug"]:
+            if asked.objectfile is None:
+                measure(_made(name, asked.profile, Path(folder) / name), asked)
+        if asked.objectfile is not None:
+            measure(ObjectFile.open(asked.objectfile), asked)
+
+
+def _made(name: str, profile: str, folder: Path) -> ObjectFile:
+    mesh, made_of = build(name), material(MATERIALS[name])
+    coded, spacing = spaced_codes(RasterMesh(mesh), GELSIGHT_R15, touch_profile(profile).codes, 0)
+    codes = CodesPart(codes_graph(coded.patches, GELSIGHT_R15, SKIRT), coded.nodes, OFF * spacing)
+    origin = Provenance(licence="CC0-1.0")
+    part = TouchPart(GELSIGHT_R15, SKIRT, DEPTHS, MOST_TILT, 2e-3, origin, codes)
+    return with_touch(create_object(folder, name, mesh, made_of, origin), part)
+
+
+def measure(of: ObjectFile, asked: argparse.Namespace) -> None:
+    """One object."""
+    compiled, graph = open_touch(of, "codes"), open_touch(of, "codes", compiled=False)
+    codes = compiled.maps
+    assert isinstance(codes, CodeMaps)
+    presses = _possible(of, codes, asked.presses)
+    truth = open_touch(of, "reference").at(presses)
+    table = Table(title=f"{of.description.name}: {len(presses)} presses at places that were never coded")
+    for head in (
+        "maps from",
+        "rms um, median",
+        "90th",
+        "map dB",
+        "10th",
+        "picture grey",
+        "dB",
+        "10th",
+        "SSIM",
+        "ms a map, alone",
+        f"by {CHUNK}",
+    ):
+        table.add_column(head)
+    reference = open_touch(of, "reference")
+    for said, touch in (
+        ("rasteriser (reference)", reference),
+        ("codes, compiled", compiled),
+        ("codes, onnxruntime", graph),
+    ):
+        table.add_row(said, *_errors(touch.at(presses), truth), *_costs(touch.at, presses, asked.repeat))
+    table.add_row(*_perceptron(of, presses, asked.repeat))
+    table.add_row("nearest coded place", *_errors(_nearest(of, codes, reference, presses), truth), "", "")
+    table.add_row("untouched gel", *_errors(np.zeros_like(truth), truth), "", "")
+    console = Console(width=150)
+    console.print(table)
+    apart = np.abs(compiled.at(presses) - graph.at(presses))
+    rms, high, most = 1e6 * np.sqrt((apart**2).mean()), 1e6 * np.quantile(apart, 0.999), 1e6 * apart.max()
+    console.print(
+        f"  compiled codes from their graph: {rms:.2g} um rms, {high:.2g} in 999 of 1000, {most:.2g} at most"
+    )
+    twice = open_touch(of, "codes", threads=2)
+    pairs = (
+        ("codes, compiled", twice.maps),
+        ("codes, two graphs", _twice(of)),
+        ("rasteriser", _halves(reference.maps, reference.maps)),
+    )
+    for said, maps in pairs:
+        console.print(
+            f"  {said}, batches of {CHUNK} on two threads: {_throughput(maps, presses, asked.repeat)}"
+        )
+
+
+def _possible(of: ObjectFile, codes: CodeMaps, count: int) -> Presses:
+    """Presses that nothing of the object is in the way of, near a code."""
+    presses = draw_presses(of.mesh, SurfaceSearch(of.mesh).spread(count, SEED)[0], SEED)
+    possible = reference_maps(RasterMesh(of.mesh), presses, GELSIGHT_R15, SKIRT).possible
+    return presses[np.flatnonzero(possible & (codes.nodes.nearest(presses)[1] <= codes.nodes.most))]
+
+
+def _nearest(of: ObjectFile, codes: CodeMaps, reference: ObjectTouch, presses: Presses) -> FloatArray:
+    """One map for each coded place: upright, half as deep as may be, at the yaw that is asked."""
+    entry = reference.entry.codes
+    assert entry is not None
+    nodes = nodes_from(of.read(entry.nodes), entry.nodes.file)[codes.nodes.nearest(presses)[0]]
+    nothing = np.zeros(len(presses))
+    depths = nothing + np.mean(DEPTHS)
+    return reference.at(Presses(nodes.points, nodes.normals, depths, nothing, nothing, presses.yaws))
+
+
+def _pictures(maps: FloatArray) -> ByteArray:
+    drawn: ByteArray = optics(CALIBRATION, "fast", GELSIGHT_R15).render(maps).images
+    return drawn
+
+
+def _errors(found: FloatArray, truth: FloatArray) -> tuple[str, ...]:
+    rms = np.sqrt(((found - truth) ** 2).mean(axis=(1, 2)))
+    decibels = 20.0 * np.log10(2e-3 / np.maximum(rms, 1e-13))
+    pairs = list(zip(_pictures(found), _pictures(truth), strict=True))
+    grey = np.sqrt([mean_square(a, b) for a, b in pairs])
+    alike = np.minimum([psnr(a, b) for a, b in pairs], 99.0)
+    return (
+        f"{1e6 * np.median(rms):.3g}",
+        f"{1e6 * np.quantile(rms, 0.9):.3g}",
+        f"{np.median(decibels):.1f}" if rms.any() else "same",
+        f"{np.quantile(decibels, 0.1):.1f}" if rms.any() else "same",
+        f"{np.median(grey):.2f}",
+        f"{np.median(alike):.1f}" if grey.any() else "same",
+        f"{np.quantile(alike, 0.1):.1f}" if grey.any() else "same",
+        f"{np.median([ssim(a, b) for a, b in pairs]):.3f}",
+    )
+
+
+def _costs(ask: Callable[[Presses], object], presses: Presses, repeat: int) -> tuple[str, str]:
+    return _cost(ask, [presses[k : k + 1] for k in range(CHUNK)], repeat), _cost(
+        ask, [presses[:CHUNK]], repeat
+    )
+
+
+def _cost(ask: Callable[[Presses], object], batches: list[Presses], repeat: int) -> str:
+    took = []
+    for batch in batches[:1]:
+        ask(batch)
+    for _ in range(repeat):
+        begun = time.thread_time()
+        for batch in batches:
+            ask(batch)
+        took.append(1e3 * (time.thread_time() - begun) / sum(len(batch) for batch in batches))
+    low, middle, high = np.quantile(took, [0.25, 0.5, 0.75])
+    return f"{middle:.3g} ({low:.3g} to {high:.3g})"
+
+
+def _perceptron(of: ObjectFile, presses: Presses, repeat: int) -> tuple[str, ...]:
+    touch = of.description.touch
+    assert touch is not None
+    upright = Presses(
+        presses.points,
+        presses.normals,
+        presses.depths,
+        presses.tilts,
+        presses.azimuths,
+        np.zeros(len(presses)),
+    )[:8]
+    if touch.perceptron is not None:
+        learned = open_touch(of, "perceptron")
+        truth = open_touch(of, "reference").at(upright)
+        alone = _cost(learned.at, [upright[:1]], max(1, repeat // 3))
+        return ("perceptron, at no yaw", *_errors(learned.at(upright), truth), alone, "")
+    random = np.random.default_rng(0)
+    sizes = zip(PAPER, [*[256] * 8, 1], strict=True)
+    layers = [(random.normal(0.0, np.sqrt(2.0 / i), (i, o)), np.zeros(o)) for i, o in sizes]
+    low, high = of.mesh.bounds
+    least, most = pixel_domain(low, high, DEPTHS, MOST_TILT, GELSIGHT_R15)
+    graph = perceptron_graph(MlpWeights(tuple(layers), (5,)), paper_normaliser(least, most), 2.5e-3)
+    network = Network(graph.SerializeToString(), PERCEPTRON, *perceptron_tensors(least, most))
+    maps = PerceptronMaps(network, GelEntry.of(GELSIGHT_R15, SKIRT))
+    return ("perceptron, untrained", *[""] * 8, _cost(maps, [upright[:1]], max(1, repeat // 3)), "")
+
+
+def _twice(of: ObjectFile) -> Maps:
+    """Two graphs, each on its own thread."""
+    return _halves(*(open_touch(of, "codes", compiled=False).maps for _ in range(2)))
+
+
+def _halves(first: Maps, second: Maps) -> Maps:
+    pool = ThreadPoolExecutor(2)
+
+    def both(presses: Presses) -> AnyArray:
+        middle = len(presses) // 2
+        jobs = [pool.submit(first, presses[:middle]), pool.submit(second, presses[middle:])]
+        return np.concatenate([job.result() for job in jobs])
+
+    return both
+
+
+def _throughput(maps: Maps, presses: Presses, repeat: int) -> str:
+    presses = presses[: len(presses) - len(presses) % CHUNK]
+    batches = [presses[k : k + CHUNK] for k in range(0, len(presses), CHUNK)]
+    maps(batches[0])
+    rates = []
+    for _ in range(repeat):
+        begun, worked = time.perf_counter(), time.process_time()
+        for batch in batches:
+            maps(batch)
+        took, used = time.perf_counter() - begun, time.process_time() - worked
+        rates.append((len(presses) / took, used / took, len(presses) / used))
+    best = max(rates)
+    middle, _, each = np.median(rates, axis=0)
+    got = f"best {best[0]:.0f} on the {best[1]:.2f} cores it got"
+    return f"{middle:.0f} a second, {got}; {each:.0f} for a core's second"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,204 @@
+"""Depth read from real ball presses that the calibration never saw, against the ball.
+
+``python tests/benchmarks/touch/real_depth.py [fots] [r15] [tmd] [--folds N] [--only-fold K] [--every N]``
+needs the real data. Folds are by press; a calibration is fitted without marks to the presses of the other
+folds; of the sphere only centre and offset are fitted to what was read, within 0.95 of the contact's radius.
+"""
+
+import argparse
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from calibration.taxim.mark_free import Identity
+from calibration.taxim.pictures import Pictures, read_pictures
+from calibration.taxim.smooth_fit import changes
+from harness.basics.arrays import ByteArray, FloatArray
+from harness.sim.optics.contact_depth import read_depth
+from harness.sim.optics.inverse import DRIFTING, invert
+from harness.sim.optics.inverse_error import height_errors
+from harness.sim.optics.poisson import free_heights
+from tests.oracles.truemap import read_tmd
+from tests.samples.ball_depth import FOTS, R15, WITHIN, BallFit, fit_ball, taught, usable
+from tests.support.real_data import WHY_NOT, find_shared_data
+
+CONSOLE = Console(width=118, highlight=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """One held-out press.
+
+    Attributes:
+        name: of its picture.
+        image: ``(rows, columns, 3)``.
+        height: ``(rows, columns)`` metres, read.
+        ball: the sphere under it.
+        once: metres, RMSE of the single reading by the smooth model.
+        covered: share of the compared pixels whose slope is trusted.
+        scores: ``(n,)`` errors in units of their stated standard deviation.
+        stated: metres, rms of that standard deviation.
+        seconds: of the processor: reading, and stating its error.
+    """
+
+    name: str
+    image: ByteArray
+    height: FloatArray
+    ball: BallFit
+    once: float
+    covered: float
+    scores: FloatArray
+    stated: float
+    seconds: tuple[float, float]
+
+
+def main() -> None:
+    """Measure what was asked for; all of it without a word."""
+    options = _options()
+    data = find_shared_data()
+    if data is None:
+        raise SystemExit(WHY_NOT)
+    wanted = ["fots", "r15", "tmd"] if "all" in options.what else options.what
+    folds = range(options.folds) if options.only_fold is None else [options.only_fold]
+    if "fots" in wanted:
+        folder = data / "tactile/fots_ball_presses"
+        pictures = read_pictures(folder / "gelsight", folder / "gelsight_bg.png")
+        measured = _presses(pictures, FOTS, options.folds, list(folds), options.every)
+        _report("FOTS GelSight, 240 x 320, ball of 4.70 mm", measured)
+        if options.picture is not None:
+            _draw(measured, options.picture)
+    if "r15" in wanted:
+        pictures = read_pictures(data / "tactile/objectfolder_calibs")
+        _report(
+            "GelSight R1.5, 160 x 120, ball of 4 mm",
+            _presses(pictures, R15, options.folds, list(folds), options.every),
+        )
+    if "tmd" in wanted:
+        _round_trip(data / "tactile/gelsight_groove/heightmap.tmd")
+
+
+def _presses(pictures: Pictures, who: Identity, folds: int, chosen: list[int], every: int) -> list[Measured]:
+    pack = usable(pictures, who.ball)
+    change = changes(pack)
+    measured = []
+    for fold in chosen:
+        out = np.arange(len(change)) % folds == fold
+        began = time.process_time()
+        made = taught(pack, change, np.nonzero(~out)[0], who)
+        CONSOLE.print(
+            f"fold {fold}: {int((~out).sum())} presses fitted in {time.process_time() - began:.1f} s"
+        )
+        for k in np.nonzero(out)[0][::every]:
+            began = time.process_time()
+            depth = read_depth(pack.images[k][None], made.calibration, DRIFTING)
+            read_in = time.process_time() - began
+            errors = height_errors(pack.images[k][None], depth)[0]
+            stated_in = time.process_time() - began - read_in
+            near, contact = pack.centres[k] + made.bias, WITHIN * made.contact
+            height = depth.read.height[0]
+            ball = fit_ball(height, near, contact, who.pitch, who.ball_radius)
+            single = invert(pack.images[k][None], made.calibration, DRIFTING).height[0]
+            once = fit_ball(single, near, contact, who.pitch, who.ball_radius).rmse
+            sigma = errors.sigma_without(ball.fitted(who.ball), ball.inside)
+            measured.append(
+                Measured(
+                    pictures.names[pack.number[k]],
+                    pack.images[k],
+                    height,
+                    ball,
+                    once,
+                    float(depth.read.trusted[0][ball.inside].mean()),
+                    (height - ball.sphere)[ball.inside] / sigma,
+                    float(np.sqrt(np.mean(sigma**2))),
+                    (read_in, stated_in),
+                )
+            )
+    return measured
+
+
+def _report(title: str, measured: list[Measured]) -> None:
+    table = Table(title=f"{title}: {len(measured)} presses held out", title_justify="left")
+    for heading in ("within 0.95 of the contact's radius", "median", "p10", "p90", "worst"):
+        table.add_column(heading, justify="left" if heading.startswith("within") else "right")
+    columns = {
+        "RMSE against the sphere, mm": [1e3 * one.ball.rmse for one in measured],
+        "the same, a single reading by the smooth model, mm": [1e3 * one.once for one in measured],
+        "flat plane against the sphere, mm": [1e3 * one.ball.flat for one in measured],
+        "stated standard deviation, rms, mm": [1e3 * one.stated for one in measured],
+        "seconds of the processor, reading": [one.seconds[0] for one in measured],
+        "seconds of the processor, its error": [one.seconds[1] for one in measured],
+    }
+    for words, values in columns.items():
+        numbers = [*np.percentile(values, (50, 10, 90)), max(values)]
+        table.add_row(words, *(f"{number:.4f}" for number in numbers))
+    covered = [one.covered for one in measured]
+    table.add_row(
+        "share with a trusted slope", *(f"{np.percentile(covered, at):.3f}" for at in (50, 10, 90, 0))
+    )
+    CONSOLE.print(table)
+    scores = np.abs(np.concatenate([one.scores for one in measured]))
+    good = sum(one.ball.rmse <= 0.06e-3 for one in measured)
+    halved = sum(one.ball.rmse <= 0.5 * one.ball.flat for one in measured)
+    CONSOLE.print(
+        f"at most 0.06 mm: {good} of {len(measured)}; at most half the plane's: {halved}; "
+        f"within 1 / 2 stated deviations: {(scores < 1).mean():.0%} / {(scores < 2).mean():.0%} of pixels\n"
+    )
+
+
+def _round_trip(path: Path) -> None:
+    measured = read_tmd(path)
+    surface = measured.heights / measured.pitch[0]
+    down, right = np.gradient(surface)
+    apart = free_heights(down, right) - (surface - surface.mean())
+    whole = float(np.ptp(surface))
+    CONSOLE.print(
+        f"{path.name}, {surface.shape[1]} x {surface.shape[0]}: gradients to heights, rms "
+        f"{apart.std() / whole:.4%} and at most {np.abs(apart).max() / whole:.3%} of a range of "
+        f"{1e3 * whole * measured.pitch[0]:.3f} mm (rms {apart.std() / surface.std():.3%} of its deviation)"
+    )
+
+
+def _draw(measured: list[Measured], path: Path) -> None:
+    """Best, median and worst press: picture, recovered, sphere, error."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    order = sorted(measured, key=lambda one: one.ball.rmse)
+    figure = Figure(figsize=(15.0, 13.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(3, 4)
+    for row, one in zip(axes, (order[0], order[len(order) // 2], order[-1]), strict=True):
+        inside = one.ball.inside
+        row[0].imshow(one.image)
+        row[0].set_title(
+            f"{one.name}: RMSE {1e3 * one.ball.rmse:.3f} mm,\nplane {1e3 * one.ball.flat:.3f} mm"
+        )
+        panels = (
+            ("recovered, mm", 1e3 * one.height, "viridis", None),
+            ("sphere in the contact, mm", np.where(inside, 1e3 * one.ball.sphere, np.nan), "viridis", None),
+            ("error, mm", np.where(inside, 1e3 * (one.height - one.ball.sphere), np.nan), "RdBu_r", 0.15),
+        )
+        for axis, (title, values, colours, limit) in zip(row[1:], panels, strict=True):
+            low = None if limit is None else -limit
+            shown = axis.imshow(values, cmap=colours, vmin=low, vmax=limit)
+            axis.set_title(title)
+            figure.colorbar(shown, ax=axis, shrink=0.8)
+    figure.savefig(path, dpi=70)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", nargs="*", default="all", choices=["all", "fots", "r15", "tmd"])
+    parser.add_argument("--folds", type=int, default=2)
+    parser.add_argument("--only-fold", type=int)
+    parser.add_argument("--every", type=int, default=1, help="of the held-out presses, one in so many")
+    parser.add_argument("--picture", type=Path)
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,211 @@
+"""What networks of vision err by and cost to train: pictures kept back, steps, borders between cells.
+
+python tests/benchmarks/vision/bench_vision_training.py builtin:mug builtin:bowl --profile smoke
+python tests/benchmarks/vision/bench_vision_training.py FILE.obj \
+    --units m --steps 1000 4000 --sheet pictures.png
+python tests/benchmarks/vision/bench_vision_training.py builtin:mug \
+    --profile standard --built OBJECT   (trained)
+"""
+
+import argparse
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from rich.console import Console
+
+from harness.authoring.vision.data import HeldOut, draw_tuples, held_out_pictures
+from harness.authoring.vision.metrics import BEHIND, network_pictures, picture_errors, reference_pictures
+from harness.authoring.vision.profiles import VisionProfile, vision_profile
+from harness.authoring.vision.vision import author_vision
+from harness.basics.arrays import ByteArray
+from harness.objectfile.vision.coverage.outline import is_closed, mesh_outline
+from harness.objectfile.vision.network.graph import FILE, vision_graph, vision_model
+from harness.objectfile.vision.network.network import VisionModel
+from harness.objectfile.vision.network.plain import Asked, evaluate
+from harness.objectfile.vision.render import VisionRenderer
+from harness.objectfile.vision.settings import RenderSettings
+from harness.objectfile.vision.work import Crew, Room
+from harness.picture.image_file import write_png
+from harness.picture.linear_image import LinearImage
+from harness.picture.pinhole import DirectionalLight, Pinhole
+from harness.picture.srgb import bytes_from_linear
+from harness.sim.light.appearance import Appearance
+from harness.sim.light.appearance_source import appearance_of
+from harness.sim.light.direct_image import LitObject
+from harness.sim.light.lambert import irradiance, places_seen, radiance, sees_light
+
+CONSOLE = Console(width=140, highlight=False, emoji=False)
+
+WAYS = {
+    "default": RenderSettings(),
+    "lead 1": RenderSettings(lead=1.0),
+    "coverage 5": RenderSettings(coverage=5),
+    "rays 2": RenderSettings(rays=2),
+    "one sample": RenderSettings(level="one_sample"),
+    "whole shell": RenderSettings(termination=0.0),
+}
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("objects", nargs="*", default=["builtin:mug"])
+    parser.add_argument("--units", default="m")
+    parser.add_argument("--profile", default="smoke")
+    parser.add_argument("--steps", type=int, nargs="*", default=[])
+    parser.add_argument("--batch", type=int)
+    parser.add_argument("--rate", type=float)
+    parser.add_argument("--pictures", type=int)
+    parser.add_argument("--threads", type=int)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--strict", action="store_true", help="and networks told what the paper's are")
+    parser.add_argument("--built", type=Path, help="an ObjectFile of the object: nothing is trained")
+    parser.add_argument("--sheet", type=Path)
+    given = parser.parse_args()
+    rows = [measure(name, steps, given) for name in given.objects for steps in given.steps or [None]]
+    if given.sheet:
+        write_png(given.sheet, np.vstack(rows))
+
+
+def measure(name: str, steps: int | None, given: argparse.Namespace) -> ByteArray:
+    """One object: its networks, and their pictures beside the exact ones."""
+    look, profile = appearance_of(name, given.units), chosen(steps, given)
+    if given.built:
+        CONSOLE.print(f"{Path(name).stem}, as {given.built} has it")
+        return by_ways(look, vision_model((given.built / FILE).read_bytes()), profile, given)
+    on_core = time.process_time()
+    with TemporaryDirectory() as folder:
+        made = author_vision(look, profile, given.seed, Path(folder), unsaid, given.threads)
+    on_core = time.process_time() - on_core
+    CONSOLE.print(
+        f"{Path(name).stem}: {len(made.model.grid)} networks, {profile.networks.steps} steps of "
+        f"{profile.networks.batch}, "
+        f"{on_core:.0f} s of one core; on the clock "
+        + ", ".join(f"{part} {seconds:.0f} s" for part, seconds in made.seconds.items())
+    )
+    if profile.strict is not None:
+        CONSOLE.print(f"  told no more than the paper's {line(made.errors, 'strict_')}")
+    return by_ways(look, made.model, profile, given)
+
+
+def unsaid(_what: str, _share: float) -> None:
+    """Progress that nobody is told of."""
+
+
+def chosen(steps: int | None, given: argparse.Namespace) -> VisionProfile:
+    """The profile that was asked for."""
+    profile = vision_profile(given.profile)
+    if not given.strict:
+        profile = replace(profile, strict=None)
+    elif profile.strict is None:
+        size = replace(profile.networks.size, kind="osf")
+        profile = replace(profile, strict=replace(profile.networks, size=size))
+    if given.pictures:
+        profile = replace(profile, pictures=given.pictures)
+    asked = {"steps": steps, "batch": given.batch, "rate": given.rate}
+    others = {name: value for name, value in asked.items() if value}
+    return replace(profile, networks=replace(profile.networks, **others))
+
+
+def line(errors: Mapping[str, float], before: str = "") -> str:
+    """Errors as they are printed."""
+    whole, worst, alone, alike = (
+        errors[before + name] for name in ("psnr_db", "psnr_db_worst", "psnr_db_object", "ssim")
+    )
+    return f"{whole:6.2f} dB, worst {worst:6.2f}, object alone {alone:6.2f}, ssim {alike:.4f}"
+
+
+def by_ways(
+    look: Appearance, model: VisionModel, profile: VisionProfile, given: argparse.Namespace
+) -> ByteArray:
+    """What settings of the renderer make of the same networks; pictures of the default."""
+    lit = LitObject(look)
+    held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, given.seed)
+    exact = reference_pictures(lit, held_out, profile.samples)
+    renderer = VisionRenderer(vision_graph(model).SerializeToString(), look.mesh, given.threads)
+    drawn: dict[str, list[LinearImage]] = {}
+    for way, settings in WAYS.items():
+        drawn[way] = network_pictures(renderer, held_out, settings)
+        each = [difference(a, b) for a, b in zip(drawn[way], drawn["default"], strict=True)]
+        apart = 255.0 * np.sqrt(np.mean(each))
+        errors = picture_errors(exact, drawn[way])
+        CONSOLE.print(f"  {way:12} {line(errors)}, from the default {apart:.2f}/255")
+    for side in (3, 5):
+        limit = [one_ray(lit, camera, light, side) for camera, light in _pairs(held_out)]
+        CONSOLE.print(
+            f"  exact colours, one ray a pixel, coverage {side}: {line(picture_errors(exact, limit))}"
+        )
+    CONSOLE.print(f"  across borders between cells {across_borders(model, lit):.2f}/255")
+    return np.hstack([beside(exact[0], drawn["default"][0]), beside(exact[-1], drawn["default"][-1])])
+
+
+def one_ray(lit: LitObject, camera: Pinhole, light: DirectionalLight, side: int) -> LinearImage:
+    """What networks without error would give: exact light where the renderer's outline asks for it."""
+    mesh, (x, y) = lit.appearance.mesh, camera.centre_px
+    outline = mesh_outline(mesh, is_closed(mesh), camera, side, Crew(1), Room())
+    across, down = (outline.places[:, k] - centre for k, centre in enumerate((x, y)))
+    ways = np.stack([across, down, np.full(len(down), camera.focal_px)], axis=1).astype(np.float64)
+    ways = ways / np.linalg.norm(ways, axis=1, keepdims=True) @ camera.object_from_camera[:3, :3].T
+    hits = lit.rays.first_hits(camera.eye, ways)
+    met = np.flatnonzero(hits.face >= 0)
+    places = places_seen(lit.appearance, hits.face[met], hits.weights[met], ways[met])
+    falling = irradiance(places, light, mesh.diagonal)
+    falling = falling * sees_light(lit.rays, places, light, falling > 0.0)
+    colour, alpha = np.zeros((camera.pixels, 3)), np.zeros(camera.pixels)
+    colour[outline.pixels[met]] = radiance(places, falling) * outline.cover[met, None]
+    alpha[outline.pixels] = outline.cover
+    shape = (camera.height, camera.width)
+    return LinearImage(colour.reshape(*shape, 3), alpha.reshape(shape), np.full(shape, np.inf))
+
+
+def _pairs(held_out: HeldOut) -> list[tuple[Pinhole, DirectionalLight]]:
+    return list(zip(held_out.cameras, held_out.lights, strict=True))
+
+
+def difference(one: LinearImage, other: LinearImage) -> float:
+    """Mean square over pixels and channels, of light as shown before white, 0 to 1."""
+    apart = one.display(BEHIND).astype(np.float64) - other.display(BEHIND)
+    return float(np.mean((apart / 255.0) ** 2))
+
+
+def across_borders(model: VisionModel, lit: LitObject) -> float:
+    """Root mean square of what two neighbours differ by at their border, grey levels as shown; lit places."""
+    grid, told = model.grid, draw_tuples(lit, 200_000, 7, HeldOut((), ()))
+    scaled = (told.points - grid.low) / grid.cell
+    away = np.abs(scaled - np.round(scaled))
+    axis = np.argmin(away, axis=1)
+    near = np.flatnonzero((away.min(axis=1) < 0.01) & told.visible)
+    border = told.points[near].copy()
+    rows = np.arange(len(near))
+    border[rows, axis[near]] = (grid.low + grid.cell * np.round(scaled[near]))[rows, axis[near]]
+    beyond = np.zeros_like(border)
+    beyond[rows, axis[near]] = 1e-6 * grid.cell
+    sides = [grid.networks(border + by) for by in (-beyond, beyond)]
+    both = np.flatnonzero((sides[0] >= 0) & (sides[1] >= 0) & (sides[0] != sides[1]))[:2000]
+    extras = np.concatenate([told.visible[near, None], told.normals[near]], axis=1)
+    if not model.weights.size.extras:
+        extras = np.empty((len(near), 0))
+    found = [np.empty((len(both), 3)) for _ in sides]
+    for k, side in enumerate(sides):
+        for row, i in enumerate(both):
+            one = slice(i, i + 1)
+            light = told.lights[near[i]]
+            asked = Asked(side[one], border[one], told.views[near[i : i + 1]], light, extras[one])
+            found[k][row] = evaluate(model, asked)[1][0]
+    shown = [bytes_from_linear(each).astype(np.float64) for each in found]
+    return float(np.sqrt(np.mean((shown[0] - shown[1]) ** 2)))
+
+
+def beside(exact: LinearImage, found: LinearImage) -> ByteArray:
+    """The exact picture, the networks', and four times what they differ by."""
+    wanted, got = exact.display(BEHIND), found.display(BEHIND)
+    apart = np.clip(128 + 4 * (got.astype(np.int64) - wanted), 0, 255).astype(np.uint8)
+    return np.hstack([wanted, got, apart])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,171 @@
+"""The GelSight driver against a stream on a socket: the driver used at the bench, unchanged."""
+
+import socket
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from drivers.camera.http_camera import HttpCamera, gelsight, scene_camera
+from harness.basics.arrays import ByteArray
+from harness.basics.clock import now
+from harness.basics.errors import BenchFault
+from harness.bench.sensor import GELSIGHT_R15
+from mocks.camera.gelsight_stream import MjpegServer, encode
+from mocks.faults import Fault
+
+SMALL = replace(GELSIGHT_R15, rows=12, columns=16)
+
+
+class Patch:
+    """A view of one colour that a test may change."""
+
+    def __init__(self) -> None:
+        self.colour = (10, 120, 240)
+
+    def state(self) -> tuple[int, int, int]:
+        return self.colour
+
+    def picture(self) -> ByteArray:
+        return np.broadcast_to(np.array(self.colour, np.uint8), (12, 16, 3)).copy()
+
+    def sent(self) -> None:
+        pass
+
+
+@dataclass
+class Bench:
+    view: Patch
+    server: MjpegServer
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.server.port}/?action=stream"
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    view = Patch()
+    server = MjpegServer("127.0.0.1", 0, view, 50.0)
+    stop = threading.Event()
+    thread = threading.Thread(target=server.serve, args=(stop.is_set,))
+    thread.start()
+    yield Bench(view, server)
+    stop.set()
+    thread.join()
+
+
+@pytest.fixture
+def gel(bench: Bench) -> Iterator[HttpCamera]:
+    gel = gelsight(bench.url, SMALL)
+    gel.open()
+    yield gel
+    gel.close()
+
+
+def test_frames_are_rgb_with_the_bytes_they_came_as(bench: Bench, gel: HttpCamera) -> None:
+    reading = gel.read(3, 2.0)
+    assert reading.channel.name == "gel.image"
+    assert reading.values.shape == (3, 12, 16, 3)
+    assert np.abs(reading.values.astype(int) - np.array(bench.view.colour)).max() <= 2
+    assert reading.encoded == (encode(bench.view.picture()),) * 3
+
+
+def test_only_frames_that_arrive_after_the_call_are_read(gel: HttpCamera) -> None:
+    asked = now()
+    reading = gel.read(4, 2.0)
+    assert np.all(reading.times > asked)
+    assert np.all(np.diff(reading.times) > 0.0)
+
+
+def test_a_slow_consumer_still_gets_the_newest_frame(bench: Bench, gel: HttpCamera) -> None:
+    gel.read(20, 2.0)  # twenty frames have piled up behind the capture in the meantime
+    bench.view.colour = (200, 30, 60)
+    gel.read(2, 2.0)  # a frame already on its way may be the old one; the one after it is not
+    assert np.abs(gel.read(1, 2.0).values[0, 0, 0].astype(int) - [200, 30, 60]).max() <= 2
+
+
+def test_the_rate_is_measured(gel: HttpCamera) -> None:
+    gel.read(50, 3.0)
+    health = gel.health()
+    assert health.rate == pytest.approx(50.0, rel=0.2)
+    assert health.latency is None
+    assert "GelSight R1.5" in health.identity
+
+
+def test_opening_and_closing_twice_does_nothing_more(bench: Bench, gel: HttpCamera) -> None:
+    gel.open()
+    gel.read(1, 2.0)
+    gel.close()
+    gel.close()
+    with pytest.raises(BenchFault, match="before it was opened"):
+        gel.read(1, 1.0)
+    gel.open()
+    gel.read(1, 2.0)
+
+
+def test_a_wrong_port_is_one_sentence_naming_the_address() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    gel = gelsight(f"http://127.0.0.1:{port}/?action=stream", SMALL)
+    with pytest.raises(BenchFault, match=f"gel: no video stream at http://127.0.0.1:{port}/") as refused:
+        gel.open()
+    assert "\n" not in str(refused.value)
+    gel.close()
+
+
+def test_pictures_of_another_size_are_refused(bench: Bench) -> None:
+    gel = gelsight(bench.url, GELSIGHT_R15)
+    with pytest.raises(BenchFault, match="sends 16 x 12 pixels and the station expects 160 x 120"):
+        gel.open()
+    assert "gel" not in [thread.name for thread in threading.enumerate()]
+
+
+def test_a_stall_is_a_fault_and_then_heals(bench: Bench, gel: HttpCamera) -> None:
+    gel.read(10, 2.0)
+    bench.server.fault.set(Fault("gel", "stall", 0.8))
+    with pytest.raises(BenchFault, match=r"sent [012] of 3 frames in 0.3 s; the stream at .* has stalled"):
+        gel.read(3, 0.3)
+    assert gel.read(5, 3.0).values.shape == (5, 12, 16, 3)
+    assert "opened again" in gel.health().detail
+    assert gel.health().drops >= 20
+
+
+def test_half_a_picture_is_never_read(bench: Bench, gel: HttpCamera) -> None:
+    bench.server.fault.set(Fault("gel", "truncate", 0.3))
+    reading = gel.read(10, 3.0)
+    assert np.abs(reading.values.astype(int) - np.array(bench.view.colour)).max() <= 2
+    assert gel.health().drops >= 10
+
+
+def test_a_dropped_connection_is_made_again(bench: Bench, gel: HttpCamera) -> None:
+    bench.server.fault.set(Fault("gel", "drop", 0.3))
+    gel.read(20, 3.0)
+    assert "opened again" in gel.health().detail
+
+
+def test_a_frozen_stream_goes_on_with_the_old_picture(bench: Bench, gel: HttpCamera) -> None:
+    before = gel.read(1, 2.0).encoded[0]
+    bench.server.fault.set(Fault("gel", "freeze"))
+    bench.view.colour = (0, 0, 0)
+    assert gel.read(5, 2.0).encoded == (before,) * 5
+    bench.server.fault.set(Fault("gel", "none"))
+    gel.read(2, 2.0)
+    assert gel.read(1, 2.0).encoded[0] != before
+
+
+def test_a_count_that_cannot_be_kept_is_a_programming_error(gel: HttpCamera) -> None:
+    for count in (0, 65):
+        with pytest.raises(ValueError, match="frames asked for"):
+            gel.read(count, 1.0)
+
+
+def test_the_scene_camera_reads_the_same_way(bench: Bench) -> None:
+    camera = scene_camera(bench.url, rows=12, columns=16)
+    camera.open()
+    reading = camera.read(2, 2.0)
+    camera.close()
+    assert reading.channel.name == "camera.image"
+    assert reading.values.shape == (2, 12, 16, 3)

@@ -1,0 +1,109 @@
+"""The estimator's dials: what an operator may choose, and that the choice is what is run."""
+
+from dataclasses import fields
+
+import pytest
+
+from experiments.contact_localization.accuracy.dials import (
+    FINEST,
+    KNOBS,
+    SENSES,
+    chosen,
+    levels_of,
+    needs_sound,
+    saves_no_answer_time,
+    settings,
+    settings_by_count,
+)
+from experiments.contact_localization.accuracy.front import front_of, shipped_curve
+from experiments.contact_localization.posterior.levels import Levels
+from harness.basics.errors import WrongUse
+from harness.effects.accuracy import Accuracy, Knob
+
+OURS = [knob for knob in KNOBS if knob.name.startswith("localization.")]
+
+
+def test_choosing_nothing_is_the_estimators_own_default() -> None:
+    assert levels_of(chosen([])) == Levels()
+
+
+def test_every_field_of_the_levels_has_its_dial() -> None:
+    assert {knob.name.removeprefix("localization.") for knob in OURS} == {f.name for f in fields(Levels)}
+
+
+@pytest.mark.parametrize("knob", OURS, ids=lambda knob: knob.name)
+def test_turning_one_dial_changes_that_level_and_no_other(knob: Knob) -> None:
+    name = knob.name.removeprefix("localization.")
+    for level in knob.levels:
+        found = levels_of(chosen([f"{knob.name}={level}"]))
+        before = Levels()
+        for field in fields(Levels):
+            value = vars(found)[field.name]
+            assert value == (level if field.name == name else vars(before)[field.name])
+            assert type(value) is type(vars(before)[field.name])
+
+
+def test_dials_go_from_cheap_to_exact() -> None:
+    coarse, fine = levels_of(Accuracy.coarsest(KNOBS)), levels_of(Accuracy.finest(KNOBS))
+    assert coarse.spacing > fine.spacing
+    assert coarse.particles < fine.particles
+    assert coarse.samples < fine.samples
+    assert coarse.rounds < fine.rounds
+    assert coarse.block > fine.block
+
+
+@pytest.mark.parametrize(
+    "text", ["localization.spacin=0.002", "localization.spacing=0.0021", "localization.spacing"]
+)
+def test_a_mistyped_choice_is_refused(text: str) -> None:
+    with pytest.raises(WrongUse):
+        chosen([text])
+
+
+def test_names_are_unique() -> None:
+    names = [knob.name for knob in KNOBS]
+    assert len(names) == len(set(names))
+
+
+@pytest.mark.parametrize("thorough", [False, True])
+def test_what_is_measured_names_its_sense_and_only_levels_that_there_are(thorough: bool) -> None:
+    found = settings(thorough)
+    assert {setting[SENSES.name] for setting in found} == {"touch", "audio", "both"}
+    for setting in found:
+        Accuracy.default(KNOBS).with_(setting)
+    assert FINEST in found
+
+
+def test_runs_that_were_not_heard_are_measured_by_touch_alone() -> None:
+    assert not any(needs_sound(setting) for setting in (*settings(sound=False), *settings_by_count(False)))
+    assert all(setting in settings() for setting in settings(sound=False))
+
+
+def test_what_is_measured_with_fewer_contacts_is_measured_with_the_most_too() -> None:
+    for sound in (False, True):
+        assert all(setting in settings(sound=sound) for setting in settings_by_count(sound))
+
+
+def test_about_thirty_settings_are_measured_over_senses_modes_and_elements() -> None:
+    found = settings()
+    assert 25 <= len(found) <= 35
+    assert {setting.get("sound.modes") for setting in found} >= {None, 16, 32}
+    assert {setting.get("sound.edge") for setting in found} >= {None, 0.7}
+
+
+@pytest.mark.parametrize("level", ["codes", "perceptron"])
+def test_a_run_takes_no_touch_that_it_does_not_carry(level: str) -> None:
+    with pytest.raises(WrongUse, match=rf"touch\.shapes = {level}: .*take touch\.shapes = reference"):
+        chosen([f"touch.shapes={level}"])
+    assert chosen(["touch.shapes=reference"]) == chosen([])
+
+
+def test_a_shipped_budget_never_buys_coarser_elements() -> None:
+    """They are found sooner, once an object, and save an answer nothing: only luck would choose them."""
+    curve = shipped_curve()
+    measured = [point for point in curve.points if saves_no_answer_time(point.levels)]
+    assert measured, "the curve no longer says what coarser elements cost"
+    for condition in curve.conditions():
+        offered = front_of(curve, condition, (), shipped=True).points
+        assert offered
+        assert not [point.name for point in offered if saves_no_answer_time(point.levels)]

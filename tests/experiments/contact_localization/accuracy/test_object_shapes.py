@@ -1,0 +1,149 @@
+"""The modes that sounds are compared with may come from the object's ObjectFile: nothing is solved then."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.contact_localization import build_model as model_of
+from experiments.contact_localization.accuracy.cases import preparations
+from experiments.contact_localization.accuracy.dials import KNOBS, SENSES, needs_objectfile, settings
+from experiments.contact_localization.accuracy.front import Front
+from experiments.contact_localization.accuracy.solving import Models
+from experiments.contact_localization.build_model import model_of_run, model_of_scene
+from experiments.contact_localization.model import Model
+from harness.basics.errors import WrongUse
+from harness.basics.materials import MATERIALS
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile, Sensors, scene_from_options
+from harness.bench.station_file import load_station, station_path
+from harness.commands.scenes import resolve
+from harness.cost.curve import Point, Sample
+from harness.effects import sound_effects
+from harness.effects.accuracy import Accuracy, Level
+from harness.effects.scene_object import known_object
+from harness.objectfile.audio.part import with_audio
+from harness.objectfile.entries import Provenance
+from harness.objectfile.file import ObjectFile, create_object
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles, create_run, station_calibration
+from tests.samples.object_bench import MODES, egg_part
+
+STATION = load_station(station_path("mock"))
+CALIBRATION = station_calibration(STATION)
+MUG = known_object(scene_from_options("builtin:mug")).mesh
+LOWEST: dict[str, Level] = {"sound.shapes": "network", "sound.modes": 16}
+
+
+@pytest.fixture(scope="module")
+def of(tmp_path_factory: pytest.TempPathFactory) -> ObjectFile:
+    """A mug that sounds like no mug."""
+    folder = tmp_path_factory.mktemp("objects") / "mug"
+    made = create_object(folder, "mug", MUG, MATERIALS["ceramic"], Provenance(licence="CC0-1.0"))
+    part = egg_part(MUG)
+    return with_audio(made, replace(part, modes=replace(part.modes, limit=2e4)))
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_solved(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def never(*_given: Any) -> Any:
+        raise AssertionError("solved")
+
+    monkeypatch.setattr(sound_effects, "modes_of", never)
+    monkeypatch.setenv("TOUCHSTONE_CACHE", str(tmp_path / "cache"))
+
+
+def scene_of(of: ObjectFile | None) -> SceneFile:
+    scene = scene_from_options("builtin:mug", objectfile=None if of is None else str(of.folder))
+    return scene.model_copy(update={"sensors": Sensors(sound=True)})
+
+
+def at(levels: dict[str, Any]) -> Accuracy:
+    return Accuracy.default(KNOBS).with_(levels)
+
+
+@pytest.mark.parametrize("level", ["network", "table"])
+def test_the_model_hears_with_the_objectfiles_modes(of: ObjectFile, level: str) -> None:
+    model = model_of_scene(scene_of(of), STATION, MUG, CALIBRATION, at({**LOWEST, "sound.shapes": level}))
+    assert model.modes is not None
+    assert len(model.modes.frequencies) == MODES
+    gains = model.gains(4e-3)
+    assert gains.shapes.shape == (len(model.surface(4e-3).points), MODES, 3)
+    assert np.isfinite(gains.shapes).all()
+
+
+def test_a_run_hears_with_those_it_carries(of: ObjectFile, tmp_path: Path) -> None:
+    plan: dict[str, Any] = {"contacts": []}
+    folder = tmp_path / "run"
+    create_run(folder, "contact-localization", scene_of(of), STATION, MUG, CALIBRATION, plan, 0, None)
+    run = RunFiles(Recording(folder))
+    elsewhere = run.scene.model_copy(
+        update={"object": run.scene.object.model_copy(update={"objectfile": str(tmp_path / "gone")})}
+    )
+    vars(run)["scene"] = elsewhere  # as where the run was carried to another machine
+    model = model_of_run(run, at(LOWEST))
+    assert model.modes is not None
+    assert len(model.modes.frequencies) == MODES
+
+
+def test_another_objects_is_refused_before_anything_is_compared(of: ObjectFile) -> None:
+    bigger = Mesh(1.1 * MUG.vertices, MUG.faces)
+    with pytest.raises(WrongUse, match="is not of the scene's object"):
+        model_of_scene(scene_of(of), STATION, bigger, CALIBRATION, at(LOWEST))
+    with pytest.raises(WrongUse, match="the scene names no ObjectFile"):
+        model_of_scene(scene_of(None), STATION, MUG, CALIBRATION, at(LOWEST))
+
+
+def test_nobody_reads_an_objectfile_where_modes_are_solved(
+    of: ObjectFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_given: Any) -> Any:
+        raise AssertionError("read")
+
+    monkeypatch.setattr(model_of, "known_file", never)
+    with pytest.raises(AssertionError, match="solved"):
+        model_of_scene(scene_of(of), STATION, MUG, CALIBRATION, at({}))
+
+
+def test_settings_with_an_objectfile_are_measured_beside_those_without() -> None:
+    without, beside = settings(), settings(objectfile=True)
+    assert beside[: len(without)] == without
+    added = beside[len(without) :]
+    assert not any(needs_objectfile(setting) for setting in without)
+    assert all(needs_objectfile(setting) for setting in added)
+    assert {setting["sound.shapes"] for setting in added} == {"network", "table"}
+    assert not any(needs_objectfile(setting) for setting in settings(thorough=True))
+    assert settings(sound=False, objectfile=True) == settings(sound=False)
+    for setting in added:
+        at(setting)
+
+
+def test_a_budget_chooses_no_objectfile_where_the_scene_names_none() -> None:
+    sample = Sample("mug-0", "mug", 1e-3, 2e-3, 0.1, 0.2, 0.2)
+    named: dict[str, dict[str, Level]] = {"solved": {}, "learned": {"sound.shapes": "network"}}
+    points = [
+        Point(name, {SENSES.name: "both", **levels}, {"contacts": 6}, (sample,))
+        for name, levels in named.items()
+    ]
+    front = Front(tuple(points), 1.0, 6, (), "today", shipped=False)
+    assert [point.name for point in front.solved().points] == ["solved"]
+    with pytest.raises(WrongUse, match="this scene names none"):
+        Front((points[1],), 1.0, 6, (), "today", shipped=False).solved()
+
+
+def test_an_option_names_it_beside_an_object_and_not_beside_a_scene(of: ObjectFile) -> None:
+    assert resolve(None, "builtin:mug", objectfile=str(of.folder)).object.objectfile == str(of.folder)
+    with pytest.raises(WrongUse, match="--objectfile belong to --object"):
+        resolve(Path("scenes/mug_both.toml"), None, objectfile=str(of.folder))
+
+
+def test_what_the_modes_took_is_said_by_level(of: ObjectFile) -> None:
+    def make(accuracy: Accuracy) -> Model:
+        return model_of_scene(scene_of(of), STATION, MUG, CALIBRATION, accuracy)
+
+    models = Models(make)
+    models.at({SENSES.name: "both", **LOWEST})
+    (said,) = preparations({"mug": models})
+    assert "sound.modes 16, sound.edge 0.35, sound.shapes network took 0." in said

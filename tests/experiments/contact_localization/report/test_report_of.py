@@ -1,0 +1,28 @@
+"""What the report says of a world that differs from the model: every value in a row, in a few digits."""
+
+import pytest
+
+from experiments.contact_localization.posterior.levels import Levels
+from experiments.contact_localization.report.report import _by, _flat, _said
+
+
+def test_a_tree_of_values_is_a_row_for_each_leaf() -> None:
+    tree = {"gap": "default", "sound": {"modes": 13, "room": {"seconds": 0.4}}, "scale": 1.0}
+    rows = [("gap", "default"), ("sound.modes", 13), ("sound.room.seconds", 0.4), ("scale", 1.0)]
+    assert list(_flat(tree)) == rows
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [(0.123456, "0.1235"), ([0.0, -0.0, -1e-6], "0, 0, -1e-06"), (13, "13"), ("exact", "exact")],
+)
+def test_a_value_is_said_in_four_digits_and_nothing_is_not_less_than_nothing(
+    value: object, said: str
+) -> None:
+    assert _said(value) == said
+
+
+def test_a_run_without_sound_answers_by_touch_whatever_its_levels_say() -> None:
+    assert _by(Levels(senses="both"), heard=False) == "touch"
+    assert _by(Levels(senses="both"), heard=True) == "both"
+    assert _by(Levels(senses="touch", method="particle"), heard=True) == "particle"

@@ -1,0 +1,78 @@
+"""Quantities: every unit is the SI value times its factor; a bare or foreign number is refused."""
+
+import math
+from decimal import Decimal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harness.basics import quantities
+from harness.basics.quantities import ANGLE, FORCE, FORCE_SENSITIVITY, LENGTH, RATIO, SPEED, Dimension
+
+DIMENSIONS = [value for value in vars(quantities).values() if isinstance(value, Dimension)]
+
+
+@pytest.mark.parametrize(
+    ("dimension", "text", "value"),
+    [
+        (LENGTH, "1.2 mm", 1.2e-3),
+        (LENGTH, "1.1mm", 0.0011),
+        (LENGTH, " -0.5 m ", -0.5),
+        (LENGTH, "25 µm", 25e-6),
+        (LENGTH, "1e-3 m", 1e-3),
+        (LENGTH, ".5 in", 0.0127),
+        (ANGLE, "180 deg", math.pi),
+        (ANGLE, "15 deg", 0.26179938779914943654),
+        (SPEED, "10 mm/s", 0.01),
+        (FORCE, "5 N", 5.0),
+        (FORCE_SENSITIVITY, "22.5 mV/N", 0.0225),
+        (RATIO, "5 %", 0.05),
+    ],
+)
+def test_a_quantity_is_the_nearest_float_to_its_si_value(
+    dimension: Dimension, text: str, value: float
+) -> None:
+    assert dimension.parse(text) == value
+
+
+@pytest.mark.parametrize("dimension", DIMENSIONS, ids=lambda d: d.name)
+def test_the_example_of_a_dimension_reads(dimension: Dimension) -> None:
+    assert math.isfinite(dimension.parse(dimension.example))
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_text_reads_back_to_the_same_bits(value: float) -> None:
+    assert LENGTH.parse(LENGTH.text(value)) == value
+
+
+@given(st.decimals(min_value=-1000, max_value=1000, places=6), st.sampled_from(["m", "cm", "mm", "um"]))
+def test_units_agree(number: Decimal, unit: str) -> None:
+    in_metres = number * Decimal(LENGTH.factors[unit])
+    assert LENGTH.parse(f"{number} {unit}") == LENGTH.parse(f"{in_metres:f} m")
+
+
+@pytest.mark.parametrize("bare", [5, 1.2, "5", "1.2e-3", " 7 "])
+def test_a_bare_number_is_refused_because_its_unit_is_missing(bare: object) -> None:
+    with pytest.raises(ValueError, match=r"has no unit; write a length as \"1.2 mm\""):
+        LENGTH.parse(bare)
+
+
+@pytest.mark.parametrize("text", ["5 kg", "1 MM", "3 mm/s", "4 1"])
+def test_a_wrong_unit_names_the_accepted_ones(text: str) -> None:
+    with pytest.raises(ValueError, match=r"is not a length: the unit .* is none of m, mm, cm, um"):
+        LENGTH.parse(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "mm", "nan mm", "inf mm", "1,2 mm", "0x10 mm", "--1 mm", "2 mm extra", "4 m m", True, None, []],
+)
+def test_what_is_not_a_number_is_refused(text: object) -> None:
+    with pytest.raises(ValueError, match="is not a number and a unit"):
+        LENGTH.parse(text)
+
+
+def test_a_number_beyond_floating_point_is_refused() -> None:
+    with pytest.raises(ValueError, match="too large"):
+        LENGTH.parse("1e999 m")

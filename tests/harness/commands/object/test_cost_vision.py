@@ -1,0 +1,75 @@
+"""``touchstone cost vision`` on a small block: a curve, a picture, and what it refuses."""
+
+import json
+from pathlib import Path
+from types import MappingProxyType
+
+import pytest
+import trimesh
+
+from harness.authoring.vision import profiles as vision_profiles
+from harness.authoring.vision.profiles import CellsSpec, VisionProfile
+from harness.cli import invoke
+from harness.objectfile.vision.network.network import NetworkSize
+
+TINY = VisionProfile(
+    CellsSpec(NetworkSize(width=8, octaves=2, turns=1, kind="osf-v"), cells=4, places=20_000, steps=60),
+    pictures=2,
+)
+
+
+@pytest.fixture
+def block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    profiles = {**vision_profiles.VISION_PROFILES, "tiny": TINY}
+    monkeypatch.setattr(vision_profiles, "VISION_PROFILES", MappingProxyType(profiles))
+    path = tmp_path / "block.ply"
+    trimesh.creation.box([0.06, 0.05, 0.02]).export(path)
+    return path
+
+
+def cost(block: Path, *more: str) -> int:
+    return invoke(
+        ["cost", "vision", str(block), "--units", "m", "--profile", "tiny", "--views", "2", "--repeat", "2",
+         "--size", "24", "--threads", "1", "--out", str(block.parent / "cost"), *more]
+    )  # fmt: skip
+
+
+def test_a_knob_is_turned_and_its_curve_kept(block: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    knobs = ("--knob", "termination", "--knob", "weights")
+    assert cost(block, *knobs, "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    out = block.parent / "cost"
+    assert json.loads((out / "curve.json").read_text()) == answer
+    assert Path(answer["picture"]).read_bytes().startswith(b"\x89PNG")
+    points = answer["points"]
+    assert [point["level"] for point in points if point["knob"] == "termination"][-1] == "0"
+    sizes = [point["weight_bytes"] for point in points if point["knob"] == "weights, bits"]
+    assert sizes == sorted(sizes, reverse=True)
+    assert len(set(sizes)) == 4
+    for point in points:
+        assert point["cpu_s"]["middle"] > 0.0
+        assert point["from_exact"]["psnr_db"] > 5.0
+    before = {path: path.stat().st_mtime_ns for path in out.glob("*.onnx")}
+    assert len(before) == 1
+    assert cost(block, *knobs) == 0
+    said = capsys.readouterr().out
+    assert {path: path.stat().st_mtime_ns for path in out.glob("*.onnx")} == before
+    for words in ("termination", "weights, bits", "CPU, ms", "curve.png"):
+        assert words in said
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--knob", "terminaton"), "no knob 'terminaton'; did you mean 'termination'"),
+        (("--profile", "fine"), "no profile 'fine' of vision"),
+        (("--units", "ft"), "unknown unit 'ft'"),
+        (("--size", "8"), "greater than or equal to 16"),
+    ],
+)
+def test_what_cannot_be_measured_is_wrong_use(
+    block: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...], said: str
+) -> None:
+    assert cost(block, *more) == 2
+    assert said in capsys.readouterr().err
+    assert not (block.parent / "cost").exists()

@@ -1,0 +1,157 @@
+"""``touchstone depth``: heights, errors and points of presses that were drawn, and of real ones."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.basics.arrays import ByteArray, FloatArray
+from harness.basics.geometry import inverse
+from harness.bench.sensor import GELSIGHT_R15
+from harness.bench.station_file import load_station, station_path
+from harness.cli import invoke
+from harness.picture.image_file import write_png
+from harness.picture.square_pixels import made_square, stated
+from harness.sim.gel.gel import R15_SKIRT, deform
+from harness.sim.optics.depth_reading import DepthReading, read_press
+from harness.sim.optics.inverse import STEADY
+from harness.sim.optics.optics import Optics
+from harness.sim.optics.tactile_calibration import TactileCalibration, save_calibration, shipped_calibration
+
+NAME = "gelsight_r15_bench"
+BALL, DEPTH = 8e-3, 0.5e-3
+CENTRE = (70.0, 50.0)
+
+
+@pytest.fixture(scope="module")
+def known() -> TactileCalibration:
+    return shipped_calibration(NAME)
+
+
+@pytest.fixture(scope="module")
+def surface() -> FloatArray:
+    """``(rows, columns)`` metres: a shallow ball, so that no slope is beyond the calibration."""
+    y, x = np.mgrid[:120, :160].astype(np.float64)
+    away = GELSIGHT_R15.pitch * np.hypot(x - CENTRE[0], y - CENTRE[1])
+    reached = np.sqrt(np.maximum(BALL**2 - away**2, 0.0)) - BALL + DEPTH
+    return np.asarray(deform(np.maximum(reached, 0.0)[None], R15_SKIRT)[0])
+
+
+@pytest.fixture(scope="module")
+def picture(known: TactileCalibration, surface: FloatArray) -> ByteArray:
+    return np.asarray(Optics(known, "smooth").render(surface[None]).images[0])
+
+
+@pytest.fixture(scope="module")
+def read(known: TactileCalibration, picture: ByteArray) -> DepthReading:
+    return read_press(picture[None], known, STEADY)
+
+
+def _answered(capsys: pytest.CaptureFixture[str], *words: str | Path, code: int = 0) -> dict[str, Any]:
+    assert invoke(["depth", *map(str, words), "--json"]) == code
+    answer: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return answer
+
+
+def test_a_drawn_press_is_read_within_its_stated_error(read: DepthReading, surface: FloatArray) -> None:
+    apart = (read.height - surface)[read.contact] / read.sigma[read.contact]
+    assert (np.abs(apart) < 2.0).mean() > 0.9
+    assert (read.sigma > 0.0).all()
+    assert read.sigma[read.contact].min() > read.sigma[0, 0]
+
+
+def test_points_are_where_the_gel_is_in_its_own_frame_and_in_the_tools(read: DepthReading) -> None:
+    points = read.points()
+    assert len(points) == read.contact.sum()
+    top = points[np.argmin(points[:, 2])]
+    pitch = GELSIGHT_R15.pitch
+    middle = np.array([CENTRE[0] + 0.5 - 80.0, CENTRE[1] + 0.5 - 60.0]) * pitch
+    assert top[:2] == pytest.approx(middle, abs=3.0 * pitch)
+    assert (points[:, 2] <= 0.0).all()
+    flange_from_gel = load_station(station_path("mock")).flange_from_gel
+    moved = read.points(flange_from_gel)
+    back = moved @ inverse(flange_from_gel)[:3, :3].T + inverse(flange_from_gel)[:3, 3]
+    assert back == pytest.approx(points, abs=1e-12)
+
+
+def test_the_command_writes_arrays_and_a_picture_and_answers(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, picture: ByteArray, read: DepthReading
+) -> None:
+    write_png(tmp_path / "press.png", picture)
+    words = ("--calibration", NAME, "--out", tmp_path / "d.npz", "--picture", tmp_path / "d.png")
+    answer = _answered(
+        capsys, tmp_path / "press.png", *words, "--height-out", tmp_path / "h.npy", "--station", "mock"
+    )
+    assert answer["contact"]
+    assert answer["frame"] == "flange"
+    assert answer["deepest_m"] == pytest.approx(read.height.max(), rel=0.2)
+    assert answer["deepest_sigma_m"] > 0.0
+    assert not answer["flags"]["touches_border"]
+    assert not answer["flags"]["not_anchored"]
+    with np.load(tmp_path / "d.npz", allow_pickle=False) as kept:
+        assert kept["points"].shape == (answer["contact_pixels"], 3)
+        assert kept["points_sigma"].shape == (answer["contact_pixels"],)
+        assert kept["sigma"].shape == kept["height"].shape == (120, 160)
+        assert np.array_equal(np.load(tmp_path / "h.npy"), kept["height"])
+    assert (tmp_path / "d.png").stat().st_size > 1000
+
+
+def test_the_untouched_gel_is_no_contact(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, known: TactileCalibration
+) -> None:
+    write_png(tmp_path / "rest.png", known.background)
+    words = ("--background", tmp_path / "rest.png", "--calibration", NAME, "--out", tmp_path / "d.npz")
+    answer = _answered(capsys, tmp_path / "rest.png", *words)
+    assert answer["flags"]["no_contact"]
+    assert answer["deepest_m"] == 0.0
+    assert answer["deepest_point_m"] is None
+    with np.load(tmp_path / "d.npz", allow_pickle=False) as kept:
+        assert kept["points"].shape == (0, 3)
+
+
+def test_pictures_of_high_pixels_are_made_square_as_the_presses_were(
+    known: TactileCalibration, picture: ByteArray, read: DepthReading
+) -> None:
+    high = 1.05
+    header = replace(known.header, made_from=known.header.made_from + stated(high))
+    squared = replace(known, header=header)
+    seen = made_square(picture, 1.0 / high)
+    rest = made_square(known.background, 1.0 / high)
+    again = read_press(seen[None], squared, STEADY, rest)
+    assert again.aspect == pytest.approx(high)
+    # Two splines there and back blur by a part of a pixel.
+    assert np.abs(again.height - read.height).max() < 0.1 * DEPTH
+    wrong = read_press(seen[None], known, STEADY, rest)
+    assert np.abs(wrong.height - read.height).max() > 2.0 * np.abs(again.height - read.height).max()
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--out", "d.txt", "--calibration", NAME), "end in .npz"),
+        (("--out", "d.npz"), "--calibration FILE"),
+        (("--out", "d.npz", "--calibration", "no_such"), "no shipped calibration"),
+    ],
+)
+def test_what_is_missing_is_said(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    picture: ByteArray,
+    words: tuple[str, ...],
+    sentence: str,
+) -> None:
+    write_png(tmp_path / "press.png", picture)
+    assert invoke(["depth", str(tmp_path / "press.png"), *words, "--json"]) in (1, 2)
+    assert sentence in json.loads(capsys.readouterr().out)["error"]
+
+
+def test_a_picture_of_another_camera_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, known: TactileCalibration
+) -> None:
+    write_png(tmp_path / "press.png", np.zeros((60, 80, 3), np.uint8))
+    save_calibration(known, tmp_path / "c.npz")
+    words = ("--calibration", tmp_path / "c.npz", "--out", tmp_path / "d.npz")
+    assert "own pictures" in _answered(capsys, tmp_path / "press.png", *words, code=1)["error"]

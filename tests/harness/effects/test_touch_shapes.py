@@ -1,0 +1,195 @@
+"""The ObjectFile's codes, its perceptron and the rasteriser are levels of one quantity: the gel's surface."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
+from harness.basics.geometry import inverse
+from harness.basics.materials import MATERIALS
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile, scene_from_options
+from harness.bench.sensor import GELSIGHT_R15
+from harness.effects.accuracy import Accuracy
+from harness.effects.catalogue import EFFECTS
+from harness.effects.effect import Facts, knobs_of
+from harness.effects.evaluate import Evaluation, evaluate
+from harness.effects.explain import as_json, scene_plan
+from harness.effects.plan import plan
+from harness.objectfile.file import ObjectFile, create_object
+from harness.objectfile.touch.touch import open_touch
+from harness.sim.gel.gel import R15_SKIRT
+from harness.sim.gel.presses import Presses
+from harness.sim.optics.tactile_calibration import shipped_calibration
+from tests.samples import touch_bench as tb
+from tests.samples.object_bench import PROVENANCE
+
+BENCH = shipped_calibration("gelsight_r15_bench")
+CALIBRATION = replace(BENCH, header=replace(BENCH.header, skirt=tb.SKIRT))
+
+
+@pytest.fixture(scope="module")
+def of(tmp_path_factory: pytest.TempPathFactory) -> ObjectFile:
+    """Read only."""
+    return tb.peg_file(tmp_path_factory.mktemp("objects") / "peg")
+
+
+def scene_of(of: ObjectFile | None) -> SceneFile:
+    return scene_from_options("builtin:mug", objectfile=None if of is None else str(of.folder))
+
+
+def presses() -> Presses:
+    nodes, some = tb.coded().nodes, np.linspace(0.0, 1.0, 6)
+    chosen = np.linspace(0, len(nodes) - 1, 6).astype(np.int64)
+    return Presses(
+        nodes.points[chosen], nodes.normals[chosen], 1e-3 + 5e-4 * some, 0.2 * some, 3.0 * some, some
+    )
+
+
+def evaluated(of: ObjectFile | None, level: str, **given: Any) -> Evaluation:
+    accuracy = Accuracy(knobs_of(EFFECTS), {"touch.shapes": level})
+    made = plan(EFFECTS, Facts(scene_of(of), tb.SENSOR), ["touch.gel"], accuracy)
+    sources = {
+        "object.mesh": tb.peg(),
+        "object.wall": None,
+        "object.file": of,
+        "contact.gel_from_object": inverse(presses().object_from_gel),
+        "sensor": tb.SENSOR,
+        "sensor.calibration": CALIBRATION,
+    }
+    return evaluate(made, {**sources, **{name.replace("__", "."): value for name, value in given.items()}})
+
+
+def test_codes_are_a_level_of_what_the_rasteriser_computes(of: ObjectFile) -> None:
+    codes, reference = evaluated(of, "codes"), evaluated(of, "reference")
+    assert np.sqrt(((codes["touch.gel"] - reference["touch.gel"]) ** 2).mean()) < 5e-5
+    assert set(codes.calls) == {"object.raster", "contact.presses", "object.touch_codes", "touch.gel"}
+    assert set(reference.calls) == {"object.raster", "touch.height_map", "touch.gel"}
+
+
+def test_a_pose_is_answered_as_the_press_that_it_is(of: ObjectFile) -> None:
+    """To float32's rounding of a millimetre."""
+    np.testing.assert_allclose(
+        evaluated(of, "codes")["touch.gel"], open_touch(of, "codes").at(presses()), atol=1e-8
+    )
+
+
+def test_the_rasteriser_asks_for_no_objectfile_even_where_there_is_one(of: ObjectFile) -> None:
+    accuracy = Accuracy(knobs_of(EFFECTS), {})
+    made = plan(EFFECTS, Facts(scene_of(of), tb.SENSOR), ["touch.gel"], accuracy)
+    assert made.sources == ("object.mesh", "contact.gel_from_object", "sensor", "sensor.calibration")
+
+
+def test_shadows_start_from_the_object_itself_at_every_level(of: ObjectFile) -> None:
+    accuracy = Accuracy(knobs_of(EFFECTS), {"touch.shapes": "codes"})
+    lit = replace(GELSIGHT_R15, casts_shadow=True)
+    ran = {
+        step.effect.provides
+        for step in plan(EFFECTS, Facts(scene_of(of), lit), ["touch.image"], accuracy).ran
+    }
+    assert {"touch.height_map", "object.touch_codes", "touch.darkening"} <= ran
+
+
+@pytest.mark.parametrize("level", ["codes", "perceptron"])
+def test_without_an_objectfile_its_levels_are_refused(level: str) -> None:
+    with pytest.raises(
+        WrongUse, match=rf"touch\.shapes = {level}: the scene names no ObjectFile .*touch\.shapes = reference"
+    ):
+        evaluated(None, level)
+
+
+def test_an_objectfile_without_that_touch_is_refused(of: ObjectFile, tmp_path: Path) -> None:
+    untouched = create_object(tmp_path / "peg", "peg", tb.peg(), MATERIALS["steel"], PROVENANCE)
+    with pytest.raises(DataRefused, match=r"has no touch; add it .*--only touch.*touch\.shapes = reference"):
+        evaluated(untouched, "codes")
+    with pytest.raises(DataRefused, match="the touch of peg has no perceptron"):
+        evaluated(of, "perceptron")
+
+
+@pytest.mark.parametrize(
+    ("mesh", "said"),
+    [
+        (Mesh(tb.peg().vertices * 1e3, tb.peg().faces), r"it reaches x .* mm, the scene's object x 38000"),
+        (Mesh(tb.peg().vertices + np.array([1e-3, 0.0, 0.0]), tb.peg().faces), "it reaches x"),
+    ],
+    ids=["millimetres", "moved"],
+)
+def test_another_object_is_refused_and_said(of: ObjectFile, mesh: Mesh, said: str) -> None:
+    with pytest.raises(WrongUse, match=f"is not of the scene's object: {said}.*touch.shapes = reference"):
+        evaluated(of, "codes", object__mesh=mesh)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "skirt", "said"),
+    [
+        (replace(tb.SENSOR, rows=25), tb.SKIRT, r"24 x 32 pixels and coarse 25 x 32"),
+        (replace(tb.SENSOR, pitch=0.61e-3), tb.SKIRT, r"pixels of 0\.6 mm, that of coarse of 0\.61 mm"),
+        (replace(tb.SENSOR, gel_thickness=3e-3), tb.SKIRT, r"gel of 2\.5 mm, that of coarse of 3 mm"),
+        (replace(tb.SENSOR, gel_radius=0.1), tb.SKIRT, "flat and that of coarse a dome"),
+        (tb.SENSOR, R15_SKIRT, "its skirt is .* and that of the calibration"),
+    ],
+    ids=["rows", "pitch", "thickness", "dome", "skirt"],
+)
+def test_another_gel_is_refused_and_said(of: ObjectFile, sensor: Any, skirt: Any, said: str) -> None:
+    calibration = replace(BENCH, header=replace(BENCH.header, skirt=skirt))
+    with pytest.raises(WrongUse, match=f"is of another gel: .*{said}.*touch.shapes = reference"):
+        evaluated(of, "codes", sensor=sensor, sensor__calibration=calibration)
+
+
+def test_a_pose_that_the_codes_were_not_made_for_is_refused(of: ObjectFile) -> None:
+    deep = replace(presses(), depths=np.full(6, 2.2e-3))
+    with pytest.raises(OutOfDomain, match=r"2\.2 mm deep was asked .* knows 0\.5 to 2 mm"):
+        evaluated(of, "codes", contact__gel_from_object=inverse(deep.object_from_gel))
+
+
+@pytest.mark.parametrize(
+    ("level", "why"),
+    [
+        ("codes", "touch.shapes is codes, and the scene names an ObjectFile"),
+        ("reference", "touch.shapes is reference, its default"),
+    ],
+)
+def test_explain_says_which_level_runs_and_why(of: ObjectFile, level: str, why: str) -> None:
+    told = as_json(
+        scene_plan(scene_of(of), GELSIGHT_R15, Accuracy(knobs_of(EFFECTS), {"touch.shapes": level}))
+    )
+    steps = {step["effect"]: step for step in told["ran"]}
+    assert steps["touch.gel"]["reason"].endswith(why)
+    assert ("object.touch_codes" in steps) == (level == "codes")
+    assert ("touch.height_map" in steps) == (level == "reference")
+
+
+_LOADING = """
+import sys
+from pathlib import Path
+import numpy as np
+from harness.objectfile.file import ObjectFile
+from harness.bench.scene import scene_from_options
+from harness.bench.sensor import GELSIGHT_R15
+from harness.sim.gel.press_pose import contact_place, gel_from_object
+from harness.sim.optics.tactile_calibration import shipped_calibration
+from harness.sim.optics.pressed_gel import Gel
+from harness.effects.touch_press import press_mesh
+TOUCH = {"harness.objectfile.touch.touch", "harness.objectfile.touch.level", "onnx", "onnxruntime"}
+mesh = ObjectFile.open(Path(sys.argv[1])).mesh
+at = gel_from_object(contact_place(mesh, np.array([0.01, 0.02, 0.05])), 1e-3, 0.0, 0.0, 0.0)
+scene = scene_from_options("builtin:mug", objectfile=sys.argv[1])
+gel = Gel(GELSIGHT_R15, shipped_calibration("gelsight_r15_bench"))
+press_mesh({"object.mesh": mesh, "contact.gel_from_object": at[None]}, gel, scene)
+print(sorted(TOUCH & sys.modules.keys()))
+press_mesh({"object.mesh": mesh, "contact.gel_from_object": at[None]}, gel, scene, ["touch.shapes=codes"])
+print("harness.objectfile.touch.touch" in sys.modules)
+"""
+
+
+def test_a_scene_that_does_not_ask_loads_nothing_of_it(tmp_path: Path) -> None:
+    folder = tb.ball_file(tmp_path / "ball").folder
+    said = subprocess.run(
+        [sys.executable, "-c", _LOADING, str(folder)], capture_output=True, text=True, check=False
+    )
+    assert said.stdout.split("\n")[:2] == ["[]", "True"], said.stderr

@@ -1,0 +1,169 @@
+"""The touch of an ObjectFile: its levels agree, its domain holds, and damage is found where it is."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
+from harness.objectfile.file import ObjectFile
+from harness.objectfile.touch.nodes import SurfaceNodes, nodes_bytes, nodes_from
+from harness.objectfile.touch.part import with_touch
+from harness.objectfile.touch.touch import CodeMaps, open_touch
+from harness.objectfile.verify.verify import verify
+from harness.sim.gel.presses import Presses
+from tests.samples import touch_bench as tb
+from tests.samples.object_bench import exchange, rewrite
+
+
+@pytest.fixture(scope="module")
+def peg_object(tmp_path_factory: pytest.TempPathFactory) -> ObjectFile:
+    """Read only."""
+    return tb.peg_file(tmp_path_factory.mktemp("objects") / "peg")
+
+
+@pytest.fixture
+def spoiled_peg(peg_object: ObjectFile, tmp_path: Path) -> Path:
+    shutil.copytree(peg_object.folder, tmp_path / "peg")
+    return tmp_path / "peg"
+
+
+def presses(count: int = 6) -> Presses:
+    nodes = tb.coded().nodes
+    chosen = np.linspace(0, len(nodes) - 1, count).astype(np.int64)
+    some = np.linspace(0.0, 1.0, count)
+    return Presses(
+        nodes.points[chosen], nodes.normals[chosen], 1e-3 + 5e-4 * some, 0.2 * some, 6.0 * some, 3.0 * some
+    )
+
+
+def failures(of: ObjectFile) -> dict[str, str]:
+    return {check.name: check.said for check in verify(of) if not check.passed}
+
+
+def test_a_touch_as_it_was_built_passes_every_check(peg_object: ObjectFile) -> None:
+    checks = verify(peg_object)
+    assert all(check.passed for check in checks), checks
+    assert [check.name for check in checks] == [
+        *(f"{name}: bytes" for name in ("mesh.ply", "touch.onnx", "touch_nodes.npy")),
+        *("folder: nothing else", "mesh", "touch: graph", "touch: domain", "touch: self-test"),
+        "touch: codes and mesh",
+    ]
+
+
+def test_codes_and_reference_are_levels_of_one_quantity(peg_object: ObjectFile) -> None:
+    codes, reference = open_touch(ObjectFile.open(peg_object.folder)), open_touch(peg_object, "reference")
+    found, truth = codes.at(presses()), reference.at(presses())
+    assert found.shape == truth.shape == (6, tb.SENSOR.rows, tb.SENSOR.columns)
+    assert np.sqrt(((found - truth) ** 2).mean()) < 5e-5
+    assert codes.entry.gel.sensor == tb.SENSOR
+    assert codes.entry.gel.skirt == tb.SKIRT
+
+
+@pytest.mark.parametrize(("level", "compiled"), [("codes", True), ("codes", False), ("reference", True)])
+def test_no_presses_give_no_maps(peg_object: ObjectFile, level: Any, compiled: bool) -> None:
+    touch, none = open_touch(peg_object, level, compiled=compiled), presses()[:0]
+    for found in (touch.at(none), touch.maps(none)):
+        assert found.shape == (0, tb.SENSOR.rows, tb.SENSOR.columns)
+
+
+def test_a_graph_asked_for_some_inputs_and_not_others_says_so(peg_object: ObjectFile) -> None:
+    touch = open_touch(peg_object, "codes", compiled=False)
+    assert isinstance(touch.maps, CodeMaps)
+    asked = touch.maps.nodes.queries(presses())
+    with pytest.raises(DataRefused, match="cannot be run"):
+        touch.maps.network({name: array[:0] for name, array in asked.items() if name == "node"})
+    with pytest.raises(DataRefused, match="cannot be run"):
+        touch.maps.network({name: array[: 0 if name == "node" else None] for name, array in asked.items()})
+
+
+@pytest.mark.parametrize("level", ["codes", "reference"])
+def test_what_a_touch_was_not_made_for_is_refused_and_not_clamped(peg_object: ObjectFile, level: Any) -> None:
+    touch, asked = open_touch(peg_object, level), presses()
+    with pytest.raises(OutOfDomain, match=r"knows 0\.5 to 2 mm"):
+        touch.at(replace(asked, depths=np.full(6, 2.01e-3)))
+    with pytest.raises(OutOfDomain, match="knows 0 to 15 deg"):
+        touch.at(replace(asked, tilts=np.full(6, np.radians(15.1))))
+    with pytest.raises(OutOfDomain, match="off the surface"):
+        touch.at(replace(asked, points=asked.points + 0.01))
+    touch.at(replace(asked, depths=np.full(6, 2e-3), tilts=np.full(6, np.radians(15.0))))
+
+
+def test_a_press_with_the_normal_of_another_place_is_refused(peg_object: ObjectFile) -> None:
+    asked = presses()
+    with pytest.raises(OutOfDomain, match=r"press_pose\.contact_place"):
+        open_touch(peg_object).at(replace(asked, normals=-asked.normals))
+
+
+def test_levels_that_are_not_there_are_said(peg_object: ObjectFile, egg_object: ObjectFile) -> None:
+    with pytest.raises(DataRefused, match="--only touch"):
+        open_touch(egg_object)
+    with pytest.raises(DataRefused, match="has no perceptron"):
+        open_touch(peg_object, "perceptron")
+    wrong: Any = "fine"
+    with pytest.raises(WrongUse, match="there is codes, perceptron, reference"):
+        open_touch(peg_object, wrong)
+
+
+def test_a_touch_of_nothing_is_no_touch(peg_object: ObjectFile) -> None:
+    part = tb.peg_part()
+    with pytest.raises(WrongUse, match="codes or a perceptron"):
+        with_touch(peg_object, replace(part, codes=None))
+
+
+@pytest.mark.parametrize("name", ["touch.onnx", "touch_nodes.npy"])
+def test_a_changed_file_is_refused(spoiled_peg: Path, name: str) -> None:
+    data = bytearray((spoiled_peg / name).read_bytes())
+    data[-1] ^= 1
+    (spoiled_peg / name).write_bytes(data)
+    with pytest.raises(DataRefused, match="was changed"):
+        open_touch(ObjectFile.open(spoiled_peg))
+    assert f"{name}: bytes" in failures(ObjectFile.open(spoiled_peg))
+
+
+def test_nodes_of_another_order_are_told_by_pressing(spoiled_peg: Path) -> None:
+    nodes = tb.coded().nodes
+    other = nodes_bytes(SurfaceNodes(nodes.points[::-1], nodes.normals[::-1]))
+    found = failures(exchange(spoiled_peg, "touch_nodes.npy", other))
+    assert set(found) == {"touch: codes and mesh"}
+    assert "different objects" in found["touch: codes and mesh"]
+
+
+def test_nodes_of_another_number_are_refused(spoiled_peg: Path) -> None:
+    nodes = tb.coded().nodes
+    of = exchange(spoiled_peg, "touch_nodes.npy", nodes_bytes(nodes[np.arange(5)]))
+    with pytest.raises(DataRefused, match="5 nodes, its graph another number"):
+        open_touch(of)
+
+
+def test_a_description_that_contradicts_itself_is_refused(spoiled_peg: Path) -> None:
+    def narrow(tree: dict[str, Any]) -> None:
+        tree["touch"]["gel"]["rows"] = 23
+
+    with pytest.raises(DataRefused, match="where touch has"):
+        rewrite(spoiled_peg, narrow)
+
+    def turn(tree: dict[str, Any]) -> None:
+        tree["touch"]["gel"]["rows"] = tb.SENSOR.rows
+        tree["touch"]["depth_m"] = [2e-3, 5e-4]
+
+    with pytest.raises(DataRefused, match="the lesser comes first"):
+        rewrite(spoiled_peg, turn)
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"no array", "not a file of numpy"),
+        (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.eye(3)[:2]))[:-8], "bytes, not the"),
+        (nodes_bytes(SurfaceNodes(np.full((2, 3), np.nan), np.eye(3)[:2])), "not finite"),
+        (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.ones((2, 3)))), "length 1"),
+        (nodes_bytes(SurfaceNodes(np.zeros((0, 3)), np.zeros((0, 3)))), r"float64 \(n, 6\)"),
+    ],
+)
+def test_a_file_that_holds_no_nodes_is_refused(data: bytes, said: str) -> None:
+    with pytest.raises(DataRefused, match=said):
+        nodes_from(data, "touch_nodes.npy")
