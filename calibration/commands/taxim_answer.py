@@ -155,7 +155,7 @@ def doubts(scale: "ArmScale", arm: "ArmPresses", squared: float) -> list[str]:
 
 def keep(scale: dict[str, Any], artefact: Path) -> None:
     """What the arm measured, beside the artefact, whose format has a place for the pitch alone."""
-    from harness.recording.recording import write_text_whole
+    from harness.basics.whole_file import write_text_whole
 
     path = artefact.with_name(f"{artefact.stem}.scale.json")
     write_text_whole(path, dumps({"schema": 1, **scale}, indent=1, allow_nan=False) + "\n")

@@ -17,10 +17,10 @@ from calibration.taxim.pack import PressPack
 from calibration.taxim.smooth_fit import distance, huber, scaled_place
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
-from harness.sim.gel.gel import GelLevel, deform
+from harness.sim.gel.gel import GelLevel, GelSkirt, deform
 from harness.sim.optics import lit_calibration
 from harness.sim.optics.shading import KNEE, POSITION_TERMS
-from harness.sim.optics.tactile_calibration import GelSkirt, smooth_terms
+from harness.sim.optics.tactile_calibration import smooth_terms
 
 REACH = 4.0
 """Contact radii from the centre that are looked at; in the published sets the skirt ends at 3.5."""

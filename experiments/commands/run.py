@@ -175,7 +175,7 @@ def _with_cost(result: dict[str, Any], cost: dict[str, Any], recording: Any) -> 
 
     from experiments.contact_localization.accuracy.within_words import sentences
     from experiments.contact_localization.report.result import RESULT
-    from harness.recording.recording import write_text_whole
+    from harness.basics.whole_file import write_text_whole
 
     whole = {**result, "cost": cost}
     write_text_whole(recording.folder / RESULT, dumps(whole, indent=1, allow_nan=False) + "\n")

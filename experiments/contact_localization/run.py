@@ -26,6 +26,7 @@ from experiments.contact_localization.sound.gate import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.symmetry import find_symmetries
+from harness.basics.whole_file import write_text_whole
 from harness.bench.device import Health
 from harness.bench.gap import lasting_name
 from harness.bench.scene import SceneFile
@@ -33,7 +34,7 @@ from harness.bench.station import Bench, RunContext, open_station
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.effects.scene_object import KnownObject, known_object
-from harness.recording.recording import Recording, require_unused, write_text_whole
+from harness.recording.recording import Recording, require_unused
 from harness.recording.run_folder import RunFiles, create_run, station_acquisition, station_calibration
 from harness.recording.session import Progress, perform
 from harness.report.page import write_report

@@ -22,7 +22,7 @@ from harness.basics.quantities import (
     Time,
 )
 from harness.basics.toml_file import StrictModel, load_toml, nearest, validate
-from harness.objectfile.entries import DESCRIPTION
+from harness.objects.builtin import DESCRIPTION
 
 BUILTIN = "builtin:"
 UNITS = ("m", "cm", "mm", "in")

@@ -8,9 +8,9 @@ from typing import Any
 
 from harness.basics.errors import DataRefused, TouchstoneError
 from harness.basics.store import default_folder
+from harness.basics.whole_file import write_text_whole
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.provenance import machine, machine_key
-from harness.recording.recording import write_text_whole
 
 SCHEMA = 3
 

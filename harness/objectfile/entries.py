@@ -7,8 +7,7 @@ from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from harness.basics.materials import Material
 from harness.basics.toml_file import StrictModel
-
-DESCRIPTION = "object.json"
+from harness.objects.builtin import DESCRIPTION
 
 MOST_BYTES = 256 * 2**20
 """Of one file; nothing larger is read."""

@@ -21,17 +21,11 @@ from harness.objectfile.description import (
     description_text,
     read_description,
 )
-from harness.objectfile.entries import (
-    DESCRIPTION,
-    AudioEntry,
-    FileEntry,
-    MaterialEntry,
-    MeshEntry,
-    Provenance,
-)
+from harness.objectfile.entries import AudioEntry, FileEntry, MaterialEntry, MeshEntry, Provenance
 from harness.objectfile.surface_file import mesh_from_ply, ply_bytes
 from harness.objectfile.touch_entries import TouchEntry
 from harness.objectfile.vision_entry import VisionEntry
+from harness.objects.builtin import DESCRIPTION
 
 MESH = "mesh.ply"
 

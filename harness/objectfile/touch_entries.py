@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from harness.bench.sensor import TactileSensor
 from harness.objectfile.entries import Entry, FileEntry, NetworkEntry, Provenance
-from harness.sim.optics.tactile_calibration import GelSkirt
+from harness.sim.gel.gel import GelSkirt
 
 Positive = Annotated[float, Field(gt=0.0)]
 Size = Annotated[int, Field(ge=1)]

@@ -5,8 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from harness.objectfile.entries import Entry, FileEntry, NetworkEntry, Provenance
-from harness.objectfile.vision.network.network import EXTRAS, MOST_CELLS, Kind
-from harness.objectfile.vision.network.tensors import Corner, box_tensors
+from harness.objectfile.vision_tensors import EXTRAS, MOST_CELLS, Corner, Kind, box_tensors
 
 Positive = Annotated[float, Field(gt=0.0)]
 Cells = Annotated[int, Field(ge=1, le=MOST_CELLS)]

@@ -18,3 +18,7 @@ def build(name: str, edge: float = 3e-3) -> Mesh:
     if name in targets.MATERIALS:
         return targets.build_target(name, edge)
     return household.build(name, edge)
+
+
+DESCRIPTION = "object.json"
+"""The file that makes a folder an ObjectFile; a scene may name such a folder."""

@@ -5,15 +5,15 @@ whole or not at all, and the first step that is not is where a run resumes.
 """
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from harness.basics.errors import RecordingDamaged, WrongUse
+from harness.basics.whole_file import write_text_whole
 from harness.bench.reading import Reading
-from harness.recording.step_file import Step, StepRecord, read_step, sync_folder, write_step
+from harness.recording.step_file import Step, StepRecord, read_step, write_step
 
 SCHEMA = 1
 
@@ -105,17 +105,6 @@ def require_unused(folder: Path) -> None:
     """Refuse a folder that holds a run, before anything in it is touched."""
     if (folder / "run.json").exists():
         raise WrongUse(f"{folder} holds a run already; resume it with --resume, or name another folder")
-
-
-def write_text_whole(path: Path, text: str) -> None:
-    """Write a text file aside, flush it, rename it: readers see the old one or the new one."""
-    part = path.with_name(f".{path.name}.part")
-    with part.open("w", encoding="utf-8") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
-    part.replace(path)
-    sync_folder(path.parent)
 
 
 def _read_header(path: Path) -> RunHeader:

@@ -19,8 +19,8 @@ from harness.bench.acquisition import AcquisitionCalibration
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import Station, station_from_json
 from harness.effects.scene_object import known_file
-from harness.objectfile.entries import DESCRIPTION
 from harness.objectfile.file import ObjectFile, copied
+from harness.objects.builtin import DESCRIPTION
 from harness.recording.recording import Recording, RunHeader, require_unused
 from harness.sim.optics.lit_calibration import read_calibration, shadow_of
 from harness.sim.optics.tactile_calibration import (

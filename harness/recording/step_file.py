@@ -14,6 +14,7 @@ from mcap.writer import CompressionType, Writer
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import RecordingDamaged
+from harness.basics.whole_file import sync_folder
 from harness.bench.reading import Channel, Reading
 from harness.recording.codecs import codec_of
 
@@ -64,15 +65,6 @@ def write_step(path: Path, record: StepRecord, clock_offset_ns: int) -> None:
         os.fsync(stream.fileno())
     part.replace(path)
     sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Flush a folder's entries to the disk, so that a rename survives a power cut."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _write_reading(writer: Writer, reading: Reading, clock_offset_ns: int) -> None:

@@ -15,9 +15,10 @@ import numpy as np
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
 from harness.basics.wav import write_pcm
+from harness.basics.whole_file import write_text_whole
 from harness.bench.acquisition_channels import FORCE, PRESSURE
 from harness.bench.reading import Reading
-from harness.recording.recording import Recording, write_text_whole
+from harness.recording.recording import Recording
 
 SCHEMA = 1
 INDEX = "wav.json"

@@ -7,15 +7,11 @@ import numpy as np
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.bench.gap import GelGap
 from harness.bench.sensor import TactileSensor
-from harness.sim.gel.gel import R15_SKIRT, deform, half_kernel, over_range
+from harness.sim.gel.gel import R15_SKIRT, GelSkirt, deform, half_kernel, over_range
 from harness.sim.gel.height_map import rest_surface
 from harness.sim.optics.lit_calibration import read_calibration
 from harness.sim.optics.optics import Optics
-from harness.sim.optics.tactile_calibration import (
-    GelSkirt,
-    TactileCalibration,
-    shipped_calibration,
-)
+from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
 
 WORLD_CALIBRATION = "gelsight_r15_world"
 """Fitted to presses that no estimator's calibration has seen."""

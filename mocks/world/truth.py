@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.basics.arrays import FloatArray
+from harness.basics.whole_file import write_text_whole
 from harness.bench.station import STRIKE
-from harness.recording.recording import write_text_whole
 from mocks.world.world import World
 
 if TYPE_CHECKING:

@@ -29,13 +29,13 @@ from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
 from experiments.contact_localization.accuracy.table import objects
 from experiments.contact_localization.accuracy.table_cell import Cell, cells
 from experiments.contact_localization.accuracy.within import ask
+from harness.basics.whole_file import write_text_whole
 from harness.bench.station_file import load_station, station_path
 from harness.cost.choice import for_budget
 from harness.cost.curve import GROSS, Curve
 from harness.cost.file import curve_path, load, sample_json
 from harness.cost.provenance import code, machine, stale
 from harness.effects.accuracy import Level
-from harness.recording.recording import write_text_whole
 
 SHARE = 0.95
 CONTACTS = 6

@@ -14,9 +14,10 @@ from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.graph import OutputScales, audio_graph
 from harness.objectfile.audio.part import AudioPart, with_audio
-from harness.objectfile.entries import DESCRIPTION, Provenance
+from harness.objectfile.entries import Provenance
 from harness.objectfile.file import ObjectFile, create_object
 from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
+from harness.objects.builtin import DESCRIPTION
 from harness.sim.modal.modes import Modes, dampings
 
 MODES = 7

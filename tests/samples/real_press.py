@@ -18,11 +18,10 @@ from calibration.taxim.shadow.fit import fit_shadow
 from calibration.taxim.smooth_fit import changes, distance, refined_centre
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, IntArray, read_only
 from harness.picture.image_metrics import ssim
-from harness.sim.gel.gel import R15_SKIRT, deform
+from harness.sim.gel.gel import R15_SKIRT, GelSkirt, deform
 from harness.sim.optics.lit_calibration import LitCalibration
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.shadow import ShadowTable
-from harness.sim.optics.tactile_calibration import GelSkirt
 
 R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
 FOTS = Identity("GelSight", "FOTS", "MIT", "2026-01-01", 1e-3 / 19.58, 2.35e-3)

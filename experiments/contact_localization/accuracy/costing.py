@@ -18,12 +18,12 @@ from experiments.contact_localization.accuracy.solving import (
 )
 from experiments.contact_localization.accuracy.table_cell import Cell
 from harness.basics.errors import TouchstoneError
+from harness.basics.whole_file import write_text_whole
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import sample_from, sample_json
 from harness.cost.provenance import code, machine
-from harness.recording.recording import write_text_whole
 
 _SCHEMA = 2
 """Of a run's file; one of another schema is measured again."""

@@ -14,10 +14,10 @@ from experiments.contact_localization.accuracy.table_cell import HEARD, METHODS,
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError, WrongUse
 from harness.basics.metrics import Interval, bootstrap, mean, median, share_above
+from harness.basics.whole_file import write_text_whole
 from harness.bench.scene import SceneFile, scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.objects.household import MATERIALS
-from harness.recording.recording import write_text_whole
 
 GROSS = 20.0e-3
 """m: an error beyond this is a failure, counted at its full value all the same."""

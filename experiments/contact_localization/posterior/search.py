@@ -14,9 +14,9 @@ from experiments.contact_localization.posterior.hypotheses import Contact, Hypot
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores, possible_anchors
 from experiments.contact_localization.posterior.shared_errors import log_prior, moves
 from experiments.contact_localization.touch.contact_scales import contact_scales, place_noise
-from experiments.contact_localization.touch.touch import TouchMap, View, best_fit, touch_terms
+from experiments.contact_localization.touch.touch import TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
-from harness.sim.gel.view import half_as_fine, view_along
+from harness.sim.gel.view import View, half_as_fine, view_along
 from harness.sim.solid.surface_samples import Surface
 
 _KNOWN_YAWS = np.radians(np.arange(-5.0, 5.5, 1.0))

@@ -8,12 +8,11 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
+from harness.sim.gel.view import POOL
 
 Reading = tuple[FloatArray, float, IntArray, BoolArray, FloatArray, FloatArray]
 Sigmas = tuple[float, float]
 
-POOL = 4
-"""Pixels of a view, each way, that share the limits on where the gel can be."""
 
 _CORE = 0.2
 """Share of the deepest place above which the object shapes the gel (Taxim, section III-A)."""

@@ -17,6 +17,7 @@ from experiments.contact_localization.touch.kernels import (
     terms_at,
 )
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
+from harness.sim.gel.view import View
 
 LEVEL_SLOPE = 0.06
 """Mean slope of a pixel below which it may be the gel at rest."""
@@ -77,33 +78,6 @@ class TouchMap:
     def reading(self) -> Reading:
         """As the loops take it."""
         return self.heights, self.pitch, self.touched, self.flat, self.skirt, self.edge
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """The object seen along the tool, with the touch term at each place filled in on demand.
-
-    Attributes:
-        object_from_view: ``(3, 3)``, columns x and y of the gel's image and z along the tool.
-        origin: ``(2,)`` metres, view x and y of the centre of pixel (0, 0).
-        pitch: metres a pixel, half of the touch map's.
-        depth: ``(rows, columns)`` metres along z of the first surface, inf where there is none.
-        nearest: for blocks of ``POOL`` pixels each way, metres along z: the gel's centre cannot be
-            nearer to the arm, or nothing would touch it.
-        farthest: for the same blocks, metres along z: it cannot be farther, or the object would
-            reach through the gel.
-        score: ``(rows, columns)`` nats, NaN where not asked for yet.
-        gel_depth: ``(rows, columns)`` metres along z of the gel's centre, from the fit.
-    """
-
-    object_from_view: FloatArray
-    origin: FloatArray
-    pitch: float
-    depth: FloatArray
-    nearest: FloatArray
-    farthest: FloatArray
-    score: FloatArray
-    gel_depth: FloatArray
 
 
 def touch_map(

@@ -13,9 +13,9 @@ from harness.bench.sensor import TactileSensor
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes
 from harness.objectfile.touch.touch import Maps
+from harness.sim.gel.gel import GelSkirt
 from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.presses import Presses
-from harness.sim.optics.tactile_calibration import GelSkirt
 
 RANGE = 2e-3
 """m that a full-scale error is: the deepest press."""

@@ -21,8 +21,8 @@ from harness.objectfile.touch.graph import codes_graph
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes
 from harness.objectfile.touch.part import CODES, CodesPart, PerceptronPart, codes_tensors
 from harness.objectfile.touch.touch import CodeMaps
+from harness.sim.gel.gel import GelSkirt
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.optics.tactile_calibration import GelSkirt
 
 CHECKPOINT = ".touch_training.npz"
 """Beside ``object.json`` until the training is over."""

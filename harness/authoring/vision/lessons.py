@@ -17,7 +17,7 @@ from harness.authoring.vision.places import cosine_about, is_closed, sphere, sur
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import OutOfDomain
 from harness.basics.mesh import Mesh
-from harness.objectfile.vision.network.network import Kind
+from harness.objectfile.vision_tensors import Kind
 from harness.sim.light.direct_image import LitObject
 from harness.sim.light.lambert import Places, cosines, places_seen, radiance
 

@@ -12,7 +12,8 @@ from harness.authoring.vision.teacher_profiles import (
 )
 from harness.basics.errors import WrongUse
 from harness.basics.toml_file import nearest
-from harness.objectfile.vision.network.network import CELLS, PAPER, Kind, NetworkSize
+from harness.objectfile.vision.network.network import CELLS, PAPER, NetworkSize
+from harness.objectfile.vision_tensors import Kind
 
 
 @dataclass(frozen=True)

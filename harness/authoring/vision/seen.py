@@ -14,10 +14,11 @@ from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.cores import own_cores
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage.outline import Outline
-from harness.objectfile.vision.network.network import Kind, VisionGrid
+from harness.objectfile.vision.network.network import VisionGrid
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.samples import Asker, Samples, Scene
 from harness.objectfile.vision.settings import RenderSettings, VisionLevel
+from harness.objectfile.vision_tensors import Kind
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.direct_image import LitObject

@@ -25,9 +25,10 @@ from harness.authoring.vision.teacher_profiles import TeacherSpec
 from harness.basics.cores import own_cores
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
-from harness.objectfile.vision.network.network import Kind, VisionGrid
+from harness.objectfile.vision.network.network import VisionGrid
 from harness.objectfile.vision.settings import RenderSettings
 from harness.objectfile.vision.shell import Lattice, grid_of, lattice_of, surface_shell
+from harness.objectfile.vision_tensors import Kind
 from harness.picture.linear_image import LinearImage
 from harness.sim.light.direct_image import LitObject
 

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from harness.authoring.perceptron import dense_layer
 from harness.authoring.vision.teacher_profiles import TeacherSpec
-from harness.objectfile.vision.network.network import EXTRAS
+from harness.objectfile.vision_tensors import EXTRAS
 
 _PRIMES = (1, 2_654_435_761, 805_459_861)
 """Of the hash, as in the source."""

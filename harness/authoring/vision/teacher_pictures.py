@@ -7,16 +7,11 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.network.graph import vision_graph
-from harness.objectfile.vision.network.network import (
-    Kind,
-    NetworkSize,
-    VisionGrid,
-    VisionModel,
-    VisionWeights,
-)
+from harness.objectfile.vision.network.network import NetworkSize, VisionGrid, VisionModel, VisionWeights
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.samples import Asker, Samples, Scene
 from harness.objectfile.vision.settings import VisionLevel
+from harness.objectfile.vision_tensors import Kind
 
 Answers = Callable[[FloatArray, AnyArray, AnyArray, AnyArray], tuple[AnyArray, AnyArray]]
 """Of places, views, lights and extras: densities, and linear colours."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from harness.authoring.vision.finish_profiles import TeacherFinish
 from harness.basics.errors import WrongUse
-from harness.objectfile.vision.network.network import EXTRAS, Kind
+from harness.objectfile.vision_tensors import EXTRAS, Kind
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from harness.authoring.vision.teacher_network import Teacher
 from harness.authoring.vision.teacher_profiles import TeacherSpec
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.store import digest
-from harness.objectfile.vision.network.network import EXTRAS
+from harness.objectfile.vision_tensors import EXTRAS
 
 VERSION = 1
 """Raised with every change of what training computes, so that no old checkpoint is gone on from."""

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from harness.basics.whole_file import write_text_whole
 from harness.commands import options
 from harness.commands.object import vision_options
 from harness.commands.object.cost_vision_answer import Measured, as_json, draw, load_of_others, print_answer
 from harness.commands.output import emit, share_progress, warn
-from harness.recording.recording import write_text_whole
 
 if TYPE_CHECKING:
     from harness.authoring.training import Report

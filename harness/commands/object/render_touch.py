@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from harness.commands import force_options as forces
 from harness.commands import options
 from harness.commands.object.render_touch_answer import RenderedPress, as_json, draw, notes, print_answer
 from harness.commands.output import emit, warn
-from harness.commands.press import force_options as forces
 
 if TYPE_CHECKING:
     from harness.effects.touch_press import Press

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from harness.commands.force_options import force_json, force_notes, force_row
 from harness.commands.output import ANSWERS
-from harness.commands.press.force_options import force_json, force_notes, force_row
 
 if TYPE_CHECKING:
     from harness.effects.touch_press import Press

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from harness.commands import force_options as forces
 from harness.commands import options
 from harness.commands.output import ANSWERS, emit, warn
 from harness.commands.press import depth_force
-from harness.commands.press import force_options as forces
 
 if TYPE_CHECKING:
     from harness.basics.arrays import ByteArray, FloatArray

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from harness.commands import options
-from harness.commands.press.force_options import described, noted, require_force, sentence, stiffness
+from harness.commands.force_options import described, noted, require_force, sentence, stiffness
 
 if TYPE_CHECKING:
     from harness.bench.station_file import Station

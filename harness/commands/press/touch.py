@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
+from harness.commands import force_options as forces
 from harness.commands import options
 from harness.commands.output import emit, warn
-from harness.commands.press import force_options as forces
 from harness.commands.press import touch_sources as sources
 from harness.commands.press.touch_answer import Touched, as_json, draw, print_answer
 from harness.commands.press.touch_sources import Three, refuse

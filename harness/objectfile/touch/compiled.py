@@ -20,8 +20,7 @@ from harness.objectfile.graph_check import checked_graph, require_declared
 from harness.objectfile.touch.graph import LOOKUPS, PatchCodes, coarseness, codes_graph
 from harness.objectfile.touch.kernels import press
 from harness.objectfile.touch.rays import ray_places
-from harness.sim.gel.gel import half_kernel
-from harness.sim.optics.tactile_calibration import GelSkirt
+from harness.sim.gel.gel import GelSkirt, half_kernel
 
 _CODES, _COLUMNS, _MEAN, _COVER, _SCALE = "c1", "c2", "c4", "c7", "c9"
 """Names of constants, as ``codes_graph`` counts them."""

@@ -24,7 +24,7 @@ from harness.bench.sensor import TactileSensor
 from harness.objectfile.graph import Nodes, Storage
 from harness.objectfile.touch.rays import between, ray_places, row_terms
 from harness.objectfile.touch.skirt import hung
-from harness.sim.optics.tactile_calibration import GelSkirt
+from harness.sim.gel.gel import GelSkirt
 
 LOOKUPS = 3
 """Along a ray. The error of a look-up shrinks by the surface's slope times the gel's lean, about a fifth."""

@@ -9,7 +9,7 @@ from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import require_same_shape
 from harness.objectfile.touch.touch import ObjectTouch, TouchLevel, open_touch
 from harness.objectfile.touch_entries import GelEntry
-from harness.sim.optics.tactile_calibration import GelSkirt
+from harness.sim.gel.gel import GelSkirt
 
 INSTEAD = "touch.shapes = reference"
 """The level that needs no ObjectFile."""

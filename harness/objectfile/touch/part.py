@@ -15,7 +15,7 @@ from harness.objectfile.file import ObjectFile, file_entry, with_part
 from harness.objectfile.network_part import SELF_TEST_VALUES, NetworkPart, network_entry, spread
 from harness.objectfile.touch.nodes import SurfaceNodes, nodes_bytes
 from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
-from harness.sim.optics.tactile_calibration import GelSkirt
+from harness.sim.gel.gel import GelSkirt
 
 CODES = "touch.onnx"
 NODES = "touch_nodes.npy"

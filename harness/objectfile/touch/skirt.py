@@ -5,8 +5,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray
 from harness.bench.sensor import TactileSensor
 from harness.objectfile.graph import Nodes
-from harness.sim.gel.gel import half_kernel
-from harness.sim.optics.tactile_calibration import GelSkirt
+from harness.sim.gel.gel import GelSkirt, half_kernel
 
 
 def hung(nodes: Nodes, deep: str, sensor: TactileSensor, skirt: GelSkirt) -> str:

@@ -8,12 +8,13 @@ import numpy as np
 
 from harness.basics.errors import DataRefused, TouchstoneError
 from harness.objectfile.audio.audio import open_audio
-from harness.objectfile.entries import DESCRIPTION, FileEntry
+from harness.objectfile.entries import FileEntry
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.verify.network import look_at_domain, look_at_graph, look_at_self_test, opened_once
 from harness.objectfile.verify.touch import look_at_codes
 from harness.objectfile.verify.vision import look_at_looks, look_at_networks, look_at_weights
+from harness.objects.builtin import DESCRIPTION
 
 _SAMPLES = 256
 """Places of the surface where network and table are compared."""

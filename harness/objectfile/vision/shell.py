@@ -8,8 +8,9 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, MeshRefused, WrongUse
 from harness.basics.mesh import Mesh
-from harness.objectfile.vision.network.network import CELLS, MOST_CELLS, VisionGrid
+from harness.objectfile.vision.network.network import CELLS, VisionGrid
 from harness.objectfile.vision.voxels import distances, touch_voxels
+from harness.objectfile.vision_tensors import MOST_CELLS
 
 PER_CELL = 8
 """Voxels along a cell: 128 along the longest side of the object."""

@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, OutOfDomain
 from harness.basics.named_file import require_file
-from harness.recording.recording import write_text_whole
+from harness.basics.whole_file import write_text_whole
 
 Above = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Said = Annotated[str, Field(min_length=1)]

@@ -5,6 +5,7 @@ Gaussians, putting back after each the part that the object surely shapes. It wo
 indentation, so an untouched gel, flat or dome, stays untouched to the bit.
 """
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -13,9 +14,26 @@ from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import OutOfDomain
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.kernels import blur, blur_coarsely, put_back
-from harness.sim.optics.tactile_calibration import GelSkirt
 
 GelLevel = Literal["exact", "fast"]
+
+
+@dataclass(frozen=True)
+class GelSkirt:
+    """How a gel hangs from what presses it: blurs repeated with the core put back.
+
+    The constants of Taxim (Si and Yuan, 2022) and ObjectFolder 2.0, in pixels of the sensor.
+
+    Attributes:
+        kernels: odd widths in pixels of the Gaussian blurs, widest first.
+        final: odd width in pixels of the last blur, over the core too.
+        core: share of the greatest penetration above which the object shapes the gel.
+    """
+
+    kernels: tuple[int, ...] = (11, 5)
+    final: int = 5
+    core: float = 0.2
+
 
 TAXIM_SKIRT = GelSkirt(kernels=(201, 101, 51, 21, 11, 5), final=5, core=0.4)
 """For pixels of 0.0295 mm and images of 480 x 640 (Taxim's own sensor)."""

@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import CalibrationRefused, OutOfDomain, WrongUse
+from harness.basics.whole_file import write_text_whole
 from harness.bench.sensor import MarkerGrid
-from harness.recording.recording import write_text_whole
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Above = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]

@@ -1,10 +1,10 @@
 """Pictures of an object along the tool: for the touch term, and for where a housing fits."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.ndimage import minimum_filter
 
-from experiments.contact_localization.touch.kernels import POOL
-from experiments.contact_localization.touch.touch import View
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.geometry import transform
 from harness.bench.sensor import TactileSensor
@@ -15,6 +15,37 @@ _SLACK = 3.0e-3
 
 _MARGIN = 4.0e-3
 """Metres around the object: a tool's line may miss it by a little while the gel still touches."""
+
+
+POOL = 4
+"""Pixels of a view, each way, that share the limits on where the gel can be."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """The object seen along the tool, with the touch term at each place filled in on demand.
+
+    Attributes:
+        object_from_view: ``(3, 3)``, columns x and y of the gel's image and z along the tool.
+        origin: ``(2,)`` metres, view x and y of the centre of pixel (0, 0).
+        pitch: metres a pixel, half of the touch map's.
+        depth: ``(rows, columns)`` metres along z of the first surface, inf where there is none.
+        nearest: for blocks of ``POOL`` pixels each way, metres along z: the gel's centre cannot be
+            nearer to the arm, or nothing would touch it.
+        farthest: for the same blocks, metres along z: it cannot be farther, or the object would
+            reach through the gel.
+        score: ``(rows, columns)`` nats, NaN where not asked for yet.
+        gel_depth: ``(rows, columns)`` metres along z of the gel's centre, from the fit.
+    """
+
+    object_from_view: FloatArray
+    origin: FloatArray
+    pitch: float
+    depth: FloatArray
+    nearest: FloatArray
+    farthest: FloatArray
+    score: FloatArray
+    gel_depth: FloatArray
 
 
 def view_along(

@@ -23,6 +23,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import CalibrationRefused
 from harness.basics.named_file import require_file
+from harness.sim.gel.gel import GelSkirt
 from harness.sim.optics.shading import POSITION_TERMS
 from harness.sim.optics.shadow import ShadowTable
 from harness.sim.optics.tactile_calibration import (
@@ -30,7 +31,6 @@ from harness.sim.optics.tactile_calibration import (
     SCHEMA,
     CalibrationHeader,
     Float32Array,
-    GelSkirt,
     TactileCalibration,
     load_calibration,
     smooth_terms,

@@ -16,15 +16,10 @@ import numpy as np
 from harness.basics.arrays import AnyArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused
 from harness.bench.sensor import TactileSensor
-from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, skirt_for
+from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, GelSkirt, skirt_for
 from harness.sim.optics.shadow import ShadowTable
 from harness.sim.optics.shadow_file import read_shadow_table
-from harness.sim.optics.tactile_calibration import (
-    TABLE_TERMS,
-    CalibrationHeader,
-    GelSkirt,
-    TactileCalibration,
-)
+from harness.sim.optics.tactile_calibration import TABLE_TERMS, CalibrationHeader, TactileCalibration
 
 TABLE = "polycalib.npz"
 PRESSES = "dataPack.npz"

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused
+from harness.sim.gel.gel import GelSkirt
 
 SCHEMA = 1
 CHANNEL_ORDER = "RGB"
@@ -23,23 +24,6 @@ TABLE_TERMS = 6
 Float32Array = npt.NDArray[np.float32]
 
 _SHIPPED = Path(__file__).parent / "data"
-
-
-@dataclass(frozen=True)
-class GelSkirt:
-    """How a gel hangs from what presses it: blurs repeated with the core put back.
-
-    The constants of Taxim (Si and Yuan, 2022) and ObjectFolder 2.0, in pixels of the sensor.
-
-    Attributes:
-        kernels: odd widths in pixels of the Gaussian blurs, widest first.
-        final: odd width in pixels of the last blur, over the core too.
-        core: share of the greatest penetration above which the object shapes the gel.
-    """
-
-    kernels: tuple[int, ...] = (11, 5)
-    final: int = 5
-    core: float = 0.2
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ from harness.basics import geometry
 from harness.basics.arrays import FloatArray
 from harness.bench.sensor import GELSIGHT_R15, TactileSensor
 from harness.objects.household import build
-from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, deform, over_range
+from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, GelSkirt, deform, over_range
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
 from harness.sim.optics.inverse import invert
 from harness.sim.optics.optics import Optics, OpticsLevel
-from harness.sim.optics.tactile_calibration import GelSkirt, TactileCalibration, shipped_calibration
+from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
 from tests.oracles.mujoco_depth import CannotDraw, gaps_drawn
 
 pytestmark = pytest.mark.benchmark

@@ -19,9 +19,9 @@ from calibration.taxim.pack import PressPack
 from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused
-from harness.sim.gel.gel import deform
+from harness.sim.gel.gel import GelSkirt, deform
 from harness.sim.optics.shading import design, scaled_position, softly_limited
-from harness.sim.optics.tactile_calibration import GelSkirt, smooth_terms
+from harness.sim.optics.tactile_calibration import smooth_terms
 from tests.samples.drawn_presses import BALL, COLUMNS, CONTACT, ROWS, spread_centres
 
 TRUE = skirt_of(4.0 * CONTACT, 0.5)

@@ -10,8 +10,9 @@ from dataclasses import fields
 import numpy as np
 
 from harness.basics.arrays import AnyArray
-from harness.objectfile.vision.network.network import EXTRAS, Kind, NetworkSize, VisionWeights
+from harness.objectfile.vision.network.network import NetworkSize, VisionWeights
 from harness.objectfile.vision.network.plain import scatter_rows
+from harness.objectfile.vision_tensors import EXTRAS, Kind
 
 WEIGHTS = "networks."
 """Before the names of weights; outputs have names of their own."""

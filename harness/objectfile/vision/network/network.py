@@ -9,24 +9,16 @@ network sees its own cell as -1 .. 1, so that ten octaves of it are exact in flo
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only
 from harness.basics.errors import OutOfDomain, WrongUse
-
-Kind = Literal["osf", "osf-v"]
-"""``osf`` is told what the paper's is; ``osf-v`` also the light's visibility and the surface's normal."""
+from harness.objectfile.vision_tensors import EXTRAS, MOST_CELLS, Kind
 
 CELLS = 16
 """Along the longest side of the object's box, as in the paper."""
 
-EXTRAS = {"osf": 0, "osf-v": 4}
-"""Further inputs: visibility of the light, then the normal's x, y, z."""
-
-MOST_CELLS = 128
-"""Along a side."""
 
 BLOCK = 32
 """Samples of one network that are asked together."""

@@ -1,9 +1,8 @@
 """What the graph of an object's look takes and gives, in words, units and limits."""
 
-from harness.objectfile.entries import Domain, Input, Tensor
+from harness.objectfile.entries import Input, Tensor
 from harness.objectfile.vision.network.network import BLOCK, VisionModel
-
-Corner = tuple[float, float, float]
+from harness.objectfile.vision_tensors import box_tensors
 
 
 def vision_tensors(model: VisionModel, block: int = BLOCK) -> tuple[tuple[Input, ...], tuple[Tensor, ...]]:
@@ -16,55 +15,3 @@ def vision_tensors(model: VisionModel, block: int = BLOCK) -> tuple[tuple[Input,
     grid = model.grid
     (a, b, c), (d, e, f) = grid.low.tolist(), grid.high.tolist()
     return box_tensors(len(grid), ((a, b, c), (d, e, f)), model.weights.size.extras, block)
-
-
-def box_tensors(
-    networks: int, box: tuple[Corner, Corner], extras: int, block: int
-) -> tuple[tuple[Input, ...], tuple[Tensor, ...]]:
-    """The same, of so many networks.
-
-    Args:
-        networks: one or more.
-        box: m, least and greatest corner of their grid.
-        extras: further inputs, 0 or 4.
-        block: samples of one network that are asked together.
-    """
-    low, high = box
-    directions = Domain(low=(-1.0,) * 3 * block, high=(1.0,) * 3 * block)
-    inputs = [
-        _input("network", "int64", ("n", 1), "1", "which network, as counted in networks.first",
-               Domain(low=(0.0,), high=(networks - 1.0,))),
-        _input("points", "float64", ("n", block, 3), "m", "places in the network's cell, else moved to it",
-               Domain(low=low * block, high=high * block), "object"),
-        _input("views", "float32", ("n", block, 3), "1", "unit, from the camera", directions, "object"),
-        _input("light", "float32", ("n", 3), "1", "unit, towards the lamp",
-               Domain(low=(-1.0,) * 3, high=(1.0,) * 3), "object"),
-    ]  # fmt: skip
-    if extras:
-        told = Domain(low=(0.0, -1.0, -1.0, -1.0) * block, high=(1.0,) * 4 * block)
-        meaning = "whether the lamp is seen from the surface, and its unit normal there"
-        inputs.append(_input("extras", "float32", ("n", block, extras), "1", meaning, told, "object"))
-    density = Tensor(
-        name="density", dtype="float32", shape=("n", block, 1), unit="1/m",
-        meaning="of a ray's light, the share taken per metre where it is thin",
-    )  # fmt: skip
-    scattered = Tensor(
-        name="scattered", dtype="float32", shape=("n", block, 3), unit="1",
-        meaning="linear red, green, blue (sRGB primaries): radiance for a lamp of irradiance pi",
-    )  # fmt: skip
-    return tuple(inputs), (density, scattered)
-
-
-def _input(
-    name: str,
-    dtype: str,
-    shape: tuple[int | str, ...],
-    unit: str,
-    meaning: str,
-    domain: Domain,
-    frame: str = "",
-) -> Input:
-    return Input.model_validate({
-        "name": name, "dtype": dtype, "shape": shape, "unit": unit, "meaning": meaning,
-        "frame": frame, "domain": domain, "normaliser": "in the graph",
-    })  # fmt: skip

@@ -6,7 +6,6 @@ import pytest
 from experiments.contact_localization.touch.touch import (
     TouchMap,
     TouchNoise,
-    View,
     best_fit,
     similarities,
     touch_map,
@@ -17,7 +16,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_about
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.view import view_along
+from harness.sim.gel.view import View, view_along
 from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
 
 NOISE = TouchNoise()

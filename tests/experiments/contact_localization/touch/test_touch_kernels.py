@@ -5,11 +5,9 @@ import pytest
 from scipy.ndimage import correlate1d
 
 from experiments.contact_localization.touch import kernels as touch_kernels
-from experiments.contact_localization.touch.kernels import POOL
 from experiments.contact_localization.touch.touch import (
     TouchMap,
     TouchNoise,
-    View,
     similarities,
     touch_map,
     touch_terms,
@@ -19,7 +17,7 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.geometry import rotation_about
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.view import view_along
+from harness.sim.gel.view import POOL, View, view_along
 from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
 
 NOISE = TouchNoise()

@@ -16,9 +16,10 @@ from harness.authoring.vision.profiles import CellsSpec
 from harness.authoring.vision.seen import Exact, RayRecorder, pictures_to_learn
 from harness.basics.errors import DataRefused, WrongUse
 from harness.objectfile.vision.network.graph import vision_graph
-from harness.objectfile.vision.network.network import Kind, VisionModel
+from harness.objectfile.vision.network.network import VisionModel
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.settings import RenderSettings
+from harness.objectfile.vision_tensors import Kind
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import Pinhole
 from harness.sim.light.direct_image import LitObject

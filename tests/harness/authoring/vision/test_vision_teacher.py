@@ -18,8 +18,9 @@ from harness.authoring.vision.teacher_profiles import TeacherSpec
 from harness.authoring.vision.vision import STRICT, TEACHER, Teaching, author_vision
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, WrongUse
-from harness.objectfile.vision.network.network import Kind, NetworkSize
+from harness.objectfile.vision.network.network import NetworkSize
 from harness.objectfile.vision.network.plain import Asked, evaluate
+from harness.objectfile.vision_tensors import Kind
 from harness.sim.light.direct_image import LitObject
 from tests.samples.taught_ball import COLOUR, NOTHING, RADIUS, grid_for, lit_ball
 

@@ -20,10 +20,9 @@ from harness.objectfile.touch.compiled import CompiledCodes, compiled_codes
 from harness.objectfile.touch.graph import codes_graph
 from harness.objectfile.touch.kernels import hang
 from harness.objectfile.touch.touch import CodeMaps, open_touch
-from harness.sim.gel.gel import R15_SKIRT, deform, half_kernel, skirt_for
+from harness.sim.gel.gel import R15_SKIRT, GelSkirt, deform, half_kernel, skirt_for
 from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.presses import Presses
-from harness.sim.optics.tactile_calibration import GelSkirt
 from tests.samples import touch_bench as tb
 from tests.samples.object_bench import exchange
 

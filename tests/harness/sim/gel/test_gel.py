@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
 from harness.bench.sensor import GELSIGHT_R15
-from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, deform, half_kernel, over_range, skirt_for
-from harness.sim.optics.tactile_calibration import GelSkirt
+from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, GelSkirt, deform, half_kernel, over_range, skirt_for
 
 
 def _ball(rows: int, columns: int, radius: float, depth: float) -> FloatArray:

@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from experiments.contact_localization.touch.kernels import POOL
-from experiments.contact_localization.touch.touch import View
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, rotation_from_vector
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.view import view_along, window_depth
+from harness.sim.gel.view import POOL, View, view_along, window_depth
 from harness.sim.solid.surface_samples import sample_surface
 from tests.samples.synthetic_press import Press, box, solid, stepped_block
 

@@ -1,0 +1,1 @@
+"""One kind of experiment: begin, rehearse, perform, resume, replay, answer, score, cost, tables."""
