@@ -17,6 +17,7 @@ from rich.console import Console
 from typer.exceptions import TyperException
 
 from harness.basics.errors import TouchstoneError
+from harness.bench.experiments import EXPERIMENTS
 
 
 class Interrupted(TouchstoneError):
@@ -39,15 +40,15 @@ class Command:
 
 COMMANDS = {
     "demo": Command(
-        "experiments.commands.demo:demo",
+        "harness.commands.run.demo:demo",
         "Localize a contact on the mocked bench from end to end, and write the report.",
     ),
     "run": Command(
-        "experiments.commands.run:run",
+        "harness.commands.run.run:run",
         "Run an experiment on a bench; with --resume, go on where one stopped.",
     ),
     "replay": Command(
-        "experiments.commands.replay:replay", "Estimate again from a recording alone; no bench is opened."
+        "harness.commands.run.replay:replay", "Estimate again from a recording alone; no bench is opened."
     ),
     "explain": Command(
         "harness.commands.explain:explain", "Say which effects a scene calls for, which not, and why."
@@ -61,14 +62,6 @@ COMMANDS = {
     "depth": Command(
         "harness.commands.press.depth:depth",
         "How deep a gel is pressed, from live pictures of it, with the error of every pixel.",
-    ),
-    "tables localization": Command(
-        "experiments.commands.tables:localization",
-        "Localization error over objects, seeds and methods; stops and resumes at will.",
-    ),
-    "cost contact-localization": Command(
-        "experiments.commands.cost:contact_localization",
-        "Error against seconds of the estimate; `run --budget` and `run --error` go by it.",
     ),
     "cost vision": Command(
         "harness.commands.object.cost_vision:vision",
@@ -123,6 +116,21 @@ COMMANDS = {
     ),
 }
 
+
+def commands() -> dict[str, Command]:
+    """Every command by its words: the literal ones, and the table and the cost curve of every experiment."""
+    found = dict(COMMANDS)
+    for name, row in EXPERIMENTS.items():
+        if row.value is not None:
+            found[f"tables {name}"] = Command(
+                "harness.commands.run.tables:tables", f"A table of: {row.about}"
+            )
+            found[f"cost {name}"] = Command(
+                "harness.commands.run.cost:cost", f"Error against seconds of: {row.about}"
+            )
+    return found
+
+
 GROUPS = {
     "tables": "The tables a paper would print, measured on the mocked bench.",
     "cost": "What accuracy costs in seconds, measured on this machine.",
@@ -133,7 +141,8 @@ GROUPS = {
     "sim": "What the simulators compute, one at a time.",
 }
 
-_MOST_WORDS = max(len(name.split()) for name in COMMANDS)
+_MOST_WORDS = 3
+"""Of a command's name."""
 
 EPILOG = (
     "Start with `touchstone demo`. Exit codes: 0 answered; 1 a named failure of the bench or the data; "
@@ -166,7 +175,7 @@ def invoke(arguments: list[str]) -> int:
 def _chosen(arguments: Sequence[str]) -> str | None:
     words = [word for word in arguments if not word.startswith("-")]
     candidates = (" ".join(words[:count]) for count in range(_MOST_WORDS, 0, -1))
-    return next((name for name in candidates if name in COMMANDS), None)
+    return next((name for name in candidates if name in commands()), None)
 
 
 def _app(chosen: str | None) -> typer.Typer:
@@ -180,7 +189,7 @@ def _app(chosen: str | None) -> typer.Typer:
         pretty_exceptions_enable=False,
     )
     groups = {name: typer.Typer(help=text, no_args_is_help=True) for name, text in GROUPS.items()}
-    for name, command in COMMANDS.items():
+    for name, command in commands().items():
         group, _, last = name.rpartition(" ")
         parent = groups[group] if group else app
         body = _interruptible(load(command.target)) if name == chosen else _stub

@@ -2,18 +2,23 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numba.core.event import install_recorder
 
+from experiments.contact_localization.accuracy.dials import levels_of
+from experiments.contact_localization.accuracy.solving import Readings, located, prepare, timed_height_map
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.posterior.estimate import Estimate, each_estimate, estimate
+from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.levels import Levels, Senses
+from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, RecordingDamaged, WrongUse
 from harness.basics.geometry import rotation_from_quaternion, transform
+from harness.basics.symmetry import SymmetryGroup, find_symmetries
 from harness.bench.acquisition import AcquisitionCalibration, of_one_stream, strike_from_readings
 from harness.bench.acquisition_channels import FORCE
 from harness.bench.reading import Reading
@@ -27,105 +32,151 @@ AROUND_IMAGES = 0.1
 """s before the first frame from which the arm, at rest, is averaged too."""
 
 
+_SENSES: tuple[Senses, ...] = ("touch", "audio", "both")
+
+
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What the recording says.
+    """What the recording says of its last contact.
 
     Attributes:
         observations: the contacts as recorded.
+        heights: ``(rows, columns)`` metres of indentation of each contact, from its images.
         model: the object and the sensor.
         prior: what was believed of the object's orientation.
-        estimates: after each contact; the last is the answer.
-        seconds: of the last answer, from images to region; the surface's samples are made once before, and
-            kernels are loaded.
-        sense: what ``estimates`` are by.
-        others: the last answer by each other sense, or why that sense refused the object.
+        last: the answer.
+        seconds: of the answer, from images to region; the surface's samples are made once before, and kernels
+            are loaded.
+        sense: what ``last`` is by.
+        others: the answer by each other sense, or why that sense refused the object.
     """
 
     observations: tuple[Observation, ...]
+    heights: tuple[FloatArray, ...]
     model: Model
     prior: Prior
-    estimates: tuple[Estimate, ...]
+    last: Estimate
     seconds: float
     sense: Senses = "touch"
     others: Mapping[Senses, Estimate | FitRefused] = field(default_factory=dict)
 
     @property
-    def last(self) -> Estimate:
-        """The answer."""
-        return self.estimates[-1]
-
-    @property
     def by_sense(self) -> dict[Senses, Estimate | FitRefused]:
-        """The last answer by every sense that was recorded: touch, audio, both."""
+        """The answer by every sense that was recorded: touch, audio, both."""
         found: dict[Senses, Estimate | FitRefused] = {**self.others, self.sense: self.last}
         return {sense: found[sense] for sense in _SENSES if sense in found}
 
 
-_SENSES: tuple[Senses, ...] = ("touch", "audio", "both")
-
-
-def answer(
-    run: RunFiles, levels: Levels, every_contact: bool = True, accuracy: Accuracy | None = None
-) -> Answer:
-    """Estimate from a recording.
+class ContactAnswering:
+    """Readings to answer: each contact's images are read once, for the answer and all that follows it.
 
     Args:
         run: the folder.
-        levels: of the estimator's dials.
-        every_contact: whether the estimates after each contact are wanted too.
-        accuracy: of the modes that a sound is compared with; None for the default levels.
-
-    Raises:
-        WrongUse: the run holds no contact yet.
-        FitRefused: no place on this object explains the readings.
+        accuracy: of the estimate, and of the modes that a sound is compared with.
     """
-    observations = observe(run)
-    if not observations:
-        raise WrongUse(f"{run.recording.folder} holds no contact yet; go on with `touchstone run --resume`")
-    model, prior, seed = model_of_run(run, accuracy), prior_of(run), run.recording.header.seed
-    first = 1 if every_contact else len(observations)
-    senses: tuple[Senses, ...] = _SENSES if any(o.strike is not None for o in observations) else ("touch",)
-    sense = levels.senses if levels.senses in senses else "touch"
-    if levels.senses == "audio" and sense == "touch":
-        raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
 
-    def by(one: Senses) -> Estimate | FitRefused:
-        return _tried(observations, model, prior, replace(levels, senses=one), seed)
+    def __init__(self, run: RunFiles, accuracy: Accuracy) -> None:
+        self.model, self.prior = model_of_run(run, accuracy), prior_of(run)
+        self._levels, self._run = levels_of(accuracy), run
+        self._seen: list[Observation] = []
+        self._heights: list[FloatArray] = []
+        self._taken = (0.0, 0.0)
+        prepare(self.model, accuracy)
+        _ = self.symmetry
 
-    with install_recorder("numba:compiler_lock") as loads:
-        estimates = each_estimate(
-            observations, model, prior, replace(levels, senses=sense), seed=seed, first=first
-        )
-        others = {other: by(other) for other in senses if other != sense}
-    if loads.buffer:  # a kernel was compiled or loaded meanwhile: no answer costs that
-        estimates = (*estimates[:-1], _in_the_time_of(by(sense), estimates[-1]))
-        others = {
-            other: found if isinstance(found, FitRefused) else _in_the_time_of(by(other), found)
-            for other, found in others.items()
-        }
-    seconds = sum(estimates[-1].seconds.values())
-    return Answer(observations, model, prior, estimates, seconds, sense, others)
+    @cached_property
+    def symmetry(self) -> SymmetryGroup:
+        """Of the object."""
+        return find_symmetries(self.model.mesh)
+
+    @property
+    def readings(self) -> Readings:
+        """The contacts read so far, in time with each other.
+
+        Raises:
+            WrongUse: no contact was read.
+        """
+        if not self._seen:
+            raise WrongUse("no contact was read; a run needs at least one")
+        seed = self._run.recording.header.seed
+        heights = tuple(self._heights)
+        return Readings(in_time(self._seen), heights, self.model, self.prior, seed, self._taken)
+
+    def read(self, record: StepRecord) -> None:
+        """Take in a contact; its images are turned into heights here, and nowhere else."""
+        station = self._run.station
+        aspect = aspect_stated(self._run.calibration.header.made_from)
+        seen = observe_step(record, station.flange_from_gel, self._run.acquisition, aspect)
+        with install_recorder("numba:compiler_lock") as loads:
+            heights, cpu, wall = timed_height_map(seen, self.model)
+        if loads.buffer:  # a kernel was compiled or loaded meanwhile: no reading costs that
+            heights, cpu, wall = timed_height_map(seen, self.model)
+        self._seen.append(seen)
+        self._heights.append(heights)
+        self._taken = (self._taken[0] + cpu, self._taken[1] + wall)
+
+    def answer(self) -> Answer:
+        """By the sense that the accuracy names, and by each other one that was recorded.
+
+        Raises:
+            WrongUse: no contact was read; or none was struck, and an answer by sound alone was asked for.
+            FitRefused: no place on this object explains the readings.
+        """
+        readings = self.readings
+        senses = _SENSES if readings.heard else ("touch",)
+        sense = self._levels.senses if self._levels.senses in senses else "touch"
+        if self._levels.senses == "audio" and sense == "touch":
+            raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
+        with install_recorder("numba:compiler_lock") as loads:
+            last = self._by(sense, readings)
+            others = {other: self._tried(other, readings) for other in senses if other != sense}
+        if loads.buffer:
+            last = replace(last, seconds=self._by(sense, readings).seconds)
+            others = {other: _timed_anew(self._tried(other, readings), one) for other, one in others.items()}
+        seconds = sum(last.seconds.values())
+        seen, heights = readings.observations, readings.heights
+        return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others)
+
+    def history(self, last: Estimate, sense: Senses) -> tuple[Estimate, ...]:
+        """The estimates by a sense after each contact, the last of which is known."""
+        readings = self.readings
+        count = len(readings.observations)
+        if count == 1:
+            return (last,)
+        return (*self._located(replace(self._levels, senses=sense), readings.first(count - 1), 1), last)
+
+    def _by(self, sense: Senses, readings: Readings) -> Estimate:
+        return self._located(replace(self._levels, senses=sense), readings, None)[-1]
+
+    def _tried(self, sense: Senses, readings: Readings) -> Estimate | FitRefused:
+        try:
+            return self._by(sense, readings)
+        except FitRefused as refusal:
+            return refusal
+
+    def _located(self, levels: Levels, readings: Readings, first: int | None) -> tuple[Estimate, ...]:
+        return located(readings, levels, first)
 
 
-def _tried(
-    observations: tuple[Observation, ...], model: Model, prior: Prior, levels: Levels, seed: int
-) -> Estimate | FitRefused:
-    try:
-        return estimate(observations, model, prior, levels, seed=seed)
-    except FitRefused as refusal:
-        return refusal
-
-
-def _in_the_time_of(again: Estimate | FitRefused, found: Estimate) -> Estimate:
+def _timed_anew(again: Estimate | FitRefused, found: Estimate | FitRefused) -> Estimate | FitRefused:
     """An answer with the seconds that the same one took when it was asked for again."""
-    return found if isinstance(again, FitRefused) else replace(found, seconds=again.seconds)
+    if isinstance(found, FitRefused) or isinstance(again, FitRefused):
+        return found
+    return replace(found, seconds=again.seconds)
+
+
+def answer(run: RunFiles, accuracy: Accuracy) -> Answer:
+    """What a whole recording says; as ``ContactAnswering.answer``."""
+    answering = ContactAnswering(run, accuracy)
+    for record in run.recording.steps():
+        answering.read(record)
+    return answering.answer()
 
 
 def prior_of(run: RunFiles) -> Prior:
     """The orientation the scene states, or only that it stands upright; never the position."""
     rotation = run.scene.base_from_object(run.mesh)[:3, :3]
-    return Prior(rotation, run.scene.localization.yaw)
+    return Prior(rotation, run.scene.section(Localization).yaw)
 
 
 def observe(run: RunFiles) -> tuple[Observation, ...]:

@@ -56,7 +56,7 @@ def provenance_of(
         settings: with which it was trained.
         sources: of the mesh, and of whatever else went into the part.
     """
-    builder = f"harness.authoring.object_{part}"
+    builder = f"harness.authoring.{part}.object_{part}"
     return Provenance(
         code={builder: content_hash(builder)},
         seeds={part: wanted.seed},

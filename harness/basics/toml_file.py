@@ -28,17 +28,23 @@ def load_toml(path: Path, model: type[M]) -> M:
         WrongUse: the file cannot be read, or says something the model does not know; each
             mistake is named with its key, its value and what was expected.
     """
+    return validate(read_toml(path), model, str(path))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """A TOML file as plain values.
+
+    Raises:
+        WrongUse: the file cannot be read, or is not TOML.
+    """
     try:
-        text = path.read_text(encoding="utf-8")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
         raise WrongUse(f"{path} is not UTF-8 text ({error.reason} at byte {error.start})") from error
     except OSError as error:
         raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
-    try:
-        tree = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise WrongUse(f"{path} is not TOML: {str(error)[:1].lower()}{str(error)[1:]}") from error
-    return validate(tree, model, str(path))
 
 
 def validate(tree: Any, model: type[M], where: str) -> M:

@@ -1,11 +1,11 @@
 """What is on the table: ``scene.toml``, or the options of the command line, as one model."""
 
-import math
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, create_model, field_validator, model_validator
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import WrongUse
@@ -16,12 +16,12 @@ from harness.basics.quantities import (
     Angle,
     Length,
     Nonnegative,
-    Ordered,
     Positive,
     Ratio,
     Time,
 )
-from harness.basics.toml_file import StrictModel, load_toml, nearest, validate
+from harness.basics.toml_file import StrictModel, nearest, read_toml, validate
+from harness.bench.experiments import loaded, section_models
 from harness.objects.builtin import DESCRIPTION
 
 BUILTIN = "builtin:"
@@ -174,26 +174,19 @@ class Light(StrictModel):
     colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
-class Localization(StrictModel):
-    """The contacts of a localization run.
+class Section(StrictModel):
+    """An experiment's own table in a scene file.
 
     Attributes:
-        contacts: how many.
-        spacing: ``"close"``, each within ``step`` of the last; ``"spread"``, over the object.
-        step: m, the greatest distance between successive close contacts.
-        depth: m, from and to: how far to press on after the first touch, uniform.
-        tilt: rad, the greatest angle of the tool from the surface's normal.
-        yaw: whether the estimator is told the object's yaw.
-        seed: of where, how deep and how tilted the contacts are; a run may say another.
+        table: its name there.
+        seed: of everything that the experiment draws; a run may say another.
     """
 
-    contacts: int = Field(default=6, ge=1, le=100)
-    spacing: Literal["close", "spread"] = "close"
-    step: Annotated[Length, Positive] = 0.025
-    depth: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] = (0.5e-3, 2e-3)
-    tilt: Annotated[Angle, Nonnegative] = math.radians(15.0)
-    yaw: Literal["known", "unknown"] = "known"
+    table: ClassVar[str]
     seed: int = Field(default=0, ge=0)
+
+
+S = TypeVar("S", bound=Section)
 
 
 class SceneFile(StrictModel):
@@ -209,7 +202,8 @@ class SceneFile(StrictModel):
         room: None in the open.
         lights: for the scene camera; none means that no light is simulated.
         observe: the quantities that a comparison asks the simulation for.
-        localization: the contacts to make.
+
+    A file may hold the tables of experiments too, each checked by its own model; ``section`` gives one.
     """
 
     schema_number: Literal[1] = Field(alias="schema")
@@ -221,7 +215,17 @@ class SceneFile(StrictModel):
     room: Room | None = None
     lights: tuple[Light, ...] = ()
     observe: tuple[str, ...] = ("touch.image",)
-    localization: Localization = Localization()
+
+    def section(self, model: type[S]) -> S:
+        """An experiment's table; its defaults where the file has none."""
+        found = vars(self).get(model.table)
+        return found if isinstance(found, model) else model()
+
+    def with_section(self, section: Section) -> "SceneFile":
+        """The scene with another table of an experiment."""
+        tree = self.model_dump(mode="json", by_alias=True)
+        tree[section.table] = section.model_dump(mode="json", by_alias=True)
+        return scene_from_json(tree, "the scene")
 
     def base_from_object(self, mesh: Mesh) -> FloatArray:
         """``(4, 4)``, nominal, of the object whose mesh in metres is given."""
@@ -242,7 +246,7 @@ def load_scene(path: Path) -> SceneFile:
     Raises:
         WrongUse: naming each mistake; or the mesh file or the ObjectFile does not exist.
     """
-    return _with_files_found(load_toml(path, SceneFile), path.parent, str(path))
+    return _with_files_found(scene_from_json(read_toml(path), str(path)), path.parent, str(path))
 
 
 def scene_from_options(
@@ -276,7 +280,26 @@ def scene_from_options(
 
 def scene_from_json(tree: Any, where: str) -> SceneFile:
     """The scene that ``model_dump(mode="json")`` wrote, for example into a recording."""
-    return validate(tree, SceneFile, where)
+    return validate(tree, _model_of(tree), where)
+
+
+def _model_of(tree: Any) -> type[SceneFile]:
+    """``SceneFile`` with the tables of experiments that a scene has, so that each is checked by its model."""
+    known = section_models()
+    keys = set(tree) if isinstance(tree, dict) else set()
+    strange = keys - set(known) - {field.alias or name for name, field in SceneFile.model_fields.items()}
+    # A key that nothing knows is answered with all that there is.
+    named = tuple(name for name in known if strange or name in keys)
+    return _with_tables(tuple((name, known[name]) for name in named))
+
+
+@cache
+def _with_tables(named: tuple[tuple[str, str], ...]) -> type[SceneFile]:
+    if not named:
+        return SceneFile
+    models = {name: loaded(reference) for name, reference in named}
+    fields: dict[str, Any] = {name: (model, model()) for name, model in models.items()}
+    return create_model("SceneFile", __base__=SceneFile, **fields)
 
 
 def _with_files_found(scene: SceneFile, folder: Path, where: str) -> SceneFile:

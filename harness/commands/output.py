@@ -51,26 +51,27 @@ def resumable(how: str) -> Iterator[None]:
 class StepProgress:
     """A bar over the steps of a run."""
 
-    def __init__(self, bar: Progress, done: int, total: int) -> None:
+    def __init__(self, bar: Progress, done: int, total: int, noun: str) -> None:
         self._bar = bar
-        self._task = bar.add_task("contacts", completed=done, total=total)
+        self._noun = noun
+        self._task = bar.add_task(f"{noun}s", completed=done, total=total)
 
     def began(self, step: Step) -> None:
         """Say which step is performed."""
-        self._bar.update(self._task, description=f"contact {step.index + 1}: {step.kind}")
+        self._bar.update(self._task, description=f"{self._noun} {step.index + 1}: {step.kind}")
 
     def ended(self, step: Step, seconds: float) -> None:
         """Count it, and say how long it took."""
-        self._bar.console.print(f"  contact {step.index + 1} recorded in {seconds:.1f} s")
+        self._bar.console.print(f"  {self._noun} {step.index + 1} recorded in {seconds:.1f} s")
         self._bar.advance(self._task)
 
 
 @contextmanager
-def step_progress(done: int, total: int) -> Iterator[StepProgress]:
+def step_progress(done: int, total: int, noun: str = "step") -> Iterator[StepProgress]:
     """A progress bar for the length of a session."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=CONSOLE, transient=True) as bar:
-        yield StepProgress(bar, done, total)
+        yield StepProgress(bar, done, total, noun)
 
 
 @contextmanager

@@ -1,10 +1,13 @@
 """From options to the scene they mean."""
 
+import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from harness.basics.errors import WrongUse
-from harness.bench.scene import SceneFile, load_scene, scene_from_json, scene_from_options
+from harness.basics.toml_file import nearest
+from harness.bench.scene import SceneFile, Section, load_scene, scene_from_json, scene_from_options
 
 
 def resolve(
@@ -13,11 +16,11 @@ def resolve(
     material: str | None = None,
     units: str | None = None,
     wall: str | None = None,
-    contacts: int | None = None,
-    spacing: str | None = None,
-    yaw: str | None = None,
     sense: str | None = None,
     objectfile: str | None = None,
+    section: type[Section] | None = None,
+    keys: Mapping[str, Any] | None = None,
+    assignments: Sequence[str] = (),
 ) -> SceneFile:
     """The scene of a file or of ``--object``, with what the command line changes of it.
 
@@ -35,9 +38,33 @@ def resolve(
     else:
         assert object_ is not None
         found = scene_from_options(object_, material, units, wall, objectfile)
-    changes = {"contacts": contacts, "spacing": spacing, "yaw": yaw}
-    asked = {key: str_or_int(value) for key, value in changes.items() if value is not None}
-    return _changed(found, asked, None if sense is None else {"touch": True, "sound": sense == "both"})
+    sensors = None if sense is None else {"touch": True, "sound": sense == "both"}
+    return _changed(found, section, _asked(section, keys or {}, assignments), sensors)
+
+
+def _asked(
+    section: type[Section] | None, keys: Mapping[str, Any], assignments: Sequence[str]
+) -> dict[str, Any]:
+    """Keys of an experiment's table and what they are to be, as JSON has it."""
+    asked = {key: str_or_int(value) for key, value in keys.items() if value is not None}
+    for text in assignments:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise WrongUse(f"--set {text}: write KEY=VALUE, as contacts=4")
+        asked[key.strip()] = _plain(value.strip())
+    known = set() if section is None else set(section.model_fields)
+    for key in asked:
+        if key not in known:
+            raise WrongUse(f"--{key}: the experiment's table has no {key!r}; {nearest(key, known)}")
+    return asked
+
+
+def _plain(text: str) -> Any:
+    """A value as TOML has it; words without quotes are text."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
 
 
 def str_or_int(value: Any) -> Any:
@@ -45,10 +72,16 @@ def str_or_int(value: Any) -> Any:
     return value if isinstance(value, int) else str(value)
 
 
-def _changed(scene: SceneFile, localization: dict[str, Any], sensors: dict[str, Any] | None) -> SceneFile:
-    if not localization and sensors is None:
+def _changed(
+    scene: SceneFile,
+    section: type[Section] | None,
+    asked: dict[str, Any],
+    sensors: dict[str, Any] | None,
+) -> SceneFile:
+    if not asked and sensors is None:
         return scene
     tree = scene.model_dump(mode="json", by_alias=True)
-    tree["localization"].update(localization)
+    if section is not None:
+        tree.setdefault(section.table, {}).update(asked)
     tree["sensors"].update(sensors or {})
     return scene_from_json(tree, "the options")

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
+from harness.report.observed import Observed
 from harness.report.sound_data import Sound
 from harness.report.values import Missing, Posterior
 
@@ -210,6 +211,7 @@ class ReportData:
         symmetry: the object's, in words.
         accuracy: the chosen levels by knob.
         warnings: what the operator should know.
+        observed: what the scene observes, simulated at the answer.
     """
 
     title: str
@@ -236,3 +238,4 @@ class ReportData:
     symmetry: str = "not looked for"
     accuracy: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    observed: tuple[Observed, ...] = ()

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -66,21 +66,36 @@ class RunPlan:
         return motions
 
 
-def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> RunPlan:
+@dataclass(frozen=True)
+class Wanted:
+    """The contacts that an experiment asks for.
+
+    Attributes:
+        contacts: how many.
+        spacing: ``"close"``, each within ``presses.step`` of the last; ``"spread"``, over the object.
+        presses: how far apart, how tilted, how deep.
+    """
+
+    contacts: int
+    spacing: Literal["close", "spread"]
+    presses: Presses
+
+
+def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int, wanted: Wanted) -> RunPlan:
     """Choose the sites, plan the ways, rehearse the whole.
 
     Args:
-        scene: says how many contacts, how far apart, how deep.
+        scene: says where the object stands, and whether places are struck too.
         station: whose arm it is for.
         mesh: of the object, in metres.
         seed: of the choice of sites.
+        wanted: how many contacts, how far apart, how deep.
 
     Raises:
         WrongUse: too few places that the arm can reach on a free way.
         MotionRefused: the rehearsal found a motion that must not be made.
     """
     bench = twin_of(scene, station, mesh)
-    wanted = scene.localization
     itinerary = Itinerary(bench, seed, planner(scene, station, bench))
     sites = plan_sites(
         RasterMesh(mesh),
@@ -90,7 +105,7 @@ def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> RunPl
         wanted.spacing,
         seed,
         reachable=partial(reachable, bench),
-        presses=Presses(wanted.step, wanted.tilt, wanted.depth),
+        presses=wanted.presses,
         visit=itinerary.visit,
     )
     contacts, strikes = tuple(itinerary.contacts), tuple(itinerary.strikes)

@@ -1,4 +1,4 @@
-"""The steps of a localization run: travel, touch, press, read, retreat; strike where sound is asked for.
+"""Contacts: travel, touch, press, read, retreat; strike where sound is asked for.
 
 Everything a step needs is in its parameters, planned and rehearsed before the first one moves.
 """
@@ -109,7 +109,7 @@ class Speeds:
     overtravel: float = 0.008
 
 
-class ContactLocalization:
+class PressPerformer:
     """Presses the gel where the plan says, and hands on what was read there.
 
     Args:
@@ -117,16 +117,20 @@ class ContactLocalization:
             session, and when a run is resumed.
         speeds: of the motions.
         ask: shows a person what to do, where the station has one strike; None where nobody is there.
+        plan_key: where ``run.json`` keeps the planned contacts.
     """
 
-    def __init__(self, way: Way, speeds: Speeds | None = None, ask: Ask | None = None) -> None:
+    def __init__(
+        self, way: Way, speeds: Speeds | None = None, ask: Ask | None = None, plan_key: str = "contacts"
+    ) -> None:
+        self.plan_key = plan_key
         self.way = way
         self.speeds = speeds or Speeds()
         self.ask = ask
 
     def steps(self, recording: Recording) -> Iterator[Step]:
         """The planned contacts that are not yet on the disk."""
-        for index, parameters in enumerate(recording.header.plan["contacts"]):
+        for index, parameters in enumerate(recording.header.plan[self.plan_key]):
             if index >= recording.committed:
                 yield Step(index, "press", parameters)
 

@@ -26,7 +26,7 @@ from harness.effects.scene_object import known_object
 from harness.recording.run_folder import station_acquisition, station_calibration
 from harness.recording.step_file import Step, StepRecord
 from harness.skills.planning import RunPlan, plan_run
-from harness.skills.press import ContactLocalization
+from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
 
@@ -78,7 +78,7 @@ def performed(
 ) -> tuple[Observation, ...]:
     """The first contacts of a plan, on the bench in process."""
     mesh, acquisition = known_object(scene).mesh, station_acquisition(scene, station)
-    experiment = ContactLocalization(lambda here, planned: way_between(plan.bench, here, planned))
+    experiment = PressPerformer(lambda here, planned: way_between(plan.bench, here, planned))
     bench = in_process_bench(scene, station, RunContext(truth, mesh, SEED, gap))
     observations = []
     for index, parameters in enumerate(plan.parameters()[:steps]):

@@ -16,7 +16,7 @@ ADDRESS = "127.9.8.7"
 OWNER = """
 import sys, time
 from pathlib import Path
-from drivers import arm_lock
+from drivers.ur import lock as arm_lock
 from harness.basics.owned_folder import OwnedFolder
 parent = Path(sys.argv[1])
 folder = OwnedFolder("touchstone-lab-", parent)

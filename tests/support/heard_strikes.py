@@ -11,7 +11,7 @@ from harness.bench.station import Bench
 from harness.bench.station_file import Station
 from harness.recording.step_file import Step
 from harness.skills.planning import RunPlan
-from harness.skills.press import ContactLocalization
+from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 
 Readings = dict[str, Reading]
@@ -19,7 +19,7 @@ Readings = dict[str, Reading]
 
 def performed(bench: Bench, plan: RunPlan) -> list[Readings]:
     """Every contact of a plan, its readings by channel."""
-    experiment = ContactLocalization(lambda here, there: way_between(plan.bench, here, there))
+    experiment = PressPerformer(lambda here, there: way_between(plan.bench, here, there))
     steps = [Step(index, "press", parameters) for index, parameters in enumerate(plan.parameters())]
     return [{reading.channel.name: reading for reading in experiment.perform(s, bench)} for s in steps]
 

@@ -25,7 +25,7 @@ from harness.bench.station_file import Station
 from harness.effects.scene_object import known_object
 from harness.recording.step_file import Step
 from harness.skills.planning import RunPlan, plan_run
-from harness.skills.press import ContactLocalization, Speeds
+from harness.skills.press import PressPerformer, Speeds
 from harness.twin.bench_of import way_between
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.bench import in_process_bench
@@ -45,7 +45,7 @@ class Run:
 
 
 def performed(bench: Bench, plan: RunPlan, truth: Path) -> Run:
-    experiment = ContactLocalization(
+    experiment = PressPerformer(
         lambda here, planned: way_between(plan.bench, here, planned), Speeds(travel=0.4)
     )
     step = Step(STEP, "press", plan.parameters()[0])

@@ -21,7 +21,7 @@ from harness.bench.station_file import Station, load_station
 from harness.effects.scene_object import known_object
 from harness.recording.step_file import Step
 from harness.skills.planning import RunPlan, plan_run
-from harness.skills.press import ContactLocalization, Speeds
+from harness.skills.press import PressPerformer, Speeds
 from harness.skills.strike import AFTER, BEFORE, POSE
 from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
@@ -56,7 +56,7 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh) -> RunPlan:
 
 
 def performed(bench: Bench, plan: RunPlan) -> Readings:
-    experiment = ContactLocalization(
+    experiment = PressPerformer(
         lambda here, planned: way_between(plan.bench, here, planned), Speeds(travel=0.4)
     )
     read = experiment.perform(Step(STEP, "press", plan.parameters()[0]), bench)

@@ -1,11 +1,10 @@
 """Runs on the mocked bench, performed in process and kept in memory, to be answered at any setting."""
 
 import gc
-from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from contextlib import contextmanager, nullcontext
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -38,9 +37,8 @@ from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
 from harness.effects.scene_object import known_object
+from harness.experiment.experiment import Say
 from harness.recording.run_folder import station_calibration
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +51,11 @@ class Case:
     mesh: Mesh
     _read: dict[bool, Readings] = field(init=False, default_factory=dict, repr=False)
     _left: dict[int, float] = field(init=False, default_factory=dict, repr=False)
+
+    @property
+    def steps(self) -> int:
+        """How many contacts were made."""
+        return len(self.run.observations)
 
     def readings(self, setting: Setting) -> Readings:
         """As a setting takes them; timed on their second reading, when kernels are loaded."""
@@ -156,12 +159,6 @@ def _case(
     performed = PerformedRun(observations, own.at({}), base_from_object, true_points, cell.seed)
     asked = Run(observations, own, believed(performed, cell.yaw), cell.seed, name)
     return Case(cell, asked, true_points, mesh)
-
-
-def workers_of(number: int) -> Any:
-    """A pool of processes, as a context; None in it where this process does all."""
-    spawn = get_context("spawn")
-    return ProcessPoolExecutor(number, mp_context=spawn) if number > 1 else nullcontext(None)
 
 
 def performed(

@@ -3,12 +3,11 @@
 from collections.abc import Iterator, Mapping
 
 from experiments.contact_localization.posterior.levels import Levels, Senses
-from harness.basics.errors import WrongUse
 from harness.effects.accuracy import Accuracy, Knob, Level
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 from harness.effects.sound_effects import EDGE, MODES, SHAPES
-from harness.effects.touch_file_effects import SHAPES as DRAWN
+from harness.experiment.levels import chosen_levels
 
 METHOD = Knob(
     "localization.method", ("particle", "grid"), "", "method", "grid", "the paper's filter, or ours"
@@ -85,14 +84,7 @@ def chosen(texts: list[str], start: Mapping[str, Level] | None = None) -> Accura
     Raises:
         WrongUse: an unknown dial or level, and the nearest is named; a touch that no run carries.
     """
-    accuracy = Accuracy.default(KNOBS).with_(start or {}).with_texts(texts)
-    if accuracy[DRAWN.name] != DRAWN.default:
-        raise WrongUse(
-            f"{DRAWN.name} = {accuracy[DRAWN.name]}: a run is compared with the mesh that it carries, and it "
-            f"carries no ObjectFile's touch; take {DRAWN.name} = {DRAWN.default}, or draw a press with "
-            "`touchstone object render touch`"
-        )
-    return accuracy
+    return chosen_levels(KNOBS, texts, start)
 
 
 def levels_of(accuracy: Accuracy) -> Levels:

@@ -11,6 +11,7 @@ from experiments.contact_localization.accuracy.dials import (
     saves_no_answer_time,
 )
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
+from experiments.contact_localization.section import Localization
 from harness.basics.errors import WrongUse
 from harness.bench.scene import SceneFile
 from harness.cost.choice import for_budget, for_error, nearest_condition
@@ -18,25 +19,9 @@ from harness.cost.curve import Curve, Point
 from harness.cost.file import curve_path, load
 from harness.cost.provenance import code, machine, stale
 from harness.effects.accuracy import Level
+from harness.experiment.experiment import Target
 
 SHIPPED = "data/cost.json"
-
-
-@dataclass(frozen=True)
-class Target:
-    """What is asked of an answer: one of the two.
-
-    Attributes:
-        seconds: s on the clock for the estimate.
-        error: m.
-    """
-
-    seconds: float | None = None
-    error: float | None = None
-
-    def __post_init__(self) -> None:
-        if (self.seconds is None) == (self.error is None):
-            raise WrongUse("give either a budget of seconds or an error to be met")
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +92,11 @@ def front_for(scene: SceneFile, contacts: int) -> Front:
         WrongUse: nothing like this run was measured.
         DataRefused: this machine's curve is damaged.
     """
+    asked = scene.section(Localization)
     wanted: dict[str, Level] = {
-        "spacing": scene.localization.spacing,
+        "spacing": asked.spacing,
         "gap": "default",  # a real bench has one, and a mocked one without is only cheaper to please
-        "yaw": scene.localization.yaw,
+        "yaw": asked.yaw,
         "contacts": contacts,
     }
     path = curve_path(PROGRAM)

@@ -11,7 +11,6 @@ from experiments.contact_localization.accuracy.dials import (
     SENSES,
     SIMULATED,
     levels_of,
-    needs_images,
     needs_sound,
 )
 from experiments.contact_localization.model import Model, Prior
@@ -131,6 +130,13 @@ def read(
     return Readings(tuple(observations), heights, model, prior, seed, taken)
 
 
+def timed_height_map(observation: Observation, model: Model) -> tuple[FloatArray, float, float]:
+    """A contact's height map, and the s of CPU time and on the clock that it took."""
+    cpu, wall = time.process_time(), time.perf_counter()
+    heights = height_map(observation, model)
+    return heights, time.process_time() - cpu, time.perf_counter() - wall
+
+
 def prepare(model: Model, setting: Setting) -> None:
     """Make what depends on the object alone, before any reading is needed: its samples and gains."""
     spacing = levels_at(setting).spacing
@@ -145,14 +151,27 @@ def solve(readings: Readings, setting: Setting) -> Solved:
     cpu, wall = time.process_time(), time.perf_counter()
     estimate, refusal = None, None
     try:
-        contacts = _contacts(readings, levels, noise, needs_images(setting))
-        strikes = [observation.strike for observation in readings.observations]
-        estimate = locate(
-            contacts, readings.model, readings.prior, levels, noise, seed=readings.seed, strikes=strikes
-        )[-1]
+        estimate = located(readings, levels, noise=noise)[-1]
     except FitRefused as error:
         refusal = str(error)
     return Solved(estimate, time.process_time() - cpu, time.perf_counter() - wall, refusal)
+
+
+def located(
+    readings: Readings, levels: Levels, first: int | None = None, noise: Noise | None = None
+) -> tuple[Estimate, ...]:
+    """The estimates after each contact from the ``first`` on; after the last alone where None.
+
+    Raises:
+        FitRefused: no place on this object explains the readings.
+    """
+    noise = noise or Noise()
+    images = levels.senses != "audio"
+    contacts = _contacts(readings, levels, noise, images)
+    strikes = [observation.strike for observation in readings.observations]
+    seconds = readings.shared[1] if images else 0.0
+    model, prior, seed = readings.model, readings.prior, readings.seed
+    return locate(contacts, model, prior, levels, noise, seed, first, seconds, strikes)
 
 
 def solve_loaded(readings: Readings, setting: Setting) -> Solved:

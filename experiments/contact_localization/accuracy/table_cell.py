@@ -17,6 +17,7 @@ from experiments.contact_localization.answer import in_time, observe_step
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.baselines import (
     geometry_and_axis,
     geometry_only,
@@ -41,8 +42,7 @@ from harness.effects.scene_object import known_object
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.run_folder import station_acquisition, station_calibration
 from harness.recording.step_file import Step, StepRecord
-from harness.skills.planning import plan_run
-from harness.skills.press import ContactLocalization
+from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
 
@@ -75,6 +75,11 @@ class Cell:
     sound: bool = False
 
     @property
+    def conditions(self) -> dict[str, str]:
+        """What was varied."""
+        return {"spacing": self.spacing, "gap": self.gap, "yaw": self.yaw}
+
+    @property
     def name(self) -> str:
         """Of the cell's file; a gap may be a path."""
         gap = self.gap.replace("/", "_")
@@ -102,7 +107,7 @@ def scene_of(cell: Cell, scene: SceneFile) -> SceneFile:
     """The scene of a run: the object turned by an angle of the run's own."""
     turned = np.random.default_rng((cell.seed, 7)).uniform(0.0, 360.0)
     tree = scene.model_dump(mode="json", by_alias=True)
-    tree["localization"].update({"spacing": cell.spacing})
+    tree.setdefault("localization", {})["spacing"] = cell.spacing
     tree["object"]["pose"]["yaw"] = f"{turned:.3f} deg"
     tree["sensors"]["sound"] = cell.sound
     return scene_from_json(tree, "the table")
@@ -122,10 +127,10 @@ def run_cell(cell: Cell, scene: SceneFile, station: Station) -> dict[str, Any]:
 
 def perform_cell(cell: Cell, scene: SceneFile, station: Station, mesh: Mesh) -> PerformedRun:
     """Plan and perform one run on the bench in process, without answering it."""
-    plan, acquisition = plan_run(scene, station, mesh, cell.seed), station_acquisition(scene, station)
+    plan, acquisition = plan_contacts(scene, station, mesh, cell.seed), station_acquisition(scene, station)
     calibration = station_calibration(station)
     aspect = aspect_stated(calibration.header.made_from)
-    experiment = ContactLocalization(lambda here, planned: way_between(plan.bench, here, planned))
+    experiment = PressPerformer(lambda here, planned: way_between(plan.bench, here, planned))
     with TemporaryDirectory(prefix="touchstone-table-") as folder:
         context = RunContext(Path(folder) / "truth.json", mesh, cell.seed, cell.gap)
         bench = in_process_bench(scene, station, context)

@@ -15,7 +15,7 @@ from experiments.contact_localization.accuracy.dials import (
     needs_images,
     needs_sound,
 )
-from experiments.contact_localization.accuracy.front import Front, Target
+from experiments.contact_localization.accuracy.front import Front
 from experiments.contact_localization.accuracy.solving import (
     Models,
     Readings,
@@ -36,6 +36,7 @@ from harness.cost.bounds import most_seconds
 from harness.cost.choice import for_budget, for_error
 from harness.cost.curve import Point
 from harness.cost.promise import promise
+from harness.experiment.experiment import Target
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 

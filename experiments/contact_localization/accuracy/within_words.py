@@ -6,12 +6,17 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.dials import FINEST, setting_name
-from experiments.contact_localization.accuracy.front import Front, Target
-from experiments.contact_localization.accuracy.solving import Solved
-from experiments.contact_localization.accuracy.within import Within
-from experiments.contact_localization.report.truth import read_truth
+from experiments.contact_localization.accuracy.front import Front, foresee, front_for
+from experiments.contact_localization.accuracy.solving import Solved, object_key
+from experiments.contact_localization.accuracy.within import Within, answer_within
+from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
+from harness.bench.scene import SceneFile
+from harness.effects.scene_object import known_object
+from harness.experiment.experiment import Target
+from harness.experiment.truth import read_truth
 from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
 
 
 def staleness(front: Front) -> str:
@@ -111,3 +116,32 @@ def _answer_json(solved: Solved, true: FloatArray | None) -> dict[str, Any]:
         "error_m": error,
         "refused": solved.refusal,
     }
+
+
+class ContactBudgets:
+    """Budgets of a localization, by the curve of this machine or the one that came with the program."""
+
+    def foresee(self, scene: SceneFile, target: Target) -> str:
+        """What will be tried, in a sentence; a budget that cannot be kept ends here."""
+        front = front_for(scene, scene.section(Localization).contacts)
+        return foresee(front, target, object_key(scene.object.name, known_object(scene).mesh))
+
+    def doubts(self, recording: Recording, target: Target) -> tuple[str, ...]:
+        """What the operator should know of the curve."""
+        return doubts(_front(recording), target)
+
+    def answer(self, recording: Recording, target: Target) -> dict[str, Any]:
+        """The estimate as it was asked for, timed, and what the finest levels would have said."""
+        front = _front(recording)
+        return as_json(answer_within(recording, front, target), front, target, recording)
+
+    def sentences(self, cost: Mapping[str, Any]) -> tuple[str, ...]:
+        """What was asked and what it took, for people."""
+        return sentences(cost)
+
+
+def _front(recording: Recording) -> Front:
+    return front_for(RunFiles(recording).scene, recording.committed)
+
+
+BUDGETS = ContactBudgets()

@@ -1,57 +1,61 @@
 """Fill the report of a run from its folder, its answer and, for a mocked run, its truth."""
 
 import sys
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.solving import levels_at
 from experiments.contact_localization.answer import Answer as Found
-from experiments.contact_localization.posterior.estimate import each_estimate
+from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.gate import Gate
 from experiments.contact_localization.posterior.levels import Levels
-from experiments.contact_localization.report.instruments_report import artefacts, instruments
-from experiments.contact_localization.report.result import Scored, flags_of, result_of
+from experiments.contact_localization.report.comparison import object_from_gels
+from experiments.contact_localization.report.result import flags_of, result_of, true_points, without_images
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
-from experiments.contact_localization.report.trade import Point
+from experiments.contact_localization.report.trade import Point, trade
 from experiments.contact_localization.report.twin_check import deviations
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, WrongUse
 from harness.basics.geometry import inverse
 from harness.bench.device import Health
+from harness.experiment.compare import Comparison
+from harness.experiment.experiment import Scored
 from harness.recording.run_folder import RunFiles
 from harness.report.data import (
     Answer,
     Bench,
     Contact,
     Curve,
-    EffectRun,
     ReportData,
 )
 from harness.report.figures.props import arm_parts, object_part, sensor_parts, table_and_pedestal
+from harness.report.instruments import artefacts, instruments
+from harness.report.observed import observed_rows
+from harness.report.page import write_report
+from harness.report.simulated import NO_TRUTH, effect_rows, world_rows
 from harness.report.values import Missing
 from harness.report.wording import SENSES
 
-NO_TRUTH = Missing("the truth is not known: this is not a mocked run, or its truth was taken away")
+
+def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
+    """Draw the report; the path of its page."""
+    return write_report(report_of(scored, comparison, health), folder)
 
 
-def report_of(
-    scored: Scored,
-    geometry_errors: tuple[float, ...] | None,
-    trade: tuple[Point, ...],
-    health: Mapping[str, Health] | None,
-) -> ReportData:
+def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None) -> ReportData:
     """Everything the page shows.
 
     Args:
-        scored: the run, its answer, what it was compared with.
-        geometry_errors: m after each contact, of the answer without images; None where unknown.
-        trade: errors and seconds at several levels of accuracy.
+        scored: the run and its answer.
+        comparison: what the scene observes, simulated at the answer.
         health: of the instruments at the end of the session; None for a replay.
     """
     run, found = scored.run, scored.found
     header = run.recording.header
+    history = scored.answering.history(found.last, found.sense)
+    result = result_of(scored)
     return ReportData(
         title=f"Contact localization: {run.scene.title or run.scene.object.name}",
         object_name=run.scene.object.name,
@@ -61,27 +65,27 @@ def report_of(
         made=header.created,
         command=" ".join(["touchstone", *sys.argv[1:]]),
         recording=str(run.recording.folder),
-        answer=_answer(scored),
-        contacts=tuple(_contact(scored, k) for k in range(len(found.observations))),
+        answer=_answer(scored, result),
+        contacts=_contacts(scored, comparison, history),
         bench=_bench(run, found),
-        error_by_contact=_by_contact(scored, geometry_errors),
-        error_by_seconds=_by_seconds(trade),
+        error_by_contact=_by_contact(scored, history),
+        error_by_seconds=_by_seconds(_sweep(scored)),
         instruments=instruments(run, health),
         calibrations=artefacts(run),
-        effects=_effects(scored),
-        world=_world(scored),
+        effects=effect_rows(comparison),
+        observed=observed_rows(comparison),
+        world=world_rows(scored, _ours(scored)),
         twin=deviations(run, found),
         versions={name: text for name, text in header.versions.items() if name != "git"},
         git=header.versions["git"],
         sound=sound_of(scored),
-        symmetry=scored.symmetry.name,
+        symmetry=scored.answering.symmetry.name,
         accuracy={name: str(level) for name, level in scored.accuracy.items()},
-        warnings=scored.warnings,
+        warnings=(*scored.warnings, *result["warnings"]),
     )
 
 
-def _answer(scored: Scored) -> Answer:
-    result = result_of(scored, None)
+def _answer(scored: Scored, result: Mapping[str, Any]) -> Answer:
     touch = result["estimates"][result["answer"]]
     return Answer(
         position=scored.found.last.position_in_object,
@@ -96,23 +100,39 @@ def _answer(scored: Scored) -> Answer:
     )
 
 
-def _contact(scored: Scored, index: int) -> Contact:
-    found, comparison, true = scored.found, scored.comparison, scored.true_points
-    after, gate = found.estimates[index], found.last.gates[index] if found.last.gates else None
-    return Contact(
-        number=index + 1,
-        step=str(index + 1),
-        live=comparison.live[index],
-        simulated=comparison.simulated[index],
-        live_height=comparison.live_height[index],
-        simulated_height=comparison.simulated_height[index],
-        object_from_gel=comparison.object_from_gel[index],
-        posterior=posterior_of(after),
-        truth=None if true is None else true[index],
-        error=None if true is None else float(np.linalg.norm(after.position_in_object - true[index])),
-        flags=() if gate is None else tuple(flags_of(gate)),
-        notes=(("fit", _fit(gate)),),
+def _contacts(scored: Scored, comparison: Comparison, history: tuple[Estimate, ...]) -> tuple[Contact, ...]:
+    images = _of_each(comparison, "touch.image", len(history))
+    gels = _of_each(comparison, "touch.gel", len(history))
+    poses, true = object_from_gels(scored.found), true_points(scored)
+    return tuple(
+        Contact(
+            number=k + 1,
+            step=str(k + 1),
+            live=scored.found.observations[k].images[-1],
+            simulated=images[k],
+            live_height=scored.found.heights[k],
+            simulated_height=gels[k],
+            object_from_gel=poses[k],
+            posterior=posterior_of(after),
+            truth=None if true is None else true[k],
+            error=None if true is None else float(np.linalg.norm(after.position_in_object - true[k])),
+            flags=() if gate is None else tuple(flags_of(gate)),
+            notes=(("fit", _fit(gate)),),
+        )
+        for k, (after, gate) in enumerate(zip(history, _gates(scored.found, len(history)), strict=True))
     )
+
+
+def _of_each(comparison: Comparison, name: str, count: int) -> list[Any]:
+    """A quantity of every contact, or why it was not simulated."""
+    values = comparison.evaluation.values
+    if name in values:
+        return list(values[name])
+    return [Missing(f"the scene's observe does not ask for {name}")] * count
+
+
+def _gates(found: Found, count: int) -> tuple[Gate | None, ...]:
+    return found.last.gates or (None,) * count
 
 
 def _fit(gate: Gate | None) -> str:
@@ -139,38 +159,42 @@ def _bench(run: RunFiles, found: Found) -> Bench:
     return Bench(parts, base_from_gels, in_base.mean(axis=1))
 
 
-def _by_contact(scored: Scored, geometry: tuple[float, ...] | None) -> tuple[Curve, ...] | Missing:
-    true = scored.true_points
+def _by_contact(scored: Scored, history: tuple[Estimate, ...]) -> tuple[Curve, ...] | Missing:
+    true, found = true_points(scored), scored.found
     if true is None:
         return NO_TRUTH
     counts = tuple(float(k + 1) for k in range(len(true)))
-    ours = tuple(
-        float(np.linalg.norm(estimate.position_in_object - point))
-        for estimate, point in zip(scored.found.estimates, true, strict=True)
+    ours = _errors([estimate.position_in_object for estimate in history], true)
+    alone = _errors([without_images(found, k + 1) for k in range(len(true))], true)
+    return (
+        Curve(SENSES[found.sense], counts, ours, by=found.sense),
+        *_by_other_senses(scored, true),
+        Curve("translations alone, no image", counts, alone, by="geometry"),
     )
-    sense = scored.found.sense
-    curves = [Curve(SENSES[sense], counts, ours, by=sense), *_by_other_senses(scored, true)]
-    if geometry is not None:
-        curves.append(Curve("translations alone, no image", counts, geometry, by="geometry"))
-    return tuple(curves)
 
 
 def _by_other_senses(scored: Scored, true: FloatArray) -> Iterator[Curve]:
     """The same readings after each contact by each other sense that answered in the end."""
-    found, seed = scored.found, scored.run.recording.header.seed
-    for sense, last in found.others.items():
+    counts = tuple(float(k + 1) for k in range(len(true)))
+    for sense, last in scored.found.others.items():
         if isinstance(last, FitRefused):
             continue
-        levels = replace(levels_at(scored.accuracy), senses=sense)
-        count = len(found.observations)
-        before = found.observations[: count - 1]
         try:
-            early = each_estimate(before, found.model, found.prior, levels, seed=seed) if before else ()
+            history = scored.answering.history(last, sense)
         except (FitRefused, WrongUse):  # the first contacts were not struck, or told nothing yet
             continue
-        points = [estimate.position_in_object for estimate in (*early, last)]
-        errors = tuple(float(np.linalg.norm(p - t)) for p, t in zip(points, true, strict=True))
-        yield Curve(SENSES[sense], tuple(float(k + 1) for k in range(count)), errors, by=sense)
+        points = [estimate.position_in_object for estimate in history]
+        yield Curve(SENSES[sense], counts, _errors(points, true), by=sense)
+
+
+def _errors(points: Sequence[FloatArray], true: FloatArray) -> tuple[float, ...]:
+    """m, contact by contact."""
+    return tuple(float(np.linalg.norm(point - at)) for point, at in zip(points, true, strict=True))
+
+
+def _sweep(scored: Scored) -> tuple[Point, ...]:
+    true = true_points(scored)
+    return () if true is None else trade(scored.answering.readings, true[-1])
 
 
 def _by_seconds(trade: tuple[Point, ...]) -> tuple[Curve, ...] | Missing:
@@ -205,46 +229,11 @@ def _method(levels: Levels, heard: bool) -> str:
     return f"grid, {SENSES[levels.senses]}" if heard else "grid"
 
 
-def _effects(scored: Scored) -> tuple[EffectRun, ...]:
-    plan, evaluation = scored.comparison.plan, scored.comparison.evaluation
-    ran = [
-        EffectRun(
-            step.effect.provides,
-            True,
-            step.reason,
-            evaluation.calls.get(step.effect.provides, 0),
-            evaluation.seconds.get(step.effect.provides),
-            step.effect.provides in evaluation.from_store,
-        )
-        for step in plan.ran
-    ]
-    return (*ran, *(EffectRun(step.effect.provides, False, step.reason) for step in plan.skipped))
-
-
-def _world(scored: Scored) -> dict[str, str] | Missing:
-    if scored.truth is None:
-        return NO_TRUTH
-    ours = {
+def _ours(scored: Scored) -> dict[str, str]:
+    """The estimator's side of what the world did differently."""
+    return {
         "mesh_vertices, the estimator's": str(len(scored.run.mesh.vertices)),
         "mesh_faces, the estimator's": str(len(scored.run.mesh.faces)),
         "optics_level, the comparison's": str(scored.accuracy.get("touch.optics", "")),
         "calibration_sha256, the estimator's": scored.run.calibration.sha256,
     }
-    return {name: _said(value) for name, value in (*_flat(scored.truth.differences), *ours.items())}
-
-
-def _flat(tree: Mapping[str, object], above: str = "") -> Iterator[tuple[str, object]]:
-    """Names and values of a tree, those of a branch with its name before theirs."""
-    for name, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{above}{name}.")
-        else:
-            yield f"{above}{name}", value
-
-
-def _said(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.4g}" if value else "0"  # nor -0
-    if isinstance(value, list):
-        return ", ".join(_said(item) for item in value)
-    return str(value)

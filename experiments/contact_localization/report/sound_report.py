@@ -7,13 +7,14 @@ import numpy as np
 from experiments.contact_localization.accuracy.dials import SPACING
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.report.result import Scored
+from experiments.contact_localization.report.result import true_points
 from experiments.contact_localization.report.sound_pictures import sound_pair
 from experiments.contact_localization.sound.heard import Heard, hear
 from experiments.contact_localization.sound.likelihood import ModeRow
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.bench.acquisition import Strike
+from harness.experiment.experiment import Scored
 from harness.report.sound_data import PeakLine, SenseAnswer, Sound, SpectrogramPair, StrikeLine
 from harness.report.values import Missing, Posterior
 
@@ -31,7 +32,7 @@ def sound_of(scored: Scored) -> Sound | Missing:
     heard = hear(
         [observation.strike for observation in found.observations],
         found.model,
-        scored.accuracy[SPACING.name],
+        float(scored.accuracy[SPACING.name]),
         alone=not found.last.gates,
     )
     if heard is None:
@@ -61,7 +62,8 @@ def posterior_of(estimate: Estimate) -> Posterior:
 
 
 def _senses(scored: Scored) -> tuple[SenseAnswer, ...]:
-    true = None if scored.true_points is None else scored.true_points[-1]
+    points = true_points(scored)
+    true = None if points is None else points[-1]
     return tuple(_sense(name, found, true) for name, found in scored.found.by_sense.items())
 
 

@@ -13,8 +13,13 @@ from experiments.contact_localization.accuracy.dials import (
     SENSES,
     SPACING,
 )
-from experiments.contact_localization.accuracy.solving import Setting, levels_at, prepare, read, solve_loaded
-from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.accuracy.solving import (
+    Readings,
+    Setting,
+    levels_at,
+    prepare,
+    solve_loaded,
+)
 from experiments.contact_localization.posterior.levels import Levels
 from harness.basics.arrays import FloatArray
 
@@ -72,22 +77,20 @@ class Point:
     error: float
 
 
-def trade(found: Answer, true: FloatArray, seed: int) -> tuple[Point, ...]:
+def trade(readings: Readings, true: FloatArray) -> tuple[Point, ...]:
     """Estimate the same readings again at every level; a level that refuses the fit is left out.
 
     Args:
-        found: the answer whose readings are used.
+        readings: of the run, its images read once.
         true: ``(3,)`` metres, the last contact.
-        seed: of the draws.
     """
-    readings = read(found.observations, found.model, found.prior, seed)
     points = []
     for name, setting in (LEVELS | BY_SENSE if readings.heard else LEVELS).items():
-        prepare(found.model, setting)
+        prepare(readings.model, setting)
         solved = solve_loaded(readings, setting)
         if solved.estimate is None:
             continue
-        seconds = (readings.shared[1] + solved.wall) / len(found.observations)
+        seconds = (readings.shared[1] + solved.wall) / len(readings.observations)
         error = float(np.linalg.norm(solved.estimate.position_in_object - true))
         points.append(Point(name, levels_at(setting), seconds, error))
     return tuple(points)

@@ -22,7 +22,7 @@ def test_a_part_says_the_code_that_builds_it_its_seed_and_what_it_is_of(
     part: Literal["audio", "touch", "vision"],
 ) -> None:
     made = provenance_of(WANTED, part, {"steps": 60, "width": None}, (SOURCE,))
-    builder = f"harness.authoring.object_{part}"
+    builder = f"harness.authoring.{part}.object_{part}"
     assert callable(getattr(importlib.import_module(builder), f"build_{part}"))
     assert made.code == {builder: content_hash(builder)}
     assert "harness.authoring.object_source" in closure(builder)

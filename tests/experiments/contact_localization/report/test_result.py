@@ -17,10 +17,10 @@ from experiments.contact_localization.posterior.gate import Gate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.result import Scored, estimate_of, flags_of, levels_of_result
-from experiments.contact_localization.report.truth import Truth, read_truth
 from harness.basics.errors import RecordingDamaged
 from harness.basics.geometry import translation
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
+from harness.experiment.truth import Truth, read_truth
 from harness.recording.recording import Recording
 from tests.samples.synthetic_press import PRESSES
 

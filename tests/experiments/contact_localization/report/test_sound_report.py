@@ -18,12 +18,12 @@ from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.result import Scored
 from experiments.contact_localization.report.sound_report import contact_time, sound_of, strike_line
-from experiments.contact_localization.report.truth import Truth
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import frame_facing, transform
 from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
 from harness.bench.sensor import GELSIGHT_R15
+from harness.experiment.truth import Truth
 from harness.report.sound_data import Sound
 from harness.report.values import Missing
 from harness.sim.optics.tactile_calibration import shipped_calibration

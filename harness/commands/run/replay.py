@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from experiments.commands.run import show
 from harness.commands import options
-from harness.commands.output import CONSOLE, warn
+from harness.commands.output import warn
+from harness.commands.run.run import drawing, show_report, teller
 
 
 def replay(
@@ -31,26 +31,25 @@ def replay(
 
     Try: touchstone replay runs/... --level localization.method=particle
     """
-    from experiments.contact_localization import run as session_of
-    from experiments.contact_localization.accuracy.dials import chosen
-    from experiments.contact_localization.report.result import levels_of_result
     from harness.basics.errors import RecordingDamaged
+    from harness.experiment.answer import finish, levels_of_result
+    from harness.experiment.levels import chosen_levels
+    from harness.experiment.lookup import experiment_of
     from harness.recording.recording import Recording
     from harness.recording.wav_export import export_wav
 
     recording = Recording(run)
+    kind = experiment_of(recording)
     if wav is not None:
         files = export_wav(recording, wav)
         warn(f"{len(files)} WAV files in {wav}; counts, rates and times in wav.json beside them")
     try:
-        own = levels_of_result(recording.folder)
+        own = levels_of_result(kind, recording.folder)
     except RecordingDamaged as error:
         own = {}
         warn(f"{error}; the default levels are taken")
-    accuracy = chosen(level or [], own)
+    accuracy = chosen_levels(kind.knobs, level or [], own)
     folder = out or run.with_name(f"{run.name}-replay")
-    folder.mkdir(parents=True, exist_ok=True)
-    with CONSOLE.status("estimating from the recording"):
-        result = session_of.finish(recording, accuracy, None, folder)
-    show(result, json)
+    result = finish(kind, recording, accuracy, drawing(kind), None, folder, None, teller(kind, json))
+    show_report(result, json)
     return 0

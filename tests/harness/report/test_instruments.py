@@ -6,13 +6,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from experiments.contact_localization.report.instruments_report import artefacts, instruments, samples
 from harness.bench.acquisition import shipped_acquisition
 from harness.bench.acquisition_channels import BLOCK, FLAGS, FORCE, PRESSURE, block_channel
 from harness.bench.device import Health
 from harness.bench.reading import Channel, Reading
 from harness.bench.station_file import load_station, station_path
 from harness.recording.run_folder import RunFiles
+from harness.report.instruments import artefacts, instruments, samples
 from harness.report.values import Missing
 from harness.sim.optics.tactile_calibration import shipped_calibration
 

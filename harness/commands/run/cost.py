@@ -7,11 +7,14 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from harness.basics.cores import own_cores
 from harness.commands import options
 from harness.commands.output import ANSWERS, CONSOLE, emit, warn
+from harness.commands.run.conditions import WhereOption, levels_of
 
 
-def contact_localization(
+def cost(
+    context: typer.Context,
     seeds: Annotated[int, typer.Option(help="Runs of each object.", min=1, max=1000)] = 10,
     first_seed: Annotated[int, typer.Option(help="The first of them.", min=0)] = 3000,
     only: Annotated[
@@ -21,77 +24,79 @@ def contact_localization(
     spacing: Annotated[list[str] | None, typer.Option(help="close or spread; both if left out.")] = None,
     yaw: Annotated[list[str] | None, typer.Option(help="known or unknown; known if left out.")] = None,
     sense: Annotated[
-        str,
+        str | None,
         typer.Option(help="touch: pressed only; both: struck too, and answered by touch, sound and both."),
-    ] = "both",
+    ] = None,
+    where: WhereOption = None,
     gap: Annotated[str, typer.Option(help="Reality gap of the mocked bench: default or none.")] = "default",
     contacts: Annotated[
-        list[int] | None, typer.Option(help="Contacts used; 2, 4 and 6 if left out.", min=1)
+        list[int] | None, typer.Option(help="Steps used; of a localization 2, 4 and 6 if left out.", min=1)
     ] = None,
     thorough: Annotated[
         bool, typer.Option("--thorough", help="Every dial turned from the cheapest, default and finest.")
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder of runs and page; what is stopped resumes there.")] = Path(
-        "runs/cost/contact-localization"
-    ),
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of runs and page; what is stopped resumes there. runs/cost/NAME if left out."
+        ),
+    ] = None,
     json: options.Json = False,
 ) -> int:
     """Error against seconds of the estimate; `run --budget` and `run --error` go by it.
 
     Every run is performed once on the mocked bench in process; its readings are answered at every
-    setting of the dials, and at a few from the first 2 and 4 contacts. Runs are performed side by side;
+    setting of the dials, and at a few from the first steps alone. Runs are performed side by side;
     then one process answers, one answer at a time: leave the machine alone meanwhile. The curve is kept
     for this machine and this code, beside those of other conditions; with --scene the object of a scene
     is measured, and budgets for it go by its own seconds.
 
     Try: touchstone cost contact-localization --seeds 2 --only mug --contacts 6
     """
-    from experiments.contact_localization.accuracy.cases import preparations
-    from experiments.contact_localization.accuracy.costing import Work, gathered, joined, measure
-    from experiments.contact_localization.accuracy.dials import METHOD, SENSES, settings, settings_by_count
-    from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
-    from experiments.contact_localization.accuracy.table_cell import cells
     from harness.basics.errors import DataRefused
     from harness.bench.station_file import load_station, station_path
     from harness.cost.file import curve_path, load, save
     from harness.cost.provenance import code, machine, stale
+    from harness.experiment.costing import Work, gathered, joined, measure
+    from harness.experiment.lookup import named
+    from harness.experiment.tables import measurement_of
     from harness.report.cost_page import write_cost_page
 
+    kind = named(context.info_name or "")
+    measured = measurement_of(kind)
+    out = out or Path("runs/cost") / kind.name
     scenes = _scenes(only, scene)
-    sound = _known("--sense", [sense], ("touch", "both")) == ["both"]
-    wanted = cells(
-        list(scenes),
-        range(first_seed, first_seed + seeds),
-        _known("--spacing", spacing or ["close", "spread"], ("close", "spread")),
-        _known("--gap", [gap], ("default", "none")),
-        _known("--yaw", yaw or ["known"], ("known", "unknown")),
-        sound,
-    )
+    given = {"spacing": spacing, "yaw": yaw, "sense": None if sense is None else [sense]}
+    chosen = {**levels_of(measured.conditions, given, where or []), "gap": [_gap(gap)]}
+    wanted = measured.cells(list(scenes), range(first_seed, first_seed + seeds), chosen)
     work = Work(
         tuple(wanted),
-        tuple(settings(thorough, sound, all(each.object.objectfile is not None for each in scenes.values()))),
-        tuple(sorted(set(contacts or (2, 4, 6)))),
-        tuple(settings_by_count(sound)),
+        tuple(measured.settings(thorough, chosen, scenes)),
+        tuple(sorted(set(contacts or measured.counts))),
+        None if measured.fewer is None else tuple(measured.fewer(chosen)),
     )
     station = load_station(station_path("mock"))
     points: list[Any] = []
     models: dict[str, Any] = {}
     with _bar() as bar:
         task = bar.add_task("runs", total=len(wanted))
-        for _, found in measure(work, scenes, station, out / "cells", warn, _cores(), models):
+        cells = out / "cells"
+        for _, found in measure(kind, work, scenes, station, cells, warn, own_cores(), models):
             points += found
             bar.advance(task)
     if not points:
         raise DataRefused("no run could be performed; the reasons stand above")
-    curve = gathered(points, "What a contact's place costs", preparations(models))
-    path = curve_path(PROGRAM)
+    curve = gathered(
+        kind, points, f"What {kind.title[:1].lower()}{kind.title[1:]} costs", measured.notes(models)
+    )
+    path = curve_path(kind.name)
     if path.exists():
         old = load(path)
-        if not stale(old, machine(), code(ESTIMATOR)):
-            curve = joined(old, curve)
+        if not stale(old, machine(), code(measured.estimator)):
+            curve = joined(kind, old, curve)
     save(curve, path)
     save(curve, out / "curve.json")
-    page = write_cost_page(curve, (), (SENSES.name, METHOD.name), "contacts", out)
+    page = write_cost_page(curve, (), _styled(kind), f"{kind.step}s", out)
     result = _result(curve, path, page)
     if json:
         emit(result)
@@ -102,11 +107,18 @@ def contact_localization(
     return 0
 
 
-def _cores() -> int:
-    import os
-    import sys
+def _styled(kind: Any) -> tuple[str, ...]:
+    """Dials whose levels are methods: marks of a chart differ by them."""
+    return tuple(knob.name for knob in kind.own_knobs if knob.kind == "method")
 
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+
+def _gap(name: str) -> str:
+    from harness.basics.errors import WrongUse
+    from harness.basics.toml_file import nearest
+
+    if name not in ("default", "none"):
+        raise WrongUse(f"--gap {name!r} is not known; {nearest(name, ('default', 'none'))}")
+    return name
 
 
 def _bar() -> Progress:
@@ -121,10 +133,10 @@ def _bar() -> Progress:
 
 
 def _scenes(only: list[str] | None, scene: Path | None) -> dict[str, Any]:
-    from experiments.contact_localization.accuracy.table import objects
     from harness.basics.errors import WrongUse
     from harness.basics.toml_file import nearest
     from harness.bench.scene import load_scene
+    from harness.experiment.subjects import objects
 
     if scene is not None:
         if only:
@@ -136,16 +148,6 @@ def _scenes(only: list[str] | None, scene: Path | None) -> dict[str, Any]:
         if name not in scenes:
             raise WrongUse(f"no built-in object {name!r}; {nearest(name, scenes)}")
     return {name: scenes[name] for name in only or scenes}
-
-
-def _known(option: str, given: list[str], levels: tuple[str, ...]) -> list[str]:
-    from harness.basics.errors import WrongUse
-    from harness.basics.toml_file import nearest
-
-    for level in given:
-        if level not in levels:
-            raise WrongUse(f"{option} {level!r} is not known; {nearest(level, levels)}")
-    return given
 
 
 def _result(curve: Any, path: Path, page: Path) -> dict[str, Any]:

@@ -11,9 +11,11 @@ from rich.table import Table
 
 from harness.commands import options
 from harness.commands.output import ANSWERS, CONSOLE, emit, warn
+from harness.commands.run.conditions import WhereOption, levels_of
 
 
-def localization(
+def tables(
+    context: typer.Context,
     seeds: Annotated[int, typer.Option(help="Runs of each object and condition.", min=1, max=1000)] = 10,
     first_seed: Annotated[int, typer.Option(help="The first of them; below 1000 is for development.")] = 2000,
     data: Annotated[
@@ -26,29 +28,35 @@ def localization(
         typer.Option(help="default, none, another shipped one or a file; the first two if left out."),
     ] = None,
     yaw: Annotated[list[str] | None, typer.Option(help="known or unknown; both if left out.")] = None,
+    where: WhereOption = None,
     sound: Annotated[
-        bool, typer.Option(help="Whether every place is struck too, with the rows that hear it.")
-    ] = True,
+        bool | None, typer.Option(help="Whether every place is struck too, with the rows that hear it.")
+    ] = None,
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 2,
-    out: Annotated[Path, typer.Option(help="Folder of the runs; a stopped table resumes there.")] = Path(
-        "runs/tables/localization"
-    ),
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the runs; a stopped table resumes there. runs/tables/NAME if left out."),
+    ] = None,
     json: options.Json = False,
 ) -> int:
-    """Localization error over objects, seeds and methods; stops and resumes at will.
+    """Error over objects, seeds and methods; stops and resumes at will.
 
     Every run is planned, rehearsed and performed on the mocked bench in process, then answered by every
     method. Errors are in millimetres, with 90 % bootstrap intervals; gross is the share above 20 mm.
     A refused answer counts as a random one. Region is the share of runs whose 90 % region holds the truth.
 
-    Try: touchstone tables localization --seeds 2 --only mug
+    Try: touchstone tables contact-localization --seeds 2 --only mug
     """
-    from experiments.contact_localization.accuracy.table import by_object, measure, objects, rows
-    from experiments.contact_localization.accuracy.table_cell import Cell, cells
     from harness.basics.errors import WrongUse
     from harness.basics.toml_file import nearest
     from harness.bench.gap import load_gap
+    from harness.experiment.lookup import named
+    from harness.experiment.subjects import objects
+    from harness.experiment.tables import by_object, key_of, measure, measurement_of, rows
 
+    kind = named(context.info_name or "")
+    measured = measurement_of(kind)
+    out = out or Path("runs/tables") / kind.name
     folder = data or _data_folder()
     if folder is None:
         warn("real meshes not found (--data, TOUCHSTONE_DATA or ../shared/data): built-in objects only")
@@ -58,15 +66,14 @@ def localization(
             raise WrongUse(f"no object {name!r} in this table; {nearest(name, scenes)}")
     for name in gap or []:
         load_gap(name)
-    wanted = cells(
-        only or list(scenes),
-        range(first_seed, first_seed + seeds),
-        spacing or ["close", "spread"],
-        gap or ["default", "none"],
-        yaw or ["known", "unknown"],
-        sound,
-    )
-    results: dict[Cell, Any] = {}
+    sense = None if sound is None else ["both" if sound else "touch"]
+    given = {"spacing": spacing, "yaw": yaw, "sense": sense}
+    chosen = {
+        **levels_of(measured.conditions, given, where or [], tabled=True),
+        "gap": gap or ["default", "none"],
+    }
+    wanted = measured.cells(only or list(scenes), range(first_seed, first_seed + seeds), chosen)
+    results: dict[Any, Any] = {}
     columns = (
         TextColumn("runs"),
         BarColumn(),
@@ -76,23 +83,22 @@ def localization(
     )
     with Progress(*columns, console=CONSOLE, transient=True) as bar:
         task = bar.add_task("runs", total=len(wanted))
-        for cell, result in measure(wanted, scenes, out, workers):
+        for cell, result in measure(kind, wanted, scenes, out, workers):
             results[cell] = result
             if "failed" in result:
                 warn(f"{cell.name}: {result['failed']}")
             bar.advance(task)
-    table = rows(results)
+    table = rows(kind, results)
     failed = sum("failed" in result for result in results.values())
     if json:
-        conditions = sorted({(row.spacing, row.gap, row.yaw) for row in table})
         objects_ = [
-            {"spacing": c[0], "gap": c[1], "yaw": c[2], "mean_error_m": by_object(results, c)}
-            for c in conditions
+            {**dict(key), "mean_error_m": by_object(results, key)}
+            for key in sorted({key_of(cell) for cell, result in results.items() if "rows" in result})
         ]
-        rows_ = [asdict(row) for row in table]
+        rows_ = [_plain(row) for row in table]
         emit({"schema": 1, "runs": len(results), "failed": failed, "rows": rows_, "by_object": objects_})
         return 0
-    _print(table)
+    _print(table, measured.published)
     if failed:
         warn(f"{failed} of {len(results)} runs could not be planned or performed; they are not in the table")
     return 0
@@ -106,27 +112,30 @@ def _data_folder() -> Path | None:
 
 _HEADINGS = ("method", "median", "mean", "gross", "refused", "modulo symmetry", "region", "s")
 _GAPS = {"default": "on", "none": "off"}
+"""Of gaps, in a title."""
 
 
-def _print(table: list[Any]) -> None:
-    from experiments.contact_localization.accuracy.table import PAPER_CM
+def _plain(row: Any) -> dict[str, Any]:
+    tree = asdict(row)
+    return {**tree.pop("conditions"), **tree}
 
-    conditions = sorted({(row.spacing, row.gap, row.yaw) for row in table})
-    for spacing, gap, yaw in conditions:
-        chosen = [row for row in table if (row.spacing, row.gap, row.yaw) == (spacing, gap, yaw)]
-        drawn = Table(
-            title=f"mock: {spacing} steps, gap {_GAPS.get(gap, gap)}, yaw {yaw}; "
-            f"{chosen[0].runs} runs; mm [5 to 95 %]"
-        )
+
+def _print(table: list[Any], published: Any) -> None:
+    conditions = sorted({tuple(row.conditions.items()) for row in table})
+    for condition in conditions:
+        chosen = [row for row in table if tuple(row.conditions.items()) == condition]
+        said = ", ".join(f"{name} {_GAPS.get(level, level)}" for name, level in condition)
+        drawn = Table(title=f"mock: {said}; {chosen[0].runs} runs; mm [5 to 95 %]")
         for heading in _HEADINGS:
             drawn.add_column(heading, no_wrap=True)
         for row in chosen:
             drawn.add_row(*_cells(row))
         ANSWERS.print(drawn)
-    said = "; ".join(f"{name}: {', '.join(f'{v:g}' for v in values)}" for name, values in PAPER_CM.items())
-    ANSWERS.print(
-        f"the paper (ObjectFolder 2.0, table 4, other objects, mean error in cm): {said}", markup=False
-    )
+    if published:
+        said = "; ".join(
+            f"{name}: {', '.join(f'{v:g}' for v in values)}" for name, values in published.items()
+        )
+        ANSWERS.print(f"the paper (ObjectFolder 2.0, other objects, mean error in cm): {said}", markup=False)
 
 
 def _cells(row: Any) -> list[str]:

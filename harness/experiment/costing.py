@@ -1,22 +1,16 @@
-"""Measure what the estimate's accuracy costs: runs performed once, answered at every setting."""
+"""Measure what an experiment's accuracy costs: runs performed once, answered at every setting."""
 
 import datetime as dt
 import json
 import os
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from experiments.contact_localization.accuracy.cases import Case, Say, performed, workers_of
-from experiments.contact_localization.accuracy.dials import setting_name
-from experiments.contact_localization.accuracy.solving import (
-    ESTIMATOR,
-    PROGRAM,
-    Models,
-    Setting,
-)
-from experiments.contact_localization.accuracy.table_cell import Cell
 from harness.basics.errors import TouchstoneError
 from harness.basics.whole_file import write_text_whole
 from harness.bench.scene import SceneFile
@@ -24,6 +18,8 @@ from harness.bench.station_file import Station
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import sample_from, sample_json
 from harness.cost.provenance import code, machine
+from harness.experiment.experiment import Case, Cell, Experiment, Say, Setting
+from harness.experiment.tables import measurement_of
 
 _SCHEMA = 2
 """Of a run's file; one of another schema is measured again."""
@@ -39,21 +35,21 @@ class Work:
     Attributes:
         cells: the runs.
         settings: of the dials.
-        contacts: how many contacts are used, each a condition of its own.
-        fewer: settings that are measured with fewer contacts than the most; None for all of them.
+        counts: how many steps are used, each a condition of its own.
+        fewer: settings that are measured with fewer steps than the most; None for all of them.
     """
 
     cells: tuple[Cell, ...]
     settings: tuple[Setting, ...]
-    contacts: tuple[int, ...]
+    counts: tuple[int, ...]
     fewer: tuple[Setting, ...] | None = None
 
     @property
     def asked(self) -> tuple[tuple[int, Setting], ...]:
-        """The answers a run is asked for: how many contacts, and the setting."""
+        """The answers a run is asked for: how many steps, and the setting."""
         fewer = self.settings if self.fewer is None else self.fewer
-        most = max(self.contacts)
-        return tuple((n, each) for n in self.contacts for each in (self.settings if n == most else fewer))
+        most = max(self.counts)
+        return tuple((n, each) for n in self.counts for each in (self.settings if n == most else fewer))
 
     @property
     def each(self) -> int:
@@ -62,17 +58,19 @@ class Work:
 
 
 def measure(
+    experiment: Experiment,
     work: Work,
     scenes: Mapping[str, SceneFile],
     station: Station,
     folder: Path,
     say: Say,
     workers: int = 1,
-    models: MutableMapping[str, Models] | None = None,
+    models: MutableMapping[str, Any] | None = None,
 ) -> Iterator[tuple[Cell, list[Point]]]:
     """Perform and answer every run that is not on the disk yet; one file a run.
 
     Args:
+        experiment: that the runs are of.
         work: the runs and settings.
         scenes: by object.
         station: a mocked one.
@@ -86,56 +84,67 @@ def measure(
     """
     folder.mkdir(parents=True, exist_ok=True)
     models = {} if models is None else models
-    stamp = {"schema": _SCHEMA, "machine": machine(), "sha256": code(ESTIMATOR)["sha256"]}
+    measured = measurement_of(experiment)
+    stamp = {"schema": _SCHEMA, "machine": machine(), "sha256": code(measured.estimator)["sha256"]}
     with workers_of(workers) as pool:
         for first in range(0, len(work.cells), _ROUND):
             cells = work.cells[first : first + _ROUND]
             known = {cell: _kept(folder / f"{cell.name}.json", stamp, work) for cell in cells}
             missing = [cell for cell, points in known.items() if points is None]
-            cases = performed(missing, scenes, station, pool, models, say)
+            cases = measured.performed(missing, scenes, station, pool, models, say)
             for cell in cells:
                 points = known[cell]
                 if points is None:
-                    points = _measured(cases.pop(cell), work, say) if cell in cases else []
+                    points = _measured(experiment, cases.pop(cell), work, say) if cell in cases else []
                     tree: dict[str, Any] = {**stamp, "work": _work_json(work)}
                     tree["points"] = [_one_json(p) for p in points]
                     write_text_whole(folder / f"{cell.name}.json", json.dumps(tree, allow_nan=False))
                 yield cell, points
 
 
-def _measured(case: Case, work: Work, say: Say) -> list[Point]:
-    condition = {"spacing": case.cell.spacing, "gap": case.cell.gap, "yaw": case.cell.yaw}
-    asked = [(count, setting) for count, setting in work.asked if count <= len(case.run.observations)]
+def _measured(experiment: Experiment, case: Case, work: Work, say: Say) -> list[Point]:
+    condition = dict(case.cell.conditions)
+    asked = [(count, setting) for count, setting in work.asked if count <= case.steps]
     points = []
     try:
         for count, setting in asked:
             sample = case.sample(setting, count)
-            points.append(Point(setting_name(setting), setting, {**condition, "contacts": count}, (sample,)))
+            points.append(_point(experiment, setting, {**condition, f"{experiment.step}s": count}, sample))
     except TouchstoneError as error:
         say(f"{case.cell.name} was not answered: {error}")
         return []
     return points
 
 
-def gathered(points: Sequence[Point], title: str, notes: Sequence[str] = ()) -> Curve:
+def _point(experiment: Experiment, setting: Setting, condition: Mapping[str, Any], sample: Sample) -> Point:
+    return Point(measurement_of(experiment).setting_name(setting), setting, condition, (sample,))
+
+
+def workers_of(number: int) -> Any:
+    """A pool of processes, as a context; None in it where this process does all."""
+    spawn = get_context("spawn")
+    return ProcessPoolExecutor(number, mp_context=spawn) if number > 1 else nullcontext(None)
+
+
+def gathered(experiment: Experiment, points: Sequence[Point], title: str, notes: Sequence[str] = ()) -> Curve:
     """One curve of the points of many runs."""
     merged: dict[tuple[Any, ...], list[Point]] = {}
     for point in points:
         merged.setdefault(_key(point), []).append(point)
     return Curve(
-        program=PROGRAM,
+        program=experiment.name,
         points=tuple(_joined(same) for same in merged.values()),
         machine=machine(),
-        code=code(ESTIMATOR),
+        code=code(measurement_of(experiment).estimator),
         made=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
         title=title,
         notes=(f"load of the machine at the end: {os.getloadavg()[0]:.1f}", *notes),
     )
 
 
-def joined(old: Curve, new: Curve) -> Curve:
+def joined(experiment: Experiment, old: Curve, new: Curve) -> Curve:
     """The new measurements beside the old ones of the same machine and code; the new ones win."""
-    merged = gathered([*new.points, *old.points], new.title)
+    merged = gathered(experiment, [*new.points, *old.points], new.title)
     return replace(merged, made=new.made, notes=new.notes)
 
 

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from experiments.commands.run import Experiment, Sense, Spacing, run
 from harness.commands import options
 from harness.commands.output import CONSOLE
+from harness.commands.run.run import DEFAULT, Sense, Spacing, run
 
 
 def demo(
@@ -32,7 +32,7 @@ def demo(
         "serial line, with a reality gap of their own"
     )
     return run(
-        Experiment.CONTACT_LOCALIZATION,
+        DEFAULT,
         object_=f"builtin:{object_}",
         objectfile=objectfile,
         level=level,

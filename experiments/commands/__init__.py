@@ -1,1 +1,0 @@
-"""The commands of the ``touchstone`` program, one in each file."""

@@ -1,0 +1,84 @@
+"""Contact localization as an experiment: which point of the object's surface was touched?"""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+from experiments.contact_localization.accuracy.cases import performed, preparations
+from experiments.contact_localization.accuracy.dials import KNOBS, setting_name, settings, settings_by_count
+from experiments.contact_localization.accuracy.paper import PAPER_CM
+from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Setting
+from experiments.contact_localization.accuracy.table_cell import HEARD, METHODS, Cell, cells, run_cell
+from experiments.contact_localization.accuracy.within_words import BUDGETS
+from experiments.contact_localization.answer import ContactAnswering
+from experiments.contact_localization.lines import answer_lines
+from experiments.contact_localization.plan import plan
+from experiments.contact_localization.report.comparison import GIVES, sources
+from experiments.contact_localization.report.report import write
+from experiments.contact_localization.report.result import result_of
+from experiments.contact_localization.section import Localization
+from harness.bench.scene import SceneFile
+from harness.experiment.experiment import Condition, Experiment, Helpers, Measurement
+from harness.recording.run_folder import RunFiles
+from harness.skills.press import PressPerformer
+from harness.twin.bench_of import way_between
+
+PLAN_KEY = "contacts"
+
+
+def _performer(_run: RunFiles, helpers: Helpers) -> PressPerformer:
+    return PressPerformer(partial(way_between, helpers.twin), ask=helpers.ask, plan_key=PLAN_KEY)
+
+
+def _cells(objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]) -> list[Cell]:
+    heard = _heard(chosen)
+    return cells(objects, seeds, chosen["spacing"], chosen["gap"], chosen["yaw"], heard)
+
+
+def _heard(chosen: Mapping[str, Sequence[str]]) -> bool:
+    return "both" in chosen["sense"]
+
+
+def _settings(
+    thorough: bool, chosen: Mapping[str, Sequence[str]], scenes: Mapping[str, SceneFile]
+) -> Sequence[Setting]:
+    named = all(scene.object.objectfile is not None for scene in scenes.values())
+    return settings(thorough, _heard(chosen), named)
+
+
+MEASUREMENT = Measurement(
+    estimator=ESTIMATOR,
+    conditions=(
+        Condition("spacing", ("close", "spread"), ("close", "spread")),
+        Condition("yaw", ("known", "unknown"), ("known",), ("known", "unknown")),
+        Condition("sense", ("touch", "both"), ("both",)),
+    ),
+    cells=_cells,
+    run_cell=run_cell,
+    methods=(*METHODS, *HEARD),
+    performed=performed,
+    settings=_settings,
+    setting_name=setting_name,
+    fewer=lambda chosen: settings_by_count(_heard(chosen)),
+    counts=(2, 4, 6),
+    notes=preparations,
+    published=PAPER_CM,
+)
+
+EXPERIMENT = Experiment(
+    name=PROGRAM,
+    title="Contact localization",
+    step="contact",
+    section=Localization,
+    knobs=KNOBS,
+    plan=plan,
+    performer=_performer,
+    answering=ContactAnswering,
+    result=result_of,
+    lines=answer_lines,
+    sources=sources,
+    gives=GIVES,
+    report=write,
+    budgets=BUDGETS,
+    measurement=MEASUREMENT,
+    plan_key=PLAN_KEY,
+)

@@ -1,0 +1,31 @@
+"""The table ``[localization]`` of a scene file."""
+
+import math
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from harness.basics.quantities import Angle, Length, Nonnegative, Ordered, Positive
+from harness.bench.scene import Section
+
+
+class Localization(Section):
+    """The contacts of a localization run.
+
+    Attributes:
+        contacts: how many.
+        spacing: ``"close"``, each within ``step`` of the last; ``"spread"``, over the object.
+        step: m, the greatest distance between successive close contacts.
+        depth: m, from and to: how far to press on after the first touch, uniform.
+        tilt: rad, the greatest angle of the tool from the surface's normal.
+        yaw: whether the estimator is told the object's yaw.
+        seed: of where, how deep and how tilted the contacts are; a run may say another.
+    """
+
+    table: ClassVar[str] = "localization"
+    contacts: int = Field(default=6, ge=1, le=100)
+    spacing: Literal["close", "spread"] = "close"
+    step: Annotated[Length, Positive] = 0.025
+    depth: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] = (0.5e-3, 2e-3)
+    tilt: Annotated[Angle, Nonnegative] = math.radians(15.0)
+    yaw: Literal["known", "unknown"] = "known"

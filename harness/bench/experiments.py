@@ -1,0 +1,54 @@
+"""The literal table of what can be run at a bench: one row for each experiment and each calibration.
+
+Nothing is imported here. A row names the experiment's value and the model of its table of a scene file as
+import strings; ``harness.experiment.lookup`` loads the one, ``harness.bench.scene`` the other, on use.
+"""
+
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Row:
+    """One experiment or calibration.
+
+    Attributes:
+        about: its question, in one line.
+        value: import string of its ``Experiment``; None for a calibration.
+        section: name of its table in a scene file; None where it has none.
+        model: import string of that table's model.
+        command: the words after ``touchstone`` that read a run of it again.
+    """
+
+    about: str
+    value: str | None = None
+    section: str | None = None
+    model: str | None = None
+    command: str = "replay"
+
+
+EXPERIMENTS: dict[str, Row] = {
+    "contact-localization": Row(
+        about="Which point of the object's surface was touched?",
+        value="experiments.contact_localization.experiment:EXPERIMENT",
+        section="localization",
+        model="experiments.contact_localization.section:Localization",
+    ),
+    "calibrate-taxim": Row(
+        about="How does a tactile camera's gel turn slope into colour?", command="calibrate taxim"
+    ),
+}
+"""By the name that a run's folder carries."""
+
+
+def loaded(reference: str) -> Any:
+    """What an import string names: ``"package.module:name"``."""
+    module, _, name = reference.partition(":")
+    return vars(importlib.import_module(module))[name]
+
+
+def section_models() -> dict[str, str]:
+    """Import strings of the models of a scene file's experiment tables, by the table's name."""
+    rows = EXPERIMENTS.values()
+    return {row.section: row.model for row in rows if row.section is not None and row.model is not None}

@@ -1,0 +1,1 @@
+"""Commands of every experiment: run, replay, cost, tables, demo."""

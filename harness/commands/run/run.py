@@ -1,0 +1,281 @@
+"""``touchstone run``: an experiment on a bench, from the plan to the report."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from harness.basics.errors import WrongUse
+from harness.commands import options
+from harness.commands.output import ANSWERS, CONSOLE, emit, resumable, step_progress, warn
+
+DEFAULT = "contact-localization"
+"""Run where no experiment is named."""
+
+
+class Spacing(StrEnum):
+    """How far apart contacts are."""
+
+    CLOSE = "close"
+    SPREAD = "spread"
+
+
+class Sense(StrEnum):
+    """What is done at each place."""
+
+    TOUCH = "touch"
+    BOTH = "both"
+
+
+class Yaw(StrEnum):
+    """Whether the estimator is told the object's yaw."""
+
+    KNOWN = "known"
+    UNKNOWN = "unknown"
+
+
+def run(
+    experiment: Annotated[
+        str | None, typer.Argument(help="What to run; contact-localization if left out.", metavar="NAME")
+    ] = None,
+    station: options.StationOrOwn = None,
+    scene: options.SceneOption = None,
+    object_: options.Object = None,
+    material: options.Material = None,
+    units: options.Units = None,
+    wall: options.Wall = None,
+    objectfile: options.ObjectFileOption = None,
+    seed: options.Seed = None,
+    gap: options.GapOption = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="A key of the experiment's table in the scene, as contacts=4; again for more.",
+            metavar="KEY=VALUE",
+        ),
+    ] = None,
+    contacts: Annotated[int | None, typer.Option(help="How many contacts.", min=1, max=100)] = None,
+    spacing: Annotated[
+        Spacing | None, typer.Option(help="close: within 25 mm of the last; spread: over the object.")
+    ] = None,
+    yaw: Annotated[Yaw | None, typer.Option(help="Whether the estimator is told the object's yaw.")] = None,
+    sense: Annotated[
+        Sense | None, typer.Option(help="touch: press only; both: strike each place too, and listen.")
+    ] = None,
+    level: options.LevelOption = None,
+    budget: options.Budget = None,
+    error: options.ErrorWanted = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The run's folder; a dated one under runs/ if left out.")
+    ] = None,
+    resume: Annotated[
+        Path | None, typer.Option(help="Go on with this run folder at its first missing contact.")
+    ] = None,
+    json: options.Json = False,
+) -> int:
+    """Run an experiment on a bench; with --resume, go on where one stopped.
+
+    The motion is rehearsed in the twin before anything moves. Each contact is on the disk before the
+    next begins. Ctrl-C once ends after the contact; twice stops the arm.
+
+    Try: touchstone run contact-localization --station mock --scene scenes/mug_touch.toml
+    """
+    from harness.bench.station_file import load_station, station_path
+    from harness.commands.scenes import resolve
+    from harness.experiment.answer import finish
+    from harness.experiment.begin import begin
+    from harness.experiment.levels import chosen_levels
+    from harness.experiment.lookup import experiment_of, named, require_of
+    from harness.recording.recording import Recording
+
+    target = _target(budget, error, level)
+    if resume is not None:
+        _refuse_with_resume(
+            station=station,
+            scene=scene,
+            object=object_,
+            material=material,
+            units=units,
+            wall=wall,
+            objectfile=objectfile,
+            seed=seed,
+            gap=gap,
+            out=out,
+            set=set_,
+            contacts=contacts,
+            spacing=spacing,
+            yaw=yaw,
+            sense=sense,
+        )
+        recording = Recording(resume)
+        kind = experiment_of(recording)
+        if experiment is not None:
+            require_of(recording, named(experiment).name, "--resume")
+        accuracy = chosen_levels(kind.knobs, level or [])
+    else:
+        from harness.bench.station_file import load_station, station_path
+
+        kind = named(experiment or DEFAULT)
+        accuracy = chosen_levels(kind.knobs, level or [])
+        keys = {"contacts": contacts, "spacing": spacing, "yaw": yaw}
+        wanted = resolve(
+            scene, object_, material, units, wall, sense, objectfile, kind.section, keys, set_ or []
+        )
+        bench = load_station(station_path(station or "mock"))
+        if target is not None:
+            CONSOLE.print(_budgets(kind).foresee(wanted, target), markup=False)
+        begun = begin(kind, wanted, bench, seed, gap, out)
+        recording = begun.recording
+        _describe(kind, begun, accuracy)
+    done = _perform(kind, recording, accuracy, json, early=target is None)
+    if not done.complete:
+        return _stopped(kind, recording, json)
+    more: dict[str, Any] = {}
+    if target is not None:
+        for doubt in _budgets(kind).doubts(recording, target):
+            warn(doubt)
+        with CONSOLE.status("estimating as asked, then at the finest levels"):
+            more["cost"] = _budgets(kind).answer(recording, target)
+        accuracy = accuracy.with_(more["cost"]["levels"])
+        for sentence in _budgets(kind).sentences(more["cost"]):
+            CONSOLE.print(sentence, markup=False)
+    result = finish(
+        kind,
+        recording,
+        accuracy,
+        drawing(kind),
+        done.health or None,
+        None,
+        done.answering,
+        teller(kind, json),
+        more,
+        done.ended,
+    )
+    show_report(result, json)
+    return 0
+
+
+def teller(kind: Any, as_json: bool) -> Any:
+    """Says the answer as soon as it is known, before the report is drawn."""
+
+    def tell(result: Any) -> None:
+        for warning in result["warnings"]:
+            warn(warning)
+        if not as_json:
+            for line in kind.lines(result):
+                ANSWERS.print(line, markup=False)
+            CONSOLE.print("comparing with the simulation, drawing the report", markup=False)
+
+    return tell
+
+
+def drawing(kind: Any) -> Any:
+    """Draws the plain page of an experiment that has none of its own."""
+    from functools import partial
+
+    from harness.report.run_page import write_run_page
+
+    return partial(write_run_page, kind)
+
+
+def show_report(result: dict[str, Any], as_json: bool) -> None:
+    """Where the report is; the one object of ``--json``."""
+    if as_json:
+        emit(result)
+    else:
+        ANSWERS.print(f"report: {result['report']}", markup=False)
+
+
+def _budgets(kind: Any) -> Any:
+    if kind.budgets is None:
+        raise WrongUse(f"{kind.name} has no --budget and no --error yet; choose levels with --level")
+    return kind.budgets
+
+
+def _target(budget: str | None, error: str | None, level: list[str] | None) -> Any:
+    """What was asked of the estimate; None where nothing was."""
+    given = error if budget is None else budget
+    if given is None:
+        return None
+    from harness.basics.quantities import LENGTH, TIME
+    from harness.experiment.experiment import Target
+
+    if budget is not None and error is not None:
+        raise WrongUse("--budget and --error each choose the levels; give one of them")
+    if level:
+        raise WrongUse("--budget and --error choose the levels; leave --level out, or choose all with it")
+    option, kind = ("--budget", TIME) if budget is not None else ("--error", LENGTH)
+    value = options.quantity(option, given, kind)
+    if value <= 0.0:
+        raise WrongUse(f"{option} {given}: it must be above zero")
+    return Target(seconds=value) if budget is not None else Target(error=value)
+
+
+def _stopped(kind: Any, recording: Any, as_json: bool) -> int:
+    """Ctrl-C ended the session after a step: how to go on."""
+    said = (
+        f"stopped after {kind.step} {recording.committed}; go on with "
+        f"`touchstone run {kind.name} --resume {recording.folder}`"
+    )
+    CONSOLE.print(said, markup=False)
+    if as_json:
+        emit({"schema": 1, "error": said, "exit_code": 130, "recording": str(recording.folder)})
+    return 130
+
+
+def _perform(kind: Any, recording: Any, accuracy: Any, as_json: bool, early: bool) -> Any:
+    """What is left of the run; ``early`` takes the readings in on the way."""
+    from harness.experiment.perform import Performed, perform_on_bench, steps_planned
+
+    total = steps_planned(kind, recording)
+    if recording.committed == total:
+        return Performed(True, {})  # nothing is left to touch: no bench is opened
+    CONSOLE.print(f"recording to {recording.folder}", markup=False)
+    how = f"touchstone run {kind.name} --resume {recording.folder}"
+    with resumable(how), step_progress(recording.committed, total, kind.step) as progress:
+        ask = None if as_json else _ask
+        return perform_on_bench(kind, recording, progress, ask, accuracy if early else None)
+
+
+def _ask(what: str) -> None:
+    """Show the operator what to do now."""
+    CONSOLE.print(what, markup=False, style="bold")
+
+
+def _describe(kind: Any, begun: Any, accuracy: Any) -> None:
+    """What is about to happen, before anything moves; what is simulated, at the levels that were turned."""
+    from harness.effects.explain import as_table, left_out, scene_plan
+    from harness.recording.run_folder import RunFiles
+
+    run = RunFiles(begun.recording)
+    wanted = run.scene.section(kind.section)
+    CONSOLE.print(
+        f"{run.scene.object.name}: {len(run.mesh.faces)} faces, "
+        f"longest side {1e3 * (run.mesh.bounds[1] - run.mesh.bounds[0]).max():.0f} mm; "
+        f"{len(begun.plan.steps)} {kind.step}s{_spaced(wanted)}; station {run.station.title}"
+    )
+    CONSOLE.print(
+        f"rehearsed in the twin: {begun.plan.rehearsal.segments} motions, none refused; "
+        f"{len(begun.plan.rehearsal.warnings)} warnings"
+    )
+    effects = scene_plan(run.scene, run.station.gel.sensor, accuracy)
+    CONSOLE.print(as_table(effects, left_out=False))
+    CONSOLE.print("not simulated:")
+    for sentence in left_out(effects):
+        CONSOLE.print(f"  {sentence}", markup=False)
+
+
+def _spaced(section: Any) -> str:
+    spacing = vars(section).get("spacing")
+    return "" if spacing is None else f", {spacing}"
+
+
+def _refuse_with_resume(**given: object) -> None:
+    named = [f"--{name}" for name, value in given.items() if value is not None]
+    if named:
+        raise WrongUse(
+            f"--resume goes on with the run as it was planned; {', '.join(named)} cannot change it now: "
+            "leave them out, or start another run"
+        )

@@ -1,0 +1,155 @@
+"""From a recording to its result: answer, write ``result.json``, tell; only then compare and draw."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.basics.clock import now
+from harness.basics.errors import RecordingDamaged, WrongUse
+from harness.basics.whole_file import write_text_whole
+from harness.bench.device import Health
+from harness.effects.accuracy import Accuracy, Level
+from harness.effects.explain import as_json
+from harness.experiment.compare import Comparison, compare, planned
+from harness.experiment.experiment import Answering, Experiment, Scored
+from harness.experiment.truth import read_truth
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+
+SCHEMA = 1
+RESULT = "result.json"
+"""In a run's folder, and in that of a replay."""
+
+OBSERVED = "observed.npz"
+"""Beside it: what the scene observes, simulated at the answer."""
+
+Tell = Callable[[Mapping[str, Any]], None]
+Draw = Callable[[Scored, Comparison, Mapping[str, Health] | None, Path], Path]
+"""Draws the report of an experiment that has no page of its own."""
+
+
+def score(
+    experiment: Experiment, recording: Recording, accuracy: Accuracy, answering: Answering | None = None
+) -> Scored:
+    """Answer, and look at the truth where there is one.
+
+    Args:
+        experiment: that the run is of.
+        recording: of the run.
+        accuracy: of the answer.
+        answering: that has the readings already; None to take them from the folder.
+
+    Raises:
+        WrongUse: the run holds no step yet.
+        FitRefused: nothing explains the readings.
+    """
+    run = RunFiles(recording)
+    if recording.committed == 0:
+        raise WrongUse(
+            f"{recording.folder} holds no {experiment.step} yet; go on with `touchstone run --resume`"
+        )
+    if answering is None:
+        answering = experiment.answering(run, accuracy)
+        for record in recording.steps():
+            answering.read(record)
+    found = answering.answer()
+    warnings = tuple(recording.header.plan.get("warnings", ()))
+    return Scored(run, answering, found, read_truth(recording), accuracy, warnings)
+
+
+def finish(
+    experiment: Experiment,
+    recording: Recording,
+    accuracy: Accuracy,
+    draw: Draw,
+    health: Mapping[str, Health] | None = None,
+    folder: Path | None = None,
+    answering: Answering | None = None,
+    tell: Tell = lambda _: None,
+    more: Mapping[str, Any] | None = None,
+    since: float | None = None,
+) -> dict[str, Any]:
+    """The result of a run: written and told as soon as it is known, then again with what the report adds.
+
+    Args:
+        experiment: that the run is of.
+        recording: of the run.
+        accuracy: of the answer and of what is simulated.
+        draw: the report of an experiment that has no page of its own.
+        health: of the instruments; None for a replay.
+        folder: for result and report; the run's own where None.
+        answering: that has the readings already.
+        tell: is given the result before the report is drawn.
+        more: further keys of the result.
+        since: s on the bench clock, when the last step was on the disk; the result says how long after.
+    """
+    folder = folder or recording.folder
+    scored = score(experiment, recording, accuracy, answering)
+    result = {**common(experiment, scored), **experiment.result(scored), **(more or {})}
+    result["warnings"] = [*scored.warnings, *result.get("warnings", ())]
+    result["answered_after_s"] = None if since is None else now() - since
+    _write(folder / RESULT, result)
+    tell(result)
+    comparison = compare(scored, experiment.sources(scored))
+    drawn = experiment.report or draw
+    page = drawn(scored, comparison, health, folder / "report")
+    np.savez_compressed(folder / OBSERVED, **comparison.arrays())  # type: ignore[arg-type]
+    result |= {
+        "plan": plan_json(comparison),
+        "observed": comparison.observed(),
+        "report": str(page),
+    }
+    _write(folder / RESULT, result)
+    return result
+
+
+def common(experiment: Experiment, scored: Scored) -> dict[str, Any]:
+    """What every result holds; keys carry their unit."""
+    recording = scored.run.recording
+    return {
+        "schema": SCHEMA,
+        "experiment": experiment.name,
+        "object": scored.run.scene.object.name,
+        "mock": recording.header.mock is not None,
+        "seed": recording.header.seed,
+        "plan": as_json(planned(scored.run, scored.accuracy)),
+        "accuracy": dict(scored.accuracy),
+        "world": None if scored.truth is None else dict(scored.truth.differences),
+        "recording": str(recording.folder),
+        "report": None,
+    }
+
+
+def plan_json(comparison: Comparison) -> dict[str, Any]:
+    """The effects that ran, with what each took, and those that did not."""
+    described = as_json(comparison.plan)
+    evaluation = comparison.evaluation
+    for step in described["ran"]:
+        step["seconds"] = evaluation.seconds.get(step["effect"])
+        step["calls"] = evaluation.calls.get(step["effect"], 0)
+    return described
+
+
+def levels_of_result(experiment: Experiment, folder: Path) -> dict[str, Level]:
+    """The levels that the result in a folder was found at; none where it has no result.
+
+    Raises:
+        RecordingDamaged: the result cannot be read, or was found at a level that is no longer there.
+    """
+    path = folder / RESULT
+    if not path.exists():
+        return {}
+    known = {knob.name: knob for knob in experiment.knobs}
+    try:
+        levels = json.loads(path.read_text())["accuracy"]
+        return {name: known[name].checked(level) for name, level in levels.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, WrongUse) as error:
+        raise RecordingDamaged(f"{path} does not say at which levels it was found ({error})") from error
+
+
+def _write(path: Path, result: Mapping[str, Any]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text_whole(path, json.dumps(result, indent=1, allow_nan=False) + "\n")

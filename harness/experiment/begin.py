@@ -1,0 +1,83 @@
+"""Begin a run: take in the object, plan, rehearse in the twin, refuse what cannot be, make the folder."""
+
+import datetime as dt
+from dataclasses import dataclass
+from pathlib import Path
+
+from harness.basics.errors import WrongUse
+from harness.bench.gap import lasting_name
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
+from harness.effects.scene_object import KnownObject, known_object
+from harness.experiment.compare import require_sources
+from harness.experiment.experiment import Experiment, Planned
+from harness.experiment.lookup import runs_folder
+from harness.recording.recording import Recording, require_unused
+from harness.recording.run_folder import create_run, station_acquisition, station_calibration
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A run that is planned, rehearsed and on the disk, and has not moved yet."""
+
+    recording: Recording
+    plan: Planned
+    known: KnownObject
+
+
+def begin(
+    experiment: Experiment,
+    scene: SceneFile,
+    station: Station,
+    seed: int | None = None,
+    gap: str | None = None,
+    folder: Path | None = None,
+) -> Begun:
+    """Take in the object, plan and rehearse every step, make the run's folder.
+
+    Args:
+        experiment: which.
+        scene: on the table.
+        station: the bench.
+        seed: of all that is drawn; the scene's where None.
+        gap: reality gap of a mocked bench; the experiment's or the station's where None.
+        folder: of the run; a dated one under ``runs/`` where None.
+
+    Raises:
+        MeshRefused, WrongUse: of the object, the scene, the gap, or a folder that holds a run; or the scene
+            observes what this run cannot give.
+        MotionRefused: the rehearsal found a motion that must not be made; nothing was created.
+    """
+    if folder is not None:
+        require_unused(folder)
+    if gap is not None and station.mock is None:
+        raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")
+    mock = None
+    if station.mock is not None:
+        mock = {"gap": lasting_name(gap or experiment.gap or station.mock.gap)}
+    known = known_object(scene)
+    calibration, acquisition = station_calibration(station), station_acquisition(scene, station)
+    require_sources(experiment, scene, station, calibration)
+    section = scene.section(experiment.section)
+    seed = section.seed if seed is None else seed
+    plan = experiment.plan(scene, station, known.mesh, seed)
+    described = {
+        experiment.plan_key: list(plan.steps),
+        **plan.described,
+        "warnings": [*known.warnings, *plan.rehearsal.warnings],
+    }
+    stamp = dt.datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
+    where = folder or runs_folder(experiment.name, scene.object.name, stamp)
+    recording = create_run(
+        where,
+        experiment.name,
+        scene.with_section(section),
+        station,
+        known.mesh,
+        calibration,
+        described,
+        seed,
+        mock,
+        acquisition,
+    )
+    return Begun(recording, plan, known)

@@ -1,0 +1,124 @@
+"""What a scene observes, simulated at the answer; what a run can give is checked before it begins."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import WrongUse
+from harness.basics.materials import MATERIALS
+from harness.basics.store import Store, default_folder
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
+from harness.effects.accuracy import Accuracy
+from harness.effects.evaluate import Evaluation, evaluate
+from harness.effects.explain import scene_plan
+from harness.effects.plan import Plan
+from harness.experiment.experiment import Experiment, Scored
+from harness.recording.run_folder import RunFiles
+from harness.sim.optics.lit_calibration import shadow_of
+from harness.sim.optics.tactile_calibration import TactileCalibration
+
+CARRIED = ("object.mesh", "object.wall", "object.material", "sensor", "sensor.calibration", "seed")
+"""Sources that every run's folder carries."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What the scene observes, as it should have been read.
+
+    Attributes:
+        plan: which effects the scene called for.
+        evaluation: which ran, how often and how long; their values by name.
+    """
+
+    plan: Plan
+    evaluation: Evaluation
+
+    def observed(self) -> dict[str, dict[str, Any]]:
+        """Every wanted quantity as JSON values: shape and range of an array, its parts of a mapping."""
+        return {name: _described(self.evaluation[name]) for name in self.plan.wanted}
+
+    def arrays(self) -> dict[str, AnyArray]:
+        """Every wanted quantity that is an array, or a mapping of them, by name."""
+        found: dict[str, AnyArray] = {}
+        for name in self.plan.wanted:
+            value = self.evaluation[name]
+            parts = value.items() if isinstance(value, Mapping) else [("", value)]
+            for part, array in parts:
+                if isinstance(array, np.ndarray):
+                    found[f"{name}.{part}" if part else name] = array
+        return found
+
+
+def require_sources(
+    experiment: Experiment, scene: SceneFile, station: Station, calibration: TactileCalibration
+) -> None:
+    """Refuse a scene that observes what no run of this experiment can simulate.
+
+    Raises:
+        WrongUse: naming what is missing and which observed quantity needs it; or ``observe`` names something
+            that nothing computes, that the scene rules out or that is not built.
+    """
+    plan = scene_plan(scene, station.gel.sensor)
+    given = {*CARRIED, *experiment.gives}
+    if shadow_of(calibration) is not None:
+        given.add("sensor.shadow_table")
+    if scene.sensors.sound and scene.object.objectfile is not None:
+        given.add("object.file")
+    missing = [name for name in plan.sources if name not in given]
+    if missing:
+        raise WrongUse(
+            f"observe = {list(scene.observe)}: a run of {experiment.name} has no {', '.join(missing)} to "
+            f"simulate it from; it has {', '.join(sorted(given))}: observe what follows from these"
+        )
+
+
+def compare(scored: Scored, given: Mapping[str, Any]) -> Comparison:
+    """Simulate what the scene observes at the answer, and nothing else.
+
+    Args:
+        scored: the answer.
+        given: what it gives the simulation, by the names of the experiment's ``gives``.
+    """
+    run = scored.run
+    plan = scene_plan(run.scene, run.station.gel.sensor, scored.accuracy)
+    sources = {**_carried(run, plan), **given}
+    return Comparison(plan, evaluate(plan, sources, Store(default_folder())))
+
+
+def planned(run: RunFiles, accuracy: Accuracy) -> Plan:
+    """Which effects the scene calls for."""
+    return scene_plan(run.scene, run.station.gel.sensor, accuracy)
+
+
+def _carried(run: RunFiles, plan: Plan) -> dict[str, Any]:
+    sources: dict[str, Any] = {
+        "object.mesh": run.mesh,
+        "object.wall": run.scene.object.wall,
+        "object.material": MATERIALS[run.scene.object.material],
+        "sensor": run.station.gel.sensor,
+        "sensor.calibration": run.calibration,
+        "seed": run.recording.header.seed,
+    }
+    shadow = shadow_of(run.calibration)
+    if shadow is not None:
+        sources["sensor.shadow_table"] = shadow
+    if "object.file" in plan.sources:
+        sources["object.file"] = run.objectfile
+    return sources
+
+
+def _described(value: Any) -> dict[str, Any]:
+    if isinstance(value, Mapping):
+        return {"parts": {str(name): _described(part) for name, part in value.items()}}
+    if not isinstance(value, np.ndarray):
+        return {"kind": type(value).__name__}
+    said: dict[str, Any] = {"shape": list(value.shape), "dtype": str(value.dtype)}
+    if value.size and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
+        finite = value[np.isfinite(value)]
+        if finite.size:
+            said |= {"least": float(finite.min()), "mean": float(finite.mean()), "most": float(finite.max())}
+    return said

@@ -1,0 +1,303 @@
+"""What an experiment is: a value that says how to plan it, perform it, answer it and score the answer.
+
+Everything else that a run needs is done for every experiment alike by the modules beside this one: begin and
+rehearse, perform and resume, replay, compare, write the result and the report, tables, cost.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
+from harness.bench.device import Health
+from harness.bench.reading import Reading
+from harness.bench.scene import SceneFile, Section
+from harness.bench.station import Bench
+from harness.bench.station_file import Station
+from harness.cost.curve import Sample
+from harness.effects.accuracy import Accuracy, Knob, Level
+from harness.effects.catalogue import EFFECTS
+from harness.effects.effect import knobs_of
+from harness.experiment.truth import Truth
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import Step, StepRecord
+from harness.twin.bench import TwinBench
+from harness.twin.rehearsal import RehearsalReport
+
+Setting = Mapping[str, Level]
+"""Levels of some dials; what it leaves open is at its default."""
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A run, planned and rehearsed.
+
+    Attributes:
+        steps: the parameters of each, as JSON values.
+        rehearsal: what the twin found.
+        bench: the twin it was rehearsed in.
+        described: more that ``run.json`` keeps of the plan, as JSON values.
+    """
+
+    steps: Sequence[Mapping[str, Any]]
+    rehearsal: RehearsalReport
+    bench: TwinBench
+    described: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Helpers:
+    """What a step's performer may use beside the bench.
+
+    Attributes:
+        twin: finds a way where the arm is not where a step's travel was planned from.
+        ask: shows a person what to do; None where nobody is there.
+        say: tells how the step goes.
+    """
+
+    twin: TwinBench
+    ask: Callable[[str], None] | None = None
+    say: Callable[[str], None] = lambda _: None
+
+
+class Performer(Protocol):
+    """Moves the arm and reads the instruments, a step at a time."""
+
+    def steps(self, recording: Recording) -> Iterator[Step]:
+        """The steps still to perform; may look at what has been recorded so far."""
+
+    def perform(self, step: Step, bench: Bench) -> Sequence[Reading]:
+        """Touch the hardware; everything read is returned, nothing else is kept."""
+
+
+class Answering(Protocol):
+    """Readings to answer: each step is read once, and all that needs the readings has them from here."""
+
+    def read(self, record: StepRecord) -> None:
+        """Take in one step's readings, in order."""
+
+    def answer(self) -> Any:
+        """What the steps read so far say.
+
+        Raises:
+            FitRefused: nothing explains the readings.
+            WrongUse: no step was read.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """An answer with what it is held against.
+
+    Attributes:
+        run: the folder.
+        answering: the readings.
+        found: the answer, as the experiment has it.
+        truth: of a mocked run.
+        accuracy: the chosen level of every dial.
+        warnings: what the operator should know.
+    """
+
+    run: RunFiles
+    answering: Any
+    found: Any
+    truth: Truth | None
+    accuracy: Accuracy
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What a table or a cost curve varies beside object and seed.
+
+    Attributes:
+        name: ``"spacing"``.
+        levels: all that there are.
+        usual: those that a cost curve measures where nobody says.
+        tabled: those of a table.
+    """
+
+    name: str
+    levels: tuple[str, ...]
+    usual: tuple[str, ...]
+    tabled: tuple[str, ...] = ()
+
+
+class Cell(Protocol):
+    """One run of a table or a cost curve."""
+
+    @property
+    def object(self) -> str:
+        """Its name among the subjects."""
+
+    @property
+    def seed(self) -> int:
+        """Of the places, the world and the draws."""
+
+    @property
+    def name(self) -> str:
+        """Of the run's file."""
+
+    @property
+    def conditions(self) -> Mapping[str, str]:
+        """What was varied, by name; ``gap`` always among them."""
+
+
+class Case(Protocol):
+    """A performed run with its truth, to be answered at any setting."""
+
+    @property
+    def cell(self) -> Cell:
+        """Which run."""
+
+    @property
+    def steps(self) -> int:
+        """How many were performed."""
+
+    def sample(self, setting: Setting, steps: int) -> Sample:
+        """The error and the seconds of an answer from the first steps."""
+
+
+Say = Callable[[str], None]
+
+
+class Perform(Protocol):
+    """Performs runs, side by side where there is a pool of processes; tells of each that could not be."""
+
+    def __call__(
+        self,
+        cells: Sequence[Any],
+        scenes: Mapping[str, SceneFile],
+        station: Station,
+        pool: Executor | None,
+        models: MutableMapping[str, Any],
+        say: Say,
+    ) -> dict[Any, Any]:
+        """The cases by cell; ``models`` is taken from and added to."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """How tables and cost curves measure an experiment.
+
+    Attributes:
+        estimator: module whose sources, with all they import, decide whether a curve still holds.
+        conditions: what is varied beside object, gap and seed.
+        cells: the runs of so many objects, seeds and levels of the conditions, ``gap`` among them.
+        run_cell: performs one in process and answers it by every method: ``rows`` by method, each with
+            ``error_m`` and ``seconds``; a share of rows may have ``error_symmetric_m``, ``in_region90``,
+            ``refused``.
+        methods: in the order of a table's rows.
+        performed: runs for a cost curve.
+        settings: of the dials, that a cost curve measures: every one of them, or the usual ones.
+        setting_name: of a setting, for people.
+        fewer: settings that are measured with fewer steps too.
+        counts: of steps, that a cost curve measures where nobody says.
+        gross: m: an error beyond this is a failure.
+        notes: sentences that a curve keeps, from the models made on the way.
+        published: what others printed, by method; for the foot of a table.
+    """
+
+    estimator: str
+    conditions: tuple[Condition, ...]
+    cells: Callable[[Sequence[str], Sequence[int], Mapping[str, Sequence[str]]], Sequence[Any]]
+    run_cell: Callable[[Any, SceneFile, Station], dict[str, Any]]
+    methods: tuple[str, ...]
+    performed: Perform
+    settings: Callable[[bool, Mapping[str, Sequence[str]], Mapping[str, SceneFile]], Sequence[Setting]]
+    setting_name: Callable[[Setting], str]
+    fewer: Callable[[Mapping[str, Sequence[str]]], Sequence[Setting]] | None = None
+    counts: tuple[int, ...] = (1,)
+    gross: float = 20.0e-3
+    notes: Callable[[Mapping[str, Any]], tuple[str, ...]] = lambda _: ()
+    published: Mapping[str, Sequence[float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is asked of an answer: one of the two.
+
+    Attributes:
+        seconds: s on the clock for the estimate.
+        error: m.
+    """
+
+    seconds: float | None = None
+    error: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.seconds is None) == (self.error is None):
+            raise WrongUse("give either a budget of seconds or an error to be met")
+
+
+class Budgets(Protocol):
+    """Answers as asked: within so many seconds, or to an error."""
+
+    def foresee(self, scene: SceneFile, target: Target) -> str:
+        """What will be tried, in a sentence, before anything moves.
+
+        Raises:
+            WrongUse: a budget that cannot be kept.
+        """
+
+    def doubts(self, recording: Recording, target: Target) -> tuple[str, ...]:
+        """What the operator should know of the curve that the answer goes by."""
+
+    def answer(self, recording: Recording, target: Target) -> dict[str, Any]:
+        """What was asked, what it took and at which ``levels``, as JSON values."""
+
+    def sentences(self, cost: Mapping[str, Any]) -> tuple[str, ...]:
+        """The same for people."""
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """One kind of question that a bench is asked.
+
+    Attributes:
+        name: on the command line and in run folders.
+        title: of its report.
+        step: what a step is called: ``"contact"``.
+        section: the model of its table in a scene file.
+        knobs: every dial that its answer and its comparison have.
+        plan: chooses the steps and rehearses them.
+        performer: of the steps, at an open bench.
+        answering: of a run, at an accuracy.
+        result: the answer as JSON values, keys with their units, with ``seconds`` and ``warnings``.
+        lines: the answer for people, from the whole result.
+        sources: what the answer gives the comparison, by name.
+        gives: the names of those sources; what else a scene observes is refused before anything moves.
+        report: writes the page of a scored run; None for the plain page of every experiment.
+        budgets: answers to a budget or an error; None where it cannot.
+        measurement: for tables and cost; None where it has none.
+        plan_key: where ``run.json`` keeps the steps.
+        gap: of a mocked bench where none is asked for; None for the station's.
+    """
+
+    name: str
+    title: str
+    step: str
+    section: type[Section]
+    knobs: tuple[Knob, ...]
+    plan: Callable[[SceneFile, Station, Mesh, int], Planned]
+    performer: Callable[[RunFiles, Helpers], Performer]
+    answering: Callable[[RunFiles, Accuracy], Answering]
+    result: Callable[[Scored], dict[str, Any]]
+    lines: Callable[[Mapping[str, Any]], list[str]]
+    sources: Callable[[Scored], Mapping[str, Any]]
+    gives: tuple[str, ...]
+    report: Callable[[Scored, Any, Mapping[str, Health] | None, Path], Path] | None = None
+    budgets: Budgets | None = None
+    measurement: Measurement | None = None
+    plan_key: str = "steps"
+    gap: str | None = None
+
+    @property
+    def own_knobs(self) -> tuple[Knob, ...]:
+        """Those dials that are not the simulation's."""
+        simulated = {knob.name for knob in knobs_of(EFFECTS)}
+        return tuple(knob for knob in self.knobs if knob.name not in simulated)

@@ -1,0 +1,69 @@
+"""Experiments by name, and whose run a folder is."""
+
+from pathlib import Path
+
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import nearest
+from harness.bench.experiments import EXPERIMENTS, loaded
+from harness.experiment.experiment import Experiment
+from harness.recording.recording import Recording
+
+
+def names() -> tuple[str, ...]:
+    """Of every experiment, in the order of the table."""
+    return tuple(name for name, row in EXPERIMENTS.items() if row.value is not None)
+
+
+def named(name: str) -> Experiment:
+    """The experiment of this name.
+
+    Raises:
+        WrongUse: there is none.
+    """
+    row = EXPERIMENTS.get(name)
+    if row is None or row.value is None:
+        raise WrongUse(f"no experiment {name!r}; {nearest(name, names())}")
+    found = loaded(row.value)
+    assert isinstance(found, Experiment)
+    return found
+
+
+def experiment_of(recording: Recording) -> Experiment:
+    """The experiment that a run is of.
+
+    Raises:
+        WrongUse: it is a calibration's, or of an experiment that this version does not have.
+    """
+    name = recording.header.experiment
+    row = EXPERIMENTS.get(name)
+    if row is None:
+        raise WrongUse(f"{recording.folder} is a run of {name!r}, which this version does not have")
+    if row.value is None:
+        raise WrongUse(
+            f"{recording.folder} is a run of `touchstone {row.command}`; read it with "
+            f"`touchstone {row.command} {recording.folder}`"
+        )
+    return named(name)
+
+
+def require_of(recording: Recording, name: str, doing: str) -> None:
+    """Refuse a run of anything but the experiment or calibration ``name``.
+
+    Args:
+        recording: of the run.
+        name: as in the table.
+        doing: what was asked of it: ``"--resume"``.
+
+    Raises:
+        WrongUse: the run is another's.
+    """
+    whose = recording.header.experiment
+    if whose != name:
+        raise WrongUse(f"{doing} {recording.folder}: it is a run of {whose}, not of {name}")
+
+
+def runs_folder(name: str, object_name: str | None, stamp: str) -> Path:
+    """A folder under ``runs/`` that does not exist yet."""
+    base = Path("runs") / "-".join(part for part in (stamp, name, object_name) if part)
+    candidates = (base, *(base.with_name(f"{base.name}-{k}") for k in range(2, 1000)))
+    return next(path for path in candidates if not path.exists())

@@ -1,0 +1,139 @@
+"""Perform what is left of a run on its bench; a step's readings are taken in once it is on the disk."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+
+from harness.basics.clock import now
+from harness.basics.errors import FitRefused, WrongUse
+from harness.bench.device import Health
+from harness.bench.station import Bench, RunContext, open_station
+from harness.effects.accuracy import Accuracy
+from harness.experiment.experiment import Answering, Experiment, Helpers
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.recording.session import Progress, perform
+from harness.recording.step_file import Step
+from harness.skills.strike import Ask, by_hand, somebody
+from harness.twin.bench_of import twin_of
+
+_REHEARSED_ANSWERS = 2
+"""Steps after which the answer is tried once: what is compiled for it is loaded while the arm rests."""
+
+
+@dataclass(frozen=True, eq=False)
+class Performed:
+    """What came of a session at a bench.
+
+    Attributes:
+        complete: whether every step was performed; False where Ctrl-C ended it early.
+        health: how the instruments did, by name.
+        answering: the readings taken in on the way; None where none were to be.
+        ended: s on the bench clock, when the last step was on the disk; None where none was performed.
+    """
+
+    complete: bool
+    health: dict[str, Health]
+    answering: Answering | None = None
+    ended: float | None = None
+
+
+def steps_planned(experiment: Experiment, recording: Recording) -> int:
+    """How many steps the run was planned with."""
+    return len(recording.header.plan[experiment.plan_key])
+
+
+def perform_on_bench(
+    experiment: Experiment,
+    recording: Recording,
+    progress: Progress,
+    ask: Ask | None = None,
+    accuracy: Accuracy | None = None,
+    say: Callable[[str], None] = lambda _: None,
+) -> Performed:
+    """Open the run's bench and perform what is left.
+
+    What the readings will be compared with is made while the bench opens, and before anything moves: an
+    object whose modes cannot be found is refused while the arm still stands.
+
+    Args:
+        experiment: that the run is of.
+        recording: of the run.
+        progress: is told of each step.
+        ask: shows a person what to do, where the station has one strike; None where nobody is there.
+        accuracy: of the answer; None where no readings are to be taken in on the way.
+        say: tells how a step goes.
+
+    Raises:
+        MeshRefused: the scene calls for sound, and the object's surface cannot be filled.
+    """
+    run = RunFiles(recording)
+    mock = recording.header.mock
+    context = RunContext(
+        truth=recording.truth_path,
+        mesh=run.mesh,
+        seed=recording.header.seed,
+        gap=None if mock is None else mock["gap"],
+    )
+    if by_hand(run.scene, run.station):
+        somebody(ask)
+    ahead = ThreadPoolExecutor(1, "model")
+    answering = None if accuracy is None else ahead.submit(experiment.answering, run, accuracy)
+    ahead.shutdown(wait=False)  # a bench that does not open says so at once
+    with open_station(run.station, run.scene, context) as bench:
+        made = None if answering is None else answering.result()
+        return perform_on(experiment, bench, recording, progress, ask, made, say)
+
+
+def perform_on(
+    experiment: Experiment,
+    bench: Bench,
+    recording: Recording,
+    progress: Progress,
+    ask: Ask | None = None,
+    answering: Answering | None = None,
+    say: Callable[[str], None] = lambda _: None,
+) -> Performed:
+    """Perform what is left of a run on an open bench."""
+    run = RunFiles(recording)
+    helpers = Helpers(twin_of(run.scene, run.station, run.mesh), ask, say)
+    if answering is not None:
+        for record in recording.steps():
+            answering.read(record)
+    told = _Reading(progress, recording, answering)
+    complete = perform(experiment.performer(run, helpers), bench, recording, bench.arm.stop, told)
+    return Performed(complete, health_of(bench), answering, told.last)
+
+
+def health_of(bench: Bench) -> dict[str, Health]:
+    """How each instrument did, by its name."""
+    found = {"arm": bench.arm.health(), "gel": bench.gel.health()}
+    if bench.hammer is not None:
+        found["hammer"] = bench.hammer.health()
+    if bench.microphone is not None:
+        found["microphone"] = bench.microphone.health()
+    return found
+
+
+class _Reading:
+    """Takes in every step that ends, the arm at rest meanwhile; tells of it as before, and notes when."""
+
+    def __init__(self, progress: Progress, recording: Recording, answering: Answering | None) -> None:
+        self.last: float | None = None
+        self._progress = progress
+        self._recording = recording
+        self._answering = answering
+
+    def began(self, step: Step) -> None:
+        self._progress.began(step)
+
+    def ended(self, step: Step, seconds: float) -> None:
+        self.last = now()
+        self._progress.ended(step, seconds)
+        if self._answering is None:
+            return
+        self._answering.read(self._recording.step(step.index))
+        if step.index < _REHEARSED_ANSWERS:
+            with suppress(FitRefused, WrongUse):  # as few steps may say too little
+                self._answering.answer()

@@ -1,0 +1,25 @@
+"""The objects that tables and cost curves are measured on: our own, and real meshes where they are."""
+
+from pathlib import Path
+
+from harness.bench.scene import SceneFile, scene_from_options
+from harness.objects.household import MATERIALS
+
+REAL = {
+    "025_mug": ("meshes/ycb_isaac/025_mug/textured.obj", "cm", "ceramic"),
+    "wineglass": ("meshes/contactdb_objects/wineglass.stl", "m", "glass"),
+    "teapot": ("meshes/contactdb_objects/teapot.stl", "m", "ceramic"),
+}
+"""Real meshes: file under the data folder, units, material."""
+
+
+def objects(data: Path | None, builtin_only: bool = False) -> dict[str, SceneFile]:
+    """Scenes by the object's name: ours, and the real ones where the data is there."""
+    scenes = {name: scene_from_options(f"builtin:{name}") for name in MATERIALS}
+    if data is None or builtin_only:
+        return scenes
+    real = {
+        name: scene_from_options(str(data / file), material, units)
+        for name, (file, units, material) in REAL.items()
+    }
+    return {**scenes, **real}

@@ -1,0 +1,183 @@
+"""A table of an experiment: many mocked runs, kept one file each, so that it stops and resumes at will."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import TouchstoneError, WrongUse
+from harness.basics.metrics import Interval, bootstrap, mean, median, share_above
+from harness.basics.whole_file import write_text_whole
+from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.station_file import load_station, station_path
+from harness.experiment.experiment import Cell, Experiment, Measurement
+from harness.experiment.lookup import named
+
+Key = tuple[tuple[str, str], ...]
+"""Conditions by name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One method under one condition.
+
+    Attributes:
+        conditions: by name.
+        method: which.
+        runs: how many.
+        raw: median, mean and share of gross errors, in the error's own unit.
+        symmetric: the same, modulo the object's symmetry; None for a random point.
+        held: share of runs whose 90 % region holds the truth; None where there is no region.
+        seconds: median of an answer; from all of the run's readings.
+        refused: of the runs, how many were not answered; each counts as a random answer.
+    """
+
+    conditions: Mapping[str, str]
+    method: str
+    runs: int
+    raw: tuple[Interval, Interval, Interval]
+    symmetric: tuple[Interval, Interval, Interval] | None
+    held: float | None
+    seconds: float
+    refused: int = 0
+
+
+def measure(
+    experiment: Experiment,
+    wanted: Sequence[Cell],
+    scenes: Mapping[str, SceneFile],
+    folder: Path,
+    workers: int,
+) -> Iterator[tuple[Cell, dict[str, Any]]]:
+    """Run what is not on the disk yet; yields every cell's result as it is known.
+
+    Args:
+        experiment: that the runs are of.
+        wanted: the runs.
+        scenes: by object.
+        folder: one JSON file a run.
+        workers: processes; 1 for this one alone.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    missing = []
+    for cell in wanted:
+        path = folder / f"{cell.name}.json"
+        if path.exists():
+            yield cell, json.loads(path.read_text(encoding="utf-8"))
+        else:
+            missing.append(cell)
+    trees = {name: scene.model_dump(mode="json", by_alias=True) for name, scene in scenes.items()}
+    for cell, result in _made(experiment.name, missing, trees, workers):
+        write_text_whole(folder / f"{cell.name}.json", json.dumps(result, allow_nan=False))
+        yield cell, result
+
+
+def _made(
+    name: str, missing: Sequence[Cell], trees: Mapping[str, dict[str, Any]], workers: int
+) -> Iterator[tuple[Cell, dict[str, Any]]]:
+    if workers == 1:
+        for cell in missing:
+            yield cell, _run(name, cell, trees[cell.object])
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        running = {pool.submit(_run, name, cell, trees[cell.object]): cell for cell in missing}
+        try:
+            for done in as_completed(running):
+                yield running[done], done.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _run(name: str, cell: Cell, tree: dict[str, Any]) -> dict[str, Any]:
+    scene = scene_from_json(tree, "the table")
+    try:
+        return measurement_of(named(name)).run_cell(cell, scene, load_station(station_path("mock")))
+    except TouchstoneError as error:
+        # A run that cannot be planned or performed is said to be so; it is no measurement.
+        return {"schema": 1, "failed": f"{type(error).__name__}: {error}"}
+
+
+def measurement_of(experiment: Experiment) -> Measurement:
+    """How an experiment is measured.
+
+    Raises:
+        WrongUse: it is not.
+    """
+    if experiment.measurement is None:
+        raise WrongUse(
+            f"{experiment.name} has no tables and no cost curve: it does not say how to measure it"
+        )
+    return experiment.measurement
+
+
+def rows(experiment: Experiment, results: Mapping[Cell, Mapping[str, Any]]) -> list[Row]:
+    """The table of what has been measured so far.
+
+    Raises:
+        WrongUse: nothing has.
+    """
+    performed = {cell: result for cell, result in results.items() if "rows" in result}
+    if not performed:
+        raise WrongUse("no run of the table has been performed yet")
+    measured = measurement_of(experiment)
+    found = {method for result in performed.values() for method in result["rows"]}
+    return [
+        _row(performed, condition, method, measured)
+        for condition in sorted({key_of(cell) for cell in performed})
+        for method in measured.methods
+        if method in found
+    ]
+
+
+def key_of(cell: Cell) -> Key:
+    """The conditions of a run, in a form that sorts and compares."""
+    return tuple(cell.conditions.items())
+
+
+def by_object(results: Mapping[Cell, Mapping[str, Any]], condition: Key) -> dict[str, dict[str, float]]:
+    """Mean error in metres of every method on every object, under one condition.
+
+    Args:
+        results: of the cells.
+        condition: as ``key_of`` gives it.
+    """
+    found: dict[str, dict[str, list[float]]] = {}
+    for cell, result in results.items():
+        if "rows" in result and key_of(cell) == condition:
+            for method, row in result["rows"].items():
+                found.setdefault(cell.object, {}).setdefault(method, []).append(row["error_m"])
+    return {name: {m: float(np.mean(e)) for m, e in methods.items()} for name, methods in found.items()}
+
+
+def _row(
+    performed: Mapping[Cell, Mapping[str, Any]], condition: Key, method: str, measured: Measurement
+) -> Row:
+    found = [
+        result["rows"][method]
+        for cell, result in performed.items()
+        if key_of(cell) == condition and method in result["rows"]
+    ]
+    held = [bool(one["in_region90"]) for one in found if "in_region90" in one]
+    raw = np.array([one["error_m"] for one in found])
+    symmetric = [one.get("error_symmetric_m") for one in found]
+    return Row(
+        dict(condition),
+        method,
+        len(found),
+        _statistics(raw, measured.gross),
+        None if None in symmetric else _statistics(np.array(symmetric), measured.gross),
+        float(np.mean(held)) if held else None,
+        float(np.median([one["seconds"] for one in found])),
+        sum("refused" in one for one in found),
+    )
+
+
+def _statistics(errors: FloatArray, gross: float) -> tuple[Interval, Interval, Interval]:
+    return bootstrap(errors, median), bootstrap(errors, mean), bootstrap(errors, share_above(gross))
