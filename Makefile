@@ -60,7 +60,7 @@ bench: $(DEV) ## timings with their spread, beside the peers
 	@$(BIN)/python -m pytest -m benchmark -s
 
 tables: $(RUN) ## the localization table (long; resumes where it was stopped)
-	@$(BIN)/touchstone tables localization
+	@$(BIN)/touchstone tables contact-localization
 
 clean: ## runs, caches and the virtual environment
 	rm -rf $(VENV) runs build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -60,6 +60,7 @@ MEASUREMENT = Measurement(
     setting_name=setting_name,
     fewer=lambda chosen: settings_by_count(_heard(chosen)),
     counts=(2, 4, 6),
+    regions=("touch", "audio", "both"),
     notes=preparations,
     published=PAPER_CM,
 )

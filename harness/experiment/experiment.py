@@ -197,6 +197,7 @@ class Measurement:
         setting_name: of a setting, for people.
         fewer: settings that are measured with fewer steps too.
         counts: of steps, that a cost curve measures where nobody says.
+        regions: methods whose 90 % region a table scores.
         gross: m: an error beyond this is a failure.
         notes: sentences that a curve keeps, from the models made on the way.
         published: what others printed, by method; for the foot of a table.
@@ -212,6 +213,7 @@ class Measurement:
     setting_name: Callable[[Setting], str]
     fewer: Callable[[Mapping[str, Sequence[str]]], Sequence[Setting]] | None = None
     counts: tuple[int, ...] = (1,)
+    regions: tuple[str, ...] = ()
     gross: float = 20.0e-3
     notes: Callable[[Mapping[str, Any]], tuple[str, ...]] = lambda _: ()
     published: Mapping[str, Sequence[float]] = field(default_factory=dict)

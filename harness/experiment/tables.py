@@ -19,6 +19,9 @@ from harness.bench.station_file import load_station, station_path
 from harness.experiment.experiment import Cell, Experiment, Measurement
 from harness.experiment.lookup import named
 
+Results = Mapping[Any, Mapping[str, Any]]
+"""What every cell of a table came to; a cell is as ``harness.experiment.experiment.Cell``."""
+
 Key = tuple[tuple[str, str], ...]
 """Conditions by name."""
 
@@ -117,7 +120,7 @@ def measurement_of(experiment: Experiment) -> Measurement:
     return experiment.measurement
 
 
-def rows(experiment: Experiment, results: Mapping[Cell, Mapping[str, Any]]) -> list[Row]:
+def rows(experiment: Experiment, results: Results) -> list[Row]:
     """The table of what has been measured so far.
 
     Raises:
@@ -141,7 +144,7 @@ def key_of(cell: Cell) -> Key:
     return tuple(cell.conditions.items())
 
 
-def by_object(results: Mapping[Cell, Mapping[str, Any]], condition: Key) -> dict[str, dict[str, float]]:
+def by_object(results: Results, condition: Key) -> dict[str, dict[str, float]]:
     """Mean error in metres of every method on every object, under one condition.
 
     Args:
@@ -156,9 +159,7 @@ def by_object(results: Mapping[Cell, Mapping[str, Any]], condition: Key) -> dict
     return {name: {m: float(np.mean(e)) for m, e in methods.items()} for name, methods in found.items()}
 
 
-def _row(
-    performed: Mapping[Cell, Mapping[str, Any]], condition: Key, method: str, measured: Measurement
-) -> Row:
+def _row(performed: Results, condition: Key, method: str, measured: Measurement) -> Row:
     found = [
         result["rows"][method]
         for cell, result in performed.items()
@@ -173,7 +174,7 @@ def _row(
         len(found),
         _statistics(raw, measured.gross),
         None if None in symmetric else _statistics(np.array(symmetric), measured.gross),
-        float(np.mean(held)) if held else None,
+        float(np.mean(held)) if held and method in measured.regions else None,
         float(np.median([one["seconds"] for one in found])),
         sum("refused" in one for one in found),
     )

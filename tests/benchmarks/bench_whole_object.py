@@ -23,12 +23,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from experiments.contact_localization.accuracy.table import REAL
 from harness.authoring.audio.object_audio import MODES, STAGES, AudioRequest, build_audio
 from harness.authoring.audio.profiles import PROFILES
 from harness.basics.materials import material
 from harness.basics.store import Store
 from harness.bench.scene import BUILTIN
+from harness.experiment.subjects import REAL
 from harness.objects.household import MATERIALS
 from harness.sim.modal.modal import default_edge
 from harness.sim.modal.stage_seconds import cpu, wall

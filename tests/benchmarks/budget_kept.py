@@ -23,10 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.cases import Case, performed, workers_of
-from experiments.contact_localization.accuracy.front import Front, Target, front_of
+from experiments.contact_localization.accuracy.cases import Case, performed
+from experiments.contact_localization.accuracy.front import Front, front_of
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Models
-from experiments.contact_localization.accuracy.table import objects
 from experiments.contact_localization.accuracy.table_cell import Cell, cells
 from experiments.contact_localization.accuracy.within import ask
 from harness.basics.whole_file import write_text_whole
@@ -36,6 +35,9 @@ from harness.cost.curve import GROSS, Curve
 from harness.cost.file import curve_path, load, sample_json
 from harness.cost.provenance import code, machine, stale
 from harness.effects.accuracy import Level
+from harness.experiment.costing import workers_of
+from harness.experiment.experiment import Target
+from harness.experiment.subjects import objects
 
 SHARE = 0.95
 CONTACTS = 6

@@ -12,6 +12,7 @@ from experiments.contact_localization.answer import observe_step
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.estimate import Estimate, estimate
 from experiments.contact_localization.posterior.levels import Levels, Senses
 from experiments.contact_localization.sound.gate import doubts_of_sound
@@ -25,7 +26,7 @@ from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.scene_object import known_object
 from harness.recording.run_folder import station_acquisition, station_calibration
 from harness.recording.step_file import Step, StepRecord
-from harness.skills.planning import RunPlan, plan_run
+from harness.skills.planning import RunPlan
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
@@ -107,7 +108,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Run:
     )
     (folder / "failing.toml").write_text(failing)
     mesh = known_object(scene).mesh
-    plan = plan_run(scene, station, mesh, SEED)
+    plan = plan_contacts(scene, station, mesh, SEED)
     good = performed(scene, station, plan, folder / "good.json", "default", CONTACTS)
     harmed = performed(scene, station, plan, folder / "harmed.json", str(folder / "failing.toml"), 4)
     contacts = json.loads((folder / "good.json").read_text())["contacts"]
@@ -147,7 +148,7 @@ def radius99(found: Estimate) -> float:
     """Metres, of 99 answers in a hundred, of a Gaussian on a surface: one in ten is beyond ``credible90``.
 
     A region of nine tenths misses one true place in ten as well: what one run of a seed is held to, on any
-    machine, is this; how many regions hold their place is counted by ``touchstone tables localization``.
+    machine, is this; how many regions hold their place is counted by ``touchstone tables contact-localization``.
     """
     return float(np.sqrt(2.0) * found.credible90)
 

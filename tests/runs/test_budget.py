@@ -7,10 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.commands import run as run_command
-from experiments.contact_localization import run as session_of
 from experiments.contact_localization.accuracy.cases import Case
-from experiments.contact_localization.accuracy.costing import Work, gathered, joined, measure
 from experiments.contact_localization.accuracy.dials import (
     FINEST,
     KNOBS,
@@ -19,21 +16,26 @@ from experiments.contact_localization.accuracy.dials import (
     setting_name,
     settings,
 )
-from experiments.contact_localization.accuracy.front import Front, Target, foresee, front_for, shipped_curve
+from experiments.contact_localization.accuracy.front import Front, foresee, front_for, shipped_curve
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, object_key
-from experiments.contact_localization.accuracy.table import objects
 from experiments.contact_localization.accuracy.table_cell import cells
 from experiments.contact_localization.accuracy.within import answer_within
 from experiments.contact_localization.accuracy.within_words import as_json, doubts, sentences, staleness
+from experiments.contact_localization.experiment import EXPERIMENT
 from harness.basics.errors import WrongUse
 from harness.bench.station_file import load_station, station_path
 from harness.cli import invoke
+from harness.commands.run import run as run_command
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import curve_path, load, save
 from harness.cost.provenance import code, machine
 from harness.effects.accuracy import Accuracy, Level
+from harness.experiment.costing import Work, gathered, joined, measure
+from harness.experiment.experiment import Target
+from harness.experiment.subjects import objects
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
+from tests.support import sessions as session_of
 from tests.support.whole_run import copied
 
 COARSE: dict[str, Level] = {
@@ -249,7 +251,7 @@ def two_settings() -> Work:
 
 
 def test_fewer_contacts_are_measured_at_few_settings(two_settings: Work) -> None:
-    few = replace(two_settings, contacts=(2, 4, 6), fewer=(DEFAULT,))
+    few = replace(two_settings, counts=(2, 4, 6), fewer=(DEFAULT,))
     assert few.asked == ((2, DEFAULT), (4, DEFAULT), (6, COARSE), (6, DEFAULT))
     assert few.each == 4
 
@@ -258,7 +260,7 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     two_settings: Work, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     station, scenes = load_station(station_path("mock")), objects(None)
-    ((_, points),) = measure(two_settings, scenes, station, tmp_path, pytest.fail)
+    ((_, points),) = measure(EXPERIMENT, two_settings, scenes, station, tmp_path, pytest.fail)
     assert len(points) == two_settings.each == 4
     assert {int(point.condition["contacts"]) for point in points} == {2, 3}
     assert all(point.samples[0].cpu > 0.0 and point.samples[0].error < 0.5 for point in points)
@@ -267,7 +269,7 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
         raise AssertionError("the run was performed again")
 
     monkeypatch.setattr("experiments.contact_localization.accuracy.cases.perform", again)
-    ((_, resumed),) = measure(two_settings, scenes, station, tmp_path, pytest.fail)
+    ((_, resumed),) = measure(EXPERIMENT, two_settings, scenes, station, tmp_path, pytest.fail)
     assert [point.samples for point in resumed] == [point.samples for point in points]
     (kept,) = tmp_path.glob("*.json")
     whole = kept.read_text(encoding="utf-8")
@@ -276,16 +278,14 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
         del point["sample"]["work"]
     kept.write_text(json.dumps({**tree, "schema": 1}), encoding="utf-8")
     with pytest.raises(AssertionError, match="performed again"):
-        list(measure(two_settings, scenes, station, tmp_path, pytest.fail))
+        list(measure(EXPERIMENT, two_settings, scenes, station, tmp_path, pytest.fail))
     kept.write_text(whole, encoding="utf-8")
-    monkeypatch.setattr(
-        "experiments.contact_localization.accuracy.costing.code", lambda _: {"sha256": "other"}
-    )
+    monkeypatch.setattr("harness.experiment.costing.code", lambda _: {"sha256": "other"})
     with pytest.raises(AssertionError, match="performed again"):
-        list(measure(two_settings, scenes, station, tmp_path, pytest.fail))
+        list(measure(EXPERIMENT, two_settings, scenes, station, tmp_path, pytest.fail))
     monkeypatch.undo()
-    curve = gathered(points, "T")
-    assert len(joined(curve, curve).points) == 4
+    curve = gathered(EXPERIMENT, points, "T")
+    assert len(joined(EXPERIMENT, curve, curve).points) == 4
 
 
 def test_the_command_measures_keeps_and_draws(

@@ -8,36 +8,39 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.dials import chosen, levels_of
+from experiments.contact_localization.accuracy.dials import chosen
 from experiments.contact_localization.answer import Answer, answer
-from experiments.contact_localization.run import score
+from experiments.contact_localization.posterior.estimate import Estimate
+from experiments.contact_localization.report.result import true_points
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
+from tests.support.sessions import score
 from tests.support.whole_run import copied, edited, rewritten, with_reading
 
 MOVED = np.array([0.03, -0.02, 0.01])
 
 
 def answered(recording: Recording) -> Answer:
-    return answer(RunFiles(recording), levels_of(chosen([])))
+    return answer(RunFiles(recording), chosen([]))
 
 
 def numbers(found: Answer) -> dict[str, Any]:
     """Every number of an answer that is not a time."""
+    each = [one for one in found.by_sense.values() if isinstance(one, Estimate)]
     return {
-        "points": [e.points for e in found.estimates],
-        "weights": [e.weights for e in found.estimates],
-        "positions": [e.position_in_object for e in found.estimates],
-        "contacts": [e.contacts for e in found.estimates],
-        "candidates": [e.candidates for e in found.estimates],
-        "credible90": [e.credible90 for e in found.estimates],
-        "area": [e.region.area for e in found.estimates],
-        "yaw": [(e.yaw, e.yaw_sigma) for e in found.estimates],
-        "modes": [[(m.position, m.weight, m.covariance) for m in e.modes] for e in found.estimates],
-        "fits": [[g.fit for g in e.gates] for e in found.estimates],
+        "points": [e.points for e in each],
+        "weights": [e.weights for e in each],
+        "positions": [e.position_in_object for e in each],
+        "contacts": [e.contacts for e in each],
+        "candidates": [e.candidates for e in each],
+        "credible90": [e.credible90 for e in each],
+        "area": [e.region.area for e in each],
+        "yaw": [(e.yaw, e.yaw_sigma) for e in each],
+        "modes": [[(m.position, m.weight, m.covariance) for m in e.modes] for e in each],
+        "fits": [[g.fit for g in e.gates] for e in each],
     }
 
 
@@ -159,4 +162,4 @@ def test_the_images_are_looked_at(done: Recording, found: Answer, tmp_path: Path
 def test_scores_are_null_without_a_truth(done: Recording, tmp_path: Path) -> None:
     scored = score(copied(done, tmp_path / "run", truth=False), chosen([]))
     assert scored.truth is None
-    assert scored.true_points is None
+    assert true_points(scored) is None

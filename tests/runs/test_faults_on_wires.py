@@ -14,17 +14,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization import run as session_of
 from harness.basics.errors import SafetyStop, TouchstoneError
-from harness.bench.device import Health
 from harness.bench.station import Bench, RunContext
 from harness.cli import invoke
+from harness.experiment import perform
+from harness.experiment.experiment import Experiment
+from harness.experiment.perform import Performed
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Progress
 from harness.recording.step_file import Step
-from harness.skills.strike import Ask
 from mocks.in_process.bench import in_process_bench
+from tests.support import sessions as session_of
 from tests.support.whole_run import Quiet, copied, edited
 
 pytestmark = [
@@ -88,28 +89,28 @@ Resume = Callable[[Recording, Cue, Callable[[Bench], dict[str, Any]]], Session]
 @pytest.fixture
 def resume(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Resume:
     """Goes on with a run by the command line, cues a fault, and looks at the bench after the failure."""
-    perform_on = session_of.perform_on
+    perform_on = perform.perform_on
 
     def go_on(recording: Recording, fault: Cue, look: Callable[[Bench], dict[str, Any]]) -> Session:
         failed: dict[str, Any] = {}
 
         def faulty(
-            bench: Bench, run: Recording, progress: Progress, ask: Ask | None = None
-        ) -> tuple[bool, dict[str, Health]]:
+            kind: Experiment, bench: Bench, run: Recording, progress: Progress, *others: Any
+        ) -> Performed:
             try:
-                return perform_on(bench, run, Cued(progress, bench, fault), ask)
+                return perform_on(kind, bench, run, Cued(progress, bench, fault), *others)
             except TouchstoneError:
                 failed.update(moved=moved_in(bench, 0.3), **look(bench))
                 raise
 
-        monkeypatch.setattr(session_of, "perform_on", faulty)
+        monkeypatch.setattr("harness.experiment.perform.perform_on", faulty)
         code = invoke(["run", "--resume", str(recording.folder), "--json"])
         captured = capsys.readouterr()
         assert "Traceback" not in captured.err
         said = json.loads(captured.out)
         assert said["exit_code"] == code
         assert "\n" not in said["error"]
-        monkeypatch.setattr(session_of, "perform_on", perform_on)
+        monkeypatch.setattr("harness.experiment.perform.perform_on", perform_on)
         return Session(code, said, failed)
 
     return go_on
@@ -144,8 +145,8 @@ def test_a_stalled_camera(resume: Resume, begun: Recording) -> None:
     assert hashes(begun) == before
     run = RunFiles(begun)
     context = RunContext(begun.truth_path, run.mesh, begun.header.seed, "default")
-    complete, _ = session_of.perform_on(in_process_bench(run.scene, run.station, context), begun, Quiet())
-    assert complete
+    bench = in_process_bench(run.scene, run.station, context)
+    assert session_of.perform_on(bench, begun, Quiet()).complete
     assert begun.committed == 3
     assert before.items() <= hashes(begun).items()
 

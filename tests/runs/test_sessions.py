@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization import run as session_of
 from harness.basics.errors import BenchFault, NotTouched, WrongUse
 from harness.bench.reading import Reading
 from harness.bench.station import Bench, RunContext
@@ -22,6 +21,7 @@ from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step
 from mocks.in_process.bench import in_process_bench
+from tests.support import sessions as session_of
 from tests.support.whole_run import Quiet, copied, edited, in_process_run, touch_scene
 
 PACKETS_APART = 0.1e-3
@@ -46,7 +46,7 @@ def cut(recording: Recording, folder: Path, steps: int) -> Recording:
 def test_a_resumed_run_reads_what_the_whole_one_read(done: Recording, tmp_path: Path, steps: int) -> None:
     stopped = cut(done, tmp_path / "run", steps)
     kept = {path: path.read_bytes() for path in (tmp_path / "run" / "steps").glob("*")}
-    complete, _ = session_of.perform_on(bench_of(stopped), stopped, Quiet())
+    complete = session_of.perform_on(bench_of(stopped), stopped, Quiet()).complete
     assert complete
     assert {path: path.read_bytes() for path in kept} == kept
     for mine, theirs in zip(stopped.steps(), done.steps(), strict=True):
@@ -78,8 +78,8 @@ def test_a_complete_run_is_resumed_without_a_bench(
     def finish(recording: Recording, *_: object) -> dict[str, Any]:
         return {"schema": 1, "warnings": [], "recording": str(recording.folder)}
 
-    monkeypatch.setattr(session_of, "open_station", open_nothing)
-    monkeypatch.setattr(session_of, "finish", finish)
+    monkeypatch.setattr("harness.experiment.perform.open_station", open_nothing)
+    monkeypatch.setattr("harness.experiment.answer.finish", finish)
     folder = copied(done, tmp_path / "run").folder
     assert invoke(["run", "--resume", str(folder), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["recording"] == str(folder)
@@ -147,7 +147,7 @@ def test_what_no_command_foresaw_is_one_sentence_too(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr(session_of, "start", fail)
+    monkeypatch.setattr("harness.experiment.begin.begin", fail)
     code = invoke(["run", "--object", "builtin:mug", "--json"])
     captured = capsys.readouterr()
     answer = json.loads(captured.out)
@@ -165,7 +165,7 @@ def test_ctrl_c_of_a_command_that_does_not_resume_does_not_send_to_resume(
     def fail(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(session_of, "finish", fail)
+    monkeypatch.setattr("harness.experiment.answer.finish", fail)
     assert invoke(["replay", str(done.folder), "--out", str(tmp_path / "replay")]) == 130
     assert capsys.readouterr().err == "error: interrupted\n"
 
@@ -176,7 +176,7 @@ def test_a_run_that_its_bench_ends_says_how_it_goes_on(
     def fail(*_: object, **__: object) -> None:
         raise BenchFault("the arm is gone")
 
-    monkeypatch.setattr(session_of, "perform_on_bench", fail)
+    monkeypatch.setattr("harness.experiment.perform.perform_on_bench", fail)
     folder = copied(done, tmp_path / "run").folder
     (folder / "steps" / "002.mcap").unlink()
     assert invoke(["run", "--resume", str(folder)]) == 1
@@ -203,7 +203,7 @@ class Pressing(Quiet):
 
 def test_ctrl_c_once_ends_after_the_step(done: Recording, tmp_path: Path) -> None:
     stopped = cut(done, tmp_path / "run", 0)
-    complete, _ = session_of.perform_on(bench_of(stopped), stopped, Pressing(at=1))
+    complete = session_of.perform_on(bench_of(stopped), stopped, Pressing(at=1)).complete
     assert not complete
     assert stopped.committed == 2
 

@@ -19,8 +19,7 @@ import cv2
 import numpy as np
 import pytest
 
-from experiments.contact_localization import run as session_of
-from experiments.contact_localization.accuracy.table import REAL, objects
+from experiments.contact_localization.accuracy.dials import chosen
 from experiments.contact_localization.accuracy.table_cell import Cell, scene_of
 from experiments.contact_localization.answer import Answer, answer
 from experiments.contact_localization.observation import Observation
@@ -32,6 +31,7 @@ from harness.bench.gap import load_gap
 from harness.bench.scene import SceneFile
 from harness.bench.station import PRESS, RunContext
 from harness.bench.station_file import load_station, station_path
+from harness.experiment.subjects import REAL, objects
 from harness.objects.household import MATERIALS
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -39,6 +39,7 @@ from mocks.camera.gelsight_stream import encode
 from mocks.in_process.bench import in_process_bench
 from mocks.lab_scene import nominal_bench
 from mocks.world.world import World
+from tests.support import sessions as session_of
 from tests.support.real_data import find_shared_data
 from tests.support.whole_run import Quiet, copied, touch_scene
 
@@ -86,19 +87,19 @@ class Side:
 def side(recording: Recording) -> Side:
     run = RunFiles(recording)
     truth = json.loads(recording.truth_path.read_text(encoding="utf-8"))
-    return Side(run, truth, answer(run, Levels(), every_contact=False))
+    return Side(run, truth, answer(run, chosen([])))
 
 
 def both(scene: SceneFile, folder: Path) -> tuple[Side, Side]:
     """Over the wires and in process, of one plan."""
     started = session_of.start(scene, load_station(station_path("mock")), SEED, GAP, folder / "wires")
     wired, simulated = started.recording, copied(started.recording, folder / "process", truth=False)
-    complete, _ = session_of.perform_on_bench(wired, Quiet())
+    complete = session_of.perform_on_bench(wired, Quiet()).complete
     assert complete
     run = RunFiles(simulated)
     context = RunContext(simulated.truth_path, run.mesh, SEED, GAP)
-    complete, _ = session_of.perform_on(in_process_bench(run.scene, run.station, context), simulated, Quiet())
-    assert complete
+    bench = in_process_bench(run.scene, run.station, context)
+    assert session_of.perform_on(bench, simulated, Quiet()).complete
     return side(wired), side(simulated)
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from experiments.contact_localization import run as session_of
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station import RunContext
 from harness.bench.station_file import load_station, station_path
@@ -15,6 +14,7 @@ from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step, StepRecord, write_step
 from mocks.in_process.bench import in_process_bench
+from tests.support import sessions as session_of
 
 
 class Quiet:
@@ -44,7 +44,7 @@ def in_process_run(folder: Path, scene: SceneFile, seed: int, gap: str = "defaul
     run = RunFiles(recording)
     context = RunContext(recording.truth_path, run.mesh, seed, gap)
     bench = in_process_bench(run.scene, run.station, context)
-    complete, _ = session_of.perform_on(bench, recording, Quiet())
+    complete = session_of.perform_on(bench, recording, Quiet()).complete
     assert complete
     return recording
 

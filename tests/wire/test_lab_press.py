@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
+from experiments.contact_localization.plan import plan_contacts
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_from_quaternion, transform
 from harness.bench.gap import load_gap
@@ -24,7 +25,7 @@ from harness.bench.station import Bench, RunContext, open_station
 from harness.bench.station_file import Station
 from harness.effects.scene_object import known_object
 from harness.recording.step_file import Step
-from harness.skills.planning import RunPlan, plan_run
+from harness.skills.planning import RunPlan
 from harness.skills.press import PressPerformer, Speeds
 from harness.twin.bench_of import way_between
 from mocks.camera.gelsight_stream import encode
@@ -57,7 +58,7 @@ def performed(bench: Bench, plan: RunPlan, truth: Path) -> Run:
 def runs(scene: SceneFile, station: Station, tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run]:
     """Over the wires, and in process."""
     mesh = known_object(scene).mesh
-    plan = plan_run(scene, station, mesh, 1)
+    plan = plan_contacts(scene, station, mesh, 1)
     folder = tmp_path_factory.mktemp("press")
     wired, simulated = folder / "wire.json", folder / "process.json"
     with open_station(station, scene, RunContext(wired, mesh, SEED, GAP)) as bench:

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.contact_localization.plan import plan_contacts
+from experiments.contact_localization.section import Localization
 from harness.basics.errors import BenchFault
 from harness.basics.mesh import Mesh
 from harness.bench.acquisition import Strike
@@ -18,7 +20,7 @@ from harness.bench.station_file import load_station
 from harness.commands.check import rest_levels
 from harness.effects.scene_object import known_object
 from harness.recording.synchronise import synchronised
-from harness.skills.planning import RunPlan, plan_run
+from harness.skills.planning import RunPlan
 from mocks.in_process.bench import in_process_bench
 from mocks.sound_card.card import why_not
 from tests.support.heard_strikes import Readings, delay, performed, strikes_on
@@ -34,8 +36,8 @@ SEED, GAP = 5, "none"
 @pytest.fixture(scope="module")
 def scene() -> SceneFile:
     read = load_scene(ROOT / "scenes" / "mug_both.toml")
-    twice = read.localization.model_copy(update={"contacts": 2})
-    return read.model_copy(update={"localization": twice})
+    twice = read.section(Localization).model_copy(update={"contacts": 2})
+    return read.with_section(twice)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +48,7 @@ def mesh(scene: SceneFile) -> Mesh:
 @pytest.fixture(scope="module")
 def plan(scene: SceneFile, mesh: Mesh) -> RunPlan:
     """Two places whose sounds only one delay explains: of a round body many pairs are refused for less."""
-    return plan_run(scene, CARD, mesh, 6)
+    return plan_contacts(scene, CARD, mesh, 6)
 
 
 @pytest.fixture(scope="module")

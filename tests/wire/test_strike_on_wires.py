@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.contact_localization.plan import plan_contacts
+from experiments.contact_localization.section import Localization
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import BenchFault
 from harness.basics.geometry import rotation_from_quaternion, transform
@@ -20,7 +22,7 @@ from harness.bench.station import STRIKE, Bench, RunContext, open_station
 from harness.bench.station_file import Station, load_station
 from harness.effects.scene_object import known_object
 from harness.recording.step_file import Step
-from harness.skills.planning import RunPlan, plan_run
+from harness.skills.planning import RunPlan
 from harness.skills.press import PressPerformer, Speeds
 from harness.skills.strike import AFTER, BEFORE, POSE
 from harness.twin.bench_of import way_between
@@ -36,8 +38,8 @@ Readings = dict[str, Reading]
 @pytest.fixture(scope="module")
 def scene() -> SceneFile:
     read = load_scene(ROOT / "scenes" / "mug_both.toml")
-    once = read.localization.model_copy(update={"contacts": 1})
-    return read.model_copy(update={"localization": once})
+    once = read.section(Localization).model_copy(update={"contacts": 1})
+    return read.with_section(once)
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +54,7 @@ def mesh(scene: SceneFile) -> Mesh:
 
 @pytest.fixture(scope="module")
 def plan(scene: SceneFile, station: Station, mesh: Mesh) -> RunPlan:
-    return plan_run(scene, station, mesh, 1)
+    return plan_contacts(scene, station, mesh, 1)
 
 
 def performed(bench: Bench, plan: RunPlan) -> Readings:

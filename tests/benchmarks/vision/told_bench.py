@@ -17,9 +17,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from experiments.contact_localization.accuracy.cases import Case, performed, workers_of
+from experiments.contact_localization.accuracy.cases import Case, performed
 from experiments.contact_localization.accuracy.solving import Models
-from experiments.contact_localization.accuracy.table import objects
 from experiments.contact_localization.accuracy.table_cell import cells
 from experiments.contact_localization.posterior.baselines import geometry_and_axis
 from experiments.contact_localization.posterior.estimate import estimate
@@ -29,6 +28,8 @@ from harness.basics.geometry import rotation_about
 from harness.basics.symmetry import find_symmetries
 from harness.bench.gap import load_gap
 from harness.bench.station_file import load_station, station_path
+from harness.experiment.costing import workers_of
+from harness.experiment.subjects import objects
 from mocks.world.gap_draw import GapDraw
 
 TOLD: Mapping[str, frozenset[str]] = {

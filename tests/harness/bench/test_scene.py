@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.contact_localization.section import Localization
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply, rotation_about
 from harness.basics.mesh import Mesh
@@ -52,7 +53,7 @@ def test_a_scene_needs_only_an_object(tmp_path: Path) -> None:
     assert scene.sensors.touch
     assert not scene.sensors.sound
     assert scene.room is None
-    assert scene.localization.depth == (0.5e-3, 2e-3)
+    assert scene.section(Localization).depth == (0.5e-3, 2e-3)
 
 
 def test_a_built_in_object_brings_its_material() -> None:

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.contact_localization.plan import plan_contacts
+from experiments.contact_localization.section import Localization
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply
 from harness.bench import kinematics
@@ -13,7 +15,7 @@ from harness.bench.scene import SceneFile, scene_from_json, scene_from_options
 from harness.bench.station_file import Station, load_station, station_from_json, station_path
 from harness.effects.scene_object import known_object
 from harness.skills import sites
-from harness.skills.planning import HOME, Itinerary, RunPlan, plan_run
+from harness.skills.planning import HOME, Itinerary, RunPlan
 from harness.skills.sites import SHORTEST_STEP
 from harness.twin.rehearsal import rehearse
 
@@ -23,7 +25,7 @@ STATION = load_station(station_path("mock"))
 
 
 def planned(scene: SceneFile, seed: int) -> RunPlan:
-    return plan_run(scene, STATION, known_object(scene).mesh, seed)
+    return plan_contacts(scene, STATION, known_object(scene).mesh, seed)
 
 
 def turned(scene: SceneFile, yaw: str) -> SceneFile:
@@ -33,7 +35,7 @@ def turned(scene: SceneFile, yaw: str) -> SceneFile:
 
 
 def assert_good(plan: RunPlan, scene: SceneFile) -> None:
-    wanted = scene.localization
+    wanted = scene.section(Localization)
     assert len(plan.sites) == len(plan.contacts) == wanted.contacts
     starts = [HOME, *(contact.stand_off_joints for contact in plan.contacts)]
     for contact, start in zip(plan.contacts, starts[:-1], strict=True):
@@ -127,7 +129,7 @@ def test_ways_stay_in_the_stations_workspace() -> None:
     free = planned(scene, 1)
     ceiling = highest(free, STATION) - 0.01
     station = lowered(f"{1e3 * ceiling:.1f} mm")
-    plan = plan_run(scene, station, known_object(scene).mesh, 1)
+    plan = plan_contacts(scene, station, known_object(scene).mesh, 1)
     assert highest(plan, station) < ceiling
     refused = rehearse(plan.bench, free.segments()).refusals
     assert refused

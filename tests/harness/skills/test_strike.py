@@ -8,6 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from experiments.contact_localization.plan import plan_contacts
+from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, WrongUse
 from harness.basics.geometry import translation
@@ -16,7 +18,7 @@ from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import STRIKE, Bench
 from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.scene_object import known_object
-from harness.skills.planning import RunPlan, plan_run
+from harness.skills.planning import RunPlan
 from harness.skills.strike import (
     AFTER,
     ATTEMPTS,
@@ -149,8 +151,8 @@ def both() -> SceneFile:
 
 @pytest.fixture(scope="module")
 def plan(both: SceneFile) -> RunPlan:
-    few = both.localization.model_copy(update={"contacts": 2})
-    return plan_run(both.model_copy(update={"localization": few}), STATION, known_object(both).mesh, 1)
+    few = both.section(Localization).model_copy(update={"contacts": 2})
+    return plan_contacts(both.with_section(few), STATION, known_object(both).mesh, 1)
 
 
 def test_every_contact_of_a_scene_with_sound_has_its_strike(plan: RunPlan) -> None:
@@ -165,9 +167,9 @@ def test_every_contact_of_a_scene_with_sound_has_its_strike(plan: RunPlan) -> No
 
 def test_a_touch_only_scene_plans_no_strike(both: SceneFile) -> None:
     silent = both.sensors.model_copy(update={"sound": False})
-    few = both.localization.model_copy(update={"contacts": 1})
+    few = both.section(Localization).model_copy(update={"contacts": 1})
     scene = both.model_copy(update={"sensors": silent, "localization": few})
-    made = plan_run(scene, STATION, known_object(scene).mesh, 1)
+    made = plan_contacts(scene, STATION, known_object(scene).mesh, 1)
     assert made.strikes == ()
     assert "strike" not in made.parameters()[0]
 

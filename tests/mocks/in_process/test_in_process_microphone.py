@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.contact_localization.plan import plan_contacts
+from experiments.contact_localization.section import Localization
 from experiments.contact_localization.sound.analysis import analyse
 from harness.basics.mesh import Mesh
 from harness.bench.acquisition import Strike, strike_from_readings
@@ -19,7 +21,7 @@ from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles, create_run, station_acquisition, station_calibration
 from harness.recording.step_file import Step
 from harness.recording.synchronise import synchronised
-from harness.skills.planning import RunPlan, plan_run
+from harness.skills.planning import RunPlan
 from mocks.in_process.bench import in_process_bench
 from mocks.in_process.microphone import DRIFT_PPM, LATENCY, WANDER
 from tests.support.heard_strikes import Readings, delay, performed, strikes_on
@@ -31,8 +33,8 @@ SEED, RATE = 5, 48e3
 @pytest.fixture(scope="module")
 def scene() -> SceneFile:
     read = load_scene(ROOT / "scenes" / "mug_both.toml")
-    thrice = read.localization.model_copy(update={"contacts": 3})
-    return read.model_copy(update={"localization": thrice})
+    thrice = read.section(Localization).model_copy(update={"contacts": 3})
+    return read.with_section(thrice)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +48,7 @@ CARD = load_station(ROOT / "stations" / "mock_sound_card.toml")
 
 @pytest.fixture(scope="module")
 def plan(scene: SceneFile, mesh: Mesh) -> RunPlan:
-    return plan_run(scene, BOX, mesh, 1)
+    return plan_contacts(scene, BOX, mesh, 1)
 
 
 def opened(scene: SceneFile, station: Station, mesh: Mesh, folder: Path) -> Bench:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.accuracy import table_cell
-from experiments.contact_localization.accuracy.table import GROSS, Row, measure, objects, rows
 from experiments.contact_localization.accuracy.table_cell import METHODS, Cell, cells, scene_of
+from experiments.contact_localization.experiment import EXPERIMENT, MEASUREMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.baselines import mean_random_error
@@ -19,6 +19,9 @@ from harness.basics.clock import now
 from harness.basics.errors import WrongUse
 from harness.basics.symmetry import find_symmetries
 from harness.bench.scene import scene_from_options
+from harness.experiment.subjects import objects
+from harness.experiment.tables import Row, measure
+from harness.experiment.tables import rows as rows_of
 
 Results = dict[Cell, Mapping[str, Any]]
 
@@ -43,8 +46,16 @@ def runs(errors: list[float], gap: str = "default", spacing: str = "close") -> R
     }
 
 
+GROSS = MEASUREMENT.gross
+
+
+def rows(results: Results) -> list[Row]:
+    return rows_of(EXPERIMENT, results)
+
+
 def row(found: list[Row], method: str, spacing: str = "close", gap: str = "default") -> Row:
-    (only,) = [r for r in found if (r.method, r.spacing, r.gap) == (method, spacing, gap)]
+    wanted = (method, spacing, gap)
+    (only,) = [r for r in found if (r.method, r.conditions["spacing"], r.conditions["gap"]) == wanted]
     return only
 
 
@@ -156,7 +167,7 @@ def test_what_is_on_the_disk_is_not_run_again(tmp_path: Path) -> None:
         written = result({"touch": 1e-3 * (1 + cell.seed)})
         (tmp_path / f"{cell.name}.json").write_text(json.dumps(written))
     before = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    found = dict(measure(wanted, objects(None), tmp_path, workers=1))
+    found = dict(measure(EXPERIMENT, wanted, objects(None), tmp_path, workers=1))
     assert [found[cell]["rows"]["touch"]["error_m"] for cell in wanted] == [1e-3, 2e-3]
     assert {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
 

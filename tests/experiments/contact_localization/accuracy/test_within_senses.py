@@ -10,7 +10,7 @@ from experiments.contact_localization.accuracy.dials import (
     needs_sound,
     setting_name,
 )
-from experiments.contact_localization.accuracy.front import Front, Target
+from experiments.contact_localization.accuracy.front import Front
 from experiments.contact_localization.accuracy.solving import Models, Setting, read, solve
 from experiments.contact_localization.accuracy.within import Run, ask
 from experiments.contact_localization.model import Model, Prior
@@ -21,6 +21,7 @@ from harness.basics.materials import Material
 from harness.bench.sensor import GELSIGHT_R15
 from harness.cost.curve import Point, Sample
 from harness.effects.accuracy import Accuracy
+from harness.experiment.experiment import Target
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples import sounding_plate as plate
 

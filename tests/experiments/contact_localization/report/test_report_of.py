@@ -3,7 +3,8 @@
 import pytest
 
 from experiments.contact_localization.posterior.levels import Levels
-from experiments.contact_localization.report.report import _by, _flat, _said
+from experiments.contact_localization.report.report import _by
+from harness.report.simulated import _flat, _said
 
 
 def test_a_tree_of_values_is_a_row_for_each_leaf() -> None:

@@ -3,23 +3,28 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.dials import chosen
+from experiments.contact_localization.accuracy.dials import KNOBS, chosen
 from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.gate import Gate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.levels import Levels
-from experiments.contact_localization.report.result import Scored, estimate_of, flags_of, levels_of_result
+from experiments.contact_localization.report.result import estimate_of, flags_of
 from harness.basics.errors import RecordingDamaged
 from harness.basics.geometry import translation
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
+from harness.effects.accuracy import Accuracy
+from harness.experiment.answer import levels_of_result
+from harness.experiment.experiment import Scored
 from harness.experiment.truth import Truth, read_truth
 from harness.recording.recording import Recording
 from tests.samples.synthetic_press import PRESSES
@@ -37,7 +42,8 @@ def answered(contacts: tuple[Contact, ...], block: Model, prior: Prior) -> Answe
     last: Estimate = locate(contacts, block, prior, QUICK, Noise())[-1]
     image = np.zeros((1, 120, 160, 3), np.uint8)
     observations = tuple(Observation(c.base_from_gel, image) for c in contacts)
-    return Answer(observations, block, prior, (last,), 0.1)
+    heights = tuple(np.zeros((120, 160)) for _ in contacts)
+    return Answer(observations, heights, block, prior, last, 0.1)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +54,8 @@ def found(contacts: tuple[Contact, ...], block: Model, prior: Prior) -> Answer:
 def scored(found: Answer, symmetry: SymmetryGroup, truth: Truth | None) -> Scored:
     """Only what the estimate by touch is made from."""
     nothing = cast(Any, None)
-    return Scored(nothing, found, found.last.position_in_object, nothing, truth, symmetry, {}, ())
+    answering = SimpleNamespace(symmetry=symmetry)
+    return Scored(nothing, answering, found, truth, Accuracy.default(KNOBS), ())
 
 
 def as_written(one: Scored) -> dict[str, Any]:
@@ -149,13 +156,13 @@ def test_a_run_without_a_truth_beside_it_has_none(tmp_path: Path) -> None:
     ["", "[]", "{}", '{"accuracy": 3}', '{"accuracy": {"old": 1}}', '{"accuracy": {"touch.gel": "x"}}'],
 )
 def test_a_result_that_does_not_say_its_levels_is_damaged(tmp_path: Path, written: str) -> None:
-    assert levels_of_result(tmp_path) == {}
+    assert levels_of_result(EXPERIMENT, tmp_path) == {}
     (tmp_path / "result.json").write_text(written)
     with pytest.raises(RecordingDamaged, match="at which levels"):
-        levels_of_result(tmp_path)
+        levels_of_result(EXPERIMENT, tmp_path)
 
 
 def test_a_result_says_the_levels_it_was_found_at(tmp_path: Path) -> None:
     levels = dict(chosen(["localization.spacing=0.0015", "localization.senses=touch"]))
     (tmp_path / "result.json").write_text(json.dumps({"accuracy": levels}))
-    assert levels_of_result(tmp_path) == levels
+    assert levels_of_result(EXPERIMENT, tmp_path) == levels

@@ -9,20 +9,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.contact_localization.accuracy.dials import SPACING
+from experiments.contact_localization.accuracy.dials import KNOBS, SPACING
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.levels import Levels
-from experiments.contact_localization.report.result import Scored
 from experiments.contact_localization.report.sound_report import contact_time, sound_of, strike_line
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import frame_facing, transform
 from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
 from harness.bench.sensor import GELSIGHT_R15
+from harness.effects.accuracy import Accuracy
+from harness.experiment.experiment import Scored
 from harness.experiment.truth import Truth
 from harness.report.sound_data import Sound
 from harness.report.values import Missing
@@ -64,9 +65,10 @@ def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True)
     )[-1]
     found = Answer(
         tuple(Observation(pose, IMAGE, strike) for pose, strike in zip(poses, strikes, strict=True)),
+        tuple(np.zeros((1, 1)) for _ in poses),
         model,
         prior,
-        (last,),
+        last,
         0.1,
         "audio",
         {"touch": FitRefused("these are not presses of this object")},
@@ -74,8 +76,8 @@ def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True)
     run = SimpleNamespace(scene=SimpleNamespace(sensors=SimpleNamespace(sound=asked)))
     truth = Truth({k: POINTS[k] for k in range(K)}, {})
     nothing = cast(Any, None)
-    accuracy = {SPACING.name: COARSE}
-    return Scored(cast(Any, run), found, POINTS[-1], nothing, truth, nothing, accuracy, ())
+    accuracy = Accuracy.default(KNOBS).with_({SPACING.name: COARSE})
+    return Scored(cast(Any, run), nothing, found, truth, accuracy, ())
 
 
 def shown(model: Model, strikes: tuple[Strike | None, ...]) -> Sound:

@@ -1,18 +1,18 @@
 """Error against seconds, and live beside simulated: what the report draws from one recording."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.solving import levels_at
+from experiments.contact_localization.accuracy.solving import levels_at, read
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.levels import Levels
-from experiments.contact_localization.report.comparison import _gels
+from experiments.contact_localization.report.comparison import object_from_gels
 from experiments.contact_localization.report.trade import LEVELS, trade
 from harness.basics.arrays import FloatArray
 from harness.sim.optics.optics import Optics
@@ -41,12 +41,13 @@ def answered(contacts: tuple[Contact, ...], block: Model, prior: Prior) -> Answe
     )
     quick = Levels(spacing=3e-3, rounds=1, samples=300)
     last = locate(contacts, block, prior, quick, Noise())[-1]
-    return Answer(observations, block, prior, (last,), 0.1)
+    return Answer(observations, tuple(heights), block, prior, last, 0.1)
 
 
 def test_every_level_is_tried_on_the_same_readings_and_scored(answered: Answer) -> None:
     true = np.array(PRESSES[-1].point)
-    points = trade(answered, true, seed=0)
+    readings = read(answered.observations, answered.model, answered.prior, seed=0)
+    points = trade(readings, true)
     assert [point.name for point in points] == list(LEVELS)
     for point in points:
         assert point.levels == ALL[point.name]
@@ -58,7 +59,7 @@ def test_every_level_is_tried_on_the_same_readings_and_scored(answered: Answer) 
 
 def test_a_gel_is_put_as_deep_behind_its_contact_as_its_image_says(answered: Answer) -> None:
     heights: FloatArray = np.array([np.full((120, 160), 1e-4 * (k + 1)) for k in range(len(PRESSES))])
-    placed = _gels(answered, heights)
+    placed = object_from_gels(replace(answered, heights=tuple(heights)))
     for k, pose in enumerate(placed):
         point = answered.last.contacts[k]
         assert pose[:3, 3] == pytest.approx(point + 1e-4 * (k + 1) * pose[:3, 2], abs=1e-12)

@@ -16,7 +16,7 @@ COMMANDS = (
     ("replay", "absent"),
     ("explain", "absent.toml"),
     ("check", "--station", "absent.toml"),
-    ("tables", "localization", "--gap", "absent.toml"),
+    ("tables", "contact-localization", "--gap", "absent.toml"),
     ("depth", "absent.png", "--calibration", "gelsight_r15_bench", "--out", "d.npz"),
     ("depth", "absent.png", "--calibration", "absent.npz", "--out", "d.npz"),
     ("object", "build", "absent.obj", "--material", "steel", "--out", "o"),
