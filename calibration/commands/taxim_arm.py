@@ -69,8 +69,8 @@ def pressed(wanted: Wanted, as_json: bool) -> Path | None:
         CONSOLE.print(f"recording to {recording.folder}", markup=False)
         how = f"touchstone calibrate taxim --resume {recording.folder}"
         with resumable(how), _progress(recording.committed, total) as told:
-            complete, _ = perform_on_bench(recording, told, told.say)
-        if not complete:
+            done = perform_on_bench(recording, told, told.say)
+        if not done.complete:
             _stopped(recording, as_json)
             return None
     return recording.folder
@@ -78,15 +78,12 @@ def pressed(wanted: Wanted, as_json: bool) -> Path | None:
 
 def _recording(wanted: Wanted) -> "Recording":
     from calibration.taxim.arm.record import NAME
+    from harness.experiment.lookup import require_of
     from harness.recording.recording import Recording
 
     if wanted.resume is not None:
         recording = Recording(wanted.resume)
-        if recording.header.experiment != NAME:
-            raise WrongUse(
-                f"--resume {wanted.resume}: a run of {recording.header.experiment}; resume it with its own "
-                "command"
-            )
+        require_of(recording, NAME, "--resume")
         return recording
     return _begun(wanted)
 

@@ -10,7 +10,7 @@ from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.scene_object import KnownObject, known_object
 from harness.experiment.compare import require_sources
-from harness.experiment.experiment import Experiment, Planned
+from harness.experiment.experiment import Experiment, Planned, Procedure
 from harness.experiment.lookup import runs_folder
 from harness.recording.recording import Recording, require_unused
 from harness.recording.run_folder import create_run, station_acquisition, station_calibration
@@ -26,7 +26,7 @@ class Begun:
 
 
 def begin(
-    experiment: Experiment,
+    procedure: Procedure,
     scene: SceneFile,
     station: Station,
     seed: int | None = None,
@@ -36,7 +36,7 @@ def begin(
     """Take in the object, plan and rehearse every step, make the run's folder.
 
     Args:
-        experiment: which.
+        procedure: an experiment, or what a calibration does.
         scene: on the table.
         station: the bench.
         seed: of all that is drawn; the scene's where None.
@@ -54,24 +54,27 @@ def begin(
         raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")
     mock = None
     if station.mock is not None:
-        mock = {"gap": lasting_name(gap or experiment.gap or station.mock.gap)}
+        mock = {"gap": lasting_name(gap or procedure.gap or station.mock.gap)}
     known = known_object(scene)
     calibration, acquisition = station_calibration(station), station_acquisition(scene, station)
-    require_sources(experiment, scene, station, calibration)
-    section = scene.section(experiment.section)
-    seed = section.seed if seed is None else seed
-    plan = experiment.plan(scene, station, known.mesh, seed)
+    if isinstance(procedure, Experiment):
+        require_sources(procedure, scene, station, calibration)
+    if procedure.section is not None:
+        section = scene.section(procedure.section)
+        scene, seed = scene.with_section(section), section.seed if seed is None else seed
+    seed = 0 if seed is None else seed
+    plan = procedure.plan(scene, station, known.mesh, seed)
     described = {
-        experiment.plan_key: list(plan.steps),
+        procedure.plan_key: list(plan.steps),
         **plan.described,
         "warnings": [*known.warnings, *plan.rehearsal.warnings],
     }
     stamp = dt.datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
-    where = folder or runs_folder(experiment.name, scene.object.name, stamp)
+    where = folder or runs_folder(procedure.name, scene.object.name, stamp)
     recording = create_run(
         where,
-        experiment.name,
-        scene.with_section(section),
+        procedure.name,
+        scene,
         station,
         known.mesh,
         calibration,

@@ -256,18 +256,36 @@ class Budgets(Protocol):
         """The same for people."""
 
 
-@dataclass(frozen=True, eq=False)
-class Experiment:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Procedure:
+    """What an arm is to do at a bench, whatever is made of the readings: an experiment's or a calibration's.
+
+    Attributes:
+        name: in run folders, and on the command line.
+        step: what a step is called: ``"contact"``.
+        section: the model of its table in a scene file; None where it has none.
+        plan: chooses the steps and rehearses them.
+        performer: of the steps, at an open bench.
+        plan_key: where ``run.json`` keeps the steps.
+        gap: of a mocked bench where none is asked for; None for the station's.
+    """
+
+    name: str
+    step: str
+    section: type[Section] | None = None
+    plan: Callable[[SceneFile, Station, Mesh, int], Planned]
+    performer: Callable[[RunFiles, Helpers], Performer]
+    plan_key: str = "steps"
+    gap: str | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Experiment(Procedure):
     """One kind of question that a bench is asked.
 
     Attributes:
-        name: on the command line and in run folders.
         title: of its report.
-        step: what a step is called: ``"contact"``.
-        section: the model of its table in a scene file.
         knobs: every dial that its answer and its comparison have.
-        plan: chooses the steps and rehearses them.
-        performer: of the steps, at an open bench.
         answering: of a run, at an accuracy.
         result: the answer as JSON values, keys with their units, with ``seconds`` and ``warnings``.
         lines: the answer for people, from the whole result.
@@ -276,17 +294,10 @@ class Experiment:
         report: writes the page of a scored run; None for the plain page of every experiment.
         budgets: answers to a budget or an error; None where it cannot.
         measurement: for tables and cost; None where it has none.
-        plan_key: where ``run.json`` keeps the steps.
-        gap: of a mocked bench where none is asked for; None for the station's.
     """
 
-    name: str
     title: str
-    step: str
-    section: type[Section]
     knobs: tuple[Knob, ...]
-    plan: Callable[[SceneFile, Station, Mesh, int], Planned]
-    performer: Callable[[RunFiles, Helpers], Performer]
     answering: Callable[[RunFiles, Accuracy], Answering]
     result: Callable[[Scored], dict[str, Any]]
     lines: Callable[[Mapping[str, Any]], list[str]]
@@ -295,8 +306,6 @@ class Experiment:
     report: Callable[[Scored, Any, Mapping[str, Health] | None, Path], Path] | None = None
     budgets: Budgets | None = None
     measurement: Measurement | None = None
-    plan_key: str = "steps"
-    gap: str | None = None
 
     @property
     def own_knobs(self) -> tuple[Knob, ...]:

@@ -10,7 +10,7 @@ from harness.basics.errors import FitRefused, WrongUse
 from harness.bench.device import Health
 from harness.bench.station import Bench, RunContext, open_station
 from harness.effects.accuracy import Accuracy
-from harness.experiment.experiment import Answering, Experiment, Helpers
+from harness.experiment.experiment import Answering, Experiment, Helpers, Procedure
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Progress, perform
@@ -39,13 +39,13 @@ class Performed:
     ended: float | None = None
 
 
-def steps_planned(experiment: Experiment, recording: Recording) -> int:
+def steps_planned(procedure: Procedure, recording: Recording) -> int:
     """How many steps the run was planned with."""
-    return len(recording.header.plan[experiment.plan_key])
+    return len(recording.header.plan[procedure.plan_key])
 
 
 def perform_on_bench(
-    experiment: Experiment,
+    procedure: Procedure,
     recording: Recording,
     progress: Progress,
     ask: Ask | None = None,
@@ -58,7 +58,7 @@ def perform_on_bench(
     object whose modes cannot be found is refused while the arm still stands.
 
     Args:
-        experiment: that the run is of.
+        procedure: that the run is of.
         recording: of the run.
         progress: is told of each step.
         ask: shows a person what to do, where the station has one strike; None where nobody is there.
@@ -79,15 +79,17 @@ def perform_on_bench(
     if by_hand(run.scene, run.station):
         somebody(ask)
     ahead = ThreadPoolExecutor(1, "model")
-    answering = None if accuracy is None else ahead.submit(experiment.answering, run, accuracy)
+    answering = None
+    if accuracy is not None and isinstance(procedure, Experiment):
+        answering = ahead.submit(procedure.answering, run, accuracy)
     ahead.shutdown(wait=False)  # a bench that does not open says so at once
     with open_station(run.station, run.scene, context) as bench:
         made = None if answering is None else answering.result()
-        return perform_on(experiment, bench, recording, progress, ask, made, say)
+        return perform_on(procedure, bench, recording, progress, ask, made, say)
 
 
 def perform_on(
-    experiment: Experiment,
+    procedure: Procedure,
     bench: Bench,
     recording: Recording,
     progress: Progress,
@@ -102,7 +104,7 @@ def perform_on(
         for record in recording.steps():
             answering.read(record)
     told = _Reading(progress, recording, answering)
-    complete = perform(experiment.performer(run, helpers), bench, recording, bench.arm.stop, told)
+    complete = perform(procedure.performer(run, helpers), bench, recording, bench.arm.stop, told)
     return Performed(complete, health_of(bench), answering, told.last)
 
 

@@ -148,7 +148,8 @@ def radius99(found: Estimate) -> float:
     """Metres, of 99 answers in a hundred, of a Gaussian on a surface: one in ten is beyond ``credible90``.
 
     A region of nine tenths misses one true place in ten as well: what one run of a seed is held to, on any
-    machine, is this; how many regions hold their place is counted by ``touchstone tables contact-localization``.
+    machine, is this; how many regions hold their place is counted by
+    ``touchstone tables contact-localization``.
     """
     return float(np.sqrt(2.0) * found.credible90)
 

@@ -166,7 +166,7 @@ MUG = ("run", "--object", "builtin:mug")
         (["explain", "nowhere.toml"], ("nowhere.toml",)),
         (["check", "--station", "mok"], ("did you mean 'mock'?",)),
         (["mock-lab", "--object", "builtin:mag"], ("did you mean 'mug'?",)),
-        (["tables", "localization", "--only", "mag"], ("did you mean 'mug'?",)),
+        (["tables", "contact-localization", "--only", "mag"], ("did you mean 'mug'?",)),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )

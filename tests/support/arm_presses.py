@@ -5,13 +5,14 @@ from pathlib import Path
 import numpy as np
 
 from calibration.taxim.arm.plan import PressSettings
-from calibration.taxim.arm.session import BALL, Begun, ball_scene, begin, perform_on
+from calibration.taxim.arm.session import BALL, ball_scene, begin, perform_on
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.bench.device import Health, TactileCamera
 from harness.bench.gap import gap_path, load_gap
 from harness.bench.reading import Reading
 from harness.bench.station import Bench, RunContext
 from harness.bench.station_file import load_station, station_path
+from harness.experiment.begin import Begun
 from harness.recording.codecs import decode_jpeg
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -42,7 +43,7 @@ def opened(recording: Recording) -> Bench:
 def performed(folder: Path, presses: int = 15, seed: int = 1, gap: str | None = None) -> Recording:
     """A whole run."""
     recording = begun(folder, presses, seed, gap).recording
-    complete, _ = perform_on(opened(recording), recording, Quiet())
+    complete = perform_on(opened(recording), recording, Quiet()).complete
     assert complete
     return recording
 

@@ -250,7 +250,7 @@ def _describe(kind: Any, begun: Any, accuracy: Any) -> None:
     from harness.recording.run_folder import RunFiles
 
     run = RunFiles(begun.recording)
-    wanted = run.scene.section(kind.section)
+    wanted = None if kind.section is None else run.scene.section(kind.section)
     CONSOLE.print(
         f"{run.scene.object.name}: {len(run.mesh.faces)} faces, "
         f"longest side {1e3 * (run.mesh.bounds[1] - run.mesh.bounds[0]).max():.0f} mm; "
@@ -268,7 +268,7 @@ def _describe(kind: Any, begun: Any, accuracy: Any) -> None:
 
 
 def _spaced(section: Any) -> str:
-    spacing = vars(section).get("spacing")
+    spacing = None if section is None else vars(section).get("spacing")
     return "" if spacing is None else f", {spacing}"
 
 

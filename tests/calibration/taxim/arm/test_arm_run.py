@@ -189,7 +189,7 @@ def test_a_light_that_fades_stops_the_run_between_two_presses_and_says_so(tmp_pa
 def test_a_little_drift_is_told_and_goes_on(tmp_path: Path) -> None:
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
-    complete, _ = perform_on(replace(bench, gel=Creeping(bench.gel, fades=0.1)), recording, Quiet())
+    complete = perform_on(replace(bench, gel=Creeping(bench.gel, fades=0.1)), recording, Quiet()).complete
     assert complete
     run = read_arm_run(recording.folder)
     assert 4.0 < run.drift < 40.0
@@ -229,7 +229,7 @@ def test_a_run_stopped_at_any_press_goes_on_there_and_reads_the_same(tmp_path: P
     kept = [path.read_bytes() for path in sorted((recording.folder / "steps").glob("*.mcap"))]
     again = Recording(recording.folder)
     assert again.committed == 9
-    complete, _ = perform_on(opened(again), again, Quiet())
+    complete = perform_on(opened(again), again, Quiet()).complete
     assert complete
     now = [path.read_bytes() for path in sorted((recording.folder / "steps").glob("*.mcap"))]
     assert now[:9] == kept
@@ -265,7 +265,7 @@ def test_a_killed_run_loses_no_press_and_goes_on(tmp_path: Path) -> None:
         child.wait()
     before = recording.committed
     assert 4 <= before < 18
-    complete, _ = perform_on(opened(recording), recording, Quiet())
+    complete = perform_on(opened(recording), recording, Quiet()).complete
     assert complete
     assert len(read_arm_run(recording.folder).taken) == 15
     # What was being written when it was killed is not taken for a step.
