@@ -176,7 +176,7 @@ class MockLab:
             np.savez(mesh, vertices=self._mesh.vertices, faces=self._mesh.faces)
         told = {
             "schema": _SCHEMA,
-            "scene": self._scene.model_dump(mode="json"),
+            "scene": self._scene.without_sections().model_dump(mode="json"),
             "station": self._station.model_dump(mode="json"),
             "mesh": None if mesh is None else str(mesh),
             "base_from_object": self._scene.base_from_object(self._mesh).tolist(),

@@ -221,6 +221,11 @@ class SceneFile(StrictModel):
         found = vars(self).get(model.table)
         return found if isinstance(found, model) else model()
 
+    def without_sections(self) -> "SceneFile":
+        """What is on the table alone, for whoever knows no experiment."""
+        own = {name: vars(self)[name] for name in SceneFile.model_fields}
+        return SceneFile.model_construct(**own)
+
     def with_section(self, section: Section) -> "SceneFile":
         """The scene with another table of an experiment."""
         tree = self.model_dump(mode="json", by_alias=True)

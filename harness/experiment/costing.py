@@ -95,7 +95,11 @@ def measure(
             for cell in cells:
                 points = known[cell]
                 if points is None:
-                    points = _measured(experiment, cases.pop(cell), work, say) if cell in cases else []
+                    points = []
+                    if cell in cases:
+                        case = cases.pop(cell)
+                        points = _measured(experiment, case, work, say)
+                        case.close()
                     tree: dict[str, Any] = {**stamp, "work": _work_json(work)}
                     tree["points"] = [_one_json(p) for p in points]
                     write_text_whole(folder / f"{cell.name}.json", json.dumps(tree, allow_nan=False))
@@ -109,7 +113,7 @@ def _measured(experiment: Experiment, case: Case, work: Work, say: Say) -> list[
     try:
         for count, setting in asked:
             sample = case.sample(setting, count)
-            points.append(_point(experiment, setting, {**condition, f"{experiment.step}s": count}, sample))
+            points.append(_point(experiment, setting, {**condition, experiment.plural: count}, sample))
     except TouchstoneError as error:
         say(f"{case.cell.name} was not answered: {error}")
         return []

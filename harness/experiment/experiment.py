@@ -161,6 +161,9 @@ class Case(Protocol):
     def sample(self, setting: Setting, steps: int) -> Sample:
         """The error and the seconds of an answer from the first steps."""
 
+    def close(self) -> None:
+        """It is not answered again; what it keeps on the disk can go."""
+
 
 Say = Callable[[str], None]
 
@@ -277,6 +280,11 @@ class Procedure:
     performer: Callable[[RunFiles, Helpers], Performer]
     plan_key: str = "steps"
     gap: str | None = None
+
+    @property
+    def plural(self) -> str:
+        """Of what a step is called."""
+        return f"{self.step}{'es' if self.step.endswith(('s', 'x', 'ch')) else 's'}"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -29,7 +29,7 @@ class RunPage:
         title: what was asked, of what.
         lines: the answer for people.
         values: the answer by name, as text.
-        step: what a step is called.
+        step: what steps are called.
         steps: how many.
         object_name: as the operator calls it.
         material: of the object.
@@ -103,7 +103,7 @@ def page_of(
             experiment.lines({**result, "object": run.scene.object.name, "mock": header.mock is not None})
         ),
         values=tuple(_flat(result)),
-        step=experiment.step,
+        step=experiment.plural,
         steps=run.recording.committed,
         object_name=run.scene.object.name,
         material=run.scene.object.material,

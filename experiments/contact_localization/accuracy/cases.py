@@ -57,6 +57,9 @@ class Case:
         """How many contacts were made."""
         return len(self.run.observations)
 
+    def close(self) -> None:
+        """Nothing: a case is in memory alone."""
+
     def readings(self, setting: Setting) -> Readings:
         """As a setting takes them; timed on their second reading, when kernels are loaded."""
         images = needs_images(setting)

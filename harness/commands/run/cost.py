@@ -96,7 +96,7 @@ def cost(
             curve = joined(kind, old, curve)
     save(curve, path)
     save(curve, out / "curve.json")
-    page = write_cost_page(curve, (), _styled(kind), f"{kind.step}s", out)
+    page = write_cost_page(curve, (), _styled(kind), kind.plural, out)
     result = _result(curve, path, page)
     if json:
         emit(result)

@@ -254,7 +254,7 @@ def _describe(kind: Any, begun: Any, accuracy: Any) -> None:
     CONSOLE.print(
         f"{run.scene.object.name}: {len(run.mesh.faces)} faces, "
         f"longest side {1e3 * (run.mesh.bounds[1] - run.mesh.bounds[0]).max():.0f} mm; "
-        f"{len(begun.plan.steps)} {kind.step}s{_spaced(wanted)}; station {run.station.title}"
+        f"{len(begun.plan.steps)} {kind.plural}{_spaced(wanted)}; station {run.station.title}"
     )
     CONSOLE.print(
         f"rehearsed in the twin: {begun.plan.rehearsal.segments} motions, none refused; "

@@ -1,0 +1,115 @@
+"""A toy experiment: how high did the gel stand when it touched? By the arm's last pose alone."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import inverse, rotation_from_quaternion, transform
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile, Section
+from harness.bench.station_file import Station
+from harness.effects.accuracy import Accuracy, Knob
+from harness.effects.catalogue import EFFECTS
+from harness.effects.effect import knobs_of
+from harness.experiment.experiment import Experiment, Helpers, Planned, Scored
+from harness.experiment.plain import Answered, plain_measurement
+from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import StepRecord
+from harness.skills.planning import Wanted, plan_run
+from harness.skills.press import PressPerformer
+from harness.skills.sites import Presses
+from harness.twin.bench_of import way_between
+
+STRIDE = Knob("toy.stride", (8, 1), "poses", "number", 1, "every how manieth pose is read")
+
+
+class Toy(Section):
+    """Its table in a scene: how many presses."""
+
+    table: ClassVar[str] = "toy"
+    presses: int = 2
+
+
+def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
+    """Contacts all over the object."""
+    wanted = Wanted(scene.section(Toy).presses, "spread", Presses())
+    made = plan_run(scene, station, mesh, seed, wanted)
+    return Planned(made.parameters(), made.rehearsal, made.bench)
+
+
+def performer(_run: RunFiles, helpers: Helpers) -> PressPerformer:
+    """As any contact is pressed."""
+    return PressPerformer(partial(way_between, helpers.twin), plan_key="steps")
+
+
+@dataclass
+class Answering:
+    """Where the gel was at each press."""
+
+    run: RunFiles
+    accuracy: Accuracy
+
+    def __post_init__(self) -> None:
+        self.poses: list[FloatArray] = []
+        self.seconds = 0.0
+
+    def read(self, record: StepRecord) -> None:
+        """The last pose of a step that was read, as the gel's."""
+        start = time.perf_counter()
+        pose = record.readings["arm.base_from_flange"].values[:: int(self.accuracy[STRIDE.name])][-1]
+        flange = transform(rotation_from_quaternion(pose[3:]), pose[:3])
+        self.poses.append(flange @ self.run.station.flange_from_gel)
+        self.seconds += time.perf_counter() - start
+
+    def answer(self) -> Answered:
+        """The height of the last touch, m in base."""
+        return Answered(float(self.poses[-1][2, 3]), self.seconds)
+
+
+def result(scored: Scored) -> dict[str, Any]:
+    """Its height, and how far off it is."""
+    truth = scored.truth
+    error = None if truth is None else abs(scored.found.value - true_height(scored))
+    return {"height_m": scored.found.value, "error_m": error, "seconds": scored.found.seconds, "warnings": []}
+
+
+def true_height(scored: Scored) -> float:
+    """m in base, of the last true contact."""
+    assert scored.truth is not None
+    run, last = scored.run, max(scored.truth.points)
+    point = np.append(scored.truth.points[last], 1.0)
+    return float((run.scene.base_from_object(run.mesh) @ point)[2])
+
+
+def lines(result: Mapping[str, Any]) -> list[str]:
+    """One line."""
+    return [f"toy: touched at {1e3 * result['height_m']:.0f} mm"]
+
+
+def sources(scored: Scored) -> Mapping[str, Any]:
+    """Where the gel was."""
+    run = scored.run
+    gels: Sequence[FloatArray] = scored.answering.poses
+    return {"contact.gel_from_object": inverse(np.array(gels)) @ run.scene.base_from_object(run.mesh)}
+
+
+EXPERIMENT = Experiment(
+    name="toy",
+    title="Toy",
+    step="press",
+    section=Toy,
+    knobs=(STRIDE, *knobs_of(EFFECTS)),
+    plan=plan,
+    performer=performer,
+    answering=Answering,
+    result=result,
+    lines=lines,
+    sources=sources,
+    gives=("contact.gel_from_object",),
+    measurement=plain_measurement("toy", STRIDE),
+)
