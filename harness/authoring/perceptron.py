@@ -29,11 +29,11 @@ def dense_layers(
     for index in range(depth + 1):
         taken = given + (encoded if index and index == skip else 0)
         given = width if index < depth else outputs
-        layers.append(dense_layer(taken, given, random))
+        layers.append(_dense_layer(taken, given, random))
     return layers
 
 
-def dense_layer(taken: int, given: int, random: np.random.Generator) -> nn.Linear:
+def _dense_layer(taken: int, given: int, random: np.random.Generator) -> nn.Linear:
     """Weights normal of variance ``2 / taken`` (He et al., ICCV 2015), biases zero."""
     layer = nn.Linear(taken, given)
     weight = random.standard_normal((given, taken)) * np.sqrt(2.0 / taken)

@@ -51,22 +51,19 @@ def train(training: Resumable, epochs: int, checkpoint: Path, report: Report) ->
 
 
 class Laps:
-    """Seconds of parts that follow each other.
-
-    Args:
-        now: s, on the clock or of the processor.
+    """Seconds on the clock of parts that follow each other.
 
     Attributes:
         seconds: of each part.
     """
 
-    def __init__(self, now: Callable[[], float] = time.perf_counter) -> None:
+    def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
-        self._now, self._since = now, now()
+        self._since = time.perf_counter()
 
     def lap(self, part: str) -> None:
         """What passed since the last lap belongs to ``part``."""
-        now = self._now()
+        now = time.perf_counter()
         self.seconds[part], self._since = now - self._since, now
 
 

@@ -30,7 +30,7 @@ OPAQUE = 40.0
 _LAMPS = 1 << 14
 """That are drawn from, for networks that are told visibility."""
 
-LAMPS_OF_A_PLACE = 4
+_LAMPS_OF_A_PLACE = 4
 """Of networks that are not: a ray for each."""
 
 _CHUNK = 1 << 16
@@ -79,7 +79,7 @@ def draw_for(
     ``draw_lamps`` for the rest.
     """
     told = kind == "osf-v"
-    lessons = draw_lessons(lit, count, voxel, seed, held_out, 0 if told else LAMPS_OF_A_PLACE)
+    lessons = draw_lessons(lit, count, voxel, seed, held_out, 0 if told else _LAMPS_OF_A_PLACE)
     return lessons, draw_lamps(_LAMPS if told else 0, seed, held_out)
 
 

@@ -12,8 +12,7 @@ import numpy as np
 from harness.authoring.object_source import PartRequest, created_object, provenance_of, source_of
 from harness.authoring.training import Report
 from harness.authoring.vision.profiles import vision_profile
-from harness.authoring.vision.teacher import require_torch
-from harness.authoring.vision.vision import AuthoredVision, Teaching, author_vision, checkpoints
+from harness.authoring.vision.vision import AuthoredVision, author_vision, checkpoints
 from harness.basics.mesh import Mesh
 from harness.bench.scene import BUILTIN
 from harness.objectfile.entries import Source
@@ -47,7 +46,6 @@ def build_vision(
     out: Path,
     report: Report,
     threads: int | None = None,
-    teaching: Teaching = "none",
     finish: bool = False,
 ) -> BuiltVision:
     """Build an object's look, or go on with a training that was stopped.
@@ -57,18 +55,15 @@ def build_vision(
         out: the ObjectFile's folder; one that is there keeps its other modalities and its mesh.
         report: told of progress.
         threads: of a training; None for as many as the process has cores.
-        teaching: whether a teacher is made and measured beside, or for the networks to learn from.
-        finish: whether all learn from pictures then, in a profile that does not say so itself.
+        finish: whether they learn from pictures then, in a profile that does not say so itself.
 
     Raises:
-        WrongUse: options that cannot be, a teacher without torch among them.
+        WrongUse: options that cannot be.
         MeshRefused: a mesh that cannot stand for an object.
         DataRefused: a checkpoint or an ObjectFile in the folder that is of something else.
     """
     named = vision_profile(wanted.profile)
     chosen = named.finished() if finish else named
-    if teaching != "none":
-        require_torch()
     begun = time.perf_counter()
     report("reading the mesh and its colours", 0.0)
     source = source_of(wanted.mesh, wanted.licence)
@@ -76,7 +71,7 @@ def build_vision(
     look = appearance_of(wanted.mesh, taken.units)
     created = created_object(wanted.mesh, wanted.licence, wanted.material, taken.mesh, out, source)
     read = time.perf_counter() - begun
-    vision = author_vision(look, chosen, wanted.seed, out, report, threads, teaching)
+    vision = author_vision(look, chosen, wanted.seed, out, report, threads)
     begun = time.perf_counter()
     report("writing", 1.0)
     part = VisionPart(

@@ -4,16 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from harness.authoring.vision.finish_profiles import CellsFinish, TeacherFinish
-from harness.authoring.vision.teacher_profiles import (
-    SMOKE_TEACHERS,
-    STANDARD_TEACHERS,
-    TeacherSpec,
-)
+from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.basics.errors import WrongUse
 from harness.basics.toml_file import nearest
 from harness.objectfile.vision.network.network import CELLS, PAPER, NetworkSize
-from harness.objectfile.vision_tensors import Kind
 
 
 @dataclass(frozen=True)
@@ -67,8 +61,7 @@ class VisionProfile:
         pictures: kept back, by which they are judged.
         side: pixels of those pictures.
         samples: a side of a pixel of the reference.
-        teachers: large networks that are made beside where that is asked for, one of a kind.
-        finish: what all learn from pictures then; None for nothing.
+        finish: what they learn from pictures then; None for nothing.
     """
 
     networks: CellsSpec
@@ -76,7 +69,6 @@ class VisionProfile:
     strict: CellsSpec | None = None
     side: int = 256
     samples: int = 4
-    teachers: tuple[TeacherSpec, ...] = SMOKE_TEACHERS
     finish: CellsFinish | None = None
 
     def __post_init__(self) -> None:
@@ -92,19 +84,7 @@ class VisionProfile:
 
     def finished(self) -> "VisionProfile":
         """The same, with what learns from the surface alone finished on pictures."""
-        teachers = tuple(replace(each, finish=each.finish or TeacherFinish()) for each in self.teachers)
-        return replace(self, finish=self.finish or CellsFinish(), teachers=teachers)
-
-    def teacher(self, kind: Kind) -> TeacherSpec:
-        """The teacher of a kind.
-
-        Raises:
-            WrongUse: there is none.
-        """
-        for spec in self.teachers:
-            if spec.kind == kind:
-                return spec
-        raise WrongUse(f"this profile of vision has no teacher of kind {kind!r}; take another profile")
+        return replace(self, finish=self.finish or CellsFinish())
 
 
 _COMPACT = NetworkSize(width=32, octaves=6, turns=3, kind="osf-v")
@@ -115,17 +95,15 @@ VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
         CellsSpec(_COMPACT, places=4_000_000, steps=20_000, batch=128),
         pictures=12,
         strict=CellsSpec(replace(_COMPACT, kind="osf"), places=8_000_000),
-        teachers=STANDARD_TEACHERS,
     ),
     "paper": VisionProfile(
         CellsSpec(replace(PAPER, kind="osf-v"), places=4_000_000, steps=10_000, batch=128),
         pictures=12,
         strict=CellsSpec(PAPER, places=8_000_000),
-        teachers=STANDARD_TEACHERS,
     ).finished(),
 })  # fmt: skip
 """``paper`` has networks of ObjectFolder 2.0's size, finished on pictures as those are; its strict ones are
-those, told no more. None of them needs torch, teachers aside."""
+those, told no more. None of them needs torch."""
 
 
 def vision_profile(name: str) -> VisionProfile:

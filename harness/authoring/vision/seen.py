@@ -8,8 +8,7 @@ import numpy as np
 
 from harness.authoring.training import Report
 from harness.authoring.vision.data import HeldOut, draw_views
-from harness.authoring.vision.finish_profiles import PictureSet
-from harness.authoring.vision.teacher_pictures import Answers, TeacherRenderer
+from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.cores import own_cores
 from harness.basics.mesh import Mesh
@@ -18,7 +17,6 @@ from harness.objectfile.vision.network.network import VisionGrid
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.samples import Asker, Samples, Scene
 from harness.objectfile.vision.settings import RenderSettings, VisionLevel
-from harness.objectfile.vision_tensors import Kind
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.direct_image import LitObject
@@ -72,7 +70,7 @@ def together(parts: Sequence[SeenRays]) -> SeenRays:
 
 def pictures_to_learn(
     lit: LitObject,
-    wanted: PictureSet,
+    wanted: CellsFinish,
     seed: int,
     held_out: HeldOut,
     report: Report,
@@ -107,11 +105,19 @@ def pictures_to_learn(
     return found
 
 
-class Recording(VisionRenderer):
-    """Draws, and keeps what it asked; of one thread."""
+class RayRecorder(VisionRenderer):
+    """Draws, and keeps what it asked; of one thread.
+
+    Args:
+        data: of ``vision.onnx``.
+        mesh: of the object, in metres.
+    """
 
     _keeper: "_Keeper | None" = None
     _drawn: Outline | None = None
+
+    def __init__(self, data: bytes, mesh: Mesh) -> None:
+        super().__init__(data, mesh, threads=1)
 
     def _outline(self, camera: Pinhole, chosen: RenderSettings) -> Outline:
         self._drawn = super()._outline(camera, chosen)
@@ -136,25 +142,6 @@ class Recording(VisionRenderer):
         if not keeper.scenes:
             return _none_of(self.model.weights.size.extras)
         return _of_pixels(keeper, self._drawn.pixels, light, exact)
-
-
-class RayRecorder(Recording):
-    """Of tiny networks.
-
-    Args:
-        data: of ``vision.onnx``.
-        mesh: of the object, in metres.
-    """
-
-    def __init__(self, data: bytes, mesh: Mesh) -> None:
-        super().__init__(data, mesh, threads=1)
-
-
-class TeacherRecorder(Recording, TeacherRenderer):
-    """Of one large network; arguments as of ``TeacherRenderer``."""
-
-    def __init__(self, ask: Answers, mesh: Mesh, grid: VisionGrid, kind: Kind, density_scale: float) -> None:
-        super().__init__(ask, mesh, grid, kind, density_scale, threads=1)
 
 
 class _Keeper:

@@ -1,35 +1,23 @@
 """From a look to its tiny networks, and what they are worth in pictures that they never saw.
 
 Every network is trained on its own: regressed on what leaves places of the surface, without noise and
-without a picture being drawn (``vision_lessons``). Nothing is distilled unless that is asked for: the surface
-itself answers sooner than any network that would stand for it, and exactly. Pictures come last, where the
-profile has them (``vision_finish``).
+without a picture being drawn (``vision_lessons``). Nothing is distilled: the surface itself answers exactly.
+Pictures come last, where the profile has them (``vision_finish``).
 """
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
 
 from harness.authoring.training import Laps, Report, train
 from harness.authoring.vision.cells import CellTraining
 from harness.authoring.vision.data import HeldOut, held_out_pictures
-from harness.authoring.vision.distilled import distilled, with_lamps
 from harness.authoring.vision.finish import CellFinishing
 from harness.authoring.vision.finish_profiles import CellsFinish
-from harness.authoring.vision.lessons import LAMPS_OF_A_PLACE, OPAQUE, draw_for
+from harness.authoring.vision.lessons import OPAQUE, draw_for
 from harness.authoring.vision.metrics import network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision.profiles import CellsSpec, VisionProfile
 from harness.authoring.vision.seen import Exact, pictures_to_learn
-from harness.authoring.vision.teacher import (
-    MadeTeacher,
-    finished_file,
-    made_teacher,
-    require_torch,
-    teacher_file,
-)
-from harness.authoring.vision.teacher_pictures import Answers
-from harness.authoring.vision.teacher_profiles import TeacherSpec
 from harness.objectfile.vision.network.graph import vision_graph
 from harness.objectfile.vision.network.network import VisionModel
 from harness.objectfile.vision.render import VisionRenderer
@@ -46,14 +34,8 @@ STRICT = "strict_"
 
 STRICT_CHECKPOINT = ".vision_strict_training.npz"
 
-TEACHER = "teacher_"
-"""Before the names of errors and times of a teacher."""
-
 UNFINISHED = "unfinished_"
 """Before the names of errors that networks had before they were finished on pictures."""
-
-Teaching = Literal["none", "beside", "distilled"]
-"""Whether a teacher is made: to be measured, or for networks to learn from it in the surface's stead."""
 
 Settings = dict[str, str | float | int | bool | None]
 
@@ -84,7 +66,6 @@ def author_vision(
     folder: Path,
     report: Report,
     threads: int | None = None,
-    teaching: Teaching = "none",
 ) -> AuthoredVision:
     """Make and measure the networks of one object's look.
 
@@ -92,20 +73,15 @@ def author_vision(
         look: of the object.
         profile: which networks.
         seed: of all that is drawn: pictures kept back, places, lamps, first weights.
-        folder: where checkpoints are kept, a teacher's beside it (``teacher_file``); a training that was
-            killed goes on from them, to the same bits.
+        folder: where checkpoints are kept; a training that was killed goes on from them, to the same bits.
         report: told of progress.
         threads: None for as many as the process has cores; the networks are the same for any number.
-        teaching: whether a teacher of each kind is made and measured too; it needs torch.
 
     Raises:
         MeshRefused: a surface without extent.
         OutOfDomain: nothing of the surface can be seen from outside.
         DataRefused: a checkpoint in the folder that cannot be gone on from.
-        WrongUse: a teacher where torch is not installed, or of a kind that the profile has none of.
     """
-    if teaching != "none":
-        require_torch()
     clock, lit = Laps(), LitObject(look)
     held_out = held_out_pictures(look.mesh, profile.pictures, profile.side, profile.side, seed)
     references = reference_pictures(lit, held_out, profile.samples)
@@ -113,16 +89,11 @@ def author_vision(
     made = _Making(lit, held_out, seed, report, threads, clock)
     pictures = [] if profile.finish is None else made.pictures(profile.finish)
     errors: dict[str, float] = {}
-    settings: Settings = {"teaching": teaching}
+    # No teacher: every description says so, and the same build goes on writing the same file.
+    settings: Settings = {"teaching": "none"}
     models: list[VisionModel] = []
     for spec, name, word in _asked(profile):
-        teacher = None
-        if teaching != "none":
-            wanted = profile.teacher(spec.size.kind)
-            teacher = made.teacher(wanted, teacher_file(folder, wanted.kind), word)
-            errors |= made.judged_teacher(teacher, references, word)
-            settings |= {f"{word}{TEACHER}{each}": value for each, value in teacher.settings.items()}
-        training = made.trained(spec, folder / name, word, teacher if teaching == "distilled" else None)
+        training = made.trained(spec, folder / name, word)
         if profile.finish is not None:
             errors |= made.judged(training.finish(), references, f"{word}{UNFINISHED}")
             made.finish(training, profile.finish, pictures, finished_file(folder / name), word)
@@ -133,9 +104,14 @@ def author_vision(
 
 
 def checkpoints(folder: Path) -> list[Path]:
-    """Files that a stopped training goes on from, there or not; a teacher's are not among them."""
+    """Files that a stopped training goes on from, there or not."""
     kept = [folder / name for name in (CHECKPOINT, STRICT_CHECKPOINT)]
     return kept + [finished_file(each) for each in kept]
+
+
+def finished_file(checkpoint: Path) -> Path:
+    """Beside a training's checkpoint: of what it learned from pictures then."""
+    return checkpoint.with_name(f"{checkpoint.stem}-pictures{checkpoint.suffix}")
 
 
 def _asked(profile: VisionProfile) -> list[tuple[CellsSpec, str, str]]:
@@ -168,12 +144,7 @@ def networks_alone(
 
 
 def cells_to_train(
-    lit: LitObject,
-    held_out: HeldOut,
-    spec: CellsSpec,
-    seed: int,
-    threads: int | None = None,
-    ask: Answers | None = None,
+    lit: LitObject, held_out: HeldOut, spec: CellsSpec, seed: int, threads: int | None = None
 ) -> CellTraining:
     """An object's networks with what they are to learn, not trained yet.
 
@@ -183,15 +154,10 @@ def cells_to_train(
         spec: of the networks.
         seed: of all that is drawn.
         threads: None for as many as the process has cores.
-        ask: a teacher whose answers they learn; None for the surface's.
     """
-    kind, lattice = spec.size.kind, lattice_of(lit.appearance.mesh, spec.cells)
+    lattice = lattice_of(lit.appearance.mesh, spec.cells)
     shell = surface_shell(lit.appearance.mesh, lattice)
-    lessons, lamps = draw_for(kind, lit, spec.places, shell.voxel, seed, held_out)
-    if ask is not None:
-        if kind == "osf-v":
-            lessons = with_lamps(lessons, lamps, LAMPS_OF_A_PLACE, spec.hidden, seed)
-        lessons, lamps = distilled(ask, lessons), lamps[:0]
+    lessons, lamps = draw_for(spec.size.kind, lit, spec.places, shell.voxel, seed, held_out)
     grid, scale = grid_of(shell, lattice), OPAQUE / shell.voxel
     return CellTraining(spec, grid, lessons, lamps, scale, seed, threads)
 
@@ -207,27 +173,9 @@ class _Making:
     threads: int | None
     clock: Laps
 
-    def teacher(self, spec: TeacherSpec, checkpoint: Path, word: str) -> MadeTeacher:
-        made = made_teacher(
-            *(self.lit, self.held_out, spec, self.seed, checkpoint, self.report, self.threads)
-        )
-        self.clock.lap(f"{word}{TEACHER}training")
-        return made
-
-    def judged_teacher(
-        self, teacher: MadeTeacher, references: list[LinearImage], word: str
-    ) -> dict[str, float]:
-        self.report("measuring the teacher", 0.0)
-        found = teacher.judged(self.lit, self.held_out, references, self.threads)
-        self.clock.lap(f"{word}{TEACHER}measure")
-        return {f"{word}{TEACHER}{name}": value for name, value in found.items()}
-
-    def trained(
-        self, spec: CellsSpec, checkpoint: Path, word: str, teacher: MadeTeacher | None = None
-    ) -> CellTraining:
+    def trained(self, spec: CellsSpec, checkpoint: Path, word: str) -> CellTraining:
         self.report(f"drawing places {word}".rstrip("_ "), 0.0)
-        ask = None if teacher is None else teacher.ask
-        training = cells_to_train(self.lit, self.held_out, spec, self.seed, self.threads, ask)
+        training = cells_to_train(self.lit, self.held_out, spec, self.seed, self.threads)
         self.clock.lap(f"{word}places")
         train(training, training.epochs, checkpoint, self.report)
         self.clock.lap(f"{word}networks")

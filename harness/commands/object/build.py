@@ -13,7 +13,6 @@ from harness.commands.output import ANSWERS
 
 if TYPE_CHECKING:
     from harness.authoring.audio.object_audio import AudioRequest, BuiltAudio
-    from harness.authoring.vision.vision import Teaching
 
 _ROWS = {
     "network": "network",
@@ -55,14 +54,9 @@ def build(
             min=1,
         ),
     ] = None,
-    teacher: Annotated[
-        bool, typer.Option("--teacher", help="Of vision: make one large network too, measured beside.")
-    ] = False,
-    distill: Annotated[
-        bool, typer.Option("--distill", help="Of vision: let the networks learn from that teacher.")
-    ] = False,
     finish: Annotated[
-        bool, typer.Option("--finish", help="Of vision: let all learn from pictures last; paper does anyway.")
+        bool,
+        typer.Option("--finish", help="Of vision: let it learn from pictures last; paper does anyway."),
     ] = False,
     json: options.Json = False,
 ) -> int:
@@ -77,9 +71,8 @@ def build(
     --edge are of sound alone.
 
     Vision: tiny networks of the file's own colours, as the mesh's texture says them, measured on pictures
-    whose cameras and lights were kept back. A stopped training goes on when it is called again. --teacher
-    and --distill need the extra "author". --finish is for what no place of the surface tells by itself,
-    as shadows to networks that are told no visibility.
+    whose cameras and lights were kept back. A stopped training goes on when it is called again. --finish
+    is for what no place of the surface tells by itself, as shadows to networks that are told no visibility.
 
     Try: touchstone object build builtin:bowl --material ceramic --profile smoke --out objects/bowl
     """
@@ -90,8 +83,8 @@ def build(
 
     if only not in ("audio", "touch", "vision"):
         raise WrongUse(f"--only {only} cannot be built; there is audio, touch and vision")
-    if (teacher or distill or finish) and only != "vision":
-        raise WrongUse(f"--teacher, --distill and --finish are of vision, and --only {only} was asked for")
+    if finish and only != "vision":
+        raise WrongUse(f"--finish is of vision, and --only {only} was asked for")
     thick = options.quantity("--wall", wall, LENGTH)
     wanted = PartRequest(mesh, named(material), profile, units, thick, licence, seed)
     if only == "touch":
@@ -101,8 +94,7 @@ def build(
     if only == "vision":
         from harness.commands.object.build_vision import build_vision_part
 
-        taught: Teaching = "distilled" if distill else "beside" if teacher else "none"
-        return build_vision_part(wanted, out, threads, json, taught, finish)
+        return build_vision_part(wanted, out, threads, json, finish)
     from harness.authoring.audio.object_audio import AudioRequest
 
     limit, longest = options.quantity("--up-to", up_to, FREQUENCY), options.quantity("--edge", edge, LENGTH)

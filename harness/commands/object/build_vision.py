@@ -12,7 +12,6 @@ from harness.commands.output import ANSWERS
 if TYPE_CHECKING:
     from harness.authoring.object_source import PartRequest
     from harness.authoring.vision.object_vision import BuiltVision
-    from harness.authoring.vision.vision import Teaching
     from harness.objectfile.vision_entry import VisionEntry
 
 
@@ -21,14 +20,13 @@ def build_vision_part(
     out: Path,
     threads: int | None,
     json: bool,
-    teaching: "Teaching" = "none",
     finish: bool = False,
 ) -> int:
     """Build, measure and say."""
     from harness.authoring.vision.object_vision import build_vision
 
     return build_and_say(
-        lambda report: build_vision(wanted, out, report, threads, teaching, finish),
+        lambda report: build_vision(wanted, out, report, threads, finish),
         *(as_json, print_built, json),
     )
 

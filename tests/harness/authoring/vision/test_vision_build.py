@@ -1,7 +1,6 @@
 """``touchstone object build --only vision`` on a small block: what it writes, says, keeps and refuses."""
 
 import json
-import sys
 from pathlib import Path
 from types import MappingProxyType
 
@@ -15,7 +14,7 @@ from harness.authoring.vision import profiles as vision_profiles
 from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.authoring.vision.object_vision import drawn_surface, without_seams
 from harness.authoring.vision.profiles import CellsSpec, VisionProfile
-from harness.authoring.vision.vision import CHECKPOINT, AuthoredVision, Teaching, author_vision, checkpoints
+from harness.authoring.vision.vision import CHECKPOINT, AuthoredVision, author_vision, checkpoints
 from harness.basics.mesh import Mesh
 from harness.cli import invoke
 from harness.objectfile.file import ObjectFile
@@ -110,7 +109,6 @@ def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
         folder: Path,
         report: Report,
         threads: int | None,
-        teaching: Teaching,
     ) -> AuthoredVision:
         begun.append(folder)
         if len(begun) == 1:
@@ -118,7 +116,7 @@ def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
             raise KeyboardInterrupt
         assert (folder / CHECKPOINT).read_bytes() == b"half of it"
         (folder / CHECKPOINT).unlink()
-        return author_vision(look, profile, seed, folder, report, threads, teaching)
+        return author_vision(look, profile, seed, folder, report, threads)
 
     monkeypatch.setattr(object_vision, "author_vision", killed)
     assert built(block) == 130
@@ -139,8 +137,8 @@ def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
         (("--material", "cheese"), "no material"),
         (("--wall", "3"), "--wall"),
         (("--units", "ft"), "unknown unit 'ft'"),
-        (("--only", "touch", "--teacher"), "--teacher, --distill and --finish are of vision"),
-        (("--only", "audio", "--finish"), "--teacher, --distill and --finish are of vision"),
+        (("--only", "touch", "--finish"), "--finish is of vision, and --only touch was asked for"),
+        (("--only", "audio", "--finish"), "--finish is of vision, and --only audio was asked for"),
     ],
 )
 def test_what_cannot_be_built_is_wrong_use(
@@ -148,16 +146,6 @@ def test_what_cannot_be_built_is_wrong_use(
 ) -> None:
     assert built(block, *more) == 2
     assert said in capsys.readouterr().err
-    assert not (block.parent / "object").exists()
-
-
-def test_without_torch_no_teacher_is_begun(
-    block: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "torch", None)
-    for option in ("--teacher", "--distill"):
-        assert built(block, option) == 2
-        assert "torch, which is not installed; install the extra 'author'" in capsys.readouterr().err
     assert not (block.parent / "object").exists()
 
 

@@ -13,7 +13,7 @@ from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.authoring.vision.lessons import OPAQUE, draw_lamps, draw_lessons
 from harness.authoring.vision.pixels import shares_along
 from harness.authoring.vision.profiles import CellsSpec
-from harness.authoring.vision.seen import Exact, RayRecorder, pictures_to_learn
+from harness.authoring.vision.seen import Exact, RayRecorder, pictures_to_learn, together
 from harness.basics.errors import DataRefused, WrongUse
 from harness.objectfile.vision.network.graph import vision_graph
 from harness.objectfile.vision.network.network import VisionModel
@@ -21,7 +21,7 @@ from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.settings import RenderSettings
 from harness.objectfile.vision_tensors import Kind
 from harness.picture.linear_image import LinearImage
-from harness.picture.pinhole import Pinhole
+from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.direct_image import LitObject
 from tests.samples.taught_ball import COLOUR, NOTHING, SIZE, TINY, grid_for, lit_ball
 
@@ -99,6 +99,29 @@ def test_what_is_kept_of_rays_is_what_the_picture_was_made_of(
     assert rays.extras.shape[1] == (4 if kind == "osf-v" else 0)
     inside = (rays.weight == 1.0) & (np.einsum("nx,nx->n", rays.lights, rays.views) < -0.2)
     assert np.median(rays.wanted[inside] / np.array(COLOUR), axis=1).max() < 1.01
+
+
+def test_what_is_wanted_of_rays_is_the_exact_colour_whatever_the_lamp(
+    lit: LitObject, pictures: list[Exact]
+) -> None:
+    recorder = RayRecorder(data_of(taught(lit, replace(TINY, steps=20)).finish()), lit.appearance.mesh)
+    camera, lamp, _ = pictures[0]
+    for irradiance in (np.pi, 1.0):
+        light = DirectionalLight(lamp.direction, irradiance)
+        rays = recorder.seen(camera, light, lit.render(camera, [light], 3).image)
+        cosine = np.clip(np.einsum("nx,nx->n", rays.lights, rays.extras[:, 1:]), 0.0, None)
+        inside = (rays.weight == 1.0) & (rays.extras[:, 0] == 1.0) & (cosine > 0.2)
+        assert inside.sum() > 50
+        assert rays.wanted[inside] == pytest.approx(cosine[inside, None] * np.array(COLOUR), abs=0.05)
+
+
+def test_rays_of_pictures_keep_their_own_samples_together(lit: LitObject, pictures: list[Exact]) -> None:
+    recorder = RayRecorder(data_of(taught(lit, replace(TINY, steps=20)).finish()), lit.appearance.mesh)
+    rays = recorder.seen(*pictures[0])
+    both = together([rays, rays])
+    assert len(both) == 2 * len(rays)
+    assert both.first[-1] == 2 * rays.first[-1] == len(both.points)
+    assert np.array_equal(np.diff(both.first), np.tile(np.diff(rays.first), 2))
 
 
 @pytest.mark.parametrize("kind", ["osf-v", "osf"])
