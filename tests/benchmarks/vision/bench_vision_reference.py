@@ -104,7 +104,7 @@ def by_paths(
     look: Appearance, lit: LitObject, camera: Pinhole, paths: list[int], bounces: int, best_samples: int
 ) -> list[ByteArray]:
     """Mitsuba against the direct level where no light bounces, and with bounces."""
-    from harness.authoring.traced.path_traced import PathTraced
+    from tests.oracles.traced.path_traced import PathTraced
 
     best = lit.render(camera, [LIGHT], best_samples)
     traced = PathTraced(look)

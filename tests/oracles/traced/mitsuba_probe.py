@@ -1,6 +1,6 @@
 """Whether a variant of Mitsuba can render here, asked in a process that may die of the answer.
 
-``python -m harness.authoring.traced.mitsuba_probe llvm_ad_rgb`` renders a ball and ends with 0, or does not:
+``python tests/oracles/traced/mitsuba_probe.py llvm_ad_rgb`` renders a ball and ends with 0, or does not:
 a version of LLVM that lacks an instruction ends the whole process in the middle of a picture, after it was
 imported, and after it computed sums, without complaint.
 """

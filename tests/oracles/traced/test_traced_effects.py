@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.authoring.traced.camera_effects import LIGHT, traced_camera_effects
 from harness.bench.scene import load_scene
 from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.accuracy import Accuracy
@@ -17,8 +16,9 @@ from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import plain
 from harness.sim.light.direct_image import LitObject
 from tests.oracles.seen_shapes import ball
+from tests.oracles.traced.camera_effects import LIGHT, traced_camera_effects
 
-FACTS = Facts(load_scene(Path(__file__).parents[4] / "scenes" / "mug_touch.toml"), GELSIGHT_R15)
+FACTS = Facts(load_scene(Path(__file__).parents[3] / "scenes" / "mug_touch.toml"), GELSIGHT_R15)
 GIVEN: dict[str, Any] = {
     "object.appearance": plain(ball(0.05, 3), (0.8, 0.5, 0.2)),
     "camera": Pinhole.looking_at((0.2, -0.2, 0.2), (0, 0, 0), (0, 0, 1), 24, 16, 0.5),
@@ -36,7 +36,7 @@ def test_by_paths_nothing_of_the_direct_level_runs() -> None:
 
 
 def test_paths_give_a_picture_of_the_same_object() -> None:
-    pytest.importorskip("mitsuba", reason="the extra 'author' is not installed")
+    pytest.importorskip("mitsuba", reason="the extra 'oracles' is not installed")
     effects = traced_camera_effects(True)
     accuracy = Accuracy.default(knobs_of(effects)).with_({LIGHT.name: "paths", "camera.bounces": 0})
     traced = evaluate(plan(effects, FACTS, ["camera.image"], accuracy), GIVEN)["camera.image"]

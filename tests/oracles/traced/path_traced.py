@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from harness.authoring.traced.mitsuba_scene import camera_of, lamps_of, surfaces_of
-from harness.authoring.traced.mitsuba_variant import FAST, Variant, chosen_variant
 from harness.basics.arrays import FloatArray, block_means, read_only
 from harness.basics.errors import OutOfDomain
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import Appearance
+from tests.oracles.traced.mitsuba_scene import camera_of, lamps_of, surfaces_of
+from tests.oracles.traced.mitsuba_variant import FAST, Variant, chosen_variant
 
 _CHANNELS = "place:position,normal:sh_normal,albedo:albedo"
 

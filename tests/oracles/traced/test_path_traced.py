@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from harness.authoring.traced.mitsuba_variant import ALWAYS, FAST, chosen_variant
-from harness.authoring.traced.path_traced import PathTraced, TracedImage
 from harness.basics.errors import OutOfDomain, WrongUse
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import Appearance, plain
 from harness.sim.light.appearance_source import builtin_appearance
 from harness.sim.light.direct_image import DirectImage, LitObject
 from tests.oracles.seen_shapes import ball, square
+from tests.oracles.traced.mitsuba_variant import ALWAYS, FAST, chosen_variant
+from tests.oracles.traced.path_traced import PathTraced, TracedImage
 
 UP = (0.0, 0.0, 1.0)
 GREY = (0.8, 0.5, 0.2)
@@ -19,7 +19,7 @@ ASLANT = DirectionalLight(np.array([0.5, -0.6, 0.7]))
 
 @pytest.fixture(scope="module")
 def _mitsuba() -> None:
-    pytest.importorskip("mitsuba", reason="the extra 'author' is not installed")
+    pytest.importorskip("mitsuba", reason="the extra 'oracles' is not installed")
 
 
 def seen_from(eye: tuple[float, float, float], target: tuple[float, float, float] = (0, 0, 0)) -> Pinhole:
@@ -146,5 +146,5 @@ def test_tinted_textures_are_named_as_not_there_yet() -> None:
 def test_without_mitsuba_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
     chosen_variant.cache_clear()
-    with pytest.raises(WrongUse, match="extra 'author'"):
+    with pytest.raises(WrongUse, match="extra 'oracles'"):
         chosen_variant()

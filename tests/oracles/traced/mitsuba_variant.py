@@ -6,6 +6,7 @@ import logging
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 from harness.basics.errors import WrongUse
 
@@ -41,10 +42,7 @@ def chosen_variant(wanted: str = FAST) -> Variant:
         WrongUse: Mitsuba is not installed, or none of its variants is so called.
     """
     if importlib.util.find_spec("mitsuba") is None:
-        raise WrongUse(
-            "path tracing needs Mitsuba, which is not installed; install the extra 'author', "
-            "or render at the level 'direct'"
-        )
+        raise WrongUse("path tracing needs Mitsuba, which is not installed; install the extra 'oracles'")
     import mitsuba
 
     if wanted not in mitsuba.variants():
@@ -60,7 +58,7 @@ def chosen_variant(wanted: str = FAST) -> Variant:
 
 def _trouble(variant: str) -> str:
     """What kept a variant from rendering in a child; empty where nothing did."""
-    command = [sys.executable, "-m", "harness.authoring.traced.mitsuba_probe", variant]
+    command = [sys.executable, str(Path(__file__).with_name("mitsuba_probe.py")), variant]
     try:
         ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:

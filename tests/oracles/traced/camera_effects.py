@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from harness.authoring.traced.path_traced import PathTraced, TracedImage
 from harness.effects.accuracy import Knob, Level
 from harness.effects.camera_effects import camera_effects
 from harness.effects.effect import Compute, Effect, Way
+from tests.oracles.traced.path_traced import PathTraced, TracedImage
 
 Given = Mapping[str, Any]
 Levels = Mapping[str, Level]

@@ -1,1 +1,0 @@
-"""Path tracing by Mitsuba: light that bounces, beside the direct level."""
