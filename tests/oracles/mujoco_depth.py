@@ -1,8 +1,7 @@
 """MuJoCo's renderer as the oracle of height maps: an orthographic depth image, without a display.
 
 It shares nothing with ours but mesh and pose: OpenGL transforms and fills the triangles, in single precision.
-That is done in a process of its own, as for ``harness.twin.picture``: which of EGL and OSMesa draws is
-settled when MuJoCo is imported.
+That is done in a process of its own: which of EGL and OSMesa draws is settled when MuJoCo is imported.
 """
 
 import os
@@ -21,7 +20,8 @@ from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.height_map import SEARCH_DEPTH, STAND_OFF
-from harness.twin.picture import BACKENDS
+
+_BACKENDS = ("egl", "osmesa")
 
 NEAR = 1e-3
 """Metres from the eye, which is ``STAND_OFF`` behind the gel: nothing nearer is drawn."""
@@ -52,7 +52,7 @@ def gaps_drawn(
         window = (sensor.rows, sensor.columns, sensor.pitch)
         np.savez(folder / "scenes.npz", count=len(scenes), window=window, **arrays)
         reasons = []
-        for backend in BACKENDS:
+        for backend in _BACKENDS:
             reason = _attempt(folder, backend)
             if not reason:
                 with np.load(folder / "gaps.npz") as found:

@@ -21,8 +21,8 @@ from calibration.markers.lattice import lay_lattice
 from harness.basics.arrays import FloatArray
 from harness.bench.sensor import GELSIGHT_R15, MarkerGrid
 from harness.picture.image_file import read_image
-from harness.sim.gel.marker_tensors import tensor_map
 from harness.sim.gel.markers import marker_displacements
+from tests.oracles.marker_tensors import tensor_map
 from tests.samples.drawn_dots import DrawnDots
 from tests.support.real_data import WHY_NOT, find_shared_data
 
