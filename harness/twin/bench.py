@@ -128,8 +128,7 @@ class TwinBench:
         standing = [Part(name, 0, np.zeros((1, 3))) for name in ("table", "pedestal", "object")]
         self.parts = [*arm_parts(model), *tool, *standing]
         self.reach = reaches(model, self.parts)
-        self.spec = self._make_spec(tool, table_height, pedestal_radius)
-        self.mujoco_model = self.spec.compile()
+        self.mujoco_model = self._make_spec(tool, table_height, pedestal_radius).compile()
         # The middle phase's boxes keep the margins they were compiled with.
         self.mujoco_model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
         self.data = mujoco.MjData(self.mujoco_model)
