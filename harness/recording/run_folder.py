@@ -35,7 +35,7 @@ OBJECTFILE = "objectfile"
 
 _DESCRIBED = f"{OBJECTFILE}/{DESCRIPTION}"
 
-_NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-python-headless", "mujoco", "touchstone-lab")
+_NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-contrib-python-headless", "mujoco", "touchstone-lab")
 
 
 def station_calibration(station: Station) -> TactileCalibration:
