@@ -144,7 +144,7 @@ def _rendered(folder: Path, level: "TouchLevel", contact: Three, by: _Pressing) 
     touch = open_touch(of, level)
     require_gel(of, touch.entry.gel, by.gel.sensor, by.gel.calibration.header.skirt)
     place = contact_place(of.mesh, np.array(contact))
-    # The first press loads the compiled loops for all that follow.
+    # The first press makes ready what all that follow use.
     _pressed(of, touch, place, by)
     loaded, begun = time.perf_counter() - begun, time.perf_counter()
     press = _pressed(of, touch, place, by)

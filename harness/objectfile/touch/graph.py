@@ -26,7 +26,7 @@ from harness.objectfile.touch.rays import between, ray_places, row_terms
 from harness.objectfile.touch.skirt import hung
 from harness.sim.gel.gel import GelSkirt
 
-LOOKUPS = 3
+_LOOKUPS = 3
 """Along a ray. The error of a look-up shrinks by the surface's slope times the gel's lean, about a fifth."""
 
 _LEAST_COSINE = 0.25
@@ -82,7 +82,7 @@ def codes_graph(
     patches: PatchCodes,
     sensor: TactileSensor,
     skirt: GelSkirt,
-    lookups: int = LOOKUPS,
+    lookups: int = _LOOKUPS,
     storage: Storage = "float16",
 ) -> ModelProto:
     """The graph of patches, a sensor and its gel.
@@ -105,7 +105,7 @@ def codes_graph(
     moved = nodes.add("Transpose", nodes.add("Cast", "node_from_gel", to=TensorProto.FLOAT), perm=[0, 2, 1])
     scale = np.array([1.0 / half_width, 1.0 / half_width, 1.0], np.float32)
     motion = _Motion(nodes, nodes.add("Mul", moved, nodes.constant(scale)), sensor, patches.outside)
-    coarse, half = coarseness(patches, sensor)
+    coarse, half = _coarseness(patches, sensor)
     near: str | None = None
     for _ in range(lookups - 1):
         near = motion.clipped(motion.to_height(heights, near, coarse, coarse))
@@ -155,7 +155,7 @@ def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
     return heights, nodes.add("Reshape", spread, _shape(nodes, -1, 1, size, size))
 
 
-def coarseness(patches: PatchCodes, sensor: TactileSensor) -> tuple[int, int]:
+def _coarseness(patches: PatchCodes, sensor: TactileSensor) -> tuple[int, int]:
     """Pixels a side to one ray of the first look-ups, and of those of covers."""
     coarse = _COARSE if sensor.rows % _COARSE == 0 and sensor.columns % _COARSE == 0 else 1
     # A cover is linear between a patch's pixels: half the rays see all of it where they are closer.

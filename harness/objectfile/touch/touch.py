@@ -25,7 +25,6 @@ from harness.sim.gel.presses import Presses
 
 if TYPE_CHECKING:
     from harness.objectfile.runtime import Network
-    from harness.objectfile.touch.compiled import CompiledCodes
 
 TouchLevel = Literal["codes", "perceptron", "reference"]
 
@@ -48,11 +47,11 @@ class CodeMaps:
     """Maps from codes of the surface.
 
     Attributes:
-        network: the graph of codes, run as it is or compiled.
+        network: the graph of codes.
         nodes: where the codes belong.
     """
 
-    network: "Network | CompiledCodes"
+    network: "Network"
     nodes: NodeSearch
 
     def __call__(self, presses: Presses) -> AnyArray:
@@ -159,17 +158,13 @@ def _span(values: FloatArray) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def open_touch(
-    of: ObjectFile, level: TouchLevel = "codes", threads: int = 1, compiled: bool = True
-) -> ObjectTouch:
+def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) -> ObjectTouch:
     """The touch of an object at a level.
 
     Args:
         of: an object that has a touch.
         level: ``"codes"``, ``"perceptron"`` or ``"reference"``.
-        threads: that a network, or a batch of presses, may use.
-        compiled: codes in loops made for their graph, where it is one that ``touch_graph`` makes; False runs
-            the graph as it is, as other programs do.
+        threads: that a network may use.
 
     Raises:
         DataRefused: the object has no touch, or not at that level; or a file of it is damaged.
@@ -183,7 +178,7 @@ def open_touch(
         case "reference":
             maps = ReferenceMaps(RasterMesh(of.mesh), entry.gel)
         case "codes" if entry.codes is not None:
-            maps = _codes(of, entry, entry.codes, threads, compiled)
+            maps = _codes(of, entry.codes, threads)
         case "perceptron" if entry.perceptron is not None:
             from harness.objectfile.runtime import open_network
 
@@ -196,21 +191,15 @@ def open_touch(
     return ObjectTouch(level, entry, SurfaceSearch(of.mesh), maps)
 
 
-def _codes(of: ObjectFile, touch: TouchEntry, entry: CodesEntry, threads: int, compiled: bool) -> CodeMaps:
+def _codes(of: ObjectFile, entry: CodesEntry, threads: int) -> CodeMaps:
     nodes = nodes_from(of.read(entry.nodes), entry.nodes.file)
     asked = entry.network.inputs[0].domain
     if asked.high is None or asked.high[0] != len(nodes) - 1:
         raise DataRefused(
             f"{entry.nodes.file} has {len(nodes)} nodes, its graph another number; build it again"
         )
-    data, search = of.read(entry.network), NodeSearch(nodes, entry.most_off_m)
-    if compiled:
-        # Graphs are heavy to read, and the reference needs none of it.
-        from harness.objectfile.touch.compiled import compiled_codes
-
-        found = compiled_codes(data, entry.network, touch.gel.sensor, touch.gel.skirt, threads)
-        if found is not None:
-            return CodeMaps(found, search)
+    # Graphs are heavy to read, and the reference needs none of it.
     from harness.objectfile.runtime import open_network
 
-    return CodeMaps(open_network(data, entry.network, threads), search)
+    network = open_network(of.read(entry.network), entry.network, threads)
+    return CodeMaps(network, NodeSearch(nodes, entry.most_off_m))

@@ -26,8 +26,7 @@ def look_at_codes(of: ObjectFile, entry: CodesEntry) -> str:
     kept: FileEntry = entry.nodes
     nodes = nodes_from(of.read(kept), kept.file)
     chosen = np.unique(np.linspace(0, len(nodes) - 1, _PRESSES).astype(np.int64))
-    # The graph itself, as other programs run it.
-    codes, mesh = open_touch(of, "codes", compiled=False), open_touch(of, "reference")
+    codes, mesh = open_touch(of, "codes"), open_touch(of, "reference")
     nothing = np.zeros(len(chosen))
     depths = np.full(len(chosen), float(np.mean(codes.entry.depth_m)))
     presses = Presses(nodes.points[chosen], nodes.normals[chosen], depths, nothing, nothing, nothing)

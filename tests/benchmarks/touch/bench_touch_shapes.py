@@ -87,11 +87,11 @@ def _made(name: str, profile: str, folder: Path) -> ObjectFile:
 
 def measure(of: ObjectFile, asked: argparse.Namespace) -> None:
     """One object."""
-    compiled, graph = open_touch(of, "codes"), open_touch(of, "codes", compiled=False)
-    codes = compiled.maps
+    coded, reference = open_touch(of, "codes"), open_touch(of, "reference")
+    codes = coded.maps
     assert isinstance(codes, CodeMaps)
     presses = _possible(of, codes, asked.presses)
-    truth = open_touch(of, "reference").at(presses)
+    truth = reference.at(presses)
     table = Table(title=f"{of.description.name}: {len(presses)} presses at places that were never coded")
     for head in (
         "maps from",
@@ -107,26 +107,14 @@ def measure(of: ObjectFile, asked: argparse.Namespace) -> None:
         f"by {CHUNK}",
     ):
         table.add_column(head)
-    reference = open_touch(of, "reference")
-    for said, touch in (
-        ("rasteriser (reference)", reference),
-        ("codes, compiled", compiled),
-        ("codes, onnxruntime", graph),
-    ):
+    for said, touch in (("rasteriser (reference)", reference), ("codes", coded)):
         table.add_row(said, *_errors(touch.at(presses), truth), *_costs(touch.at, presses, asked.repeat))
     table.add_row(*_perceptron(of, presses, asked.repeat))
     table.add_row("nearest coded place", *_errors(_nearest(of, codes, reference, presses), truth), "", "")
     table.add_row("untouched gel", *_errors(np.zeros_like(truth), truth), "", "")
     console = Console(width=150)
     console.print(table)
-    apart = np.abs(compiled.at(presses) - graph.at(presses))
-    rms, high, most = 1e6 * np.sqrt((apart**2).mean()), 1e6 * np.quantile(apart, 0.999), 1e6 * apart.max()
-    console.print(
-        f"  compiled codes from their graph: {rms:.2g} um rms, {high:.2g} in 999 of 1000, {most:.2g} at most"
-    )
-    twice = open_touch(of, "codes", threads=2)
     pairs = (
-        ("codes, compiled", twice.maps),
         ("codes, two graphs", _twice(of)),
         ("rasteriser", _halves(reference.maps, reference.maps)),
     )
@@ -224,7 +212,7 @@ def _perceptron(of: ObjectFile, presses: Presses, repeat: int) -> tuple[str, ...
 
 def _twice(of: ObjectFile) -> Maps:
     """Two graphs, each on its own thread."""
-    return _halves(*(open_touch(of, "codes", compiled=False).maps for _ in range(2)))
+    return _halves(*(open_touch(of, "codes").maps for _ in range(2)))
 
 
 def _halves(first: Maps, second: Maps) -> Maps:

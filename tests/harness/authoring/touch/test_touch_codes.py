@@ -80,6 +80,17 @@ def test_a_gel_that_touches_nothing_shows_exactly_nothing() -> None:
     assert not tb.maps()(far).any()
 
 
+def test_beyond_a_patch_there_is_nothing_to_touch() -> None:
+    patches = tb.coded().patches
+    half = 0.5 * len(patches.inside) * patches.pitch
+    # The gel's middle is on the patch's rim, 1 mm deep; its right half is beyond.
+    pose = np.eye(4)[None, :3].repeat(2, axis=0)
+    pose[0, 0, 3], pose[1, 0, 3], pose[:, 2, 3] = half, 40.0 * half, 1e-3
+    maps = tb.maps().network({"node": np.zeros((2, 1), np.int64), "node_from_gel": pose})["maps"]
+    assert not maps[0, :, -tb.SENSOR.columns // 3 :].any()
+    assert not maps[1].any()
+
+
 def test_a_deeper_press_is_deeper_everywhere_it_touches() -> None:
     deeper = [tb.maps()(upright(6, depth)) for depth in (0.5e-3, 1e-3, 1.5e-3, 2e-3)]
     for less, more in pairwise(deeper):

@@ -63,15 +63,15 @@ def test_codes_and_reference_are_levels_of_one_quantity(peg_object: ObjectFile) 
     assert codes.entry.gel.skirt == tb.SKIRT
 
 
-@pytest.mark.parametrize(("level", "compiled"), [("codes", True), ("codes", False), ("reference", True)])
-def test_no_presses_give_no_maps(peg_object: ObjectFile, level: Any, compiled: bool) -> None:
-    touch, none = open_touch(peg_object, level, compiled=compiled), presses()[:0]
+@pytest.mark.parametrize("level", ["codes", "reference"])
+def test_no_presses_give_no_maps(peg_object: ObjectFile, level: Any) -> None:
+    touch, none = open_touch(peg_object, level), presses()[:0]
     for found in (touch.at(none), touch.maps(none)):
         assert found.shape == (0, tb.SENSOR.rows, tb.SENSOR.columns)
 
 
 def test_a_graph_asked_for_some_inputs_and_not_others_says_so(peg_object: ObjectFile) -> None:
-    touch = open_touch(peg_object, "codes", compiled=False)
+    touch = open_touch(peg_object, "codes")
     assert isinstance(touch.maps, CodeMaps)
     asked = touch.maps.nodes.queries(presses())
     with pytest.raises(DataRefused, match="cannot be run"):
