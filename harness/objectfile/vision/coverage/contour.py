@@ -17,12 +17,6 @@ from harness.basics.mesh import Mesh
 EMPTY = 255
 """In place of a sub-pixel: none is covered."""
 
-NEIGHBOURS = 2
-"""Pixels to all sides."""
-
-_FEW = 24
-"""Numbers that are sorted sooner by moving each to its place."""
-
 
 @dataclass(frozen=True, eq=False)
 class Contours:
@@ -178,7 +172,7 @@ def _stretches(met: AnyArray, starts: AnyArray) -> tuple[AnyArray, AnyArray]:
     for i in range(len(starts) - 1):
         begins[i] = count
         row = met[starts[i] : starts[i + 1]]
-        _sort(row)
+        row.sort()
         around, begun = 0, 0
         for k in range(len(row)):
             before, around = around, around + (row[k] & 7) - 4
@@ -192,19 +186,6 @@ def _stretches(met: AnyArray, starts: AnyArray) -> tuple[AnyArray, AnyArray]:
 
 
 @compiled
-def _sort(row: AnyArray) -> None:
-    if len(row) > _FEW:
-        row.sort()
-        return
-    for k in range(1, len(row)):
-        value, at = row[k], k
-        while at > 0 and row[at - 1] > value:
-            row[at] = row[at - 1]
-            at -= 1
-        row[at] = value
-
-
-@compiled
 def covered(
     begins: AnyArray,
     stretches: AnyArray,
@@ -212,7 +193,6 @@ def covered(
     offsets: AnyArray,
     count: AnyArray,
     places: AnyArray,
-    beside: AnyArray,
 ) -> int:
     """How many sub-pixels of each pixel are covered, and which of these is nearest to its centre.
 
@@ -223,7 +203,6 @@ def covered(
         offsets: ``(side * side, 2)`` row and column of each, from the centre outwards.
         count: ``(rows, columns)`` uint8, written.
         places: ``(rows, columns)`` uint8, written: which of ``offsets``, or ``EMPTY``.
-        beside: ``(rows, columns)`` set where within ``NEIGHBOURS`` any of these is not the centre.
 
     Returns:
         Pixels that are covered anywhere.
@@ -249,9 +228,6 @@ def covered(
             places[i, j] = EMPTY if whole == 0 else 0
             if 0 < whole < side * side:
                 places[i, j] = _nearest(begins, stretches, side, offsets, i, j)
-                if places[i, j] != 0:
-                    low, left = max(i - NEIGHBOURS, 0), max(j - NEIGHBOURS, 0)
-                    beside[low : i + NEIGHBOURS + 1, left : j + NEIGHBOURS + 1] = True
     return some
 
 

@@ -8,13 +8,10 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.compiled import compiled
 from harness.objectfile.vision.ahead import AHEAD, bring_row
-from harness.objectfile.vision.coverage.contour import EMPTY, NEIGHBOURS
+from harness.objectfile.vision.coverage.contour import EMPTY
 
 _ON_EDGE = 1e-7
 """Pixels by which a triangle is widened, so that no place falls between two that share an edge."""
-
-_WIDE = 4
-"""Pixels along a row beyond which a face's own part of it is computed first."""
 
 
 @compiled
@@ -49,7 +46,6 @@ def find_front(
     faces: AnyArray,
     some: AnyArray,
     places: AnyArray,
-    beside: AnyArray,
     offsets: AnyArray,
     side: int,
     nearness: AnyArray,
@@ -62,16 +58,13 @@ def find_front(
         faces: ``(m, 3)`` uint32.
         some: ``(k,)`` int32, of the faces; the first of any that are equally near is taken.
         places: ``(rows, columns)`` which of ``offsets`` is looked at; ``EMPTY`` for none.
-        beside: ``(rows, columns)`` whether within ``NEIGHBOURS`` any pixel is looked at beside its centre.
         offsets: ``(k, 2)`` row and column of sub-pixels in a pixel.
         side: sub-pixels along a pixel.
         nearness: ``(rows, columns)`` float32 1/m, raised; 0 where there is nothing.
         front: ``(rows, columns)`` int32, written.
     """
     rows, columns = places.shape
-    scale, share = float(side), 1.0 / side
-    middle, small = float(side // 2), float(side * NEIGHBOURS)
-    bottom, right = rows * scale - 1.0, columns * scale - 1.0
+    scale = float(side)
     for n in range(len(some)):
         m = some[n]
         if n + AHEAD < len(some):
@@ -79,19 +72,8 @@ def find_front(
                 bring_row(seen, faces[some[n + AHEAD], corner])
         a, b, c = faces[m, 0], faces[m, 1], faces[m, 2]
         x0, x1, x2, y0, y1, y2 = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
-        y_low, y_high = min(y0, min(y1, y2)), max(y0, max(y1, y2))
-        if y_low > bottom + _ON_EDGE or y_high < -_ON_EDGE:
-            continue
-        x_low, x_high = min(x0, min(x1, x2)), max(x0, max(x1, x2))
-        is_plain = x_low >= 0.0 and y_low >= 0.0 and x_high < right and y_high < bottom
-        is_plain = is_plain and x_high - x_low < small and y_high - y_low < small
-        if is_plain and not beside[np.uint64(y0 * share), np.uint64(x0 * share)]:
-            # Most faces of a fine mesh lie between the centres, and need no more than this.
-            i0, i1 = _centres(y_low - middle, y_high - middle, share)
-            j0, j1 = _centres(x_low - middle, x_high - middle, share)
-        else:
-            i0, i1 = _pixels(y_low, y_high, scale, rows)
-            j0, j1 = _pixels(x_low, x_high, scale, columns)
+        i0, i1 = _pixels(min(y0, min(y1, y2)), max(y0, max(y1, y2)), scale, rows)
+        j0, j1 = _pixels(min(x0, min(x1, x2)), max(x0, max(x1, x2)), scale, columns)
         if i0 > i1 or j0 > j1:
             continue
         ax, ay, bx, by = x1 - x0, y1 - y0, x2 - x0, y2 - y0
@@ -104,13 +86,7 @@ def find_front(
         az, bz, most = z1 - z0, z2 - z0, max(z0, max(z1, z2))
         wider = _ON_EDGE * max(abs(ux) + abs(uy), abs(vx) + abs(vy))
         for i in range(i0, i1 + 1):
-            begin, end = j0, j1
-            if j1 - j0 > _WIDE:
-                y, whole = i * scale - y0, scale - 1.0
-                for p, q, r in ((ux, uy, 0.0), (vx, vy, 0.0), (-ux - vx, -uy - vy, 1.0)):
-                    rest = r + 2.0 * wider - p * x0 + q * y + (max(p, 0.0) + max(q, 0.0)) * whole
-                    begin, end = _narrowed(p * scale, rest, begin, end)
-            for j in range(begin, end + 1):
+            for j in range(j0, j1 + 1):
                 at = places[i, j]
                 if at == EMPTY:
                     continue
@@ -139,12 +115,6 @@ def nearest_of(nearness: AnyArray, front: AnyArray) -> None:
 
 
 @compiled
-def _centres(low: float, high: float, share: float) -> tuple[int, int]:
-    """First and last pixel whose centre lies from ``low`` to ``high``, both counted from the first one's."""
-    return int(np.ceil((low - _ON_EDGE) * share)), int(np.floor((high + _ON_EDGE) * share))
-
-
-@compiled
 def _pixels(low: float, high: float, scale: float, count: int) -> tuple[int, int]:
     """First and last of so many pixels that have a sub-pixel from ``low`` to ``high``."""
     begin = np.ceil(max(low, 0.0) - _ON_EDGE)
@@ -152,16 +122,6 @@ def _pixels(low: float, high: float, scale: float, count: int) -> tuple[int, int
     if begin > end:
         return 0, -1
     return int((begin + 0.5) / scale), int((end + 0.5) / scale)
-
-
-@compiled
-def _narrowed(slope: float, rest: float, first: int, last: int) -> tuple[int, int]:
-    """Whole numbers of a range where ``slope * j + rest`` is not negative, or those and one more."""
-    if slope > 0.0:
-        return max(first, int(np.floor(min(max(-rest / slope, first), last + 1.0)))), last
-    if slope < 0.0:
-        return first, min(last, int(np.ceil(max(min(-rest / slope, last), first - 1.0))))
-    return first, last
 
 
 @compiled

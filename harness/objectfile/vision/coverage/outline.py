@@ -89,10 +89,8 @@ def mesh_outline(
     shown = some[: made.turned(camera.eye, hides, sides, some)]
     count, looked = (room.take(name, (rows, columns), np.uint8) for name in ("count", "looked"))
     begins, stretches = crossed(seen, made.edges, sides, rows * side, columns * side)
-    beside = room.take("beside", (rows, columns), np.bool_)
-    beside[:] = False
-    most = covered(begins, stretches, side, offsets, count, looked, beside)
-    nearness, front = _fronts(seen, made.faces, shown, looked, beside, offsets, side, crew, room)
+    most = covered(begins, stretches, side, offsets, count, looked)
+    nearness, front = _fronts(seen, made.faces, shown, looked, offsets, side, crew, room)
     found = gathered(count, looked, nearness, front, side, offsets, most)
     return Outline(*found) if is_told else Outline(*found[:-1], np.empty(0, np.int32))
 
@@ -102,7 +100,6 @@ def _fronts(
     faces: AnyArray,
     shown: AnyArray,
     looked: AnyArray,
-    beside: AnyArray,
     offsets: AnyArray,
     side: int,
     crew: Crew,
@@ -118,7 +115,7 @@ def _fronts(
         for k in range(first, last):
             nearness[k] = 0.0
             some = shown[ends[k] : ends[k + 1]]
-            find_front(seen, faces, some, looked, beside, offsets, side, nearness[k], front[k])
+            find_front(seen, faces, some, looked, offsets, side, nearness[k], front[k])
 
     crew.share(draw_some, parts, parts)
     nearest_of(nearness, front)
