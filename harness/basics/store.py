@@ -130,6 +130,11 @@ def digest(value: Any) -> str:
     return state.hexdigest()
 
 
+def type_name(kind: type) -> str:
+    """The name that a dataclass has in keys."""
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
 def _pieces(value: Any) -> "list[bytes]":
     if isinstance(value, np.ndarray):
         if value.dtype == object:
@@ -149,6 +154,5 @@ def _pieces(value: Any) -> "list[bytes]":
         return [f"on disk {value.content_key}".encode()]
     if is_dataclass(value) and not isinstance(value, type):
         parts = [(item.name, vars(value)[item.name]) for item in fields(value)]
-        named = f"{type(value).__module__}.{type(value).__qualname__}"
-        return [named.encode(), *(p for part in parts for p in _pieces(part))]
+        return [type_name(type(value)).encode(), *(p for part in parts for p in _pieces(part))]
     raise TypeError(f"a {type(value).__qualname__} cannot be hashed; pass arrays, numbers or dataclasses")

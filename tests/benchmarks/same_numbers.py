@@ -1,6 +1,10 @@
 """Whether this checkout computes, to the bit, what commit 488cc9b computed: ``python
 tests/benchmarks/same_numbers.py``.
 
+A surface is filled with other tetrahedra every time it is filled, so modes that each side solved for itself
+would differ, as they do between two runs of one checkout. This checkout is therefore given the reference's
+cache, under the names that dataclasses had there; modes of given tetrahedra are compared as well.
+
 Under ``--folder`` it keeps a clone of that commit with its own environment, and what that clone made: the
 rows of the localization table (nine objects, two spacings, struck too), three runs over the wires and one
 calibration run of the arm, and an ObjectFile of each sense. Whatever is missing there is made first (about
@@ -10,6 +14,7 @@ seconds. Ends with 1 where anything differs.
 """
 
 import argparse
+import itertools
 import json
 import os
 import shutil
@@ -51,27 +56,42 @@ ADDED = {"observed", "answered_after_s"}
 """Keys of a result that the reference does not have yet."""
 
 
+MAIN = "import sys; from harness.cli import main; sys.exit(main())"
+
+RENAMED = """
+import json, os
+from harness.basics import store
+names = json.loads(os.environ["OLD_NAMES"])
+store.type_name = lambda kind: f"{names.get(kind.__module__, kind.__module__)}.{kind.__qualname__}"
+"""
+
+
 class Side:
     """One checkout, the environment that runs it, and the folder of what it made.
 
     Args:
         code: the checkout.
-        made: what it makes goes here, its cache too: nothing that one side solved is given to the other.
+        made: what it makes goes here, its cache too.
+        old_names: modules of the reference by what they are called in this checkout.
     """
 
-    def __init__(self, code: Path, made: Path) -> None:
-        self.code, self.made = code, made
+    def __init__(self, code: Path, made: Path, old_names: dict[str, str] | None = None) -> None:
+        self.code, self.made, self.old_names = code, made, old_names
         made.mkdir(parents=True, exist_ok=True)
 
     def touchstone(self, *arguments: str) -> str:
         """Standard output of a command of this checkout."""
         environment = {**os.environ, "TOUCHSTONE_CACHE": str(self.made / "cache")}
         python = self.code / ".venv" / "bin" / "python"
-        main = "import sys; from harness.cli import main; sys.exit(main())"
+        environment["PYTHONPATH"] = str(self.code)
+        program = MAIN
+        if self.old_names is not None:
+            environment["OLD_NAMES"] = json.dumps(self.old_names)
+            program = RENAMED + MAIN
         done = subprocess.run(
-            [str(python), "-c", main, *arguments],
+            [str(python), "-c", program, *arguments],
             cwd=self.made,
-            env={**environment, "PYTHONPATH": str(self.code)},
+            env=environment,
             stdout=subprocess.PIPE,
             text=True,
             check=False,
@@ -83,7 +103,9 @@ class Side:
     def table(self, name: str) -> None:
         """Rows of nine objects, close and spread, touched and struck, one file each."""
         shared = os.environ.get("TOUCHSTONE_DATA", str(ROOT.parent / "shared" / "data"))
+        # One process: workers that are started anew would not know the old names.
         options = ["--seeds", "1", "--gap", "default", "--yaw", "known", "--data", shared, "--json"]
+        options += ["--workers", "1"] if self.old_names is not None else []
         self.once("table.json", "tables", name, *options, "--out", "table")
 
     def once(self, name: str, *arguments: str) -> None:
@@ -92,6 +114,13 @@ class Side:
         if not path.exists():
             sys.stderr.write(f"making {path}\n")
             path.write_text(self.touchstone(*arguments))
+
+    def solid_modes(self) -> None:
+        """Modes of given tetrahedra, to the last bit of every frequency."""
+        mesh = self.made / "box.msh"
+        mesh.write_text(box_of_tetrahedra(6, 4, 3))
+        options = ["--material", "steel", "--units", "m", "--modes", "40", "--json"]
+        self.once("modes.json", "sim", "modes", str(mesh), *options)
 
     def objectfiles(self) -> None:
         """An ObjectFile of each sense, of profile smoke."""
@@ -134,6 +163,7 @@ def record(before: Side) -> None:
     before.once("run_taxim.json", "calibrate", "taxim", *options)
     before.once("replay_taxim.json", *calibration(before))
     before.table("localization")
+    before.solid_modes()
     before.objectfiles()
 
 
@@ -153,12 +183,13 @@ def make_anew(now: Side, before: Side, table: str) -> None:
         now.once(f"replay_{name}.json", *replay(before, name))
     now.once("replay_taxim.json", *calibration(before))
     now.table(table)
+    now.solid_modes()
     now.objectfiles()
 
 
 def differences(before: Side, now: Side) -> Iterator[str]:
     """Every value in which the two differ, with where it stands."""
-    for name in [*(f"replay_{run}.json" for run in (*RUNS, "taxim")), *_objects()]:
+    for name in [*(f"replay_{run}.json" for run in (*RUNS, "taxim")), "modes.json", *_objects()]:
         yield from _unlike(_json(before.made / name), _json(now.made / name), name)
     tables = sorted(path.name for path in (before.made / "table").glob("*.json"))
     for name in tables:
@@ -209,6 +240,40 @@ def _program(name: str, *arguments: str) -> str:
     return subprocess.run([found, *arguments], stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
+def _old_names() -> dict[str, str]:
+    """Modules of the reference by what they are called now, as git finds them again."""
+    found = _program("git", "-C", str(ROOT), "diff", "-M40%", "-l0", "--name-status", "--diff-filter=R", BEFORE)
+    moves = [line.split("\t")[1:] for line in found.splitlines() if line.endswith(".py")]
+    return {_module(new): _module(old) for old, new in moves}
+
+
+def _module(path: str) -> str:
+    return path.removesuffix(".py").replace("/", ".")
+
+
+def box_of_tetrahedra(*cells: int) -> str:
+    """A Gmsh file (version 2.2) of a box, 10 mm a cell, every cell cut into six tetrahedra."""
+    counts = [n + 1 for n in cells]
+    places = list(itertools.product(*(range(n) for n in counts)))
+    number = {place: k + 1 for k, place in enumerate(places)}
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$Nodes", str(len(places))]
+    lines += [f"{number[p]} {0.01 * p[0]} {0.01 * p[1]} {0.01 * p[2]}" for p in places]
+    solids = []
+    for corner in itertools.product(*(range(n) for n in cells)):
+        for order in itertools.permutations(range(3)):
+            at, path = list(corner), [tuple(corner)]
+            for axis in order:
+                at[axis] += 1
+                path.append(tuple(at))
+            # An odd order of the axes makes a cell of the other hand.
+            odd = sum(a > b for a, b in itertools.combinations(order, 2)) % 2
+            path[2:] = path[2:] if not odd else path[:1:-1]
+            solids.append(path)
+    lines += ["$EndNodes", "$Elements", str(len(solids))]
+    lines += [f"{k + 1} 4 2 0 1 {' '.join(str(number[p]) for p in s)}" for k, s in enumerate(solids)]
+    return "\n".join([*lines, "$EndElements", ""])
+
+
 def _json(path: Path) -> Any:
     return json.loads(path.read_text())
 
@@ -234,7 +299,8 @@ def main() -> int:
         return 0
     described = ("-C", str(ROOT), "describe", "--always", "--dirty=-changed", "--abbrev=9")
     commit = _program("git", *described).strip()
-    now = Side(ROOT, given.now or folder / f"now-{commit}-{os.getpid()}")
+    now = Side(ROOT, given.now or folder / f"now-{commit}-{os.getpid()}", _old_names())
+    shutil.copytree(before.made / "cache", now.made / "cache", dirs_exist_ok=True)
     make_anew(now, before, given.table)
     found = list(differences(before, now))
     for line in found:
