@@ -85,6 +85,7 @@ def nominal_bench(
         flange_from_gel=station.flange_from_gel,
         sensor=station.gel.sensor,
         calibration=station.gel.calibration,
+        other_calibration=station.gel.described.world_calibration,
         camera=_camera(scene, station),
         furniture=Furniture(scene.table.height, scene.table.size, scene.support.width),
     )

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from calibration.taxim.mark_free import Identity
     from calibration.taxim.pictures import Channels, Pictures
 
-PITCH = "0.1245mm"
-"""Of pictures of which nothing else is said: the paper's sensor."""
-
 
 def taxim(
     folder: Annotated[
@@ -47,7 +44,7 @@ def taxim(
         str | None,
         typer.Option(
             help="Length of gel that a pixel shows, as 0.0295mm. Presses cannot tell it, the arm can: "
-            f"what it measured if left out, or {PITCH} of pictures.",
+            "what it measured if left out, or that of the GelSight R1.5 of pictures.",
             metavar="LENGTH",
         ),
     ] = None,
@@ -255,6 +252,7 @@ def _identity(
     """Who the sensor is, and its pitch: as given, else by the arm, else the paper's sensor's."""
     from calibration.taxim.mark_free import Identity
     from harness.basics.errors import WrongUse
+    from harness.bench.sensor import GELSIGHT_R15
 
     recorded = None if arm is None else arm.ball_radius
     if ball_radius is None and recorded is None:
@@ -264,13 +262,13 @@ def _identity(
             f"--ball-radius {1e3 * ball_radius:g} mm: this run was made with a ball of {1e3 * recorded:g} "
             "mm; leave it out"
         )
-    measured = None if scale is None else scale.pitch.value
+    known = GELSIGHT_R15.pitch if scale is None else scale.pitch.value
     return Identity(
         sensor=sensor or ("GelSight" if arm is None else arm.sensor),
         serial=serial if arm is None or serial != "unknown" else arm.serial or serial,
         licence=licence,
         date=datetime.now(UTC).date().isoformat(),
-        pitch=measured if pitch is None and measured is not None else _length("--pitch", pitch or PITCH),
+        pitch=known if pitch is None else _length("--pitch", pitch),
         ball_radius=recorded if recorded is not None else ball_radius or 0.0,
     )
 

@@ -28,7 +28,7 @@ def load_toml(path: Path, model: type[M]) -> M:
         WrongUse: the file cannot be read, or says something the model does not know; each
             mistake is named with its key, its value and what was expected.
     """
-    return validate(read_toml(path), model, str(path))
+    return validate(read_toml(path), model, str(path), path.parent)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -47,14 +47,20 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise WrongUse(f"{path} is not TOML: {str(error)[:1].lower()}{str(error)[1:]}") from error
 
 
-def validate(tree: Any, model: type[M], where: str) -> M:
-    """Plain values (as TOML or JSON give them) as a model; ``where`` names their source in messages.
+def validate(tree: Any, model: type[M], where: str, folder: Path | None = None) -> M:
+    """Plain values (as TOML or JSON give them) as a model.
+
+    Args:
+        tree: the values.
+        model: of what they say.
+        where: names their source in messages.
+        folder: that paths among them are relative to, for the model's own checks; None for the one we are in.
 
     Raises:
         WrongUse: as ``load_toml``.
     """
     try:
-        return model.model_validate(_frozen(tree))
+        return model.model_validate(_frozen(tree), context={"folder": folder})
     except ValidationError as error:
         problems = [_sentence(detail, model) for detail in error.errors(include_url=False)]
     if len(problems) == 1:

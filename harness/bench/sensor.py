@@ -1,6 +1,20 @@
-"""The geometry of a tactile camera: all that a simulator needs to know of its make."""
+"""Tactile cameras: the geometry that simulators know of a make, read from the make's own file.
+
+A make is one TOML file (``harness.bench.sensor_file``): a shipped one goes by its name, any other by its
+path.
+"""
 
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import load_toml, nearest
+from harness.bench.sensor_file import MarkerFigure, SensorFile, Sourced
+
+_SHIPPED = Path(__file__).parent / "sensors"
+
+DEFAULT_MAKE = "gelsight-r1.5"
 
 
 @dataclass(frozen=True)
@@ -57,5 +71,132 @@ class TactileSensor:
         return self.columns * self.pitch, self.rows * self.pitch
 
 
-GELSIGHT_R15 = TactileSensor("GelSight R1.5 (ObjectFolder 2.0)", 120, 160, 0.1245e-3, 2.5e-3)
+@dataclass(frozen=True)
+class SensorDescription:
+    """A make of tactile camera, and how well its figures are known.
+
+    Attributes:
+        sensor: for the simulators and the inverse.
+        calibration: of its colours: an absolute path or the name of a shipped one; None where none comes
+            with it.
+        world_calibration: the same of other presses, for the mocked world; None where there are none.
+        sources: of every figure, by its table in the file.
+        assumed: the tables whose figures are nobody's measurement: measure them before they matter.
+    """
+
+    sensor: TactileSensor
+    calibration: str | None
+    world_calibration: str | None
+    sources: dict[str, str]
+    assumed: tuple[str, ...]
+
+
+def shipped_sensors() -> tuple[str, ...]:
+    """Names of the makes that come with the package."""
+    return tuple(sorted(path.stem for path in _SHIPPED.glob("*.toml")))
+
+
+def sensor_path(make: str, folder: Path | None = None) -> Path:
+    """The file of a make: a shipped name, or a path (relative to ``folder``; to here if None).
+
+    Raises:
+        WrongUse: there is none.
+    """
+    if make in shipped_sensors():
+        return _SHIPPED / f"{make}.toml"
+    path = (folder or Path()) / make
+    if not path.is_file():
+        listed = nearest(make, shipped_sensors())
+        raise WrongUse(f"no sensor {make!r}; {listed}; or give the path of a sensor's file")
+    return path.resolve()
+
+
+def lasting_make(make: str, folder: Path | None = None) -> str:
+    """What to write of a make: a shipped name, or a path that holds wherever it is read from.
+
+    Raises:
+        WrongUse: as ``described_sensor``.
+    """
+    path = sensor_path(make, folder)
+    _described(path)
+    return make if path.parent == _SHIPPED else str(path)
+
+
+def described_sensor(make: str) -> SensorDescription:
+    """A make by its shipped name or the path of its file.
+
+    Raises:
+        WrongUse: there is none, or as ``read_sensor``.
+    """
+    return _described(sensor_path(make))
+
+
+def read_sensor(path: Path) -> SensorDescription:
+    """Read a description, strictly.
+
+    Raises:
+        WrongUse: a key that is unknown, missing or of a wrong type or unit, each named; or a dome too flat or
+            too small for what the camera sees.
+    """
+    said = load_toml(path, SensorFile)
+    figures = {name: value for name, value in said if isinstance(value, Sourced)}
+    sensor = TactileSensor(
+        said.name,
+        said.image.rows,
+        said.image.columns,
+        said.pitch.value,
+        said.gel_thickness.value,
+        None if said.gel_radius is None else said.gel_radius.value,
+        (said.housing.x, said.housing.y),
+        _markers(said.markers),
+        said.shadow.casts,
+    )
+    _check(sensor, path)
+    return SensorDescription(
+        sensor,
+        _beside(path, said.calibration),
+        _beside(path, said.world_calibration),
+        {name: figure.source for name, figure in figures.items()},
+        tuple(name for name, figure in figures.items() if figure.basis == "assumed"),
+    )
+
+
+def _described(path: Path) -> SensorDescription:
+    return _shipped(path) if path.parent == _SHIPPED else read_sensor(path)
+
+
+@cache
+def _shipped(path: Path) -> SensorDescription:
+    """Read once: what comes with the package does not change while it runs."""
+    return read_sensor(path)
+
+
+def _beside(path: Path, calibration: str | None) -> str | None:
+    """The absolute path of a calibration beside a sensor's file; else the name it is given by."""
+    if calibration is None:
+        return None
+    beside = path.parent / calibration
+    return str(beside.resolve()) if beside.is_file() else calibration
+
+
+def _markers(said: MarkerFigure | None) -> MarkerGrid | None:
+    return None if said is None else MarkerGrid(said.rows, said.columns, said.spacing, said.radius)
+
+
+def _check(sensor: TactileSensor, path: Path) -> None:
+    reach = 0.5 * max(sensor.window)
+    if sensor.gel_radius is not None and sensor.gel_radius <= reach:
+        raise WrongUse(
+            f"{path}: a dome of {1e3 * sensor.gel_radius:g} mm radius does not span the window, which "
+            f"reaches {1e3 * reach:.1f} mm from its centre; check [gel_radius], [pitch] and [image]"
+        )
+    for side, window, housing in zip("xy", sensor.window, sensor.housing, strict=True):
+        if window > housing:
+            raise WrongUse(
+                f"{path}: the camera sees {1e3 * window:.1f} mm along {side} of a housing of "
+                f"{1e3 * housing:g} mm; check [pitch], [image] and [housing]"
+            )
+
+
+GELSIGHT_R15 = described_sensor(DEFAULT_MAKE).sensor
 """The paper's own sensor: 120 x 160 pixels of 0.1245 mm, a window of 19.9 x 14.9 mm."""

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from harness.basics.arrays import FloatArray, read_only
+from harness.basics.errors import WrongUse
 from harness.basics.geometry import rotation_from_vector, transform
 from harness.basics.quantities import (
     Acceleration,
@@ -24,10 +25,14 @@ from harness.basics.quantities import (
 )
 from harness.basics.toml_file import StrictModel
 from harness.bench.acquisition import AcquisitionCalibration, shipped_acquisition
-from harness.bench.sensor import GELSIGHT_R15, MarkerGrid, TactileSensor
-
-SENSORS = {"gelsight-r1.5": GELSIGHT_R15}
-"""The makes of gel a station may name."""
+from harness.bench.sensor import (
+    DEFAULT_MAKE,
+    MarkerGrid,
+    SensorDescription,
+    TactileSensor,
+    described_sensor,
+    lasting_make,
+)
 
 _TURN = 2 * np.pi
 
@@ -135,18 +140,19 @@ class GelSection(StrictModel):
     Attributes:
         kind: of driver.
         url: of its stream; None only in a mocked station.
-        make: a key of ``SENSORS``.
+        make: the shipped name of a sensor, or the path of a sensor's file (relative to the station file,
+            absolute once read).
         serial: of the sensor.
         calibration: path (relative to the station file, absolute once read) or name of a
             calibration artefact.
         casts_shadow: whether its light grazes enough for shadows.
-        markers: printed on its gel, None without.
+        markers: printed on its gel; None for those of its make, if it has any.
         rate: Hz, as its maker states it.
     """
 
     kind: Literal["gelsight-http"] = "gelsight-http"
     url: str | None = None
-    make: Literal["gelsight-r1.5"] = "gelsight-r1.5"
+    make: str = DEFAULT_MAKE
     serial: str = ""
     calibration: str
     casts_shadow: bool = False
@@ -154,10 +160,24 @@ class GelSection(StrictModel):
     rate: Annotated[Frequency, Positive] = 25.0
 
     @property
+    def described(self) -> SensorDescription:
+        """The make, as its file says."""
+        return described_sensor(self.make)
+
+    @property
     def sensor(self) -> TactileSensor:
         """The geometry of this very sensor."""
-        grid = None if self.markers is None else MarkerGrid(**self.markers.model_dump())
-        return replace(SENSORS[self.make], markers=grid, casts_shadow=self.casts_shadow)
+        made = self.described.sensor
+        grid = made.markers if self.markers is None else MarkerGrid(**self.markers.model_dump())
+        return replace(made, markers=grid, casts_shadow=self.casts_shadow)
+
+    @field_validator("make")
+    @classmethod
+    def _is_described(cls, make: str, info: ValidationInfo) -> str:
+        try:
+            return lasting_make(make, (info.context or {}).get("folder"))
+        except WrongUse as error:
+            raise ValueError(str(error)) from error
 
 
 class HammerSection(StrictModel):

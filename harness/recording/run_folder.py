@@ -2,6 +2,7 @@
 
 import datetime as dt
 import importlib.metadata
+import shutil
 import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,19 +18,18 @@ from harness.basics.errors import RecordingDamaged, WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.acquisition import AcquisitionCalibration
 from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.sensor import sensor_path, shipped_sensors
 from harness.bench.station_file import Station, station_from_json
 from harness.effects.scene_object import known_file
 from harness.objectfile.file import ObjectFile, copied
 from harness.objects.builtin import DESCRIPTION
 from harness.recording.recording import Recording, RunHeader, require_unused
-from harness.sim.optics.lit_calibration import read_calibration, shadow_of
-from harness.sim.optics.tactile_calibration import (
-    TactileCalibration,
-    save_calibration,
-    shipped_calibration,
-)
+from harness.sim.optics.lit_calibration import named_calibration, read_calibration, shadow_of
+from harness.sim.optics.pressed_gel import require_own
+from harness.sim.optics.tactile_calibration import TactileCalibration, save_calibration
 
 OBJECT, CALIBRATION, ACQUISITION = "object.npz", "calibration.npz", "acquisition.json"
+SENSOR = "sensor.toml"
 OBJECTFILE = "objectfile"
 """The folder of the object's ObjectFile within that of a run."""
 
@@ -43,10 +43,12 @@ def station_calibration(station: Station) -> TactileCalibration:
 
     Raises:
         CalibrationRefused: it is missing or damaged.
+        DataRefused: it is of a camera of another size.
         WrongUse: the station's light casts shadows, and the calibration has none.
     """
     named = station.gel.calibration
-    found = read_calibration(Path(named)) if named.endswith(".npz") else shipped_calibration(named)
+    found = named_calibration(named)
+    require_own(found, station.gel.sensor)
     if station.gel.casts_shadow and shadow_of(found) is None:
         raise WrongUse(
             f"the station {station.title!r} has gel.casts_shadow = true, and the presses of its calibration "
@@ -112,6 +114,9 @@ def create_run(
     if acquisition is not None:
         acquisition.save(folder / ACQUISITION)
         carried.append(ACQUISITION)
+    if station.gel.make not in shipped_sensors():
+        shutil.copyfile(sensor_path(station.gel.make), folder / SENSOR)
+        carried.append(SENSOR)
     if of is not None:
         copied(of, folder / OBJECTFILE, of.description.sound_files)
         carried.append(_DESCRIBED)
@@ -143,8 +148,11 @@ class RunFiles:
 
     @cached_property
     def station(self) -> Station:
-        """As it was resolved when the run was made."""
-        return station_from_json(self.recording.header.station, f"{self.recording.folder}/run.json")
+        """As it was resolved when the run was made; a make of one's own is read from the run's folder."""
+        tree = self.recording.header.station
+        if SENSOR in self.recording.header.files:
+            tree = {**tree, "gel": {**tree["gel"], "make": str(self._checked(SENSOR).resolve())}}
+        return station_from_json(tree, f"{self.recording.folder}/run.json")
 
     @cached_property
     def mesh(self) -> Mesh:

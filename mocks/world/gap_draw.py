@@ -162,7 +162,6 @@ class GapDraw:
             "aspect": run.aspect,
             "height_gain": run.height_gain,
             "gel_skirt_m": self.gap.gel.skirt,
-            "calibration": self.gap.gel.calibration,
         }
 
     def random(self, purpose: int, *key: int) -> np.random.Generator:

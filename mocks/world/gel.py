@@ -1,7 +1,5 @@
 """What the world's gel shows: its own skirt, its own colours, and noise."""
 
-from pathlib import Path
-
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray
@@ -9,12 +7,9 @@ from harness.bench.gap import GelGap
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.gel import R15_SKIRT, GelSkirt, deform, half_kernel, over_range
 from harness.sim.gel.height_map import rest_surface
-from harness.sim.optics.lit_calibration import read_calibration
+from harness.sim.optics.lit_calibration import named_calibration
 from harness.sim.optics.optics import Optics
-from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
-
-WORLD_CALIBRATION = "gelsight_r15_world"
-"""Fitted to presses that no estimator's calibration has seen."""
+from harness.sim.optics.pressed_gel import require_own
 
 _NARROWEST = 5
 _WIDEST = 301
@@ -26,7 +21,7 @@ class WorldGel:
     Args:
         sensor: make and geometry.
         gap: how this gel differs from its model.
-        calibration: that estimators believe in, a shipped name or a path.
+        calibration: whose colours it has, a shipped name or a path.
         steeper: the pitch that colours are stated for over this gel's own: a slope in pixels.
 
     Attributes:
@@ -36,7 +31,8 @@ class WorldGel:
 
     def __init__(self, sensor: TactileSensor, gap: GelGap, calibration: str, steeper: float = 1.0) -> None:
         self._sensor = sensor
-        self.calibration = _calibration(gap, calibration)
+        self.calibration = named_calibration(calibration)
+        require_own(self.calibration, sensor)
         self._steeper = steeper
         self._skirt = skirt_of(gap.skirt, sensor.pitch)
         self._optics = Optics(self.calibration, "exact", -rest_surface(sensor))
@@ -84,8 +80,3 @@ def _sigma(kernels: tuple[int, ...]) -> float:
     """Pixels: variances of blurs in a row add up."""
     halves = [half_kernel(kernel) for kernel in kernels]
     return float(np.sqrt(sum(2.0 * np.sum(half * np.arange(len(half)) ** 2) for half in halves)))
-
-
-def _calibration(gap: GelGap, believed: str) -> TactileCalibration:
-    name = WORLD_CALIBRATION if gap.calibration == "other presses" else believed
-    return read_calibration(Path(name)) if Path(name).is_file() else shipped_calibration(name)

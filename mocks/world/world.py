@@ -67,6 +67,8 @@ class NominalBench:
         flange_from_gel: ``(4, 4)``.
         sensor: the make of the gel.
         calibration: of the gel that estimators believe in: the name of a shipped one, or a path.
+        other_calibration: the same of presses that no estimator has seen; None where there are none, and
+            the world has the estimator's.
         camera: the scene camera, None where there is none.
         furniture: around the object.
     """
@@ -76,6 +78,7 @@ class NominalBench:
     flange_from_gel: FloatArray
     sensor: TactileSensor
     calibration: str
+    other_calibration: str | None
     camera: Camera | None = None
     furniture: Furniture = Furniture()
 
@@ -131,7 +134,9 @@ class World:
         tool = float(np.linalg.norm(bench.flange_from_gel[:3, 3]))
         self._touching_distance = self.mesh.diagonal / 2 + tool + float(np.hypot(*self.sensor.window)) + REACH
         steeper = bench.sensor.pitch / self._grid.mean_pitch
-        self._gel = WorldGel(self.sensor, gap.gel, bench.calibration, steeper)
+        other = bench.other_calibration if gap.gel.calibration == "other presses" else None
+        self._believed = other is None
+        self._gel = WorldGel(self.sensor, gap.gel, other or bench.calibration, steeper)
         self.background = self._gel.background
         self._shading = self._draw.shading(self.sensor.rows, self.sensor.columns)
         self._contact = GelContact(self.mesh, self.sensor.window, SPRING_SPACING, REACH)
@@ -200,6 +205,7 @@ class World:
         """What the world does differently from the nominal bench, for the report."""
         return {
             **self._draw.summary(),
+            "calibration": "the estimator's" if self._believed else "other presses",
             "mesh_vertices": len(self.mesh.vertices),
             "mesh_faces": len(self.mesh.faces),
             "optics_level": "exact",

@@ -28,6 +28,7 @@ def mug_bench() -> NominalBench:
         translation(np.array([0.0, 0.0, 0.12])),
         GELSIGHT_R15,
         "gelsight_r15_bench",
+        "gelsight_r15_world",
         camera,
     )
 

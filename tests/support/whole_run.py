@@ -37,9 +37,11 @@ def touch_scene(mesh: str = "builtin:mug", contacts: int = 3, spacing: str = "sp
     return scene_from_json(tree, "the test")
 
 
-def in_process_run(folder: Path, scene: SceneFile, seed: int, gap: str = "default") -> Recording:
+def in_process_run(
+    folder: Path, scene: SceneFile, seed: int, gap: str = "default", station: str = "mock"
+) -> Recording:
     """Plan, rehearse and perform a run without sockets, in simulated time; nothing is estimated."""
-    started = session_of.start(scene, load_station(station_path("mock")), seed, gap, folder)
+    started = session_of.start(scene, load_station(station_path(station)), seed, gap, folder)
     recording = started.recording
     run = RunFiles(recording)
     context = RunContext(recording.truth_path, run.mesh, seed, gap)

@@ -129,15 +129,13 @@ def _checked(out: Path, picture: Path | None, height_out: Path | None) -> None:
 def _calibration(named: str | None, bench: "Station | None") -> "TactileCalibration":
     from harness.basics.errors import WrongUse
     from harness.recording.run_folder import station_calibration
-    from harness.sim.optics.lit_calibration import read_calibration
-    from harness.sim.optics.tactile_calibration import shipped_calibration
+    from harness.sim.optics.lit_calibration import named_calibration
 
     if named is None:
         if bench is None:
             raise WrongUse("say by which colours: --calibration FILE, or a --station that has one")
         return station_calibration(bench)
-    path = Path(named)
-    return shipped_calibration(named) if not path.exists() and path.suffix == "" else read_calibration(path)
+    return named_calibration(named)
 
 
 def _frames(images: list[Path]) -> "ByteArray":

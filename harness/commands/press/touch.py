@@ -47,7 +47,9 @@ def touch(
     sensor: Annotated[
         str | None,
         typer.Option(
-            help="A make: gelsight-r1.5 (if nothing else is said) or taxim-gelsight.", metavar="NAME"
+            help="A make by its name, gelsight-r1.5 if nothing else is said, or the path of a sensor's own "
+            "file; a name that is not known is answered by all that are.",
+            metavar="NAME",
         ),
     ] = None,
     calibration: Annotated[

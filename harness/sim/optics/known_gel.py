@@ -1,46 +1,25 @@
 """The gel that a press is drawn on: a make by its name, a calibration of ours or a published one."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from harness.basics.arrays import ByteArray
 from harness.basics.errors import CalibrationRefused, WrongUse
-from harness.basics.toml_file import nearest
-from harness.bench.sensor import GELSIGHT_R15, TactileSensor
-from harness.picture.square_pixels import aspect_stated, made_square
-from harness.sim.optics.lit_calibration import read_calibration, shadow_of
-from harness.sim.optics.pressed_gel import Gel
-from harness.sim.optics.published_pack import SHADOWS, TABLE, PublishedPack, is_published, read_published
-from harness.sim.optics.tactile_calibration import (
-    TactileCalibration,
-    shipped_calibration,
-    with_background,
+from harness.bench.sensor import (
+    DEFAULT_MAKE,
+    SensorDescription,
+    TactileSensor,
+    described_sensor,
+    shipped_sensors,
 )
+from harness.picture.square_pixels import aspect_stated, made_square
+from harness.sim.optics.lit_calibration import named_calibration, shadow_of
+from harness.sim.optics.pressed_gel import Gel, how_to_calibrate
+from harness.sim.optics.published_pack import SHADOWS, TABLE, PublishedPack, is_published, read_published
+from harness.sim.optics.tactile_calibration import TactileCalibration, with_background
 
 _SAME_PITCH = 0.01
 """Relative: pitches this near are of the same make."""
-
-
-@dataclass(frozen=True)
-class Make:
-    """A make of tactile camera.
-
-    Attributes:
-        sensor: its geometry.
-        calibration: name of the one that comes with the package; None where there is none.
-    """
-
-    sensor: TactileSensor
-    calibration: str | None = None
-
-
-MAKES = {
-    "gelsight-r1.5": Make(GELSIGHT_R15, "gelsight_r15_bench"),
-    "taxim-gelsight": Make(TactileSensor("GelSight of Taxim", 480, 640, 0.0295e-3, 5.0e-3)),
-}
-"""By the name an operator gives. Taxim's gel is as thick as the dome of its published height map."""
-
-DEFAULT_MAKE = "gelsight-r1.5"
 
 
 def known_gel(
@@ -55,7 +34,8 @@ def known_gel(
     """Put a gel together from what an operator says of it.
 
     Args:
-        make: a key of ``MAKES``; None to go by the calibration, or for the default one.
+        make: the shipped name of a sensor or the path of a sensor's file; None to go by the calibration, or
+            for the default one.
         calibration: a file of ours, a published folder or the name of a shipped one; None for the make's.
         pitch: metres a pixel, where neither the make nor the calibration says it.
         thickness: metres of the gel, in place of the make's.
@@ -79,16 +59,14 @@ def known_gel(
     return Gel(replace(sensor, casts_shadow=table is not None), pack.calibration, pack.rest, table)
 
 
-def _make(name: str | None, calibration: str | None) -> Make | None:
-    if name is None:
-        return None if calibration is not None else MAKES[DEFAULT_MAKE]
-    if name not in MAKES:
-        raise WrongUse(f"no sensor {name!r}; {nearest(name, MAKES)}")
-    return MAKES[name]
+def _make(name: str | None, calibration: str | None) -> SensorDescription | None:
+    if name is None and calibration is not None:
+        return None
+    return described_sensor(DEFAULT_MAKE if name is None else name)
 
 
 def _pack(
-    make: Make | None, calibration: str | None, pitch: float | None, background: ByteArray | None
+    make: SensorDescription | None, calibration: str | None, pitch: float | None, background: ByteArray | None
 ) -> PublishedPack:
     if calibration is not None and is_published(Path(calibration)):
         stated = pitch if make is None else (pitch or make.sensor.pitch)
@@ -110,24 +88,27 @@ def _pack(
     return PublishedPack(with_background(own, square), None, shadow_of(own))
 
 
-def _own(make: Make | None, calibration: str | None) -> TactileCalibration:
+def _own(make: SensorDescription | None, calibration: str | None) -> TactileCalibration:
     if calibration is None:
         assert make is not None
         if make.calibration is None:
             raise WrongUse(
-                f"no calibration comes with {make.sensor.name}; give one with --calibration FILE_OR_FOLDER"
+                f"no calibration comes with {make.sensor.name}; give one with --calibration FILE_OR_FOLDER, "
+                f'or name it in the sensor\'s file, calibration = "FILE.npz". For one, '
+                f"{how_to_calibrate(make.sensor)}"
             )
-        return shipped_calibration(make.calibration)
+        return named_calibration(make.calibration)
     path = Path(calibration)
     if path.is_dir():
         raise CalibrationRefused(f"{path} has no {TABLE}; a published calibration is a folder that has one")
-    if not path.exists() and path.suffix == "":
-        return shipped_calibration(calibration)
-    return read_calibration(path)
+    return named_calibration(calibration)
 
 
 def _sensor(
-    make: Make | None, calibration: TactileCalibration, pitch: float | None, thickness: float | None
+    make: SensorDescription | None,
+    calibration: TactileCalibration,
+    pitch: float | None,
+    thickness: float | None,
 ) -> TactileSensor:
     found = calibration.header.pitch
     if pitch is not None and abs(pitch / found - 1.0) > _SAME_PITCH:
@@ -153,8 +134,8 @@ def _sensor(
 
 
 def _like(calibration: TactileCalibration) -> TactileSensor | None:
-    for make in MAKES.values():
-        sensor, pitch = make.sensor, calibration.header.pitch
+    for name in shipped_sensors():
+        sensor, pitch = described_sensor(name).sensor, calibration.header.pitch
         same_shape = (sensor.rows, sensor.columns) == (calibration.rows, calibration.columns)
         if same_shape and abs(sensor.pitch / pitch - 1.0) <= _SAME_PITCH:
             return sensor

@@ -33,6 +33,7 @@ from harness.sim.optics.tactile_calibration import (
     Float32Array,
     TactileCalibration,
     load_calibration,
+    shipped_calibration,
     smooth_terms,
 )
 
@@ -189,6 +190,17 @@ def place_terms(where: FloatArray) -> FloatArray:
     u, v = (np.vander(where[:, k], POSITION_DEGREE + 1, increasing=True) for k in range(2))
     places = [(c, d) for c in range(POSITION_DEGREE + 1) for d in range(POSITION_DEGREE + 1 - c)]
     return np.stack([u[:, c] * v[:, d] for c, d in places], axis=1)
+
+
+def named_calibration(named: str) -> TactileCalibration:
+    """A calibration by its path, or by the name of one that comes with the package.
+
+    Raises:
+        WrongUse: there is no such file.
+        CalibrationRefused: no such name, or as ``read_calibration``.
+    """
+    path = Path(named)
+    return read_calibration(path) if path.exists() or path.suffix else shipped_calibration(named)
 
 
 def read_calibration(path: Path) -> TactileCalibration:

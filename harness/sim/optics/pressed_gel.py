@@ -40,12 +40,7 @@ class Gel:
     forces: ForceTable | None = None
 
     def __post_init__(self) -> None:
-        seen = (self.calibration.rows, self.calibration.columns)
-        if seen != (self.sensor.rows, self.sensor.columns):
-            raise DataRefused(
-                f"the calibration is of {seen[0]} x {seen[1]} pixels and {self.sensor.name} has "
-                f"{self.sensor.rows} x {self.sensor.columns}; give the sensor's own calibration"
-            )
+        require_own(self.calibration, self.sensor)
         if self.dots is not None:
             self._require_own_dots(self.dots)
 
@@ -65,3 +60,20 @@ class Gel:
                 f"the dots were measured in a picture of {seen[0]} x {seen[1]} pixels and {self.sensor.name} "
                 f"has {own[0]} x {own[1]}; measure them at the sensor's own resolution"
             )
+
+
+def require_own(calibration: TactileCalibration, sensor: TactileSensor) -> None:
+    """``DataRefused`` for a calibration of a camera of another size."""
+    if (calibration.rows, calibration.columns) != (sensor.rows, sensor.columns):
+        raise DataRefused(
+            f"the calibration is of {calibration.rows} x {calibration.columns} pixels and {sensor.name} has "
+            f"{sensor.rows} x {sensor.columns}; give the sensor's own calibration: {how_to_calibrate(sensor)}"
+        )
+
+
+def how_to_calibrate(sensor: TactileSensor) -> str:
+    """What to run for a calibration of a sensor that has none."""
+    return (
+        f"press a ball all over it and say `touchstone calibrate taxim PRESSES/ --ball-radius 2mm --pitch "
+        f"{1e3 * sensor.pitch:g}mm`, which writes one of {sensor.rows} x {sensor.columns} pixels"
+    )

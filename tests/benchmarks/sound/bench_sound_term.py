@@ -105,7 +105,12 @@ def run_of(thing: Thing, true_modes: Modes, gap: Gap, seed: int, steps: Steps, c
     sites = plan_sites(thing.model.raster, GELSIGHT_R15, base_from_object, count, steps, seed)
     flange_from_tool = translation(np.array([0.0, 0.0, 0.1]))
     bench = NominalBench(
-        build(thing.name, 2.2e-3), base_from_object, flange_from_tool, GELSIGHT_R15, CALIBRATION
+        build(thing.name, 2.2e-3),
+        base_from_object,
+        flange_from_tool,
+        GELSIGHT_R15,
+        CALIBRATION,
+        "gelsight_r15_world",
     )
     world = World(bench, gap, seed)
     heard = Instrument(

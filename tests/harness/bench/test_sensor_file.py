@@ -5,8 +5,13 @@ from pathlib import Path
 import pytest
 
 from harness.basics.errors import WrongUse
-from harness.bench.sensor import GELSIGHT_R15
-from harness.bench.sensor_file import read_sensor, shipped_sensor, shipped_sensors
+from harness.bench.sensor import (
+    GELSIGHT_R15,
+    TactileSensor,
+    described_sensor,
+    read_sensor,
+    shipped_sensors,
+)
 
 PLAIN = """\
 schema = 1
@@ -42,13 +47,16 @@ def _written(folder: Path, text: str) -> Path:
     return path
 
 
-def test_the_papers_sensor_is_the_one_in_code() -> None:
-    assert shipped_sensor("gelsight_r15").sensor == GELSIGHT_R15
+def test_the_papers_sensor_is_its_file_to_the_bit() -> None:
+    assert described_sensor("gelsight-r1.5").sensor == GELSIGHT_R15
+    assert TactileSensor("GelSight R1.5 (ObjectFolder 2.0)", 120, 160, 0.1245e-3, 2.5e-3) == GELSIGHT_R15
+    taxim = TactileSensor("GelSight of Taxim", 480, 640, 0.0295e-3, 5.0e-3)
+    assert described_sensor("taxim-gelsight").sensor == taxim
 
 
 @pytest.mark.parametrize("name", shipped_sensors())
 def test_every_figure_says_where_it_comes_from(name: str) -> None:
-    described = shipped_sensor(name)
+    described = described_sensor(name)
     assert {"image", "pitch", "gel_thickness", "housing", "shadow"} <= set(described.sources)
     assert set(described.assumed) <= set(described.sources)
     window, housing = described.sensor.window, described.sensor.housing
@@ -56,9 +64,9 @@ def test_every_figure_says_where_it_comes_from(name: str) -> None:
     assert window[1] < housing[1]
 
 
-def test_three_makes_are_described() -> None:
-    assert set(shipped_sensors()) == {"digit", "gelsight_mini", "gelsight_r15"}
-    digit, mini = shipped_sensor("digit").sensor, shipped_sensor("gelsight_mini").sensor
+def test_four_makes_are_described() -> None:
+    assert set(shipped_sensors()) == {"digit", "gelsight-mini", "gelsight-r1.5", "taxim-gelsight"}
+    digit, mini = described_sensor("digit").sensor, described_sensor("gelsight-mini").sensor
     assert digit.gel_radius == pytest.approx(0.1)
     assert mini.gel_radius is None
     assert digit.window == pytest.approx((240e-3 / 19.58, 320e-3 / 19.58), rel=1e-5)
@@ -101,5 +109,5 @@ def test_a_mistake_is_named(tmp_path: Path, old: str, new: str, says: str) -> No
 
 
 def test_a_name_that_is_not_described() -> None:
-    with pytest.raises(WrongUse, match="gelsight_mini"):
-        shipped_sensor("gelsight_mimi")
+    with pytest.raises(WrongUse, match="did you mean 'gelsight-mini'"):
+        described_sensor("gelsight-mimi")

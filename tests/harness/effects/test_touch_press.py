@@ -10,13 +10,13 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, DataRefused, OutOfDomain, WrongUse
 from harness.basics.geometry import inverse, transform
 from harness.bench.scene import scene_from_options
-from harness.bench.sensor import GELSIGHT_R15, MarkerGrid
+from harness.bench.sensor import GELSIGHT_R15, MarkerGrid, described_sensor
 from harness.effects.evaluate import evaluate
 from harness.effects.explain import scene_plan
 from harness.effects.touch_press import press_heights, press_mesh
 from harness.objects.household import build
 from harness.sim.gel.gel import deform
-from harness.sim.optics.known_gel import MAKES, known_gel
+from harness.sim.optics.known_gel import known_gel
 from harness.sim.optics.pressed_gel import Gel
 from harness.sim.optics.shadow import ShadowTable
 from harness.sim.optics.tactile_calibration import shipped_calibration
@@ -206,7 +206,7 @@ def test_levels_are_turned_or_refused() -> None:
 
 def test_a_calibration_of_another_camera_is_refused() -> None:
     with pytest.raises(DataRefused, match="120 x 160 pixels and GelSight of Taxim has 480 x 640"):
-        Gel(MAKES["taxim-gelsight"].sensor, BENCH.calibration)
+        Gel(described_sensor("taxim-gelsight").sensor, BENCH.calibration)
 
 
 def test_gels_are_put_together_from_what_is_said() -> None:

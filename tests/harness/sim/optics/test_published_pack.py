@@ -9,8 +9,9 @@ import pytest
 
 from harness.basics.arrays import ByteArray
 from harness.basics.errors import CalibrationRefused, DataRefused, WrongUse
+from harness.bench.sensor import described_sensor
 from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT
-from harness.sim.optics.known_gel import MAKES, known_gel
+from harness.sim.optics.known_gel import known_gel
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.published_pack import PublishedPack, is_published, read_published
 
@@ -123,11 +124,11 @@ def test_taxims_and_objectfolders_folders_are_their_own_sensors(shared_data: Pat
     lab = shared_data / "tactile/taxim/gelsight_lab"
     black = np.zeros((480, 640, 3), np.uint8)
     taxim = known_gel(None, str(lab), pitch=0.0295e-3, background=black)
-    assert taxim.sensor == replace(MAKES["taxim-gelsight"].sensor, casts_shadow=True)
+    assert taxim.sensor == replace(described_sensor("taxim-gelsight").sensor, casts_shadow=True)
     assert taxim.calibration.header.skirt == TAXIM_SKIRT
     assert not known_gel("taxim-gelsight", str(lab), background=black, shadow=False).sensor.casts_shadow
     paper = known_gel(None, str(shared_data / "tactile/objectfolder_calibs"), pitch=0.1245e-3)
-    assert paper.sensor == MAKES["gelsight-r1.5"].sensor
+    assert paper.sensor == described_sensor("gelsight-r1.5").sensor
     assert paper.calibration.header.skirt == R15_SKIRT
     assert paper.rest is not None
 
