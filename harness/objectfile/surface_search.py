@@ -8,9 +8,8 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import OutOfDomain, WrongUse
 from harness.basics.faces.face_grid import FaceGrid, build_face_grid
-from harness.basics.faces.nearest_kernels import nearest_places
+from harness.basics.faces.nearest_kernels import near_surface, nearest_places, shares_on_faces
 from harness.basics.mesh import Mesh
-from harness.objectfile.near_kernel import near_surface, shares_on_faces
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,9 @@
-"""Where a surface is from a point, in machine code: nearest places, walls and columns."""
+"""Where a surface is from a point, in machine code: nearest places, and where on a face a place is."""
 
 import numpy as np
 
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
-
-_SEAM = 1e-9
-"""By which a triangle is larger for a ray, so that none slips through between two of them."""
 
 
 @compiled
@@ -53,6 +50,24 @@ def _squared(a: FloatArray, b: FloatArray) -> float:
 
 
 @compiled
+def _cells_within(
+    point: FloatArray,
+    reach: float,
+    origin: FloatArray,
+    cell: float,
+    shape: IntArray,
+    low: IntArray,
+    high: IntArray,
+) -> None:
+    """Fill in the first and last cell along each axis of the grid that are within ``reach`` m of a point."""
+    for axis in range(3):
+        first = np.floor((point[axis] - reach - origin[axis]) / cell)
+        last = np.floor((point[axis] + reach - origin[axis]) / cell)
+        low[axis] = int(min(max(first, 0.0), shape[axis] - 1.0))
+        high[axis] = int(min(max(last, 0.0), shape[axis] - 1.0))
+
+
+@compiled
 def nearest_places(
     points: FloatArray,
     directions: FloatArray,
@@ -90,11 +105,7 @@ def nearest_places(
     low, high, here = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3)
     for n in range(len(points)):
         best = reach[n] ** 2
-        for axis in range(3):
-            first = np.floor((points[n, axis] - reach[n] - origin[axis]) / cell)
-            last = np.floor((points[n, axis] + reach[n] - origin[axis]) / cell)
-            low[axis] = int(min(max(first, 0.0), shape[axis] - 1.0))
-            high[axis] = int(min(max(last, 0.0), shape[axis] - 1.0))
+        _cells_within(points[n], reach[n], origin, cell, shape, low, high)
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):
@@ -117,69 +128,84 @@ def nearest_places(
 
 
 @compiled
-def first_hits(origins: FloatArray, directions: FloatArray, corners: FloatArray) -> FloatArray:
-    """``(n,)`` how far along each ray the first triangle is; infinite where there is none.
+def near_surface(
+    points: FloatArray,
+    most: float,
+    corners: FloatArray,
+    origin: FloatArray,
+    cell: float,
+    shape: IntArray,
+    starts: IntArray,
+    faces: IntArray,
+) -> BoolArray:
+    """``(n,)``: whether some face is no farther than ``most`` m from each of ``(n, 3)`` points.
 
-    Moeller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, J. Graphics Tools 2(1), 1997.
+    A point's own cell is asked first: that of a point on the surface holds the face it lies on.
+
+    Args:
+        points: ``(n, 3)`` m, finite.
+        most: m.
+        corners: ``(m, 3, 3)`` of the faces.
+        origin: of a ``FaceGrid``, as are ``cell``, ``shape``, ``starts`` and ``faces``.
+        cell: m.
+        shape: ``(3,)`` cells.
+        starts: of each cell's list.
+        faces: of all lists.
     """
-    far = np.full(len(origins), np.inf)
-    for n in range(len(origins)):
-        ox, oy, oz = origins[n, 0], origins[n, 1], origins[n, 2]
-        dx, dy, dz = directions[n, 0], directions[n, 1], directions[n, 2]
-        for f in range(len(corners)):
-            ax, ay, az = corners[f, 0, 0], corners[f, 0, 1], corners[f, 0, 2]
-            e1x, e1y, e1z = corners[f, 1, 0] - ax, corners[f, 1, 1] - ay, corners[f, 1, 2] - az
-            e2x, e2y, e2z = corners[f, 2, 0] - ax, corners[f, 2, 1] - ay, corners[f, 2, 2] - az
-            px, py, pz = dy * e2z - dz * e2y, dz * e2x - dx * e2z, dx * e2y - dy * e2x
-            volume = e1x * px + e1y * py + e1z * pz
-            if volume == 0.0:
-                continue
-            sx, sy, sz = ox - ax, oy - ay, oz - az
-            u = (sx * px + sy * py + sz * pz) / volume
-            if u < -_SEAM or u > 1.0 + _SEAM:
-                continue
-            qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
-            v = (dx * qx + dy * qy + dz * qz) / volume
-            if v < -_SEAM or u + v > 1.0 + _SEAM:
-                continue
-            t = (e2x * qx + e2y * qy + e2z * qz) / volume
-            if 0.0 < t < far[n]:
-                far[n] = t
-    return far
+    near = np.zeros(len(points), np.bool_)
+    low, high, here = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3)
+    limit = most * most
+    for n in range(len(points)):
+        for step in range(2):
+            reach = 0.0 if step == 0 else most
+            _cells_within(points[n], reach, origin, cell, shape, low, high)
+            for i in range(low[0], high[0] + 1):
+                for j in range(low[1], high[1] + 1):
+                    for k in range(low[2], high[2] + 1):
+                        if near[n]:
+                            break
+                        c = (i * shape[1] + j) * shape[2] + k
+                        for at in range(starts[c], starts[c + 1]):
+                            if nearest_on_triangle(points[n], corners[faces[at]], here) <= limit:
+                                near[n] = True
+                                break
+            if near[n]:
+                break
+    return near
 
 
 @compiled
-def column_crossings(
-    corners: FloatArray, low: FloatArray, pitch: FloatArray, sides: IntArray
-) -> tuple[IntArray, FloatArray, IntArray]:
-    """Where vertical lines on a grid cross the faces.
+def shares_on_faces(places: FloatArray, corners: FloatArray, chosen: IntArray) -> FloatArray:
+    """``(n, 3)`` barycentric coordinates, from 0 to 1, of ``(n, 3)`` places on chosen faces.
+
+    A face without area counts as its longest edge.
 
     Args:
-        corners: ``(m, 3, 3)`` m.
-        low: ``(2,)`` m, x and y of the first line.
-        pitch: ``(2,)`` m between the lines.
-        sides: ``(2,)`` how many lines.
-
-    Returns:
-        Of each crossing the line, the height, and +1 where the face looks up, -1 where down.
+        places: ``(n, 3)`` m, each on its face.
+        corners: ``(m, 3, 3)`` of all faces.
+        chosen: ``(n,)`` faces.
     """
-    lines, heights, signs = [0], [0.0], [0]
-    for f in range(len(corners)):
-        a, b, c = corners[f, 0], corners[f, 1], corners[f, 2]
-        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if area == 0.0:
+    shares = np.zeros((len(places), 3))
+    for n in range(len(places)):
+        face = corners[chosen[n]]
+        u, v, w = face[1] - face[0], face[2] - face[0], places[n] - face[0]
+        uu, uv, vv = np.sum(u * u), np.sum(u * v), np.sum(v * v)
+        wu, wv = np.sum(w * u), np.sum(w * v)
+        area = uu * vv - uv * uv
+        if area > 1e-14 * uu * vv:
+            shares[n, 1] = min(max((vv * wu - uv * wv) / area, 0.0), 1.0)
+            shares[n, 2] = min(max((uu * wv - uv * wu) / area, 0.0), 1.0 - shares[n, 1])
+            shares[n, 0] = 1.0 - shares[n, 1] - shares[n, 2]
             continue
-        i0 = max(int(np.ceil((min(a[0], b[0], c[0]) - low[0]) / pitch[0])), 0)
-        i1 = min(int(np.floor((max(a[0], b[0], c[0]) - low[0]) / pitch[0])), sides[0] - 1)
-        j0 = max(int(np.ceil((min(a[1], b[1], c[1]) - low[1]) / pitch[1])), 0)
-        j1 = min(int(np.floor((max(a[1], b[1], c[1]) - low[1]) / pitch[1])), sides[1] - 1)
-        for i in range(i0, i1 + 1):
-            for j in range(j0, j1 + 1):
-                x, y = low[0] + i * pitch[0], low[1] + j * pitch[1]
-                s = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area
-                t = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area
-                if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
-                    lines.append(i * sides[1] + j)
-                    heights.append(a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2]))
-                    signs.append(1 if area > 0.0 else -1)
-    return np.array(lines)[1:], np.array(heights)[1:], np.array(signs)[1:]
+        longest = -1.0
+        for first in range(3):
+            second = (first + 1) % 3
+            along = face[second] - face[first]
+            length = np.sum(along * along)
+            if length > longest:
+                longest = length
+                share = np.sum((places[n] - face[first]) * along) / length if length > 0.0 else 0.0
+                share = min(max(share, 0.0), 1.0)
+                shares[n] = 0.0
+                shares[n, first], shares[n, second] = 1.0 - share, share
+    return shares

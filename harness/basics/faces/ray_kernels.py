@@ -4,15 +4,13 @@ import numpy as np
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
+from harness.basics.faces.ray_triangle import ON_EDGE, meeting
 
 Grid = tuple[FloatArray, float, IntArray, IntArray, IntArray]
 """Origin, cell, shape, starts and faces of a ``FaceGrid``."""
 
 Hit = tuple[float, int, float, float]
 """Distance, face, and the weights of the face's second and third corner."""
-
-_ON_EDGE = 1e-9
-"""Share of a face by which it is widened, so that no ray falls between two that share an edge."""
 
 _PADDING = 1e-6
 """Cells by which the box is widened: its outermost faces lie on its border."""
@@ -152,30 +150,12 @@ def nearest_of(
     triangles: FloatArray,
     best: Hit,
 ) -> Hit:
-    """The nearest of a cell's faces, or ``best`` (Moeller and Trumbore, J. Graphics Tools 2(1), 1997)."""
+    """The nearest of a cell's faces, or ``best``."""
     for k in range(first, last):
         f = faces[k]
         if f == without:
             continue
-        p = triangles[f]
-        px = d[1] * p[2, 2] - d[2] * p[2, 1]
-        py = d[2] * p[2, 0] - d[0] * p[2, 2]
-        pz = d[0] * p[2, 1] - d[1] * p[2, 0]
-        volume = p[1, 0] * px + p[1, 1] * py + p[1, 2] * pz
-        if volume == 0.0:
-            continue
-        sx, sy, sz = o[0] - p[0, 0], o[1] - p[0, 1], o[2] - p[0, 2]
-        u = (sx * px + sy * py + sz * pz) / volume
-        # Written so that a NaN of a face seen edge-on is no hit.
-        if not (-_ON_EDGE <= u <= 1.0 + _ON_EDGE):
-            continue
-        qx = sy * p[1, 2] - sz * p[1, 1]
-        qy = sz * p[1, 0] - sx * p[1, 2]
-        qz = sx * p[1, 1] - sy * p[1, 0]
-        v = (d[0] * qx + d[1] * qy + d[2] * qz) / volume
-        if not (v >= -_ON_EDGE and u + v <= 1.0 + _ON_EDGE):
-            continue
-        t = (p[2, 0] * qx + p[2, 1] * qy + p[2, 2] * qz) / volume
+        t, u, v = meeting(o, d, triangles[f], ON_EDGE)
         if least < t < best[0]:
             best = (t, f, u, v)
     return best

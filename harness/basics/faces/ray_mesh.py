@@ -8,6 +8,7 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.errors import OutOfDomain
 from harness.basics.faces.face_grid import build_face_grid
 from harness.basics.faces.ray_kernels import Grid, first_hits, free_rays
+from harness.basics.faces.ray_triangle import triangles_of
 from harness.basics.mesh import Mesh
 
 LEAST = 1e-7
@@ -52,10 +53,7 @@ class RayMesh:
         self.mesh = mesh
         self.least = LEAST * mesh.diagonal
         self._grid: Grid = (grid.origin, grid.cell, grid.shape, grid.starts, grid.faces)
-        corners = mesh.corners
-        self._triangles = read_only(
-            np.stack([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
-        )
+        self._triangles = read_only(triangles_of(mesh.corners))
 
     def first_hits(self, origins: FloatArray, directions: FloatArray) -> Hits:
         """What rays meet first.

@@ -4,7 +4,8 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.faces.face_grid import build_face_grid
-from harness.basics.faces.nearest_kernels import column_crossings, first_hits, nearest_places
+from harness.basics.faces.mesh_rays import column_crossings, first_distances
+from harness.basics.faces.nearest_kernels import nearest_places
 from harness.basics.mesh import Mesh
 
 _LINES = 256
@@ -48,7 +49,7 @@ def wall_thickness(mesh: Mesh, points: FloatArray, normals: FloatArray) -> Float
     Infinite where nothing is behind, as behind an open surface.
     """
     lift = _LIFT * mesh.diagonal
-    return first_hits(points - lift * normals, -normals, mesh.corners) + lift
+    return first_distances(points - lift * normals, -normals, mesh.corners) + lift
 
 
 def thin_wall(mesh: Mesh, share: float = 0.02) -> float:

@@ -5,7 +5,7 @@ from manifold3d import Manifold
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import MeshRefused
-from harness.basics.faces.nearest_kernels import column_crossings
+from harness.basics.faces.mesh_rays import column_crossings
 from harness.basics.mesh import Mesh
 from harness.objects.solid import from_manifold, outward, signed_volume
 from harness.sim.solid.mesh_repair import boundary_edges

@@ -11,6 +11,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only
 from harness.basics.compiled import compiled
 from harness.basics.faces.ray_kernels import Hit, nearest_of
+from harness.basics.faces.ray_triangle import triangles_of
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.voxels import OUTSIDE, clamped, distances, entered, prepared, touches
 
@@ -70,9 +71,7 @@ class FaceCubes:
         bricks[there] = np.arange(len(there), dtype=np.int32)
         counts = np.bincount(64 * number.reshape(-1) + (cubes & 63), minlength=64 * len(there))
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        triangles = np.stack(
-            [corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1
-        )
+        triangles = triangles_of(corners)
         near = distances(_grid(cubes, sides))
         for each in (low, near, bricks, starts, owners, triangles):
             read_only(each)

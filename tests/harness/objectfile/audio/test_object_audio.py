@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
+from harness.basics.faces.nearest_kernels import shares_on_faces
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.audio import CHUNK, ObjectAudio, open_audio
 from harness.objectfile.audio.table import scaled, table_bytes, table_from
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.near_kernel import shares_on_faces
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.sim.modal.modes import dampings, nearest_shares
 from harness.sim.sound.modal_radiation import radiation
