@@ -184,7 +184,11 @@ def _least_along(
 
 @compiled
 def _first_hit(corners: FloatArray, start: FloatArray, direction: FloatArray) -> float:
-    """Moeller and Trumbore, J. Graphics Tools 2(1), 1997; from either side."""
+    """Moeller and Trumbore, J. Graphics Tools 2(1), 1997; from either side.
+
+    Not by ``harness.basics.faces.ray_triangle``: its sums are those of ``np.dot``, another rounding, and
+    rehearsed contacts are written with these.
+    """
     first = np.inf
     for f in range(len(corners)):
         e1, e2 = corners[f, 1] - corners[f, 0], corners[f, 2] - corners[f, 0]
@@ -208,7 +212,11 @@ def _first_hit(corners: FloatArray, start: FloatArray, direction: FloatArray) ->
 
 @compiled
 def _nearest(corners: FloatArray, point: FloatArray) -> FloatArray:
-    """Ericson, Real-Time Collision Detection, 2005, section 5.1.5."""
+    """Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
+
+    By the weights of corners, which is up to a rounding away from ``harness.basics.faces.nearest``; rehearsed
+    contacts are written with these.
+    """
     best, best_gap = corners[0, 0].copy(), np.inf
     for f in range(len(corners)):
         near = _nearest_on(corners[f], point)

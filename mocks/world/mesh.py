@@ -101,15 +101,11 @@ def _stacked(chosen: BoolArray, *triangles: tuple[IntArray, IntArray, IntArray])
     return np.concatenate([np.stack(corners, axis=1)[chosen] for corners in triangles])
 
 
-def shares_of_corners(mesh: Mesh, face: int, point: FloatArray) -> FloatArray:
-    """``(3,)`` barycentric coordinates of a point in the plane of a face."""
-    a, b, c = mesh.corners[face]
-    (u, v), *_ = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), point - a, rcond=None)
-    return np.array([1.0 - u - v, u, v])
-
-
 def nearest_face(mesh: Mesh, point: FloatArray) -> tuple[int, FloatArray]:
-    """The face nearest to a ``(3,)`` point, and the point of that face that is nearest."""
+    """The face nearest to a ``(3,)`` point, and the point of that face that is nearest.
+
+    By arithmetic of its own: truth is not computed by the kernel that estimates are.
+    """
     corners, normals = mesh.corners, mesh.face_normals
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     height = np.einsum("ij,ij->i", point - a, normals)

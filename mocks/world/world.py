@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.faces.nearest import plane_shares
 from harness.basics.geometry import apply, inverse, transform, translation
 from harness.basics.mesh import Mesh
 from harness.bench.gap import Gap
@@ -22,7 +23,7 @@ from mocks.camera.scene_view import Body, SceneView, box
 from mocks.world.gap_draw import GapDraw
 from mocks.world.gel import WorldGel
 from mocks.world.gel_contact import GelContact
-from mocks.world.mesh import nearest_face, shares_of_corners, split_long_edges
+from mocks.world.mesh import nearest_face, split_long_edges
 
 LONGEST_EDGE = 5.0e-3
 """Metres, in the world's own tessellation: short beside the length over which shape deviates."""
@@ -285,7 +286,7 @@ class World:
 
     def _nominal_point(self, face: int, point: FloatArray) -> FloatArray:
         """Where a material point of a true face is on the nominal surface."""
-        nominal: FloatArray = shares_of_corners(self.mesh, face, point) @ self.nominal.corners[face]
+        nominal: FloatArray = plane_shares(self.mesh.corners[face], point) @ self.nominal.corners[face]
         return nominal
 
     def _indentation(self, base_from_flange: FloatArray, step: int) -> FloatArray:

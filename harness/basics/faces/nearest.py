@@ -1,4 +1,4 @@
-"""The point of a mesh's surface that is nearest to a place."""
+"""The point of a mesh's surface that is nearest to a place, and what a place on a face is made of."""
 
 import numpy as np
 
@@ -12,9 +12,19 @@ def nearest_point(mesh: Mesh, point: FloatArray) -> FloatArray:
     return np.asarray(_nearest(mesh.corners, np.ascontiguousarray(point)))
 
 
+def plane_shares(corners: FloatArray, place: FloatArray) -> FloatArray:
+    """``(3,)`` how much of each of ``(3, 3)`` corners a place in a triangle's plane is made of."""
+    edges = np.stack([corners[1] - corners[0], corners[2] - corners[0]], axis=1)
+    second, third = np.linalg.lstsq(edges, place - corners[0], rcond=None)[0]
+    return np.array([1.0 - second - third, second, third])
+
+
 @compiled
 def _nearest(corners: FloatArray, point: FloatArray) -> FloatArray:
-    """Ericson, Real-Time Collision Detection, 2005, section 5.1.5."""
+    """Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
+
+    Not by ``nearest_on_triangle``, a rounding away from it: estimates are written with this one.
+    """
     best: FloatArray = corners[0, 0].copy()
     best_gap = np.inf
     for f in range(len(corners)):

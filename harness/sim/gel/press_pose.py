@@ -11,6 +11,7 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.faces.nearest import plane_shares
 from harness.basics.geometry import frame_facing, inverse, rotation_about, transform
 from harness.basics.mesh import Mesh
 from harness.sim.solid.surface_measure import nearest_on_surface
@@ -121,13 +122,6 @@ def _smooth_normal(mesh: Mesh, place: FloatArray, face: int) -> FloatArray:
     lengths = np.linalg.norm(at_corners, axis=1, keepdims=True)
     if not (lengths > 0.0).all():
         return np.asarray(own)
-    blend = _shares(mesh.corners[face], place) @ (at_corners / lengths)
+    blend = plane_shares(mesh.corners[face], place) @ (at_corners / lengths)
     normal: FloatArray = blend / np.linalg.norm(blend)
     return normal
-
-
-def _shares(corners: FloatArray, place: FloatArray) -> FloatArray:
-    """``(3,)`` how much of each corner a place on a triangle is made of."""
-    edges = np.stack([corners[1] - corners[0], corners[2] - corners[0]], axis=1)
-    second, third = np.linalg.lstsq(edges, place - corners[0], rcond=None)[0]
-    return np.array([1.0 - second - third, second, third])

@@ -120,6 +120,9 @@ def dampings(frequencies: FloatArray, material: Material) -> FloatArray:
 def nearest_shares(points: FloatArray, corners: FloatArray) -> FloatArray:
     """``(..., 3)`` barycentric coordinates of the point of each triangle nearest to each point.
 
+    The algorithm of ``nearest_on_triangle`` with the sums of ``einsum``, which round otherwise: gains are
+    computed with these.
+
     Args:
         points: ``(..., 3)``.
         corners: ``(..., 3, 3)``; a triangle without area counts as its edges.
