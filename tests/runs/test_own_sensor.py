@@ -14,6 +14,7 @@ from harness.bench.gap import gap_path
 from harness.bench.mock_lab import MockLab
 from harness.bench.sensor import described_sensor
 from harness.bench.station_file import load_station
+from harness.cli import invoke
 from harness.objects.household import build
 from harness.picture.image_file import read_image
 from harness.recording.run_folder import RunFiles, station_calibration
@@ -83,6 +84,21 @@ def test_a_toy_presses_in_process_and_its_run_carries_it(tmp_path: Path) -> None
     world = json.loads(recording.truth_path.read_text())["differences"]
     assert world["calibration"] == "the estimator's"  # there are no other presses of a toy
     assert world["calibration_sha256"] == run.calibration.sha256
+
+
+def test_an_object_s_touch_is_built_and_rendered_for_a_toy(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    toy, out = str(write_toy(tmp_path)), str(tmp_path / "mug")
+    built = ["object", "build", "builtin:mug", "--material", "ceramic", "--profile", "smoke", "--out", out]
+    assert invoke([*built, "--only", "audio", "--sensor", toy]) == 2
+    assert invoke([*built, "--only", "touch", "--sensor", toy]) == 0
+    picture = tmp_path / "b.png"
+    place = (*PRESS[1:], "--out", str(picture))
+    assert invoke(["object", "render", "touch", out, *place]) == 2
+    assert "maps have 60 x 80 pixels" in " ".join(capsys.readouterr().err.split())
+    assert invoke(["object", "render", "touch", out, *place, "--sensor", toy]) == 0
+    assert read_image(picture).shape == (60, 80, 3)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux")

@@ -7,6 +7,7 @@ import numpy as np
 
 from harness.bench.sensor import TactileSensor
 from harness.bench.station_file import station_path
+from harness.sim.gel.gel import skirt_for
 from harness.sim.optics.tactile_calibration import save_calibration, shipped_calibration
 
 TOY_SENSOR = TactileSensor("Toy", 60, 80, 0.2e-3, 2e-3, housing=(20e-3, 16e-3))
@@ -49,10 +50,12 @@ def write_toy(folder: Path) -> Path:
 
 
 def write_calibration(path: Path, rows: int, columns: int, pitch: float) -> None:
-    """The R1.5's colours over an even background of ``rows`` x ``columns`` pixels of ``pitch`` m."""
+    """The R1.5's colours and skirt, for ``rows`` x ``columns`` pixels of ``pitch`` m over an even grey."""
     known = shipped_calibration("gelsight_r15_bench")
     even = np.full((rows, columns, 3), 110, np.uint8)
-    save_calibration(replace(known, background=even, header=replace(known.header, pitch=pitch)), path)
+    skirt = skirt_for(TactileSensor("", rows, columns, pitch, 1e-3))
+    header = replace(known.header, pitch=pitch, skirt=skirt)
+    save_calibration(replace(known, background=even, header=header), path)
 
 
 def write_station(folder: Path, make: str, calibration: str) -> Path:

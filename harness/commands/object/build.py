@@ -54,6 +54,14 @@ def build(
             min=1,
         ),
     ] = None,
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            help="Of touch: the make that presses, by its name, gelsight-r1.5 if left out, or the path of a "
+            "sensor's own file.",
+            metavar="NAME",
+        ),
+    ] = None,
     finish: Annotated[
         bool,
         typer.Option("--finish", help="Of vision: let it learn from pictures last; paper does anyway."),
@@ -85,12 +93,14 @@ def build(
         raise WrongUse(f"--only {only} cannot be built; there is audio, touch and vision")
     if finish and only != "vision":
         raise WrongUse(f"--finish is of vision, and --only {only} was asked for")
+    if sensor is not None and only != "touch":
+        raise WrongUse(f"--sensor is of touch, and --only {only} was asked for")
     thick = options.quantity("--wall", wall, LENGTH)
     wanted = PartRequest(mesh, named(material), profile, units, thick, licence, seed)
     if only == "touch":
         from harness.commands.object.build_touch import build_touch_part
 
-        return build_touch_part(wanted, out, threads or 1, json)
+        return build_touch_part(wanted, sensor, out, threads or 1, json)
     if only == "vision":
         from harness.commands.object.build_vision import build_vision_part
 

@@ -16,11 +16,12 @@ _KINDS = {"trained_places": "trained places", "unseen_places": "unseen places"}
 _ROWS = {"level": "codes", "nearest_trained": "nearest trained place", "background": "untouched gel"}
 
 
-def build_touch_part(wanted: "PartRequest", out: Path, threads: int, json: bool) -> int:
-    """Build, measure and say."""
+def build_touch_part(wanted: "PartRequest", make: str | None, out: Path, threads: int, json: bool) -> int:
+    """Build, measure and say; ``make`` is a sensor's name or the path of its file, None for the usual one."""
     from harness.authoring.touch.object_touch import TouchRequest, build_touch
+    from harness.bench.sensor import DEFAULT_MAKE, described_sensor
 
-    asked = TouchRequest(**vars(wanted))
+    asked = TouchRequest(**vars(wanted), sensor=described_sensor(make or DEFAULT_MAKE).sensor)
     return build_and_say(lambda report: build_touch(asked, out, report, threads), _as_json, _print, json)
 
 

@@ -42,6 +42,14 @@ def render(
             help="Where the map comes from: codes, perceptron, or reference (the mesh's rasteriser)."
         ),
     ] = "codes",
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            help="The make that presses, by its name or the path of its own file: the one that the "
+            "touch was built for.",
+            metavar="NAME",
+        ),
+    ] = None,
     calibration: Annotated[
         str | None,
         typer.Option(
@@ -91,7 +99,7 @@ def render(
     own = {"--gel-poisson": gel_poisson, "--force-table": force_table}
     forces.require_force(force, (), gel_modulus, gel_modulus_error, **own)
     table, levels = forces.measured(force_table, [])
-    gel = _gel(calibration, forces.stiffness(gel_modulus, gel_modulus_error, gel_poisson), table)
+    gel = _gel(sensor, calibration, forces.stiffness(gel_modulus, gel_modulus_error, gel_poisson), table)
     pressing = _Pressing(gel, (deep, tilted, towards, turned), levels, force)
     rendered = _rendered(folder, _level(level), contact, pressing)
     write_png(out, rendered.press.image)
@@ -125,10 +133,12 @@ class _Pressing:
     force: bool
 
 
-def _gel(calibration: str | None, elastic: "GelElastic", table: "ForceTable | None") -> "Gel":
+def _gel(
+    sensor: str | None, calibration: str | None, elastic: "GelElastic", table: "ForceTable | None"
+) -> "Gel":
     from harness.sim.optics.known_gel import known_gel
 
-    return replace(known_gel(None, calibration, shadow=False), elastic=elastic, forces=table)
+    return replace(known_gel(sensor, calibration, shadow=False), elastic=elastic, forces=table)
 
 
 def _rendered(folder: Path, level: "TouchLevel", contact: Three, by: _Pressing) -> RenderedPress:
