@@ -242,7 +242,9 @@ def _program(name: str, *arguments: str) -> str:
 
 def _old_names() -> dict[str, str]:
     """Modules of the reference by what they are called now, as git finds them again."""
-    found = _program("git", "-C", str(ROOT), "diff", "-M40%", "-l0", "--name-status", "--diff-filter=R", BEFORE)
+    found = _program(
+        "git", "-C", str(ROOT), "diff", "-M40%", "-l0", "--name-status", "--diff-filter=R", BEFORE
+    )
     moves = [line.split("\t")[1:] for line in found.splitlines() if line.endswith(".py")]
     return {_module(new): _module(old) for old, new in moves}
 
