@@ -103,9 +103,10 @@ class Side:
     def table(self, name: str) -> None:
         """Rows of nine objects, close and spread, touched and struck, one file each."""
         shared = os.environ.get("TOUCHSTONE_DATA", str(ROOT.parent / "shared" / "data"))
-        # One process: workers that are started anew would not know the old names.
+        # One run at a time: of two that meet an object at once each solves modes of its own, and one is kept;
+        # and workers that are started anew would not know the old names.
         options = ["--seeds", "1", "--gap", "default", "--yaw", "known", "--data", shared, "--json"]
-        options += ["--workers", "1"] if self.old_names is not None else []
+        options += ["--workers", "1"]
         self.once("table.json", "tables", name, *options, "--out", "table")
 
     def once(self, name: str, *arguments: str) -> None:
