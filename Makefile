@@ -8,7 +8,7 @@ DEV := $(VENV)/.installed-dev
 # A microphone on a sound card, and a sound card to test it with; all else works without.
 SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 
-.PHONY: help install demo test hunt lint types contracts bench tables sound clean
+.PHONY: help install demo test slow hunt lint types contracts bench tables sound clean
 
 help: ## what can be asked for
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -41,10 +41,13 @@ demo: $(RUN) ## localize a contact on the mocked bench, and write the report
 	@$(BIN)/touchstone demo
 
 test: $(DEV) sound lint types contracts ## everything CI checks
-	@$(BIN)/python -m pytest -m "not benchmark" -n auto --dist loadscope
+	@$(BIN)/python -m pytest -m "not benchmark and not slow" -n auto --dist loadscope
+
+slow: $(DEV) ## what takes minutes and rarely breaks
+	@$(BIN)/python -m pytest -m slow
 
 hunt: $(DEV) ## the property tests on cases drawn anew
-	@$(BIN)/python -m pytest -m "not benchmark" --hypothesis-profile=hunt -k "$(or $(K),test)"
+	@$(BIN)/python -m pytest -m "not benchmark and not slow" --hypothesis-profile=hunt -k "$(or $(K),test)"
 
 lint: $(DEV)
 	@$(BIN)/ruff check .
