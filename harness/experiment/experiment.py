@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequenc
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
@@ -25,8 +25,10 @@ from harness.experiment.truth import Truth
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step, StepRecord
-from harness.twin.bench import TwinBench
-from harness.twin.rehearsal import RehearsalReport
+
+if TYPE_CHECKING:  # a report knows experiments and needs no simulator of the arm
+    from harness.twin.bench import TwinBench
+    from harness.twin.rehearsal import RehearsalReport
 
 Setting = Mapping[str, Level]
 """Levels of some dials; what it leaves open is at its default."""
@@ -44,8 +46,8 @@ class Planned:
     """
 
     steps: Sequence[Mapping[str, Any]]
-    rehearsal: RehearsalReport
-    bench: TwinBench
+    rehearsal: "RehearsalReport"
+    bench: "TwinBench"
     described: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -59,7 +61,7 @@ class Helpers:
         say: tells how the step goes.
     """
 
-    twin: TwinBench
+    twin: "TwinBench"
     ask: Callable[[str], None] | None = None
     say: Callable[[str], None] = lambda _: None
 

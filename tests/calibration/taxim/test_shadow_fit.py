@@ -35,6 +35,7 @@ from tests.samples.drawn_presses import (
 )
 from tests.samples.real_press import R15, set_of
 
+ROOT = Path(__file__).parents[3]
 WHO = Identity("drawn", "0", "none", "2026-01-01", pitch=1e-4, ball_radius=BALL * 1e-4)
 GREEN = 1
 DARK = 24.0
@@ -185,11 +186,18 @@ def test_a_station_whose_light_casts_shadows_needs_a_calibration_that_has_some(t
     made = _made().calibration
     assert isinstance(made, ShadowedCalibration)
     save_calibration(made, tmp_path / "shadowed.npz")
+    rows, columns = made.background.shape[:2]
+    shipped = (ROOT / "harness" / "bench" / "sensors" / "gelsight-r1.5.toml").read_text(encoding="utf-8")
+    as_drawn = shipped.replace("rows = 120", f"rows = {rows}").replace(
+        "columns = 160", f"columns = {columns}"
+    )
+    (tmp_path / "drawn.toml").write_text(as_drawn, encoding="utf-8")
     station = load_station(station_path("mock"))
     grazed = station.gel.model_copy(update={"casts_shadow": True})
     with pytest.raises(WrongUse, match="showed no shadow"):
         station_calibration(station.model_copy(update={"gel": grazed}))
-    measured = grazed.model_copy(update={"calibration": str(tmp_path / "shadowed.npz")})
+    own = {"make": str(tmp_path / "drawn.toml"), "calibration": str(tmp_path / "shadowed.npz")}
+    measured = grazed.model_copy(update=own)
     found = station_calibration(station.model_copy(update={"gel": measured}))
     assert shadow_of(found) is not None
 
