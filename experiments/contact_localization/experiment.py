@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from experiments.contact_localization.accuracy.cases import performed, preparations
+from experiments.contact_localization.accuracy.benchmark_runs import performed, preparations
+from experiments.contact_localization.accuracy.budget_text import BUDGETS
 from experiments.contact_localization.accuracy.dials import KNOBS, setting_name, settings, settings_by_count
 from experiments.contact_localization.accuracy.paper import PAPER_CM
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Setting
 from experiments.contact_localization.accuracy.table_cell import HEARD, METHODS, Cell, cells, run_cell
-from experiments.contact_localization.accuracy.within_words import BUDGETS
 from experiments.contact_localization.answer import ContactAnswering
 from experiments.contact_localization.lines import answer_lines
 from experiments.contact_localization.plan import plan

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from experiments.contact_localization.sound.gains import GainTable, gain_table
-from experiments.contact_localization.touch.turning import Turning, turning_of
+from experiments.contact_localization.touch.symmetry_rotation import Turning, turning_of
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import WrongUse
 from harness.basics.materials import Material

@@ -17,7 +17,7 @@ from harness.effects.force_effects import pressed_of_gel
 from harness.effects.plan import Plan, default_accuracy, plan
 from harness.effects.touch_effects import DOTS, REST, contact_of, press_effects
 from harness.sim.gel.contact_force import ContactForce
-from harness.sim.gel.given_heights import Heights, require_clear
+from harness.sim.gel.height_file import Heights, require_clear
 from harness.sim.optics.pressed_gel import Gel
 
 

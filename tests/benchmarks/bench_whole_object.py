@@ -32,7 +32,7 @@ from harness.experiment.subjects import REAL
 from harness.objects.household import MATERIALS
 from harness.sim.modal.modal import default_edge
 from harness.sim.modal.stage_seconds import cpu, wall
-from harness.sim.solid.taken_surface import surface_of
+from harness.sim.solid.surface_source import surface_of
 from tests.samples.network_worth import HEADINGS, said, worth
 from tests.support.real_data import WHY_NOT, find_shared_data
 

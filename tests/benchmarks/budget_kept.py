@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.cases import Case, performed
+from experiments.contact_localization.accuracy.benchmark_runs import Case, performed
+from experiments.contact_localization.accuracy.budget import ask
 from experiments.contact_localization.accuracy.front import Front, front_of
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Models
 from experiments.contact_localization.accuracy.table_cell import Cell, cells
-from experiments.contact_localization.accuracy.within import ask
 from harness.basics.whole_file import write_text_whole
 from harness.bench.station_file import load_station, station_path
 from harness.cost.choice import for_budget

@@ -13,7 +13,7 @@ from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15, TactileSensor
 from harness.effects.touch_press import Press, press_heights, press_mesh
 from harness.sim.gel.gel import R15_SKIRT, deform, skirt_for
-from harness.sim.gel.given_heights import Heights, given_heights
+from harness.sim.gel.height_file import Heights, given_heights
 from harness.sim.gel.height_map import RasterMesh, height_maps
 from harness.sim.gel.press_pose import contact_place, gel_from_object
 from harness.sim.optics.pressed_gel import Gel

@@ -15,7 +15,7 @@ from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.estimate import Estimate, estimate
 from experiments.contact_localization.posterior.levels import Levels, Senses
-from experiments.contact_localization.sound.gate import doubts_of_sound
+from experiments.contact_localization.sound.consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused
 from harness.bench.acquisition import Strike

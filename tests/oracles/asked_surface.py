@@ -4,7 +4,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.objectfile.vision.surface import SurfaceExtras
-from harness.objectfile.vision.work import Room
+from harness.objectfile.vision.threads import Room
 
 UNKNOWN = np.empty(0, np.int32)
 """Faces, where no outline is asked."""

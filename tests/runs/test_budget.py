@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.cases import Case
+from experiments.contact_localization.accuracy.benchmark_runs import Case
+from experiments.contact_localization.accuracy.budget import answer_within
+from experiments.contact_localization.accuracy.budget_text import as_json, doubts, sentences, staleness
 from experiments.contact_localization.accuracy.dials import (
     FINEST,
     KNOBS,
@@ -19,8 +21,6 @@ from experiments.contact_localization.accuracy.dials import (
 from experiments.contact_localization.accuracy.front import Front, foresee, front_for, shipped_curve
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, object_key
 from experiments.contact_localization.accuracy.table_cell import cells
-from experiments.contact_localization.accuracy.within import answer_within
-from experiments.contact_localization.accuracy.within_words import as_json, doubts, sentences, staleness
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.basics.errors import WrongUse
 from harness.bench.station_file import load_station, station_path
@@ -268,7 +268,7 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     def again(*_: object) -> Case:
         raise AssertionError("the run was performed again")
 
-    monkeypatch.setattr("experiments.contact_localization.accuracy.cases.perform", again)
+    monkeypatch.setattr("experiments.contact_localization.accuracy.benchmark_runs.perform", again)
     ((_, resumed),) = measure(EXPERIMENT, two_settings, scenes, station, tmp_path, pytest.fail)
     assert [point.samples for point in resumed] == [point.samples for point in points]
     (kept,) = tmp_path.glob("*.json")

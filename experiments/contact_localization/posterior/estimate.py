@@ -8,7 +8,12 @@ import numpy as np
 
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation, read_contacts
-from experiments.contact_localization.posterior.gate import Gate, gates, refuse_bad_fit, refuse_inside_out
+from experiments.contact_localization.posterior.consistency import (
+    Gate,
+    gates,
+    refuse_bad_fit,
+    refuse_inside_out,
+)
 from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise
 from experiments.contact_localization.posterior.levels import Levels, Senses
 from experiments.contact_localization.posterior.methods import Solution, lap, solve_run
@@ -22,12 +27,12 @@ from experiments.contact_localization.posterior.posterior import (
     settled,
 )
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.gate import (
+from experiments.contact_localization.sound.consistency import (
     distinct_strikes,
     doubts_of_sound_at,
     refuse_strange_sound,
 )
-from experiments.contact_localization.sound.heard import Heard, hear
+from experiments.contact_localization.sound.evidence import Heard, hear
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import WrongUse
 from harness.basics.faces.nearest import nearest_point

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.contact_localization.posterior.filling import between_samples
 from experiments.contact_localization.posterior.hypotheses import Hypotheses, best_of
 from experiments.contact_localization.posterior.proposal import drawn
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.heard import Heard
+from experiments.contact_localization.posterior.subsampling import between_samples
+from experiments.contact_localization.sound.evidence import Heard
 from harness.basics.arrays import IntArray
 
 _DROPPED_AT = 18.0

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.posterior.gate import likeness_of, refuse_bad_fit
+from experiments.contact_localization.posterior.consistency import likeness_of, refuse_bad_fit
 from experiments.contact_localization.posterior.grid import on_samples, refine
 from experiments.contact_localization.posterior.hypotheses import Hypotheses, anchors
 from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.posterior.particle import particle_filter
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.heard import Heard
+from experiments.contact_localization.sound.evidence import Heard
 from experiments.contact_localization.sound.places import by_sound
 from harness.basics.arrays import FloatArray, IntArray
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.answer import Answer as Found
+from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.gate import Gate
 from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.comparison import object_from_gels
 from experiments.contact_localization.report.result import flags_of, result_of, true_points, without_images
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
-from experiments.contact_localization.report.trade import Point, trade
+from experiments.contact_localization.report.sweep import Point, trade
 from experiments.contact_localization.report.twin_check import deviations
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, WrongUse

@@ -6,11 +6,11 @@ import numpy as np
 
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.posterior.baselines import geometry_only, mean_random_error
+from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.gate import Gate
 from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.posterior.posterior import Mode
-from experiments.contact_localization.sound.gate import doubts_of_sound
+from experiments.contact_localization.sound.consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.experiment.experiment import Scored

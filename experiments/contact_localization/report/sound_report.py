@@ -9,7 +9,7 @@ from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import true_points
 from experiments.contact_localization.report.sound_pictures import sound_pair
-from experiments.contact_localization.sound.heard import Heard, hear
+from experiments.contact_localization.sound.evidence import Heard, hear
 from experiments.contact_localization.sound.likelihood import ModeRow
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused

@@ -13,7 +13,7 @@ from harness.bench.sensor import TactileSensor
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.touch.nodes import SurfaceNodes, signatures
 from harness.sim.gel.gel import GelSkirt, deform, over_range
-from harness.sim.gel.given_heights import MOST_BEYOND
+from harness.sim.gel.height_file import MOST_BEYOND
 from harness.sim.gel.height_map import RasterMesh, height_maps, penetration
 from harness.sim.gel.press_pose import contact_place
 from harness.sim.gel.presses import Presses

@@ -7,9 +7,9 @@ import numpy as np
 from harness.authoring.vision.profiles import CellsSpec
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import WrongUse
-from harness.objectfile.vision.network.kept import kept_weights
 from harness.objectfile.vision.network.network import NetworkSize, VisionModel, VisionWeights
 from harness.objectfile.vision.network.plain import scatter_rows
+from harness.objectfile.vision.network.weights_codec import kept_weights
 from harness.objectfile.vision.settings import COVERS, RenderSettings, VisionLevel
 from harness.objectfile.vision_tensors import Kind
 

@@ -55,7 +55,7 @@ def vision(
     from harness.authoring.vision.profiles import vision_profile
     from harness.sim.light.appearance_source import appearance_of
     from harness.sim.light.direct_image import LitObject
-    from harness.sim.solid.taken_surface import surface_of
+    from harness.sim.solid.surface_source import surface_of
 
     spec = vision_profile(profile).networks
     chosen = _chosen(spec, size, knob)

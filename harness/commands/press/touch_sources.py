@@ -10,7 +10,7 @@ from harness.commands.press.touch_answer import Touched
 
 if TYPE_CHECKING:
     from harness.bench.scene import SceneFile
-    from harness.sim.gel.given_heights import Heights
+    from harness.sim.gel.height_file import Heights
     from harness.sim.optics.pressed_gel import Gel
 
 Three = tuple[float, float, float]
@@ -67,7 +67,7 @@ def of_heights(
 ) -> Touched:
     """The press of a height map; ``under`` is how deep the object reaches below a gel's surface."""
     from harness.effects.touch_press import press_heights
-    from harness.sim.gel.given_heights import read_heights
+    from harness.sim.gel.height_file import read_heights
 
     kind = _heights_of(of)
     begun = time.perf_counter()

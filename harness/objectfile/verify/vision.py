@@ -11,9 +11,9 @@ from harness.objectfile.vision.network.graph import graph_block, vision_model
 from harness.objectfile.vision.network.plain import Asked, evaluate
 from harness.objectfile.vision.part import blocks_inside
 from harness.objectfile.vision.settings import RenderSettings
+from harness.objectfile.vision.threads import Crew, Room
 from harness.objectfile.vision.view import camera_for, light_for, turned
 from harness.objectfile.vision.vision import open_vision, require_described
-from harness.objectfile.vision.work import Crew, Room
 from harness.objectfile.vision_entry import VisionEntry
 
 _BLOCKS = 16

@@ -13,7 +13,7 @@ from harness.objectfile.vision.network.network import VisionModel
 from harness.objectfile.vision.samples import Asker, Samples, Scene
 from harness.objectfile.vision.settings import RenderSettings
 from harness.objectfile.vision.shell import Shell
-from harness.objectfile.vision.work import Crew, Room
+from harness.objectfile.vision.threads import Crew, Room
 
 _LEAST = 256
 """Rays that another thread is asked to follow: fewer are followed sooner than it wakes."""

@@ -22,7 +22,7 @@ from harness.objectfile.vision.samples import Asker, FusedAsker, GraphAsker, Sce
 from harness.objectfile.vision.settings import Rendered, RenderSettings, VisionLevel
 from harness.objectfile.vision.shell import DEEP, PER_CELL, shell_for
 from harness.objectfile.vision.surface import SurfaceExtras
-from harness.objectfile.vision.work import Crew, Room
+from harness.objectfile.vision.threads import Crew, Room
 from harness.picture.linear_image import LinearImage, binned
 from harness.picture.pinhole import DirectionalLight, Pinhole
 

@@ -7,12 +7,12 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.objectfile.runtime import Network
-from harness.objectfile.vision.asked import fill_asked, take_answers
 from harness.objectfile.vision.network.fold import FoldedWeights
 from harness.objectfile.vision.network.kernels import ask_blocks
 from harness.objectfile.vision.network.network import VisionGrid
 from harness.objectfile.vision.network.tiles import SAMPLES
-from harness.objectfile.vision.work import Room
+from harness.objectfile.vision.query import fill_asked, take_answers
+from harness.objectfile.vision.threads import Room
 
 _AT_ONCE = 48
 """Blocks in a run of the graph: what it computes between then stays in the second cache."""

@@ -8,9 +8,9 @@ from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.faces.ray_mesh import LEAST
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage.faces import FaceCubes
-from harness.objectfile.vision.lamp import LampGrid
-from harness.objectfile.vision.told import Surface, tell
-from harness.objectfile.vision.work import Room
+from harness.objectfile.vision.light import LampGrid
+from harness.objectfile.vision.surface_inputs import Surface, tell
+from harness.objectfile.vision.threads import Room
 from harness.sim.light.appearance import plain
 
 _EARLY = 0.25

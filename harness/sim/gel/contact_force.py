@@ -16,7 +16,7 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, 
 from harness.basics.errors import OutOfDomain
 from harness.sim.gel.contact_pressure import SETTLED, Pressure, contact_pressure, spring_pressure
 from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.given_heights import require_clear
+from harness.sim.gel.height_file import require_clear
 from harness.sim.gel.layer_compliance import disc_stiffness
 
 ForceLevel = Literal["winkler", "layer"]

@@ -19,7 +19,7 @@ from harness.sim.modal.modal import HEARING, curved
 from harness.sim.modal.solve import Elasticity, Solution, check_elasticity, check_limit, solve_mesh
 from harness.sim.solid.filled import filled
 from harness.sim.solid.modal_mesh import QuadraticMesh
-from harness.sim.solid.taken_surface import surface_of
+from harness.sim.solid.surface_source import surface_of
 from harness.sim.solid.tetrahedra import check_closed
 from harness.sim.solid.volume_mesh import read_volume
 

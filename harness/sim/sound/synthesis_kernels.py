@@ -15,7 +15,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
-from harness.sim.sound.turning import SIXTEEN, turn_double, turn_single
+from harness.sim.sound.phasor import SIXTEEN, turn_double, turn_single
 
 TILE = SIXTEEN
 """Modes side by side; two registers of eight double numbers."""

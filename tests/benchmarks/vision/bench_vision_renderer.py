@@ -27,7 +27,7 @@ from harness.objectfile.vision.network.network import SIZES
 from harness.objectfile.vision.network.tiles import LANES
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.settings import COVERS, RenderSettings, VisionLevel
-from harness.objectfile.vision.work import Crew, Room
+from harness.objectfile.vision.threads import Crew, Room
 from harness.objects.household import build
 from harness.picture.image_file import write_png
 from harness.picture.pinhole import DirectionalLight, Pinhole

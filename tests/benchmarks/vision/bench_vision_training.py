@@ -28,7 +28,7 @@ from harness.objectfile.vision.network.network import VisionModel
 from harness.objectfile.vision.network.plain import Asked, evaluate
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.settings import RenderSettings
-from harness.objectfile.vision.work import Crew, Room
+from harness.objectfile.vision.threads import Crew, Room
 from harness.picture.image_file import write_png
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole

@@ -17,7 +17,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from experiments.contact_localization.accuracy.cases import Case, performed
+from experiments.contact_localization.accuracy.benchmark_runs import Case, performed
 from experiments.contact_localization.accuracy.solving import Models
 from experiments.contact_localization.accuracy.table_cell import cells
 from experiments.contact_localization.posterior.baselines import geometry_and_axis

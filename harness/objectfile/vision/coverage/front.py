@@ -7,8 +7,8 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.compiled import compiled
-from harness.objectfile.vision.ahead import AHEAD, bring_row
 from harness.objectfile.vision.coverage.contour import EMPTY
+from harness.objectfile.vision.prefetch import AHEAD, bring_row
 
 _ON_EDGE = 1e-7
 """Pixels by which a triangle is widened, so that no place falls between two that share an edge."""

@@ -10,7 +10,7 @@ from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage.contour import Contours, covered, crossed
 from harness.objectfile.vision.coverage.front import find_front, gathered, nearest_of, projected
 from harness.objectfile.vision.coverage.raster import NEAREST, draw, look_through, placed
-from harness.objectfile.vision.work import Crew, Room
+from harness.objectfile.vision.threads import Crew, Room
 from harness.picture.pinhole import Pinhole
 
 _LEAST = 512

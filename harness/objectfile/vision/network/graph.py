@@ -25,9 +25,9 @@ from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, WrongUse
 from harness.objectfile.graph import Nodes
 from harness.objectfile.graph_check import checked_graph, declared
-from harness.objectfile.vision.network.kept import WEIGHTS, held_weights, kept_weights
 from harness.objectfile.vision.network.network import BLOCK, NetworkSize, VisionGrid, VisionModel
 from harness.objectfile.vision.network.plain import looks
+from harness.objectfile.vision.network.weights_codec import WEIGHTS, held_weights, kept_weights
 
 FILE = "vision.onnx"
 

@@ -9,6 +9,12 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.basics.compiled import compiled_fast
+from harness.objectfile.vision.network.positional_encoding import (
+    logistic_3,
+    logistic_3_narrow,
+    waves,
+    waves_narrow,
+)
 from harness.objectfile.vision.network.tiles import (
     LANES,
     OUTPUTS,
@@ -20,7 +26,6 @@ from harness.objectfile.vision.network.tiles import (
     sum_4,
     sum_4_narrow,
 )
-from harness.objectfile.vision.network.waves import logistic_3, logistic_3_narrow, waves, waves_narrow
 
 
 @compiled_fast

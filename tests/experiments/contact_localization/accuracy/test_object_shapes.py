@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization import build_model as model_of
-from experiments.contact_localization.accuracy.cases import preparations
+from experiments.contact_localization.accuracy.benchmark_runs import preparations
 from experiments.contact_localization.accuracy.dials import KNOBS, SENSES, needs_objectfile, settings
 from experiments.contact_localization.accuracy.front import Front
 from experiments.contact_localization.accuracy.solving import Models

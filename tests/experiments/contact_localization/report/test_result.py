@@ -14,8 +14,8 @@ from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.estimate import Estimate, locate
-from experiments.contact_localization.posterior.gate import Gate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.result import estimate_of, flags_of

@@ -12,8 +12,8 @@ from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import MOST_HYPOTHESES, Search
 from experiments.contact_localization.report.sound_pictures import sound_pair, spectrogram
 from experiments.contact_localization.sound.analysis import SoundEvidence, analyse
+from experiments.contact_localization.sound.evidence import Heard, hear
 from experiments.contact_localization.sound.gains import gain_table
-from experiments.contact_localization.sound.heard import Heard, hear
 from experiments.contact_localization.sound.likelihood import SoundTerm
 from experiments.contact_localization.sound.matching import SoundNoise
 from experiments.contact_localization.sound.places import ANCHORS, by_sound, sound_nats, strike_places

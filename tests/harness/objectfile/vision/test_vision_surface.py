@@ -8,9 +8,9 @@ from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage.faces import FaceCubes, first_met
 from harness.objectfile.vision.coverage.outline import is_closed, mesh_outline
-from harness.objectfile.vision.lamp import LampGrid
+from harness.objectfile.vision.light import LampGrid
 from harness.objectfile.vision.surface import SurfaceExtras
-from harness.objectfile.vision.work import Crew, Room
+from harness.objectfile.vision.threads import Crew, Room
 from harness.objects.household import build
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import plain

@@ -7,7 +7,7 @@ from harness.basics.arrays import AnyArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage.outline import centre_out, drawn_outline, is_closed, mesh_outline
-from harness.objectfile.vision.work import Crew, Room
+from harness.objectfile.vision.threads import Crew, Room
 from harness.objects.household import build
 from harness.picture.pinhole import Pinhole
 from tests.oracles.plain_look import looking

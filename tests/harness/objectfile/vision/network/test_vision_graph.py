@@ -11,7 +11,6 @@ from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.runtime import Network
 from harness.objectfile.vision.network.fold import folded
 from harness.objectfile.vision.network.graph import graph_block, vision_graph, vision_model
-from harness.objectfile.vision.network.kept import WEIGHTS, held_weights, kept_weights
 from harness.objectfile.vision.network.kernels import ask_blocks
 from harness.objectfile.vision.network.network import (
     COMPACT,
@@ -24,6 +23,7 @@ from harness.objectfile.vision.network.network import (
 from harness.objectfile.vision.network.plain import Asked, encoded, evaluate, scatter_rows
 from harness.objectfile.vision.network.tensors import vision_tensors
 from harness.objectfile.vision.network.tiles import LANES, SAMPLES
+from harness.objectfile.vision.network.weights_codec import WEIGHTS, held_weights, kept_weights
 from tests.oracles.plain_look import SMALL, box_grid, even_look, file_of, no_weights
 from tests.samples.fitted_look import drawn_look
 

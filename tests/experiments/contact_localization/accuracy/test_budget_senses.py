@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from experiments.contact_localization.accuracy.budget import Run, ask
 from experiments.contact_localization.accuracy.dials import (
     SENSES,
     SPACING,
@@ -12,7 +13,6 @@ from experiments.contact_localization.accuracy.dials import (
 )
 from experiments.contact_localization.accuracy.front import Front
 from experiments.contact_localization.accuracy.solving import Models, Setting, read, solve
-from experiments.contact_localization.accuracy.within import Run, ask
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
 from harness.basics.errors import WrongUse

@@ -6,7 +6,7 @@ import pytest
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.hypotheses import Contact
-from experiments.contact_localization.posterior.places_left import places_left
+from experiments.contact_localization.posterior.problem_size import places_left
 
 NO_IMAGE = np.zeros((1, 4, 4, 3), dtype=np.uint8)
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.bench.sensor import GELSIGHT_R15, TactileSensor
-from harness.sim.gel.given_heights import given_heights, read_heights, spanned
+from harness.sim.gel.height_file import given_heights, read_heights, spanned
 
 SENSOR = GELSIGHT_R15
 TAXIM = TactileSensor("taxim", 480, 640, 0.0295e-3, 5e-3)

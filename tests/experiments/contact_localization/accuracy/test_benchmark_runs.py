@@ -3,7 +3,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from experiments.contact_localization.accuracy.cases import _uncollected
+from experiments.contact_localization.accuracy.benchmark_runs import _uncollected
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.comparison import object_from_gels
-from experiments.contact_localization.report.trade import LEVELS, trade
+from experiments.contact_localization.report.sweep import LEVELS, trade
 from harness.basics.arrays import FloatArray
 from harness.sim.optics.optics import Optics
 from tests.samples.synthetic_press import PRESSES, felt

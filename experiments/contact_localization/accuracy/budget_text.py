@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.contact_localization.accuracy.budget import Within, answer_within
 from experiments.contact_localization.accuracy.dials import FINEST, setting_name
 from experiments.contact_localization.accuracy.front import Front, foresee, front_for
 from experiments.contact_localization.accuracy.solving import Solved, object_key
-from experiments.contact_localization.accuracy.within import Within, answer_within
 from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
 from harness.bench.scene import SceneFile

@@ -10,7 +10,7 @@ from experiments.contact_localization.posterior.hypotheses import Hypotheses, an
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.analysis import analyse
-from experiments.contact_localization.sound.heard import Heard
+from experiments.contact_localization.sound.evidence import Heard
 from experiments.contact_localization.sound.places import ANCHORS, strike_places
 from experiments.contact_localization.touch.contact_scales import SAME_AXIS, SAME_PLACE
 from harness.basics.arrays import FloatArray

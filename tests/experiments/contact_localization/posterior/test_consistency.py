@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.gate import (
+from experiments.contact_localization.posterior.consistency import (
     gates,
     likeness_of,
     refuse_bad_fit,

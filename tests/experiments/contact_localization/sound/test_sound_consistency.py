@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.sound.gate import (
+from experiments.contact_localization.sound.consistency import (
     REFUSE_BELOW,
     REFUSE_UNHEARD_BELOW,
     SoundFit,

@@ -5,8 +5,8 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
 from harness.basics.faces.ray_kernels import Hit, nearest_of
-from harness.objectfile.vision.ahead import AHEAD, bring_row
 from harness.objectfile.vision.coverage.faces import Lists, meet
+from harness.objectfile.vision.prefetch import AHEAD, bring_row
 from harness.sim.light.lambert_kernels import cosine_of, place_on
 
 Surface = tuple[FloatArray, FloatArray, FloatArray]

@@ -30,7 +30,7 @@ from experiments.contact_localization.answer import observe, prior_of
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Prior
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.posterior.places_left import places_left
+from experiments.contact_localization.posterior.problem_size import places_left
 from harness.basics.errors import WrongUse
 from harness.cost.bounds import most_seconds
 from harness.cost.choice import for_budget, for_error

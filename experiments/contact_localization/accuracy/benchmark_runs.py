@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.contact_localization.accuracy.budget import Run
 from experiments.contact_localization.accuracy.dials import SIMULATED, needs_images
 from experiments.contact_localization.accuracy.solving import (
     Models,
@@ -26,7 +27,6 @@ from experiments.contact_localization.accuracy.table_cell import (
     perform_cell,
     scene_of,
 )
-from experiments.contact_localization.accuracy.within import Run
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.baselines import mean_random_error
