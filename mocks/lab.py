@@ -35,9 +35,9 @@ from harness.basics.geometry import frame_facing, inverse, transform
 from harness.bench.gap import load_gap
 from harness.bench.kinematics import forward
 from harness.bench.station_sections import ArmSection
-from mocks.camera.lab_cameras import Seen, stream
+from mocks.camera.lab_cameras import CameraView, stream
 from mocks.faults import parse
-from mocks.lab_processes import CAMERA_PORT, GEL_PORT, Child, Line, free_address, keep_time
+from mocks.lab_processes import CAMERA_PORT, GEL_PORT, LabChild, Line, free_address, keep_time
 from mocks.lab_scene import read_lab_scene
 from mocks.shared_pose import Mark, SharedPose
 from mocks.ur.hooks import LEFT_ABOVE, ControllerConfig
@@ -93,12 +93,12 @@ class Lab:
         self._truth = truth
         self._address = address
         self._has_camera = camera
-        self._children = {"arm": Child("arm", lambda line: controller(address, line))}
-        gel = Seen(shared, _GEL, world.tactile_image)
-        self._children["gel"] = Child("gel", lambda line: stream(address, GEL_PORT, gel, GEL_RATE, line))
+        self._children = {"arm": LabChild("arm", lambda line: controller(address, line))}
+        gel = CameraView(shared, _GEL, world.tactile_image)
+        self._children["gel"] = LabChild("gel", lambda line: stream(address, GEL_PORT, gel, GEL_RATE, line))
         if camera:
-            seen = Seen(shared, _CAMERA, lambda pose, _step, _sample: world.scene_image(pose))
-            self._children["camera"] = Child(
+            seen = CameraView(shared, _CAMERA, lambda pose, _step, _sample: world.scene_image(pose))
+            self._children["camera"] = LabChild(
                 "camera", lambda line: stream(address, CAMERA_PORT, seen, CAMERA_RATE, line)
             )
         self._hammer_port: str | None = None
@@ -156,7 +156,7 @@ class Lab:
             source.begin()
         box = DaqBox(source, drift_ppm=DRIFT_PPM)
         self._hammer_port = box.port
-        self._children["hammer"] = Child("hammer", box.serve)
+        self._children["hammer"] = LabChild("hammer", box.serve)
         box.leave()
 
     def _mark(self, step: int, sample: int) -> Mapping[str, int]:

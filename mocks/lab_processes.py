@@ -63,7 +63,7 @@ class Line:
         return os.getppid() != self._parent
 
 
-class Child:
+class LabChild:
     """A process of the lab.
 
     Args:

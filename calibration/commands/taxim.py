@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 import typer
 
 from calibration.commands.taxim_answer import answer_of, doubts, keep, say, scale_answer
-from calibration.commands.taxim_arm import Wanted, chosen, pressed
+from calibration.commands.taxim_arm import PressRequest, chosen, pressed
 from calibration.commands.taxim_shadow import write_published
 from harness.commands import options
 from harness.commands.output import emit, warn
@@ -170,7 +170,7 @@ def taxim(
     from harness.sim.optics.lit_calibration import read_calibration
     from harness.sim.optics.tactile_calibration import save_calibration
 
-    wanted = Wanted(
+    wanted = PressRequest(
         station,
         scene,
         resume,

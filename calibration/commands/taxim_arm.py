@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class PressRequest:
     """What was asked for by options, None where nothing was."""
 
     station: str | None
@@ -46,7 +46,7 @@ class Wanted:
             raise WrongUse(f"{', '.join(named)}: {why}")
 
 
-def chosen(folder: Path | None, wanted: Wanted) -> None:
+def chosen(folder: Path | None, wanted: PressRequest) -> None:
     """Refuse anything but one of a folder, a station to move, or a run to go on with."""
     ways = {"FOLDER": folder, "--station": wanted.station, "--resume": wanted.resume}
     given = [name for name, value in ways.items() if value is not None]
@@ -59,7 +59,7 @@ def chosen(folder: Path | None, wanted: Wanted) -> None:
         wanted.require_none("they plan a new run of the arm; give --station, or leave them out")
 
 
-def pressed(wanted: Wanted, as_json: bool) -> Path | None:
+def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
     """The folder of the run that the arm made or went on with; None where Ctrl-C ended it early."""
     from calibration.taxim.arm.session import perform_on_bench
 
@@ -76,7 +76,7 @@ def pressed(wanted: Wanted, as_json: bool) -> Path | None:
     return recording.folder
 
 
-def _recording(wanted: Wanted) -> "Recording":
+def _recording(wanted: PressRequest) -> "Recording":
     from calibration.taxim.arm.record import NAME
     from harness.experiment.lookup import require_of
     from harness.recording.recording import Recording
@@ -88,7 +88,7 @@ def _recording(wanted: Wanted) -> "Recording":
     return _begun(wanted)
 
 
-def _begun(wanted: Wanted) -> "Recording":
+def _begun(wanted: PressRequest) -> "Recording":
     from calibration.taxim.arm.plan import PressSettings
     from calibration.taxim.arm.session import ball_scene, begin
     from harness.bench.scene import load_scene

@@ -23,7 +23,7 @@ NO_OFFSET: Final = [0.0] * 6
 
 
 @dataclass(frozen=True)
-class Controller:
+class ControllerLink:
     """What the controller says it is."""
 
     model: str
@@ -45,7 +45,7 @@ class Link:
         self._control: Any = None
         self._io: Any = None
 
-    def connect(self, model: str) -> Controller:
+    def connect(self, model: str) -> ControllerLink:
         """Check the controller, end what runs on it, upload the script, begin to receive.
 
         The packets must be read from then on; ``arm`` comes next.
@@ -164,7 +164,7 @@ class Link:
             cause = self.why()
             raise type(cause)(f"could not {what}: {cause}")
 
-    def _check_controller(self, model: str) -> Controller:
+    def _check_controller(self, model: str) -> ControllerLink:
         """Model, remote control, power and safety; then end whatever program runs there.
 
         A script left by a client that died keeps RTDEControlInterface's constructor waiting for
@@ -175,7 +175,7 @@ class Link:
         board = DashboardClient(self.address)
         try:
             board.connect(2000)
-            identity = Controller(
+            identity = ControllerLink(
                 board.getRobotModel().strip(),
                 board.getSerialNumber().strip(),
                 board.polyscopeVersion().strip(),
@@ -228,7 +228,7 @@ class Link:
             time.sleep(0.01)
 
 
-def _check_model(identity: Controller, model: str, address: str) -> None:
+def _check_model(identity: ControllerLink, model: str, address: str) -> None:
     """The dashboard names an e-Series arm without its e."""
     if identity.model.lower().rstrip("e") != model.lower().rstrip("e"):
         raise BenchFault(

@@ -17,7 +17,7 @@ from experiments.contact_localization.report.report import write
 from experiments.contact_localization.report.result import result_of
 from experiments.contact_localization.section import Localization
 from harness.bench.scene import SceneFile
-from harness.experiment.experiment import Condition, Experiment, Helpers, Measurement
+from harness.experiment.experiment import Experiment, Helpers, MeasuredCondition, Measurement
 from harness.recording.run_folder import RunFiles
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
@@ -48,9 +48,9 @@ def _settings(
 MEASUREMENT = Measurement(
     estimator=ESTIMATOR,
     conditions=(
-        Condition("spacing", ("close", "spread"), ("close", "spread")),
-        Condition("yaw", ("known", "unknown"), ("known",), ("known", "unknown")),
-        Condition("sense", ("touch", "both"), ("both",)),
+        MeasuredCondition("spacing", ("close", "spread"), ("close", "spread")),
+        MeasuredCondition("yaw", ("known", "unknown"), ("known",), ("known", "unknown")),
+        MeasuredCondition("sense", ("touch", "both"), ("both",)),
     ),
     cells=_cells,
     run_cell=run_cell,

@@ -5,14 +5,14 @@ from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.experiment.experiment import Planned
-from harness.skills.planning import RunPlan, Wanted, plan_run
-from harness.skills.sites import Presses
+from harness.skills.planning import ContactRequest, RunPlan, plan_run
+from harness.skills.sites import PressLimits
 
 
 def plan_contacts(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> RunPlan:
     """Choose the places that the scene asks for, plan the ways, rehearse the whole."""
     asked = scene.section(Localization)
-    wanted = Wanted(asked.contacts, asked.spacing, Presses(asked.step, asked.tilt, asked.depth))
+    wanted = ContactRequest(asked.contacts, asked.spacing, PressLimits(asked.step, asked.tilt, asked.depth))
     return plan_run(scene, station, mesh, seed, wanted)
 
 

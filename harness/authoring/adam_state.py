@@ -4,14 +4,14 @@ from pathlib import Path
 
 import torch
 
-from harness.authoring.checkpoint import Progress, read_checkpoint, write_checkpoint
+from harness.authoring.checkpoint import TrainingProgress, read_checkpoint, write_checkpoint
 from harness.basics.arrays import AnyArray
 
 _MOMENTS = ("step", "exp_avg", "exp_avg_sq")
 
 
 def save_training(
-    path: Path, identity: str, progress: Progress, network: torch.nn.Module, adam: torch.optim.Adam
+    path: Path, identity: str, progress: TrainingProgress, network: torch.nn.Module, adam: torch.optim.Adam
 ) -> None:
     """Write weights, both moments of Adam, its steps, the epoch and the losses; whole or not at all.
 
@@ -30,7 +30,9 @@ def save_training(
     write_checkpoint(path, identity, progress, arrays)
 
 
-def load_training(path: Path, identity: str, network: torch.nn.Module, adam: torch.optim.Adam) -> Progress:
+def load_training(
+    path: Path, identity: str, network: torch.nn.Module, adam: torch.optim.Adam
+) -> TrainingProgress:
     """Put a network and its Adam where ``save_training`` left them.
 
     Raises:

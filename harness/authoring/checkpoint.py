@@ -13,7 +13,7 @@ from harness.basics.errors import DataRefused
 
 
 @dataclass(frozen=True, eq=False)
-class Progress:
+class TrainingProgress:
     """How far a training has come.
 
     Attributes:
@@ -25,7 +25,9 @@ class Progress:
     losses: list[float]
 
 
-def write_checkpoint(path: Path, identity: str, progress: Progress, arrays: Mapping[str, AnyArray]) -> None:
+def write_checkpoint(
+    path: Path, identity: str, progress: TrainingProgress, arrays: Mapping[str, AnyArray]
+) -> None:
     """Write a checkpoint; one that was there is replaced when the new one is on disk.
 
     Args:
@@ -49,7 +51,7 @@ def write_checkpoint(path: Path, identity: str, progress: Progress, arrays: Mapp
     part.replace(path)
 
 
-def read_checkpoint(path: Path, identity: str) -> tuple[Progress, Mapping[str, AnyArray]]:
+def read_checkpoint(path: Path, identity: str) -> tuple[TrainingProgress, Mapping[str, AnyArray]]:
     """What ``write_checkpoint`` wrote.
 
     Raises:
@@ -59,7 +61,7 @@ def read_checkpoint(path: Path, identity: str) -> tuple[Progress, Mapping[str, A
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         found = str(arrays.pop("identity"))
-        progress = Progress(int(arrays.pop("epoch")), arrays.pop("losses").tolist())
+        progress = TrainingProgress(int(arrays.pop("epoch")), arrays.pop("losses").tolist())
     except (OSError, ValueError, BadZipFile, EOFError, KeyError, TypeError, AttributeError) as error:
         raise DataRefused(f"checkpoint {path} cannot be read ({error}); delete it to begin anew") from error
     if found != identity:

@@ -10,7 +10,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Row:
+class ExperimentRow:
     """One experiment or calibration.
 
     Attributes:
@@ -28,14 +28,14 @@ class Row:
     command: str = "replay"
 
 
-EXPERIMENTS: dict[str, Row] = {
-    "contact-localization": Row(
+EXPERIMENTS: dict[str, ExperimentRow] = {
+    "contact-localization": ExperimentRow(
         about="Which point of the object's surface was touched?",
         value="experiments.contact_localization.experiment:EXPERIMENT",
         section="localization",
         model="experiments.contact_localization.section:Localization",
     ),
-    "calibrate-taxim": Row(
+    "calibrate-taxim": ExperimentRow(
         about="How does a tactile camera's gel turn slope into colour?", command="calibrate taxim"
     ),
 }

@@ -12,7 +12,7 @@ WHERE_PLANNED: Final = 1e-3
 """rad: an arm this near to where a travel was planned from is there."""
 
 
-class Way(Protocol):
+class Trajectory(Protocol):
     """Finds joint way points that hit nothing."""
 
     def __call__(self, here: FloatArray, planned: FloatArray) -> FloatArray:
@@ -20,7 +20,12 @@ class Way(Protocol):
 
 
 def travel(
-    bench: Bench, start: FloatArray, planned: FloatArray, elsewhere: Way, speed: float, acceleration: float
+    bench: Bench,
+    start: FloatArray,
+    planned: FloatArray,
+    elsewhere: Trajectory,
+    speed: float,
+    acceleration: float,
 ) -> None:
     """Move along planned way points; from elsewhere than planned, by another way to the last of them.
 

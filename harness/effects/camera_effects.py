@@ -11,7 +11,7 @@ from typing import Any
 from harness.basics.arrays import FloatArray
 from harness.effects.accuracy import Knob, Level
 from harness.effects.effect import Condition, Effect
-from harness.sim.light.direct_image import DirectImage, LitObject, Seen, gathered
+from harness.sim.light.direct_image import DirectImage, LitObject, VisibleSurface, gathered
 
 Given = Mapping[str, Any]
 Levels = Mapping[str, Level]
@@ -25,7 +25,7 @@ def _lit(given: Given, _levels: Levels) -> LitObject:
     return LitObject(given["object.appearance"])
 
 
-def _seen(given: Given, levels: Levels) -> Seen:
+def _seen(given: Given, levels: Levels) -> VisibleSurface:
     lit: LitObject = given["object.lit"]
     return lit.seen(given["camera"], int(levels[SAMPLES.name]))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.effects.accuracy import Knob, Level
 from harness.effects.camera_effects import effects_when
-from harness.effects.effect import Compute, Condition, Effect, Way
+from harness.effects.effect import Compute, Condition, Effect, Implementation
 from harness.effects.sound_effects import NAMED
 from harness.sim.solid.walls import walled
 
@@ -38,8 +38,8 @@ def _opened(given: Given, _levels: Levels) -> "ObjectVision":
     return vision_from(given["object.file"], walled(given["object.mesh"], given["object.wall"]))
 
 
-def _from_file(level: "VisionLevel") -> Way:
-    return Way(("object.vision", "camera", "camera.lights"), _picture(level), when=NAMED)
+def _from_file(level: "VisionLevel") -> Implementation:
+    return Implementation(("object.vision", "camera", "camera.lights"), _picture(level), when=NAMED)
 
 
 def _picture(level: "VisionLevel") -> Compute:
@@ -61,7 +61,9 @@ def scene_camera_effects(camera: Condition, lights: Condition) -> tuple[Effect, 
             behind it.
     """
     *others, image = effects_when(lights)
-    ways: dict[Level, Way] = {level: _from_file(level) for level in ("fused", "onnx", "one_sample")}
+    ways: dict[Level, Implementation] = {
+        level: _from_file(level) for level in ("fused", "onnx", "one_sample")
+    }
     return (
         *others,
         Effect("object.vision", ("object.file", "object.mesh", "object.wall"), _opened, when=NAMED),

@@ -44,7 +44,7 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class Way:
+class Implementation:
     """How one level of an effect's ``choice`` computes the quantity, where it is not as the effect itself.
 
     Attributes:
@@ -93,9 +93,9 @@ class Effect:
     stored: bool = False
     omission: Omission | None = None
     choice: Knob | None = None
-    ways: Mapping[Level, Way] = field(default_factory=dict, hash=False)
+    ways: Mapping[Level, Implementation] = field(default_factory=dict, hash=False)
 
-    def way(self, accuracy: Accuracy) -> Way | None:
+    def way(self, accuracy: Accuracy) -> Implementation | None:
         """The way that an accuracy chooses; None for the effect's own."""
         return None if self.choice is None else self.ways.get(accuracy[self.choice.name])
 

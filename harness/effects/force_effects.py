@@ -13,7 +13,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.sensor import TactileSensor
 from harness.effects.accuracy import Knob, Level
-from harness.effects.effect import Effect, Way
+from harness.effects.effect import Effect, Implementation
 from harness.sim.gel.contact_force import PARTS, ContactForce, ForceLevel, contact_force, require_depths
 from harness.sim.gel.force_table import ForceTable
 
@@ -105,7 +105,7 @@ FORCE_EFFECT = Effect(
     knobs=(CELLS,),
     choice=FORCE,
     ways={
-        "winkler": Way(_NEEDS, _by_springs),
-        "table": Way(("touch.height_map", "sensor", "sensor.forces"), _by_table),
+        "winkler": Implementation(_NEEDS, _by_springs),
+        "table": Implementation(("touch.height_map", "sensor", "sensor.forces"), _by_table),
     },
 )

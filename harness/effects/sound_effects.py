@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.effects.accuracy import Knob, Level
-from harness.effects.effect import Compute, Condition, Effect, Way
+from harness.effects.effect import Compute, Condition, Effect, Implementation
 from harness.sim.modal.modal import (
     ELEMENT_SHARE,
     HEARING,
@@ -82,9 +82,9 @@ def _modes_of_file(level: "AudioLevel") -> Compute:
     return compute
 
 
-def _from_file(level: "AudioLevel") -> Way:
+def _from_file(level: "AudioLevel") -> Implementation:
     needs = ("object.file", "object.mesh", "object.wall", "object.material")
-    return Way(needs, _modes_of_file(level), when=NAMED, knobs=(MODES,))
+    return Implementation(needs, _modes_of_file(level), when=NAMED, knobs=(MODES,))
 
 
 def _sound(given: Given, levels: Levels) -> FloatArray:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.basics.arrays import FloatArray
 from harness.effects.accuracy import Knob, Level
-from harness.effects.effect import Compute, Effect, Way
+from harness.effects.effect import Compute, Effect, Implementation
 from harness.effects.sound_effects import NAMED
 from harness.sim.solid.walls import walled
 
@@ -52,7 +52,7 @@ def _opened(level: "TouchLevel") -> Compute:
     return compute
 
 
-def gel_from(level: "TouchLevel") -> Way:
+def gel_from(level: "TouchLevel") -> Implementation:
     """How ``touch.gel`` comes from a level of the ObjectFile."""
     opened = f"object.touch_{level}"
 
@@ -60,7 +60,7 @@ def gel_from(level: "TouchLevel") -> Way:
         surface: FloatArray = given[opened].at(given["contact.presses"])
         return surface
 
-    return Way((opened, "contact.presses"), compute, when=NAMED)
+    return Implementation((opened, "contact.presses"), compute, when=NAMED)
 
 
 FILE_EFFECTS = (

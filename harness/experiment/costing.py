@@ -18,7 +18,7 @@ from harness.bench.station_file import Station
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import sample_from, sample_json
 from harness.cost.provenance import code, machine
-from harness.experiment.experiment import Case, Cell, Experiment, Say, Setting
+from harness.experiment.experiment import Experiment, RunCase, RunCell, Say, Setting
 from harness.experiment.tables import measurement_of
 
 _SCHEMA = 2
@@ -39,7 +39,7 @@ class Work:
         fewer: settings that are measured with fewer steps than the most; None for all of them.
     """
 
-    cells: tuple[Cell, ...]
+    cells: tuple[RunCell, ...]
     settings: tuple[Setting, ...]
     counts: tuple[int, ...]
     fewer: tuple[Setting, ...] | None = None
@@ -66,7 +66,7 @@ def measure(
     say: Say,
     workers: int = 1,
     models: MutableMapping[str, Any] | None = None,
-) -> Iterator[tuple[Cell, list[Point]]]:
+) -> Iterator[tuple[RunCell, list[Point]]]:
     """Perform and answer every run that is not on the disk yet; one file a run.
 
     Args:
@@ -106,7 +106,7 @@ def measure(
                 yield cell, points
 
 
-def _measured(experiment: Experiment, case: Case, work: Work, say: Say) -> list[Point]:
+def _measured(experiment: Experiment, case: RunCase, work: Work, say: Say) -> list[Point]:
     condition = dict(case.cell.conditions)
     asked = [(count, setting) for count, setting in work.asked if count <= case.steps]
     points = []

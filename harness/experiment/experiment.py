@@ -113,7 +113,7 @@ class Scored:
 
 
 @dataclass(frozen=True)
-class Condition:
+class MeasuredCondition:
     """What a table or a cost curve varies beside object and seed.
 
     Attributes:
@@ -129,7 +129,7 @@ class Condition:
     tabled: tuple[str, ...] = ()
 
 
-class Cell(Protocol):
+class RunCell(Protocol):
     """One run of a table or a cost curve."""
 
     @property
@@ -149,11 +149,11 @@ class Cell(Protocol):
         """What was varied, by name; ``gap`` always among them."""
 
 
-class Case(Protocol):
+class RunCase(Protocol):
     """A performed run with its truth, to be answered at any setting."""
 
     @property
-    def cell(self) -> Cell:
+    def cell(self) -> RunCell:
         """Which run."""
 
     @property
@@ -209,7 +209,7 @@ class Measurement:
     """
 
     estimator: str
-    conditions: tuple[Condition, ...]
+    conditions: tuple[MeasuredCondition, ...]
     cells: Callable[[Sequence[str], Sequence[int], Mapping[str, Sequence[str]]], Sequence[Any]]
     run_cell: Callable[[Any, SceneFile, Station], dict[str, Any]]
     methods: tuple[str, ...]

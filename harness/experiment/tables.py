@@ -16,18 +16,18 @@ from harness.basics.metrics import Interval, bootstrap, mean, median, share_abov
 from harness.basics.whole_file import write_text_whole
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import load_station, station_path
-from harness.experiment.experiment import Cell, Experiment, Measurement
+from harness.experiment.experiment import Experiment, Measurement, RunCell
 from harness.experiment.lookup import named
 
 Results = Mapping[Any, Mapping[str, Any]]
-"""What every cell of a table came to; a cell is as ``harness.experiment.experiment.Cell``."""
+"""What every cell of a table came to; a cell is as ``harness.experiment.experiment.RunCell``."""
 
 Key = tuple[tuple[str, str], ...]
 """Conditions by name."""
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class TableRow:
     """One method under one condition.
 
     Attributes:
@@ -53,11 +53,11 @@ class Row:
 
 def measure(
     experiment: Experiment,
-    wanted: Sequence[Cell],
+    wanted: Sequence[RunCell],
     scenes: Mapping[str, SceneFile],
     folder: Path,
     workers: int,
-) -> Iterator[tuple[Cell, dict[str, Any]]]:
+) -> Iterator[tuple[RunCell, dict[str, Any]]]:
     """Run what is not on the disk yet; yields every cell's result as it is known.
 
     Args:
@@ -82,8 +82,8 @@ def measure(
 
 
 def _made(
-    name: str, missing: Sequence[Cell], trees: Mapping[str, dict[str, Any]], workers: int
-) -> Iterator[tuple[Cell, dict[str, Any]]]:
+    name: str, missing: Sequence[RunCell], trees: Mapping[str, dict[str, Any]], workers: int
+) -> Iterator[tuple[RunCell, dict[str, Any]]]:
     if workers == 1:
         for cell in missing:
             yield cell, _run(name, cell, trees[cell.object])
@@ -98,7 +98,7 @@ def _made(
             raise
 
 
-def _run(name: str, cell: Cell, tree: dict[str, Any]) -> dict[str, Any]:
+def _run(name: str, cell: RunCell, tree: dict[str, Any]) -> dict[str, Any]:
     scene = scene_from_json(tree, "the table")
     try:
         return measurement_of(named(name)).run_cell(cell, scene, load_station(station_path("mock")))
@@ -120,7 +120,7 @@ def measurement_of(experiment: Experiment) -> Measurement:
     return experiment.measurement
 
 
-def rows(experiment: Experiment, results: Results) -> list[Row]:
+def rows(experiment: Experiment, results: Results) -> list[TableRow]:
     """The table of what has been measured so far.
 
     Raises:
@@ -139,7 +139,7 @@ def rows(experiment: Experiment, results: Results) -> list[Row]:
     ]
 
 
-def key_of(cell: Cell) -> Key:
+def key_of(cell: RunCell) -> Key:
     """The conditions of a run, in a form that sorts and compares."""
     return tuple(cell.conditions.items())
 
@@ -159,7 +159,7 @@ def by_object(results: Results, condition: Key) -> dict[str, dict[str, float]]:
     return {name: {m: float(np.mean(e)) for m, e in methods.items()} for name, methods in found.items()}
 
 
-def _row(performed: Results, condition: Key, method: str, measured: Measurement) -> Row:
+def _row(performed: Results, condition: Key, method: str, measured: Measurement) -> TableRow:
     found = [
         result["rows"][method]
         for cell, result in performed.items()
@@ -168,7 +168,7 @@ def _row(performed: Results, condition: Key, method: str, measured: Measurement)
     held = [bool(one["in_region90"]) for one in found if "in_region90" in one]
     raw = np.array([one["error_m"] for one in found])
     symmetric = [one.get("error_symmetric_m") for one in found]
-    return Row(
+    return TableRow(
         dict(condition),
         method,
         len(found),

@@ -23,7 +23,7 @@ _START = 256
 
 
 @dataclass(frozen=True)
-class Asked:
+class ViewRequest:
     """A picture that is asked for; lengths in m, object's frame. None is what ``camera_for`` chooses.
 
     Attributes:
@@ -52,7 +52,7 @@ def _three(text: str) -> Three:
     return x, y, z
 
 
-NAMES = tuple(field.name for field in fields(Asked))
+NAMES = tuple(field.name for field in fields(ViewRequest))
 _VECTORS, _COUNTS = ("camera", "look_at", "up", "light"), ("width", "height")
 _READ: Mapping[str, Callable[[str], Any]] = {
     **dict.fromkeys(_VECTORS, _three),
@@ -68,7 +68,7 @@ _MEANT = {
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class ViewFrame:
     """A picture for a page.
 
     Attributes:
@@ -80,7 +80,7 @@ class Frame:
     said: Mapping[str, Any]
 
 
-def asked_from(query: Mapping[str, str]) -> Asked:
+def asked_from(query: Mapping[str, str]) -> ViewRequest:
     """What an address asks for.
 
     Args:
@@ -97,7 +97,7 @@ def asked_from(query: Mapping[str, str]) -> Asked:
             read[name] = _READ[name](text)
         except ValueError:
             raise WrongUse(f"{name}={text}: {_MEANT[name]} is wanted") from None
-    return Asked(**read)
+    return ViewRequest(**read)
 
 
 class LiveFrames:
@@ -128,7 +128,7 @@ class LiveFrames:
             "diagonal_m": self._vision.surface.diagonal,
         }
 
-    def frame(self, asked: Asked) -> Frame:
+    def frame(self, asked: ViewRequest) -> ViewFrame:
         """Draw a picture.
 
         Raises:
@@ -152,7 +152,7 @@ class LiveFrames:
             drawn = time.perf_counter()
         png = png_bytes(found.image.display())
         ended = time.perf_counter()
-        return Frame(
+        return ViewFrame(
             png,
             {
                 "level": found.level,

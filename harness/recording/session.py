@@ -15,7 +15,7 @@ from harness.recording.step_file import Step
 B = TypeVar("B", contravariant=True)
 
 
-class Experiment(Protocol[B]):
+class StepPerformer(Protocol[B]):
     """What a session needs of an experiment on a bench of type ``B``."""
 
     def steps(self, recording: Recording) -> Iterator[Step]:
@@ -72,7 +72,7 @@ def interruptible(stop_arm: StopArm) -> Iterator[Interrupt]:
 
 
 def perform(
-    experiment: Experiment[B], bench: B, recording: Recording, stop_arm: StopArm, progress: Progress
+    experiment: StepPerformer[B], bench: B, recording: Recording, stop_arm: StopArm, progress: Progress
 ) -> bool:
     """Perform and commit every remaining step; False where Ctrl-C ended it early.
 

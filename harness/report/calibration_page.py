@@ -114,7 +114,7 @@ class CalibrationReport:
 
 
 @dataclass(frozen=True)
-class Row:
+class CalibrationRow:
     """One example's pictures under its title."""
 
     title: str
@@ -254,13 +254,13 @@ def _map(figure: Figure, axes: Axes, values: AnyArray, title: str, colours: str,
     figure.colorbar(shown, ax=axes, shrink=0.8)
 
 
-def _row(example: Example, number: int, album: Album) -> Row:
+def _row(example: Example, number: int, album: Album) -> CalibrationRow:
     pictures = (
         ("live", example.live),
         ("drawn", example.drawn),
         ("difference", difference(example.live, example.drawn)),
     )
-    return Row(
+    return CalibrationRow(
         example.title,
         tuple((name, album.pixels(f"press_{number}_{name}", png(picture))) for name, picture in pictures),
     )

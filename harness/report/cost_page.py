@@ -19,7 +19,7 @@ PAGE = "cost.html"
 
 
 @dataclass(frozen=True)
-class Row:
+class CostRow:
     """One setting in words: its number on the front or "", then the cells of the table."""
 
     number: str
@@ -27,14 +27,14 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Section:
+class CostSection:
     """One condition: its drawing and its table."""
 
     anchor: str
     title: str
     picture: Picture
     runs: int
-    rows: tuple[Row, ...]
+    rows: tuple[CostRow, ...]
 
 
 HEADINGS = (
@@ -90,15 +90,15 @@ def _section(
     families: Sequence[str],
     stale: bool,
     album: Album,
-) -> Section:
+) -> CostSection:
     title = ", ".join(f"{name} {value}" for name, value in condition.items())
     best = front(points)
     rows = [
-        Row(str(best.index(point) + 1) if point in best else "", _cells(point))
+        CostRow(str(best.index(point) + 1) if point in best else "", _cells(point))
         for point in sorted(points, key=lambda p: p.seconds.value)
     ]
     picture = album.drawing(f"cost_{number}", cost_chart(points, families, title, stale))
-    return Section(f"c{number}", title, picture, max(len(p.samples) for p in points), tuple(rows))
+    return CostSection(f"c{number}", title, picture, max(len(p.samples) for p in points), tuple(rows))
 
 
 def _cells(point: Point) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from harness.report.values import Missing, Posterior
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class AnswerRow:
     """The answer of a run, for its last contact. Lengths in metres; None where unknown.
 
     Attributes:
@@ -37,7 +37,7 @@ class Answer:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class ContactRow:
     """One press.
 
     Attributes:
@@ -70,7 +70,7 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class BenchPart:
     """A body in the picture of the bench.
 
     Attributes:
@@ -87,7 +87,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class BenchScene:
     """What the picture of the bench shows: its bodies and, in base, the contact frames.
 
     Attributes:
@@ -97,14 +97,14 @@ class Bench:
         width: metres across the picture at the focus.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[BenchPart, ...]
     base_from_gels: FloatArray
     focus: FloatArray
     width: float = 1.1
 
 
 @dataclass(frozen=True)
-class Curve:
+class ErrorCurve:
     """Errors in metres against contacts, or against seconds; the first curve is ours.
 
     Attributes:
@@ -124,7 +124,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Instrument:
+class InstrumentRow:
     """How one instrument did during the run. Rates in Hz, times in seconds."""
 
     name: str
@@ -222,12 +222,12 @@ class ReportData:
     made: str
     command: str
     recording: str
-    answer: Answer | Missing
-    contacts: tuple[Contact, ...]
-    bench: Bench | Missing
-    error_by_contact: tuple[Curve, ...] | Missing
-    error_by_seconds: tuple[Curve, ...] | Missing
-    instruments: tuple[Instrument, ...] | Missing
+    answer: AnswerRow | Missing
+    contacts: tuple[ContactRow, ...]
+    bench: BenchScene | Missing
+    error_by_contact: tuple[ErrorCurve, ...] | Missing
+    error_by_seconds: tuple[ErrorCurve, ...] | Missing
+    instruments: tuple[InstrumentRow, ...] | Missing
     calibrations: tuple[Artefact, ...] | Missing
     effects: tuple[EffectRun, ...] | Missing
     world: dict[str, str] | Missing

@@ -10,7 +10,7 @@ from harness.bench.device import Health
 from harness.bench.reading import Reading
 from harness.bench.station_file import Station
 from harness.recording.run_folder import RunFiles
-from harness.report.data import Artefact, Instrument
+from harness.report.data import Artefact, InstrumentRow
 from harness.report.values import Missing
 
 _IN_BLOCKS = (FORCE, PRESSURE)
@@ -23,7 +23,7 @@ _HEARD_WITH = {"hammer": ("microphone",)}
 """Instruments whose box reads another's channels too."""
 
 
-def instruments(run: RunFiles, health: Mapping[str, Health] | None) -> tuple[Instrument, ...] | Missing:
+def instruments(run: RunFiles, health: Mapping[str, Health] | None) -> tuple[InstrumentRow, ...] | Missing:
     """One row an instrument.
 
     Args:
@@ -39,7 +39,7 @@ def instruments(run: RunFiles, health: Mapping[str, Health] | None) -> tuple[Ins
             whose = reading.channel.name.split(".")[0]
             counts[whose] = counts.get(whose, 0) + samples(reading)
     return tuple(
-        Instrument(
+        InstrumentRow(
             name=" and ".join(names),
             address=said.identity,
             rate=said.rate,

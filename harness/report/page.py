@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.report import wording
-from harness.report.data import Answer, Contact, Curve, ReportData
+from harness.report.data import AnswerRow, ContactRow, ErrorCurve, ReportData
 from harness.report.figures.charts import error_chart
 from harness.report.figures.figures import Album, Picture
 from harness.report.figures.pictures import (
@@ -65,7 +65,7 @@ def _content(data: ReportData, album: Album) -> dict[str, Any]:
         "say": wording,
         "is_missing": lambda value: isinstance(value, Missing),
         "headline": wording.headline(data),
-        "cards": wording.cards(data.answer) if isinstance(data.answer, Answer) else [],
+        "cards": wording.cards(data.answer) if isinstance(data.answer, AnswerRow) else [],
         "bench": bench if isinstance(bench, Missing) else album.photograph("bench", bench_figure(bench)),
         **_on_the_object(data, album, sides),
         **_sound(data, album, sides),
@@ -158,12 +158,12 @@ def _bars(peaks: tuple[PeakLine, ...] | Missing) -> list[float]:
 
 def _towards(data: ReportData) -> FloatArray:
     """The point of the object to look at: the answer, else its front."""
-    if isinstance(data.answer, Answer):
+    if isinstance(data.answer, AnswerRow):
         return data.answer.position
     return np.asarray(data.mesh.bounds.mean(axis=0))
 
 
-def _tiles(contact: Contact, album: Album) -> list[Tile]:
+def _tiles(contact: ContactRow, album: Album) -> list[Tile]:
     """Live, simulated and difference; then the two height maps on one scale."""
     prefix = f"contact_{contact.number}"
     live, simulated = contact.live, contact.simulated
@@ -193,7 +193,7 @@ def _image(image: AnyArray | Missing, name: str, album: Album) -> Picture | Miss
     return image if isinstance(image, Missing) else album.pixels(name, png(image))
 
 
-def _fit(contact: Contact) -> str:
+def _fit(contact: ContactRow) -> str:
     """How far live and simulated readings lie apart, in words."""
     said = []
     if not isinstance(contact.live, Missing) and not isinstance(contact.simulated, Missing):
@@ -207,7 +207,7 @@ def _fit(contact: Contact) -> str:
 
 
 def _chart(
-    curves: tuple[Curve, ...] | Missing, name: str, x_label: str, logarithmic_x: bool, album: Album
+    curves: tuple[ErrorCurve, ...] | Missing, name: str, x_label: str, logarithmic_x: bool, album: Album
 ) -> Picture | Missing:
     if isinstance(curves, Missing):
         return curves

@@ -10,7 +10,7 @@ from harness.bench.device import Health
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Experiment, Scored
 from harness.report import wording
-from harness.report.data import Artefact, EffectRun, Instrument
+from harness.report.data import Artefact, EffectRun, InstrumentRow
 from harness.report.instruments import artefacts, instruments
 from harness.report.observed import Observed, observed_rows
 from harness.report.simulated import effect_rows, world_rows
@@ -58,7 +58,7 @@ class RunPage:
     made: str
     command: str
     recording: str
-    instruments: tuple[Instrument, ...] | Missing
+    instruments: tuple[InstrumentRow, ...] | Missing
     calibrations: tuple[Artefact, ...] | Missing
     effects: tuple[EffectRun, ...]
     observed: tuple[Observed, ...]

@@ -1,7 +1,7 @@
 """Numbers as an operator reads them, and captions in words."""
 
 from harness.basics.arrays import FloatArray
-from harness.report.data import Answer, ReportData
+from harness.report.data import AnswerRow, ReportData
 from harness.report.sound_data import PeakLine, SenseAnswer, Sound
 from harness.report.values import Missing
 
@@ -113,7 +113,7 @@ def quantity(value: float | None, unit: str, digits: int = 3) -> str:
     return NONE if value is None else f"{value:.{digits}g} {unit}"
 
 
-def cards(answer: Answer) -> list[tuple[str, str, str]]:
+def cards(answer: AnswerRow) -> list[tuple[str, str, str]]:
     """(what, value, remark) of the numbers that stand first."""
     shown = [
         ("error", millimetres(answer.error), "last contact, straight line"),

@@ -12,7 +12,7 @@ from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.sim.gel.height_map import RasterMesh
 from harness.skills.press import ContactMotion
-from harness.skills.sites import Presses, Site, plan_sites
+from harness.skills.sites import PressLimits, Site, plan_sites
 from harness.skills.strike import StrikeMotion, planner
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import twin_of
@@ -67,7 +67,7 @@ class RunPlan:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ContactRequest:
     """The contacts that an experiment asks for.
 
     Attributes:
@@ -78,10 +78,10 @@ class Wanted:
 
     contacts: int
     spacing: Literal["close", "spread"]
-    presses: Presses
+    presses: PressLimits
 
 
-def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int, wanted: Wanted) -> RunPlan:
+def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int, wanted: ContactRequest) -> RunPlan:
     """Choose the sites, plan the ways, rehearse the whole.
 
     Args:

@@ -15,7 +15,7 @@ from harness.basics.geometry import transform
 from harness.bench.device import Arm
 from harness.bench.reading import Reading
 from harness.bench.station import PRESS, Bench
-from harness.bench.travel import Way, travel
+from harness.bench.travel import Trajectory, travel
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
 from harness.skills.first_touch import first_touch
@@ -121,7 +121,11 @@ class PressPerformer:
     """
 
     def __init__(
-        self, way: Way, speeds: Speeds | None = None, ask: Ask | None = None, plan_key: str = "contacts"
+        self,
+        way: Trajectory,
+        speeds: Speeds | None = None,
+        ask: Ask | None = None,
+        plan_key: str = "contacts",
     ) -> None:
         self.plan_key = plan_key
         self.way = way

@@ -32,7 +32,7 @@ _DEAD_ENDS = 20
 
 
 @dataclass(frozen=True)
-class Presses:
+class PressLimits:
     """What is asked of every contact of a run.
 
     Attributes:
@@ -92,7 +92,7 @@ def plan_sites(
     steps: Steps,
     seed: int,
     reachable: Reachable = from_above_or_aside,
-    presses: Presses = Presses(),
+    presses: PressLimits = PressLimits(),
     visit: Visit | None = None,
 ) -> tuple[Site, ...]:
     """Contacts to make, drawn at random among those that the sensor's housing allows.
@@ -149,7 +149,7 @@ class _Search:
     base_from_object: FloatArray
     steps: Steps
     reachable: Reachable
-    presses: Presses
+    presses: PressLimits
     visit: Visit | None
     sites: list[Site] = field(default_factory=list)
     tally: _Tally = field(default_factory=_Tally)
@@ -219,7 +219,7 @@ def try_site(
     point_in_object: FloatArray,
     normal_in_object: FloatArray,
     rng: np.random.Generator,
-    presses: Presses = Presses(),
+    presses: PressLimits = PressLimits(),
 ) -> Site | None:
     """A press at a point with a random tilt, sensor yaw and depth; None where it does not fit.
 

@@ -8,7 +8,7 @@ from mocks.lab_processes import Line
 from mocks.shared_pose import SharedPose
 
 
-class Seen:
+class CameraView:
     """A camera's view of the world at the arm's present pose, step and sample."""
 
     def __init__(
@@ -35,7 +35,7 @@ class Seen:
         self._shared.set_shown(self._viewer, self._mark.number)
 
 
-def stream(address: str, port: int, view: Seen, rate: float, line: Line) -> None:
+def stream(address: str, port: int, view: CameraView, rate: float, line: Line) -> None:
     """Serve a view as MJPEG until the lab is gone.
 
     Args:

@@ -17,7 +17,7 @@ from harness.sim.modal.modes import Modes
 from harness.sim.sound.modal_sound import ring
 from harness.sim.sound.room import reverberated, room_response
 from mocks.world.gap_draw import GapDraw
-from mocks.world.sound_draw import Blow, SoundDraw
+from mocks.world.sound_draw import BlowDraw, SoundDraw
 from mocks.world.world import Met, World
 
 LISTEN = 0.6
@@ -58,7 +58,7 @@ class Aim:
         direction_in_object: ``(3,)`` unit, the way of the blow.
     """
 
-    blow: Blow
+    blow: BlowDraw
     met: Met | None
     direction_in_object: FloatArray
 
@@ -201,7 +201,7 @@ class WorldSound:
         return float(np.sqrt(room * np.median(powers)))
 
 
-def _force(times: FloatArray, blow: Blow) -> FloatArray:
+def _force(times: FloatArray, blow: BlowDraw) -> FloatArray:
     """``(t,)`` N: a half sine, and perhaps a second, smaller one."""
     force = _half_sine(times - blow.throw, blow.pulse, blow.impulse)
     if blow.bounce is not None:

@@ -36,7 +36,7 @@ BOUNCE_AFTER, BOUNCE = (2.0e-3, 4.0e-3), 0.4
 
 
 @dataclass(frozen=True, eq=False)
-class Blow:
+class BlowDraw:
     """One strike of the hammer.
 
     Attributes:
@@ -121,7 +121,7 @@ class SoundDraw:
         phases = phase * self._draw.random(_STRIKE_PHASE, step, sample).standard_normal(count)
         return _polar(levels, phases)
 
-    def blow(self, step: int, sample: int) -> Blow:
+    def blow(self, step: int, sample: int) -> BlowDraw:
         """One strike of the hammer."""
         gap, random = self._gap, self._draw.random(_BLOW, step, sample)
         aside = np.array([*(gap.strike_point * random.standard_normal(2)), 0.0])
@@ -133,7 +133,7 @@ class SoundDraw:
         harder = HARDER if step in gap.saturated_strikes else 1.0
         impulse = 0.0 if step in gap.silent_strikes else IMPULSE * harder
         second = bounce if step in gap.double_strikes else None
-        return Blow(read_only(transform(turned, aside)), throw, pulse, impulse, second)
+        return BlowDraw(read_only(transform(turned, aside)), throw, pulse, impulse, second)
 
     def noise(self, count: int, channels: int, step: int, sample: int) -> FloatArray:
         """``(count, channels)``, of unit deviation, for one strike's record."""

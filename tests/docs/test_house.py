@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.bench.experiments import EXPERIMENTS, Row, loaded
+from harness.bench.experiments import EXPERIMENTS, ExperimentRow, loaded
 from harness.bench.scene import Section
 from harness.experiment.experiment import Experiment
 
@@ -37,7 +37,7 @@ def test_every_room_that_the_page_names_is_there() -> None:
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_row_of_the_table_of_experiments_resolves(name: str) -> None:
-    row: Row = EXPERIMENTS[name]
+    row: ExperimentRow = EXPERIMENTS[name]
     if row.value is None:
         assert row.command != "replay"
         return

@@ -13,19 +13,19 @@ import pytest
 
 from harness.basics.errors import BenchFault
 from mocks.faults import Fault
-from mocks.lab_processes import ARM_PORTS, Child, Line, free_address
+from mocks.lab_processes import ARM_PORTS, LabChild, Line, free_address
 from mocks.shared_pose import Mark, SharedPose
 
 _PARENT = """
 import sys, time
-from mocks.lab_processes import Child
+from mocks.lab_processes import LabChild
 
 def run(line):
     line.ready()
     while True:  # deaf to its line: only the system can end it
         time.sleep(1.0)
 
-child = Child("deaf", run)
+child = LabChild("deaf", run)
 child.wait_ready(5.0)
 print(child._process.pid, flush=True)
 time.sleep(60.0)
@@ -66,7 +66,7 @@ def _echo(line: Line) -> None:
 
 
 def test_a_fault_reaches_the_child() -> None:
-    child = Child("gel", _echo)
+    child = LabChild("gel", _echo)
     child.wait_ready(5.0)
     child.cue(Fault("gel", "stall", 1.5))
     child._process.join(5.0)
@@ -80,7 +80,7 @@ def _fail(line: Line) -> None:
 
 
 def test_a_child_that_fails_says_why(capfd: pytest.CaptureFixture[str]) -> None:
-    child = Child("gel", _fail)
+    child = LabChild("gel", _fail)
     with pytest.raises(BenchFault, match="mocked gel did not start: OSError: port 8080 is taken"):
         child.wait_ready(5.0)
     child.kill()
@@ -88,7 +88,7 @@ def test_a_child_that_fails_says_why(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_child_that_is_never_ready_is_not_waited_for() -> None:
-    child = Child("gel", lambda line: time.sleep(30.0))
+    child = LabChild("gel", lambda line: time.sleep(30.0))
     with pytest.raises(BenchFault, match=r"not ready within 0\.1 s"):
         child.wait_ready(0.1)
     child.kill()

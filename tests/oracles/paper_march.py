@@ -7,7 +7,7 @@ import numpy as np
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.network.network import VisionModel
-from harness.objectfile.vision.network.plain import Asked, evaluate
+from harness.objectfile.vision.network.plain import Query, evaluate
 from tests.samples.published_view import LIGHT, camera_of
 
 PLAIN_SAMPLES = 384
@@ -45,7 +45,7 @@ def paper_seconds(model: VisionModel, mesh: Mesh, size: int, crop: int) -> float
     met = np.flatnonzero(networks >= 0)
     views = np.repeat(rows, PLAIN_SAMPLES, axis=0)[met]
     told = np.zeros((len(met), model.weights.size.extras))
-    density, colour = evaluate(model, Asked(networks[met], points[met], views, LIGHT.direction, told))
+    density, colour = evaluate(model, Query(networks[met], points[met], views, LIGHT.direction, told))
     thick = np.zeros(len(networks))
     thick[met] = density * (places[1] - places[0])
     behind = np.cumsum(thick.reshape(-1, PLAIN_SAMPLES), axis=1)

@@ -8,7 +8,7 @@ import trimesh
 
 from harness.authoring.touch.codes import CodedSurface, PatchSpec, code_surface
 from harness.authoring.touch.data import DEPTHS, MOST_TILT, choose_nodes
-from harness.authoring.touch.metrics import Bench
+from harness.authoring.touch.metrics import PressBench
 from harness.authoring.touch.profiles import touch_profile
 from harness.authoring.touch.touch import OFF, opened_codes, spaced_codes
 from harness.basics.materials import MATERIALS
@@ -47,9 +47,9 @@ def coded() -> CodedSurface:
 
 
 @cache
-def bench() -> Bench:
+def bench() -> PressBench:
     """What its maps are measured on."""
-    return Bench(peg(), RasterMesh(peg()), SENSOR, SKIRT, coded().nodes, OFF * SPACING)
+    return PressBench(peg(), RasterMesh(peg()), SENSOR, SKIRT, coded().nodes, OFF * SPACING)
 
 
 @cache

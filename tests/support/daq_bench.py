@@ -13,7 +13,7 @@ from harness.bench.acquisition import AcquisitionCalibration, shipped_acquisitio
 from mocks.daq.box import DaqBox, Source
 from mocks.daq.source import Played
 from mocks.faults import Fault
-from mocks.lab_processes import Child
+from mocks.lab_processes import LabChild
 
 CALIBRATION: AcquisitionCalibration = shipped_acquisition("acquisition_bench")
 OFFSETS = (120, -180)
@@ -24,7 +24,7 @@ class Bench:
     """A box, its process, and what fires its next record."""
 
     box: DaqBox
-    child: Child
+    child: LabChild
     striker: int
 
     def fire(self) -> None:
@@ -54,7 +54,7 @@ def mocked_box(source: Callable[[Callable[[], bool]], Source], **options: object
             return False
 
     box = DaqBox(source(fired), **options)  # type: ignore[arg-type]
-    child = Child("hammer", box.serve)
+    child = LabChild("hammer", box.serve)
     box.leave()
     try:
         child.wait_ready(10.0)

@@ -15,7 +15,7 @@ from harness.basics.errors import BenchFault
 from harness.bench.sensor import GELSIGHT_R15
 from mocks.camera.gelsight_stream import MjpegServer
 from mocks.faults import Fault
-from mocks.lab_processes import Child, Line, free_address
+from mocks.lab_processes import LabChild, Line, free_address
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux")
 
@@ -59,16 +59,16 @@ def _serve(line: Line, address: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def camera() -> Iterator[tuple[Child, str]]:
+def camera() -> Iterator[tuple[LabChild, str]]:
     address = free_address()
-    child = Child("clock", lambda line: _serve(line, address))
+    child = LabChild("clock", lambda line: _serve(line, address))
     child.wait_ready(5.0)
     yield child, f"http://{address}:{PORT}/?action=stream"
     child.kill()
 
 
 @pytest.fixture
-def gel(camera: tuple[Child, str]) -> Iterator[HttpCamera]:
+def gel(camera: tuple[LabChild, str]) -> Iterator[HttpCamera]:
     gel = gelsight(camera[1], SENSOR)
     gel.open()
     yield gel
@@ -98,7 +98,7 @@ def test_the_newest_frame_is_new_however_slow_the_consumer(gel: HttpCamera) -> N
     assert np.median(ages) < 0.02
 
 
-def test_a_stalled_camera_is_named_and_read_again(camera: tuple[Child, str], gel: HttpCamera) -> None:
+def test_a_stalled_camera_is_named_and_read_again(camera: tuple[LabChild, str], gel: HttpCamera) -> None:
     camera[0].cue(Fault("gel", "stall", 1.0))
     with pytest.raises(BenchFault) as stalled:
         gel.read(10, 0.5)

@@ -17,7 +17,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, NotTouched
 from harness.bench.reading import Channel, Reading
 from harness.bench.station import PRESS, Bench
-from harness.bench.travel import Way, travel
+from harness.bench.travel import Trajectory, travel
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
 
@@ -59,7 +59,7 @@ class BallPresses:
 
     def __init__(
         self,
-        way: Way,
+        way: Trajectory,
         ball: float,
         speeds: PressSpeeds | None = None,
         say: Callable[[str], None] = lambda _: None,

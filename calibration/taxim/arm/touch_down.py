@@ -36,7 +36,7 @@ _FAINT = 3.0
 
 
 @dataclass(frozen=True)
-class Way:
+class Descent:
     """One way to see the middle of a contact.
 
     Attributes:
@@ -53,12 +53,12 @@ class Way:
 
 
 WAYS = (
-    Way(0.15, False, 4),
-    Way(0.15, False, 6),
-    Way(0.15, False, 6, degree=2),
-    Way(0.35, True, 4),
-    Way(0.35, True, 6),
-    Way(0.35, True, 6, degree=2),
+    Descent(0.15, False, 4),
+    Descent(0.15, False, 6),
+    Descent(0.15, False, 6, degree=2),
+    Descent(0.35, True, 4),
+    Descent(0.35, True, 6),
+    Descent(0.35, True, 6, degree=2),
 )
 """The first is the one whose presses off the map are named."""
 
@@ -129,7 +129,7 @@ def _found(strength: FloatArray) -> FloatArray:
     return np.array([float(column), float(row)])
 
 
-def _began(contact: _Contact, way: Way) -> FloatArray:
+def _began(contact: _Contact, way: Descent) -> FloatArray:
     strength = contact.strength[: way.pictures]
     if len(strength) < way.degree + 2 or strength[-1].max() < 2.0 * _FAINT:
         return np.full(2, np.nan)
@@ -142,7 +142,7 @@ def _began(contact: _Contact, way: Way) -> FloatArray:
     return np.asarray(solved[0], dtype=np.float64)
 
 
-def _weight(strength: FloatArray, way: Way) -> FloatArray:
+def _weight(strength: FloatArray, way: Descent) -> FloatArray:
     strongest = float(strength.max())
     floor = max(way.above * strongest, _FAINT)
     if way.even:

@@ -77,7 +77,7 @@ class Run:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class BudgetedAnswer:
     """An answer as it was asked for.
 
     Attributes:
@@ -102,7 +102,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Within:
+class BudgetResult:
     """An answer as it was asked for, and what more time would have given.
 
     Attributes:
@@ -111,12 +111,12 @@ class Within:
         finest_seconds: s on the clock that it took in all.
     """
 
-    asked: Asked
+    asked: BudgetedAnswer
     finest: Solved
     finest_seconds: float
 
 
-def answer_within(recording: Recording, front: Front, target: Target) -> Within:
+def answer_within(recording: Recording, front: Front, target: Target) -> BudgetResult:
     """Answer a recorded run as asked, then once more at the finest levels.
 
     The seconds are from readings in memory to the answer. What depends on the object alone, its
@@ -136,10 +136,10 @@ def answer_within(recording: Recording, front: Front, target: Target) -> Within:
     prepare(models.at(FINEST), FINEST)
     readings = run.read(FINEST)
     finest = solve(readings, FINEST)
-    return Within(asked, finest, readings.shared[1] + finest.wall)
+    return BudgetResult(asked, finest, readings.shared[1] + finest.wall)
 
 
-def ask(run: Run, front: Front, target: Target, loaded: bool = False) -> Asked:
+def ask(run: Run, front: Front, target: Target, loaded: bool = False) -> BudgetedAnswer:
     """Answer a run as asked; what is prepared and loaded before is not counted.
 
     Args:
@@ -164,7 +164,7 @@ def ask(run: Run, front: Front, target: Target, loaded: bool = False) -> Asked:
     promised = _promise(run, front, point, solved)
     kept = taken[1] <= target.seconds if target.seconds is not None else promised <= (target.error or 0.0)
     kept = kept and solved.estimate is not None
-    return Asked(point, solved, taken[1], taken[0], predicted, promised, kept, tried)
+    return BudgetedAnswer(point, solved, taken[1], taken[0], predicted, promised, kept, tried)
 
 
 def _candidates(run: Run, front: Front, target: Target) -> tuple[Point, ...]:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.budget import Within, answer_within
+from experiments.contact_localization.accuracy.budget import BudgetResult, answer_within
 from experiments.contact_localization.accuracy.dials import FINEST, setting_name
 from experiments.contact_localization.accuracy.front import Front, foresee, front_for
 from experiments.contact_localization.accuracy.solving import Solved, object_key
@@ -39,7 +39,7 @@ def doubts(front: Front, target: Target) -> tuple[str, ...]:
     return tuple(said)
 
 
-def as_json(found: Within, front: Front, target: Target, recording: Recording) -> dict[str, Any]:
+def as_json(found: BudgetResult, front: Front, target: Target, recording: Recording) -> dict[str, Any]:
     """What was asked, what it took, and what the finest levels say, as JSON values."""
     truth, asked = read_truth(recording), found.asked
     last = recording.committed - 1
@@ -101,7 +101,7 @@ def _finest(finest: Mapping[str, Any]) -> str:
     return f"the finest levels ({finest['setting']}) {apart}{error}; {finest['seconds']:.2g} s, not counted"
 
 
-def _apart(found: Within) -> float | None:
+def _apart(found: BudgetResult) -> float | None:
     ours, finest = found.asked.solved.estimate, found.finest.estimate
     if ours is None or finest is None:
         return None

@@ -32,7 +32,7 @@ from experiments.contact_localization.sound.consistency import (
     doubts_of_sound_at,
     refuse_strange_sound,
 )
-from experiments.contact_localization.sound.evidence import Heard, hear
+from experiments.contact_localization.sound.evidence import StrikeEvidence, hear
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import WrongUse
 from harness.basics.faces.nearest import nearest_point
@@ -173,7 +173,7 @@ def _judged(
     search: Search,
     found: Solution,
     levels: Levels,
-    heard: Heard | None,
+    heard: StrikeEvidence | None,
     count: int,
     seconds: dict[str, float],
 ) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from experiments.contact_localization.posterior.hypotheses import Hypotheses, be
 from experiments.contact_localization.posterior.proposal import drawn
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.posterior.subsampling import between_samples
-from experiments.contact_localization.sound.evidence import Heard
+from experiments.contact_localization.sound.evidence import StrikeEvidence
 from harness.basics.arrays import IntArray
 
 _DROPPED_AT = 18.0
@@ -27,7 +27,9 @@ _FILLS = 200.0
 """Effective samples of the grid that fill a region 2 mm apart so well that draws need not."""
 
 
-def on_samples(search: Search, members: IntArray, anchor: int, heard: Heard | None = None) -> Hypotheses:
+def on_samples(
+    search: Search, members: IntArray, anchor: int, heard: StrikeEvidence | None = None
+) -> Hypotheses:
     """The posterior over surface samples and yaws: places first, then coarse images, then fine ones.
 
     Args:
@@ -61,7 +63,7 @@ def refine(
     samples: int,
     rounds: int,
     seed: int,
-    heard: Heard | None = None,
+    heard: StrikeEvidence | None = None,
 ) -> Hypotheses:
     """The posterior in continuous place, yaw and shared errors, by repeated importance sampling.
 

@@ -11,7 +11,7 @@ from experiments.contact_localization.posterior.hypotheses import Hypotheses, an
 from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.posterior.particle import particle_filter
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.evidence import Heard
+from experiments.contact_localization.sound.evidence import StrikeEvidence
 from experiments.contact_localization.sound.places import by_sound
 from harness.basics.arrays import FloatArray, IntArray
 
@@ -39,7 +39,12 @@ class Solution:
 
 
 def solve_run(
-    search: Search, count: int, levels: Levels, seed: int, seconds: dict[str, float], heard: Heard | None
+    search: Search,
+    count: int,
+    levels: Levels,
+    seed: int,
+    seconds: dict[str, float],
+    heard: StrikeEvidence | None,
 ) -> Solution:
     """The posterior of the first ``count`` contacts.
 
@@ -83,7 +88,7 @@ def _by_grid(
     levels: Levels,
     seed: int,
     seconds: dict[str, float],
-    heard: Heard | None,
+    heard: StrikeEvidence | None,
 ) -> Solution:
     start = time.perf_counter()
     coarse = on_samples(search, members, anchor, heard)
@@ -96,7 +101,7 @@ def _by_grid(
     return Solution(refined, members, fits)
 
 
-def _by_sound(search: Search, count: int, heard: Heard, seconds: dict[str, float]) -> Solution:
+def _by_sound(search: Search, count: int, heard: StrikeEvidence, seconds: dict[str, float]) -> Solution:
     start = time.perf_counter()
     everyone = np.arange(count, dtype=np.int64)
     found = by_sound(search, heard.term, heard.struck, everyone)

@@ -24,10 +24,10 @@ from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.recording.run_folder import RunFiles
 from harness.report.data import (
-    Answer,
-    Bench,
-    Contact,
-    Curve,
+    AnswerRow,
+    BenchScene,
+    ContactRow,
+    ErrorCurve,
     ReportData,
 )
 from harness.report.figures.props import arm_parts, object_part, sensor_parts, table_and_pedestal
@@ -85,9 +85,9 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
     )
 
 
-def _answer(scored: Scored, result: Mapping[str, Any]) -> Answer:
+def _answer(scored: Scored, result: Mapping[str, Any]) -> AnswerRow:
     touch = result["estimates"][result["answer"]]
-    return Answer(
+    return AnswerRow(
         position=scored.found.last.position_in_object,
         seconds=touch["seconds"],
         credible90=touch["credible90_m"],
@@ -100,12 +100,14 @@ def _answer(scored: Scored, result: Mapping[str, Any]) -> Answer:
     )
 
 
-def _contacts(scored: Scored, comparison: Comparison, history: tuple[Estimate, ...]) -> tuple[Contact, ...]:
+def _contacts(
+    scored: Scored, comparison: Comparison, history: tuple[Estimate, ...]
+) -> tuple[ContactRow, ...]:
     images = _of_each(comparison, "touch.image", len(history))
     gels = _of_each(comparison, "touch.gel", len(history))
     poses, true = object_from_gels(scored.found), true_points(scored)
     return tuple(
-        Contact(
+        ContactRow(
             number=k + 1,
             step=str(k + 1),
             live=scored.found.observations[k].images[-1],
@@ -141,7 +143,7 @@ def _fit(gate: Gate | None) -> str:
     return "no contact in the image" if gate.fit is None else f"{gate.fit:.1f} nats"
 
 
-def _bench(run: RunFiles, found: Found) -> Bench:
+def _bench(run: RunFiles, found: Found) -> BenchScene:
     station, scene = run.station, run.scene
     base_from_object = scene.base_from_object(run.mesh)
     base_from_gels = np.array([observation.base_from_gel for observation in found.observations])
@@ -156,10 +158,10 @@ def _bench(run: RunFiles, found: Found) -> Bench:
         *sensor_parts(station.gel.sensor, base_from_gels[-1], inverse(station.flange_from_gel)),
         *arm_parts(station.arm.model, joints),
     )
-    return Bench(parts, base_from_gels, in_base.mean(axis=1))
+    return BenchScene(parts, base_from_gels, in_base.mean(axis=1))
 
 
-def _by_contact(scored: Scored, history: tuple[Estimate, ...]) -> tuple[Curve, ...] | Missing:
+def _by_contact(scored: Scored, history: tuple[Estimate, ...]) -> tuple[ErrorCurve, ...] | Missing:
     true, found = true_points(scored), scored.found
     if true is None:
         return NO_TRUTH
@@ -167,13 +169,13 @@ def _by_contact(scored: Scored, history: tuple[Estimate, ...]) -> tuple[Curve, .
     ours = _errors([estimate.position_in_object for estimate in history], true)
     alone = _errors([without_images(found, k + 1) for k in range(len(true))], true)
     return (
-        Curve(SENSES[found.sense], counts, ours, by=found.sense),
+        ErrorCurve(SENSES[found.sense], counts, ours, by=found.sense),
         *_by_other_senses(scored, true),
-        Curve("translations alone, no image", counts, alone, by="geometry"),
+        ErrorCurve("translations alone, no image", counts, alone, by="geometry"),
     )
 
 
-def _by_other_senses(scored: Scored, true: FloatArray) -> Iterator[Curve]:
+def _by_other_senses(scored: Scored, true: FloatArray) -> Iterator[ErrorCurve]:
     """The same readings after each contact by each other sense that answered in the end."""
     counts = tuple(float(k + 1) for k in range(len(true)))
     for sense, last in scored.found.others.items():
@@ -184,7 +186,7 @@ def _by_other_senses(scored: Scored, true: FloatArray) -> Iterator[Curve]:
         except (FitRefused, WrongUse):  # the first contacts were not struck, or told nothing yet
             continue
         points = [estimate.position_in_object for estimate in history]
-        yield Curve(SENSES[sense], counts, _errors(points, true), by=sense)
+        yield ErrorCurve(SENSES[sense], counts, _errors(points, true), by=sense)
 
 
 def _errors(points: Sequence[FloatArray], true: FloatArray) -> tuple[float, ...]:
@@ -197,7 +199,7 @@ def _sweep(scored: Scored) -> tuple[Point, ...]:
     return () if true is None else trade(scored.answering.readings, true[-1])
 
 
-def _by_seconds(trade: tuple[Point, ...]) -> tuple[Curve, ...] | Missing:
+def _by_seconds(trade: tuple[Point, ...]) -> tuple[ErrorCurve, ...] | Missing:
     if not trade:
         return NO_TRUTH
     methods: dict[str, list[Point]] = {}
@@ -205,7 +207,7 @@ def _by_seconds(trade: tuple[Point, ...]) -> tuple[Curve, ...] | Missing:
     for point in trade:
         methods.setdefault(_method(point.levels, heard), []).append(point)
     return tuple(
-        Curve(
+        ErrorCurve(
             name,
             tuple(point.seconds_a_contact for point in points),
             tuple(point.error for point in points),

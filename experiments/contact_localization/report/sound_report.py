@@ -9,7 +9,7 @@ from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import true_points
 from experiments.contact_localization.report.sound_pictures import sound_pair
-from experiments.contact_localization.sound.evidence import Heard, hear
+from experiments.contact_localization.sound.evidence import StrikeEvidence, hear
 from experiments.contact_localization.sound.likelihood import ModeRow
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
@@ -79,7 +79,7 @@ def _sense(name: str, found: Estimate | FitRefused, true: FloatArray | None) -> 
     )
 
 
-def _strikes(found: Answer, heard: Heard) -> tuple[StrikeLine, ...]:
+def _strikes(found: Answer, heard: StrikeEvidence) -> tuple[StrikeLine, ...]:
     reasons = dict(zip(heard.struck.tolist(), heard.term.evidence.reasons, strict=True))
     return tuple(
         strike_line(index + 1, observation.strike, reasons.get(index, NOT_STRUCK))
@@ -126,7 +126,7 @@ def _until(falling: FloatArray, level: float) -> float:
     return after - 1 + float(falling[after - 1] - level) / drop
 
 
-def _pair(found: Answer, heard: Heard) -> SpectrogramPair | Missing:
+def _pair(found: Answer, heard: StrikeEvidence) -> SpectrogramPair | Missing:
     counted = heard.struck[heard.term.evidence.used]
     if not len(counted):
         return Missing("no strike counts")
@@ -142,7 +142,7 @@ def _pair(found: Answer, heard: Heard) -> SpectrogramPair | Missing:
     return SpectrogramPair(index + 1, recorded.times, recorded.frequencies, recorded.levels, simulated.levels)
 
 
-def _scale(found: Answer, heard: Heard) -> float:
+def _scale(found: Answer, heard: StrikeEvidence) -> float:
     """Of the object's frequencies over the model's, as the places of the answer have it."""
     struck = [int(k) for k in heard.struck]
     return heard.term.scale_at(found.last.contacts[struck], _directions(found, struck))
@@ -155,7 +155,7 @@ def _directions(found: Answer, contacts: Sequence[int]) -> FloatArray:
     return np.asarray(axes @ object_from_base.T)
 
 
-def _peaks(found: Answer, heard: Heard) -> tuple[PeakLine, ...] | Missing:
+def _peaks(found: Answer, heard: StrikeEvidence) -> tuple[PeakLine, ...] | Missing:
     evidence = heard.term.evidence
     if int(evidence.used.sum()) < 2:
         return Missing(

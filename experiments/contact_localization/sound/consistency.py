@@ -10,7 +10,7 @@ from experiments.contact_localization.posterior.hypotheses import Hypotheses, an
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.analysis import analyse
-from experiments.contact_localization.sound.evidence import Heard
+from experiments.contact_localization.sound.evidence import StrikeEvidence
 from experiments.contact_localization.sound.places import ANCHORS, strike_places
 from experiments.contact_localization.touch.contact_scales import SAME_AXIS, SAME_PLACE
 from harness.basics.arrays import FloatArray
@@ -78,7 +78,7 @@ class SoundFit:
         return self.resonances >= _TELLING and self.unexplained > UNEXPLAINED * self.resonances
 
 
-def fit_by_sound(search: Search, hypotheses: Hypotheses, heard: Heard, count: int) -> SoundFit:
+def fit_by_sound(search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int) -> SoundFit:
     """The fit of the most probable hypothesis.
 
     Args:
@@ -99,7 +99,9 @@ def fit_by_sound(search: Search, hypotheses: Hypotheses, heard: Heard, count: in
     )
 
 
-def refuse_strange_sound(search: Search, hypotheses: Hypotheses, heard: Heard, count: int) -> tuple[str, ...]:
+def refuse_strange_sound(
+    search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int
+) -> tuple[str, ...]:
     """Raise where the places of the contacts and their sounds together cannot be of this object.
 
     Returns:
@@ -119,7 +121,9 @@ def refuse_strange_sound(search: Search, hypotheses: Hypotheses, heard: Heard, c
     )
 
 
-def doubts_of_sound_at(search: Search, hypotheses: Hypotheses, heard: Heard, count: int) -> tuple[str, ...]:
+def doubts_of_sound_at(
+    search: Search, hypotheses: Hypotheses, heard: StrikeEvidence, count: int
+) -> tuple[str, ...]:
     """What a reader must know of an answer whose sound may be another object's; empty otherwise.
 
     Where the images fit, sound does not refuse: it warns. What the images of another object's like

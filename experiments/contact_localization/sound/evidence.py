@@ -18,7 +18,7 @@ from harness.bench.acquisition import Strike
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class StrikeEvidence:
     """The sound of a run's strikes.
 
     Attributes:
@@ -43,7 +43,9 @@ class Heard:
         return sound_nats(search, self.term, self.struck, at, between=True, aside=aside)
 
 
-def hear(strikes: Sequence[Strike | None], model: Model, spacing: float, alone: bool = False) -> Heard | None:
+def hear(
+    strikes: Sequence[Strike | None], model: Model, spacing: float, alone: bool = False
+) -> StrikeEvidence | None:
     """The strikes as a term; None where nothing was struck.
 
     Args:
@@ -64,4 +66,4 @@ def hear(strikes: Sequence[Strike | None], model: Model, spacing: float, alone: 
     noise = SoundNoise()
     noise = replace(noise, weight=noise.alone) if alone else noise
     term = SoundTerm(evidence, model.gains(spacing), model.modes, model.material, noise)
-    return Heard(term, np.array(struck, dtype=np.int64))
+    return StrikeEvidence(term, np.array(struck, dtype=np.int64))

@@ -12,7 +12,7 @@ from harness.authoring.adam_state import load_training, save_training
 from harness.authoring.audio.data import between_nodes
 from harness.authoring.audio.profiles import PerceptronSpec
 from harness.authoring.audio.readout import error_shares, solve_readout
-from harness.authoring.checkpoint import Progress
+from harness.authoring.checkpoint import TrainingProgress
 from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_rate
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import WrongUse
@@ -162,7 +162,7 @@ class Training:
 
     def save(self, path: Path) -> None:
         """Write a checkpoint (``adam_state.save_training``)."""
-        progress = Progress(self.epoch, self.losses)
+        progress = TrainingProgress(self.epoch, self.losses)
         save_training(path, self._identity, progress, self._network, self._adam)
 
     def load(self, path: Path) -> None:

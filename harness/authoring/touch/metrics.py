@@ -78,7 +78,7 @@ def summary(decibels: FloatArray) -> dict[str, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class PressBench:
     """What maps are measured on.
 
     Attributes:

@@ -8,10 +8,10 @@ import torch
 from torch import Tensor, nn
 
 from harness.authoring.adam_state import load_training, save_training
-from harness.authoring.checkpoint import Progress
+from harness.authoring.checkpoint import TrainingProgress
 from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_rate
 from harness.authoring.touch.data import DEPTHS, MOST_TILT, pressed, reference_maps, smooth_normals
-from harness.authoring.touch.metrics import Bench
+from harness.authoring.touch.metrics import PressBench
 from harness.authoring.touch.profiles import TouchPerceptronSpec
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import WrongUse
@@ -46,7 +46,7 @@ class LearnedMaps:
     high: FloatArray
 
 
-def learned_from(bench: Bench, count: int, seed: int) -> LearnedMaps:
+def learned_from(bench: PressBench, count: int, seed: int) -> LearnedMaps:
     """Random presses at the nodes, without the impossible ones.
 
     Raises:
@@ -152,7 +152,7 @@ class Training:
 
     def save(self, path: Path) -> None:
         """Write a checkpoint (``adam_state.save_training``)."""
-        progress = Progress(self.epoch, self.losses)
+        progress = TrainingProgress(self.epoch, self.losses)
         save_training(path, self._identity, progress, self._network, self._adam)
 
     def load(self, path: Path) -> None:

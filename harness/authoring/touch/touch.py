@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from harness.authoring.touch.codes import CodedSurface, PatchSpec, code_surface, patch_bytes
 from harness.authoring.touch.data import DEPTHS, choose_nodes
-from harness.authoring.touch.metrics import Bench
+from harness.authoring.touch.metrics import PressBench
 from harness.authoring.touch.profiles import CodesSpec, TouchPerceptronSpec, TouchProfile
 from harness.authoring.training import Report, median_seconds, train
 from harness.basics.errors import WrongUse
@@ -94,7 +94,7 @@ def author_touch(
         coded, spacing = spaced_codes(raster, sensor, profile.codes, seed)
     graph = codes_graph(coded.patches, sensor, skirt)
     coding = time.perf_counter() - begun
-    bench = Bench(mesh, raster, sensor, skirt, coded.nodes, OFF * spacing)
+    bench = PressBench(mesh, raster, sensor, skirt, coded.nodes, OFF * spacing)
     errors, seconds = {}, {"codes": coding}
     maps = opened_codes(graph, coded.nodes, bench.most_off, sensor)
     for kind, measure in (("trained_places", bench.at_nodes), ("unseen_places", bench.between_nodes)):
@@ -161,7 +161,7 @@ def spaced_codes(
 
 
 def _trained(
-    bench: Bench, spec: TouchPerceptronSpec, seed: int, folder: Path, report: Report, threads: int
+    bench: PressBench, spec: TouchPerceptronSpec, seed: int, folder: Path, report: Report, threads: int
 ) -> tuple[PerceptronPart, Settings]:
     # Heavy, and only here: codes are made without it.
     import torch

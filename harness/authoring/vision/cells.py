@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from harness.authoring.checkpoint import Progress, read_checkpoint, write_checkpoint
+from harness.authoring.checkpoint import TrainingProgress, read_checkpoint, write_checkpoint
 from harness.authoring.vision.batch import Lesson, Pixels, batch_of, no_pixels
 from harness.authoring.vision.cell_lessons import CellLessons
 from harness.authoring.vision.kernels import teach
@@ -106,7 +106,7 @@ class CellTraining:
     def save(self, path: Path) -> None:
         """Write a checkpoint, whole or not at all."""
         flats = {"flats": self.flats[: len(self.losses)]}
-        write_checkpoint(path, self.identity, Progress(self.epoch, self.losses), flats)
+        write_checkpoint(path, self.identity, TrainingProgress(self.epoch, self.losses), flats)
 
     def load(self, path: Path) -> None:
         """Go on from a checkpoint.

@@ -15,7 +15,7 @@ import numpy as np
 from harness.authoring.training import Report
 from harness.authoring.vision.data import HeldOut
 from harness.authoring.vision.metrics import network_pictures, picture_errors, reference_pictures
-from harness.authoring.vision.trades import Networks, Trade, Way, every_sample, in_bits, kept_bytes
+from harness.authoring.vision.trades import Networks, Trade, Variation, every_sample, in_bits, kept_bytes
 from harness.objectfile.vision.network.graph import vision_graph
 from harness.objectfile.vision.network.network import VisionModel
 from harness.objectfile.vision.render import VisionRenderer
@@ -100,7 +100,7 @@ class Views:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class CostRequest:
     """Renderers by their networks, each opened once.
 
     Attributes:
@@ -125,7 +125,7 @@ class Asked:
             self._opened[networks] = VisionRenderer(data, self.lit.appearance.mesh, self.threads)
         return self._opened[networks]
 
-    def picture(self, way: Way, view: int, held_out: HeldOut) -> Rendered:
+    def picture(self, way: Variation, view: int, held_out: HeldOut) -> Rendered:
         """One picture, in the pixels of ``held_out``."""
         renderer = self.renderer(way.networks)
         return renderer.render(held_out.cameras[view], held_out.lights[view], way.settings)
@@ -136,7 +136,9 @@ def networks_of(asked: Iterable[Trade]) -> tuple[Networks, ...]:
     return tuple(dict.fromkeys(Networks(each.way.networks.spec) for each in asked))
 
 
-def measured(ways: Sequence[Way], asked: Asked, views: Views, repeat: int, report: Report) -> dict[Way, Cost]:
+def measured(
+    ways: Sequence[Variation], asked: CostRequest, views: Views, repeat: int, report: Report
+) -> dict[Variation, Cost]:
     """Errors and seconds of each way, each measured once however often it is named.
 
     Args:
@@ -148,11 +150,11 @@ def measured(ways: Sequence[Way], asked: Asked, views: Views, repeat: int, repor
     """
     each = tuple(dict.fromkeys(ways))
     sight = {side: _Sight(views, side) for side in dict.fromkeys(way.side for way in each)}
-    errors: dict[Way, Worth] = {}
+    errors: dict[Variation, Worth] = {}
     for number, way in enumerate(each):
         report("comparing pictures", 0.5 * number / len(each))
         errors[way] = _worth(way, asked, sight[way.side])
-    taken: dict[Way, list[tuple[float, float]]] = {way: [] for way in each}
+    taken: dict[Variation, list[tuple[float, float]]] = {way: [] for way in each}
     for turn in range(repeat):
         report("timing", 0.5 + 0.5 * turn / repeat)
         for way in each:
@@ -176,14 +178,14 @@ class _Sight:
     def exact(self) -> list[LinearImage]:
         return self.views.exact(self.side)
 
-    def many(self, way: Way, asked: Asked) -> list[LinearImage]:
+    def many(self, way: Variation, asked: CostRequest) -> list[LinearImage]:
         key = way.networks, every_sample(way.settings)
         if key not in self._many:
             self._many[key] = network_pictures(asked.renderer(way.networks), self.held_out, key[1])
         return self._many[key]
 
 
-def _worth(way: Way, asked: Asked, sight: _Sight) -> Worth:
+def _worth(way: Variation, asked: CostRequest, sight: _Sight) -> Worth:
     count = len(sight.held_out.cameras)
     drawn = [asked.picture(way, view, sight.held_out) for view in range(count)]
     found, model = [each.image for each in drawn], asked.model(way.networks)
@@ -197,7 +199,7 @@ def _worth(way: Way, asked: Asked, sight: _Sight) -> Worth:
     )
 
 
-def _seconds(way: Way, asked: Asked, held_out: HeldOut) -> tuple[float, float]:
+def _seconds(way: Variation, asked: CostRequest, held_out: HeldOut) -> tuple[float, float]:
     """On the clock and of CPU time, of one picture in the mean of all views."""
     clocks: tuple[Callable[[], float], ...] = (time.perf_counter, time.process_time)
     begun = [clock() for clock in clocks]

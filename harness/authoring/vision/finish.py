@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.authoring.checkpoint import Progress, read_checkpoint, write_checkpoint
+from harness.authoring.checkpoint import TrainingProgress, read_checkpoint, write_checkpoint
 from harness.authoring.vision.cell_lessons import CellLessons
 from harness.authoring.vision.cells import CellTraining, by_threads, seed_of, teach_cell
 from harness.authoring.vision.finish_profiles import CellsFinish
@@ -87,7 +87,7 @@ class CellFinishing:
 
     def save(self, path: Path) -> None:
         """Write a checkpoint, whole or not at all."""
-        progress = Progress(self.epoch, self.losses)
+        progress = TrainingProgress(self.epoch, self.losses)
         write_checkpoint(path, self._identity, progress, {"flats": self._taught.flats})
 
     def load(self, path: Path) -> None:

@@ -42,7 +42,7 @@ class Networks:
 
 
 @dataclass(frozen=True)
-class Way:
+class Variation:
     """One way to a picture.
 
     Attributes:
@@ -68,7 +68,7 @@ class Trade:
 
     knob: str
     level: str
-    way: Way
+    way: Variation
 
 
 def trades(spec: CellsSpec, side: int) -> tuple[Trade, ...]:
@@ -78,7 +78,7 @@ def trades(spec: CellsSpec, side: int) -> tuple[Trade, ...]:
         spec: of the networks that all but the knobs of networks ask.
         side: pixels of all pictures but those of the knob of that name.
     """
-    plain = Way(Networks(spec), RenderSettings(), side)
+    plain = Variation(Networks(spec), RenderSettings(), side)
     drawn: list[tuple[str, str, RenderSettings]] = [
         *(("level", level, RenderSettings(level=level)) for level in _LEVELS),
         *(("step, voxels", f"{step:g}", RenderSettings(step=step)) for step in _STEPS),

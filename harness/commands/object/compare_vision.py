@@ -11,7 +11,7 @@ from harness.commands import options
 from harness.commands.object import vision_options
 from harness.commands.object.compare_vision_answer import (
     Compared,
-    Seen,
+    ComparedPhoto,
     as_json,
     draw,
     notes,
@@ -153,7 +153,7 @@ def _refuse(sentence: str) -> NoReturn:
     raise WrongUse(sentence)
 
 
-def _of_file(wanted: _Wanted, vision: "ObjectVision") -> Seen:
+def _of_file(wanted: _Wanted, vision: "ObjectVision") -> ComparedPhoto:
     from harness.basics.quantities import ANGLE
     from harness.objectfile.vision.view import camera_for
     from harness.picture.image_file import read_image
@@ -166,7 +166,7 @@ def _of_file(wanted: _Wanted, vision: "ObjectVision") -> Seen:
     return _lit_by(wanted, live, camera, ())
 
 
-def _of_station(wanted: _Wanted, station: str, of: "ObjectFile") -> Seen:
+def _of_station(wanted: _Wanted, station: str, of: "ObjectFile") -> ComparedPhoto:
     from harness.bench.scene import load_scene
     from harness.bench.scene_camera import scene_frame, scene_lamps, scene_pinhole
     from harness.bench.station_file import load_station, station_path
@@ -184,7 +184,9 @@ def _of_station(wanted: _Wanted, station: str, of: "ObjectFile") -> Seen:
     return _lit_by(wanted, live, camera, lamps)
 
 
-def _lit_by(wanted: _Wanted, live: "ByteArray", camera: "Pinhole", known: "tuple[Lamp, ...]") -> Seen:
+def _lit_by(
+    wanted: _Wanted, live: "ByteArray", camera: "Pinhole", known: "tuple[Lamp, ...]"
+) -> ComparedPhoto:
     import numpy as np
 
     from harness.bench.scene_camera import Lamp
@@ -193,11 +195,11 @@ def _lit_by(wanted: _Wanted, live: "ByteArray", camera: "Pinhole", known: "tuple
 
     if wanted.light is not None:
         told = Lamp(DirectionalLight(np.array(wanted.light)), np.ones(3))
-        return Seen(live, camera, (told,), False)
-    return Seen(live, camera, known or (Lamp(light_for(camera), np.ones(3)),), not known)
+        return ComparedPhoto(live, camera, (told,), False)
+    return ComparedPhoto(live, camera, known or (Lamp(light_for(camera), np.ones(3)),), not known)
 
 
-def _lit(vision: "ObjectVision", seen: Seen, level: "VisionLevel") -> "LinearImage":
+def _lit(vision: "ObjectVision", seen: ComparedPhoto, level: "VisionLevel") -> "LinearImage":
     """Light of all lamps, each in its colour."""
     import numpy as np
 

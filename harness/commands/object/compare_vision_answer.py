@@ -26,7 +26,7 @@ _MANY_OUTLIERS = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class ComparedPhoto:
     """What a camera saw, and how it was simulated.
 
     Attributes:
@@ -57,7 +57,7 @@ class Compared:
 
     of: "ObjectFile"
     vision: "ObjectVision"
-    seen: Seen
+    seen: ComparedPhoto
     level: "VisionLevel"
     found: "LiveComparison"
     seconds: dict[str, float]

@@ -87,7 +87,7 @@ class _Asking:
 
 
 def _measured(chosen: "tuple[Trade, ...]", sight: "Views", asking: _Asking, report: "Report") -> Measured:
-    from harness.authoring.vision.cost import Asked, measured, networks_of
+    from harness.authoring.vision.cost import CostRequest, measured, networks_of
     from harness.authoring.vision.cost_networks import trained
 
     begun, models = time.perf_counter(), {}
@@ -97,7 +97,7 @@ def _measured(chosen: "tuple[Trade, ...]", sight: "Views", asking: _Asking, repo
     seconds = {"networks": time.perf_counter() - begun}
     before = load_of_others()
     begun = time.perf_counter()
-    asked, ways = Asked(models, sight.lit, asking.threads), [each.way for each in chosen]
+    asked, ways = CostRequest(models, sight.lit, asking.threads), [each.way for each in chosen]
     costs = measured(ways, asked, sight, asking.repeat, report)
     seconds["pictures"] = time.perf_counter() - begun
     return Measured(chosen, costs, asked.threads, asking.repeat, before, seconds)

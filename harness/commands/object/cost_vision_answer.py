@@ -14,7 +14,7 @@ from harness.commands.output import ANSWERS
 
 if TYPE_CHECKING:
     from harness.authoring.vision.cost import Cost
-    from harness.authoring.vision.trades import Trade, Way
+    from harness.authoring.vision.trades import Trade, Variation
 
 CODE = "harness.authoring.vision.cost_networks"
 """The module whose sources, with all that it imports, networks and pictures depend on."""
@@ -37,7 +37,7 @@ class Measured:
     """
 
     trades: "tuple[Trade, ...]"
-    costs: "Mapping[Way, Cost]"
+    costs: "Mapping[Variation, Cost]"
     threads: int | None
     repeat: int
     load: float | None

@@ -13,7 +13,7 @@ from harness.commands.output import emit
 
 if TYPE_CHECKING:
     from harness.objectfile.audio.audio import AudioLevel, ObjectAudio
-    from harness.objectfile.audio.blow import Blow
+    from harness.objectfile.audio.blow import HammerBlow
     from harness.objectfile.audio.strike import Place
     from harness.objectfile.file import ObjectFile
 
@@ -194,15 +194,15 @@ def _place(audio: "ObjectAudio", at: Three | None, vertex: int | None) -> "Place
     raise WrongUse("say where it is struck: either --at X Y Z in metres, or --vertex N")
 
 
-def _blow(of: "ObjectFile", mass: float, place: "Place", force: Three | None, given: _Pulse) -> "Blow":
+def _blow(of: "ObjectFile", mass: float, place: "Place", force: Three | None, given: _Pulse) -> "HammerBlow":
     from harness.basics.errors import WrongUse
-    from harness.objectfile.audio.blow import Blow, hammer, hammered
+    from harness.objectfile.audio.blow import HammerBlow, hammer, hammered
 
     along = -place.normal if force is None else force
     if given.hammer is None and given.contact_time is None:
         if any(value is not None for value in (given.tip_radius, given.hammer_mass, given.speed)):
             raise WrongUse("--tip-radius, --hammer-mass and --speed are a hammer's; say --hammer as well")
-        return Blow.instant(along)
+        return HammerBlow.instant(along)
     if given.contact_time is not None and given.tip_radius is not None:
         raise WrongUse("--contact-time stands for the tip, and --tip-radius is one; say one or the other")
     with_what = hammer(given.hammer or _ANY_TIP, given.tip_radius, given.hammer_mass)

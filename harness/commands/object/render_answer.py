@@ -9,7 +9,7 @@ from harness.commands.output import ANSWERS, warn
 
 if TYPE_CHECKING:
     from harness.objectfile.audio.audio import ObjectAudio
-    from harness.objectfile.audio.blow import Blow
+    from harness.objectfile.audio.blow import HammerBlow
     from harness.objectfile.audio.strike import Place, StruckSound
     from harness.objectfile.file import ObjectFile
 
@@ -34,7 +34,7 @@ class Rendered:
     of: "ObjectFile"
     audio: "ObjectAudio"
     place: "Place"
-    blow: "Blow"
+    blow: "HammerBlow"
     made: "StruckSound"
     duration: float
     distance: float | None
@@ -70,7 +70,7 @@ def _unit(rendered: Rendered) -> str:
     return "sqrt(kg) m/s" if rendered.distance is None else "Pa"
 
 
-def _blow_said(blow: "Blow") -> str:
+def _blow_said(blow: "HammerBlow") -> str:
     if blow.pulse is None:
         return f"an impulse of {blow.impulse:.3g} N s"
     return f"at most {blow.pulse.peak:.3g} N over {1e3 * blow.pulse.duration:.3g} ms"

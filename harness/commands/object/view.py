@@ -24,7 +24,7 @@ def view(
 
     Try: touchstone object view objects/mug
     """
-    from harness.live_view.frames import Asked, LiveFrames
+    from harness.live_view.frames import LiveFrames, ViewRequest
     from harness.live_view.server import LiveServer
 
     of, vision = vision_options.opened(folder, threads)
@@ -32,7 +32,7 @@ def view(
     server = LiveServer(frames, port)
     try:
         # The first picture, which nobody sees, loads the compiled loops.
-        frames.frame(Asked())
+        frames.frame(ViewRequest())
         if json:
             emit({"schema": 1, "object": frames.name, "url": server.url, "port": server.server_port})
         else:

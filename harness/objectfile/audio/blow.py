@@ -44,7 +44,7 @@ _PEAKED = 1.25 * DURATION
 
 
 @dataclass(frozen=True, eq=False)
-class Blow:
+class HammerBlow:
     """A force on a place of an object, and how it passes.
 
     Attributes:
@@ -132,7 +132,7 @@ def hammered(
     mass: float = math.inf,
     speed: float | None = None,
     contact: float | None = None,
-) -> Blow:
+) -> HammerBlow:
     """The blow of a hammer, by its greatest force or by its speed.
 
     Args:
@@ -165,7 +165,7 @@ def hammered(
             f"the blow's greatest force would be {pulse.peak:.3g} N; say a speed that makes it {WEAKEST:g} "
             f"to {HARDEST:g} N"
         )
-    return Blow.lasting(force, pulse)
+    return HammerBlow.lasting(force, pulse)
 
 
 def pulse_lasting(duration: float, mass: float, speed: float) -> HertzPulse:

@@ -11,7 +11,7 @@ from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.audio import CHUNK, ObjectAudio
-from harness.objectfile.audio.blow import Blow
+from harness.objectfile.audio.blow import HammerBlow
 from harness.objectfile.surface_search import SurfaceSearch, checked_points
 from harness.sim.sound.contact_pulse import struck
 from harness.sim.sound.modal_sound import audible, check_rate
@@ -124,7 +124,7 @@ def place_of_vertex(mesh: Mesh, vertex: int) -> Place:
 def strike(
     audio: ObjectAudio,
     place: Place,
-    blow: Blow,
+    blow: HammerBlow,
     duration: float,
     rate: float,
     loudness: FloatArray | None = None,
@@ -201,7 +201,7 @@ def _corner_normals(mesh: Mesh) -> FloatArray:
     return np.where(bent[..., None], at_vertices, own)
 
 
-def _check_length(duration: float, rate: float, blow: Blow) -> None:
+def _check_length(duration: float, rate: float, blow: HammerBlow) -> None:
     check_rate(rate)
     if not (np.isfinite(duration) and duration > 0.0):
         raise WrongUse(f"a sound of {duration:g} s is none; say a length above 0 s")

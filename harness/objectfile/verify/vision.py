@@ -8,7 +8,7 @@ from harness.objectfile.file import ObjectFile
 from harness.objectfile.runtime import open_network
 from harness.objectfile.vision.coverage.outline import mesh_outline
 from harness.objectfile.vision.network.graph import graph_block, vision_model
-from harness.objectfile.vision.network.plain import Asked, evaluate
+from harness.objectfile.vision.network.plain import Query, evaluate
 from harness.objectfile.vision.part import blocks_inside
 from harness.objectfile.vision.settings import RenderSettings
 from harness.objectfile.vision.threads import Crew, Room
@@ -58,7 +58,7 @@ def look_at_weights(of: ObjectFile, entry: VisionEntry) -> str:
     for row, network in enumerate(asked["network"][:, 0]):
         extras = asked["extras"][row] if "extras" in asked else np.zeros((block, 0))
         light: FloatArray = asked["light"][row].astype(np.float64)
-        one = Asked(np.full(block, network), asked["points"][row], asked["views"][row], light, extras)
+        one = Query(np.full(block, network), asked["points"][row], asked["views"][row], light, extras)
         density, colour = evaluate(model, one)
         gap = np.abs(found["density"][row, :, 0] - density).max() / max(float(density.max()), 1e-30)
         worst = max(worst, float(gap), float(np.abs(found["scattered"][row] - colour).max()))

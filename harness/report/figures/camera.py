@@ -11,7 +11,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.geometry import apply, transform
 from harness.basics.mesh import Mesh
 from harness.picture.pinhole import Pinhole
-from harness.report.data import Part
+from harness.report.data import BenchPart
 from harness.sim.gel.height_map import RasterMesh, depth_image
 
 _BACKWARD = 0.02
@@ -66,7 +66,7 @@ class View:
     face: IntArray
 
 
-def see(parts: tuple[Part, ...], camera: Pinhole) -> View:
+def see(parts: tuple[BenchPart, ...], camera: Pinhole) -> View:
     """Draw bodies into one depth buffer.
 
     Orthographic drawing of (x / z, y / z, -1 / z) is perspective drawing: that map keeps
@@ -89,7 +89,7 @@ def see(parts: tuple[Part, ...], camera: Pinhole) -> View:
     return View(camera, depth, owner, face)
 
 
-def _warped(part: Part, camera: Pinhole) -> tuple[Mesh, IntArray]:
+def _warped(part: BenchPart, camera: Pinhole) -> tuple[Mesh, IntArray]:
     """The body before the eye, in the map that makes perspective orthographic, and its faces' indices."""
     local = apply(camera.camera_from_object @ part.base_from_part, part.mesh.vertices)
     kept = np.flatnonzero((local[part.mesh.faces, 2] > _BACKWARD).all(axis=1))

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from harness.report.data import Curve
+from harness.report.data import ErrorCurve
 from harness.report.figures.marks import key, number_marks
 from harness.report.figures.style import blank, styled
 
@@ -17,7 +17,7 @@ _OF = MappingProxyType(
 """Colours of what a curve is by, the same in every chart of a report."""
 
 
-def error_chart(curves: tuple[Curve, ...], x_label: str, logarithmic_x: bool) -> Figure:
+def error_chart(curves: tuple[ErrorCurve, ...], x_label: str, logarithmic_x: bool) -> Figure:
     """Errors in millimetres on a logarithmic scale; the first curve is drawn strong.
 
     Points that have labels are numbered, and the numbers explained beside the drawing.
@@ -78,5 +78,5 @@ def error_chart(curves: tuple[Curve, ...], x_label: str, logarithmic_x: bool) ->
     return figure
 
 
-def _any(curves: tuple[Curve, ...]) -> bool:
+def _any(curves: tuple[ErrorCurve, ...]) -> bool:
     return any(error > 0.0 for curve in curves for error in curve.error)

@@ -11,7 +11,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply
 from harness.basics.mesh import Mesh
 from harness.picture.pinhole import Pinhole
-from harness.report.data import Bench, Contact, Part
+from harness.report.data import BenchPart, BenchScene, ContactRow
 from harness.report.figures.camera import look_at
 from harness.report.figures.props import CLAY
 from harness.report.figures.shading import Shot
@@ -50,7 +50,7 @@ def object_sides(mesh: Mesh, towards: FloatArray, pixels: int) -> Sides:
     bearing = float(np.arctan2(offset[1], offset[0])) if np.hypot(*offset[:2]) > 1e-4 else np.radians(-60.0)
     # Half a radian aside, so that a tool axis is seen as a line and not as a point.
     cameras = [_framing(mesh, bearing + turn, pixels) for turn in (0.5, 0.5 + np.pi)]
-    part = (Part(mesh, np.eye(4), CLAY),)
+    part = (BenchPart(mesh, np.eye(4), CLAY),)
     return Sides((Shot(part, cameras[0]), Shot(part, cameras[1])), mesh.diagonal)
 
 
@@ -68,7 +68,7 @@ def close_up(mesh: Mesh, place: FloatArray, away: FloatArray, width: float, pixe
     elevation = float(np.arctan2(away[2], np.hypot(away[0], away[1])))
     # From straight above there would be no telling which way is up.
     camera = look_at(place, azimuth, np.clip(elevation, -_STEEPEST, _STEEPEST), width, pixels, pixels)
-    return Shot((Part(mesh, np.eye(4), CLAY),), camera)
+    return Shot((BenchPart(mesh, np.eye(4), CLAY),), camera)
 
 
 def _framing(mesh: Mesh, azimuth: float, pixels: int) -> Pinhole:
@@ -111,7 +111,7 @@ class Heat:
         return np.asarray(map_coordinates(self._grid, at.T, order=1, mode="constant"))
 
 
-def bench_figure(bench: Bench) -> Figure:
+def bench_figure(bench: BenchScene) -> Figure:
     """Bench and object, the tool axis of every contact drawn into it."""
     camera = look_at(bench.focus, np.radians(-118.0), np.radians(22.0), bench.width, 680, 1040)
     shot = Shot(bench.parts, camera)
@@ -124,7 +124,7 @@ def bench_figure(bench: Bench) -> Figure:
     return figure
 
 
-def contacts_figure(sides: Sides, contacts: tuple[Contact, ...]) -> Figure:
+def contacts_figure(sides: Sides, contacts: tuple[ContactRow, ...]) -> Figure:
     """The object from two sides with the tool axis of every contact."""
     figure, both = _row(2, 5.4)
     for axes, shot in zip(both, sides.shots, strict=True):
@@ -137,7 +137,7 @@ def contacts_figure(sides: Sides, contacts: tuple[Contact, ...]) -> Figure:
     return figure
 
 
-def posterior_strip(sides: Sides, contacts: tuple[Contact, ...]) -> Figure:
+def posterior_strip(sides: Sides, contacts: tuple[ContactRow, ...]) -> Figure:
     """The posterior after each contact, seen from both sides, one column a contact."""
     shown = [contact for contact in contacts if isinstance(contact.posterior, Posterior)]
     figure = blank(2.0 * len(shown), 4.25)
@@ -151,7 +151,7 @@ def posterior_strip(sides: Sides, contacts: tuple[Contact, ...]) -> Figure:
     return figure
 
 
-def posterior_figure(sides: Sides, contact: Contact) -> Figure:
+def posterior_figure(sides: Sides, contact: ContactRow) -> Figure:
     """The posterior after one contact, large."""
     figure, both = _row(2, 5.4)
     heat = Heat(_of(contact))
@@ -160,12 +160,12 @@ def posterior_figure(sides: Sides, contact: Contact) -> Figure:
     return figure
 
 
-def _of(contact: Contact) -> Posterior:
+def _of(contact: ContactRow) -> Posterior:
     assert isinstance(contact.posterior, Posterior)
     return contact.posterior
 
 
-def _posterior_on(axes: Axes, shot: Shot, contact: Contact, heat: Heat, size: float) -> None:
+def _posterior_on(axes: Axes, shot: Shot, contact: ContactRow, heat: Heat, size: float) -> None:
     posterior = _of(contact)
     axes.imshow(shot.picture(0, heat))
     axes.set_axis_off()

@@ -9,7 +9,7 @@ from harness.basics.mesh import Mesh
 from harness.bench.kinematics import link_frames
 from harness.bench.sensor import TactileSensor
 from harness.bench.ur_tables import arm_table
-from harness.report.data import Part
+from harness.report.data import BenchPart
 from harness.twin.link_hulls import link_hulls
 
 ALUMINIUM, BLUE, FOAM = (0.80, 0.82, 0.84), (0.45, 0.60, 0.74), (0.46, 0.48, 0.54)
@@ -44,14 +44,14 @@ def cylinder(radius: float, low: float, high: float) -> Mesh:
     return convex(np.vstack([ring + low * _Z, ring + high * _Z]))
 
 
-def object_part(mesh: Mesh, base_from_object: FloatArray) -> Part:
+def object_part(mesh: Mesh, base_from_object: FloatArray) -> BenchPart:
     """The object, in the colour of clay."""
-    return Part(mesh, base_from_object, CLAY)
+    return BenchPart(mesh, base_from_object, CLAY)
 
 
 def table_and_pedestal(
     base_from_object: FloatArray, bottom: float, radius: float = 0.03, table: float = 0.0
-) -> tuple[Part, Part]:
+) -> tuple[BenchPart, BenchPart]:
     """The table about the object, and the foam under it.
 
     Args:
@@ -62,13 +62,13 @@ def table_and_pedestal(
     """
     x, y = base_from_object[:2, 3]
     low, high = np.array([x - 0.3, y - 0.4, table - 0.02]), np.array([x + 0.75, y + 0.4, table])
-    foot = Part(cylinder(radius, table, bottom), translation(np.array([x, y, 0.0])), FOAM)
-    return Part(box(low, high), np.eye(4), TABLE, smooth=False), foot
+    foot = BenchPart(cylinder(radius, table, bottom), translation(np.array([x, y, 0.0])), FOAM)
+    return BenchPart(box(low, high), np.eye(4), TABLE, smooth=False), foot
 
 
 def sensor_parts(
     sensor: TactileSensor, base_from_gel: FloatArray, gel_from_flange: FloatArray
-) -> tuple[Part, Part, Part]:
+) -> tuple[BenchPart, BenchPart, BenchPart]:
     """Gel, housing and mount of a tactile camera on a flange."""
     half, window = 0.5 * np.array(sensor.housing), 0.5 * np.array(sensor.window)
     face = -sensor.gel_thickness
@@ -78,13 +78,13 @@ def sensor_parts(
     ring = cylinder(0.03, -1e-3, 1e-3).vertices
     mount = np.vstack([apply(gel_from_flange, ring), 0.45 * ring + back * _Z])
     return (
-        Part(gel, base_from_gel, GEL, smooth=False),
-        Part(housing, base_from_gel, HOUSING, smooth=False),
-        Part(convex(mount), base_from_gel, MOUNT),
+        BenchPart(gel, base_from_gel, GEL, smooth=False),
+        BenchPart(housing, base_from_gel, HOUSING, smooth=False),
+        BenchPart(convex(mount), base_from_gel, MOUNT),
     )
 
 
-def arm_parts(model: str, joints: FloatArray) -> tuple[Part, ...]:
+def arm_parts(model: str, joints: FloatArray) -> tuple[BenchPart, ...]:
     """The base and the six links of a UR arm at ``(6,)`` rad."""
     frames, table = link_frames(model, joints), arm_table(model)
     parts = []
@@ -93,5 +93,5 @@ def arm_parts(model: str, joints: FloatArray) -> tuple[Part, ...]:
         if index > 0:
             turned = transform(rotation_about(_Z, float(joints[index - 1])), table.d[index - 1] * _Z)
             base_from_link = frames[index - 1] @ turned
-        parts.append(Part(convex(hull), base_from_link, BLUE if index in (4, 5) else ALUMINIUM))
+        parts.append(BenchPart(convex(hull), base_from_link, BLUE if index in (4, 5) else ALUMINIUM))
     return tuple(parts)

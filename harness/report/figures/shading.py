@@ -9,7 +9,7 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means
 from harness.basics.geometry import apply, inverse, transform
 from harness.basics.mesh import Mesh
 from harness.picture.pinhole import Pinhole
-from harness.report.data import Part
+from harness.report.data import BenchPart
 from harness.report.figures.camera import View, back_projected, see
 from harness.sim.gel.height_map import RasterMesh, depth_image
 
@@ -31,7 +31,7 @@ class Shot:
         camera: its rows and columns are those of the pictures.
     """
 
-    def __init__(self, parts: tuple[Part, ...], camera: Pinhole) -> None:
+    def __init__(self, parts: tuple[BenchPart, ...], camera: Pinhole) -> None:
         self.camera = camera
         fine = camera.resized(_OVERSAMPLING * camera.width, _OVERSAMPLING * camera.height)
         self._view = view = see(parts, fine)
@@ -67,7 +67,7 @@ class Shot:
         return block_means(picture, _OVERSAMPLING)
 
 
-def _normals(view: View, parts: tuple[Part, ...], points: FloatArray, filled: BoolArray) -> FloatArray:
+def _normals(view: View, parts: tuple[BenchPart, ...], points: FloatArray, filled: BoolArray) -> FloatArray:
     """``(n, 3)`` shading normals in the world, turned towards the eye."""
     normals = np.zeros((len(points), 3))
     owner, face = view.part[filled], view.face[filled]
@@ -149,7 +149,9 @@ def _light(
     return _BASE + _KEY * towards + _FILL * ahead + _SKY * sky, _SHINE * gloss
 
 
-def _lit(parts: tuple[Part, ...], points: FloatArray, normals: FloatArray, camera: Pinhole) -> FloatArray:
+def _lit(
+    parts: tuple[BenchPart, ...], points: FloatArray, normals: FloatArray, camera: Pinhole
+) -> FloatArray:
     """``(n,)`` share of the main light that reaches each point: a blurred shadow map."""
     key = _key_direction(camera)
     aside = np.cross(key, [0.0, 0.0, 1.0])

@@ -23,7 +23,7 @@ from harness.sim.light.pixel_places import QUARTERS, pixel_places, quarter_count
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class VisibleSurface:
     """What a camera sees of an object, before any light.
 
     Attributes:
@@ -81,7 +81,7 @@ class LitObject:
         self.appearance = appearance
         self.rays = RayMesh(appearance.mesh)
 
-    def seen(self, camera: Pinhole, samples: int) -> Seen:
+    def seen(self, camera: Pinhole, samples: int) -> VisibleSurface:
         """Follow the camera's rays.
 
         Args:
@@ -96,7 +96,7 @@ class LitObject:
             np.concatenate(column) for column in zip(*parts, strict=True)
         )
         places = places_seen(self.appearance, face, weights, away)
-        return Seen(camera, samples, pixel, quarter, depth, places)
+        return VisibleSurface(camera, samples, pixel, quarter, depth, places)
 
     def _seen_at(
         self, camera: Pinhole, offset: tuple[float, float], quarter: int
@@ -108,13 +108,15 @@ class LitObject:
         depth = hits.distance[met] * (away @ camera.forward)
         return met, np.full(len(met), quarter), hits.face[met], hits.weights[met], away, depth
 
-    def falling(self, seen: Seen, lights: Sequence[DirectionalLight]) -> FloatArray:
+    def falling(self, seen: VisibleSurface, lights: Sequence[DirectionalLight]) -> FloatArray:
         """``(n, lights)`` irradiance of each sample by each light, with nothing in its way."""
         size = self.appearance.mesh.diagonal
         columns = [irradiance(seen.places, light, size) for light in lights]
         return np.stack(columns, axis=1) if columns else np.zeros((len(seen.places), 0))
 
-    def shadowed(self, seen: Seen, lights: Sequence[DirectionalLight], falling: FloatArray) -> FloatArray:
+    def shadowed(
+        self, seen: VisibleSurface, lights: Sequence[DirectionalLight], falling: FloatArray
+    ) -> FloatArray:
         """``falling`` without the light that something is in the way of."""
         free = [
             sees_light(self.rays, seen.places, light, falling[:, k] > 0.0) for k, light in enumerate(lights)
@@ -160,7 +162,7 @@ class _Clock:
         self.seconds[done], self._since = now - self._since, now
 
 
-def gathered(seen: Seen, falling: FloatArray, clock: _Clock | None = None) -> DirectImage:
+def gathered(seen: VisibleSurface, falling: FloatArray, clock: _Clock | None = None) -> DirectImage:
     """The picture of what falls on the samples, ``(n, lights)``."""
     clock = clock or _Clock()
     light = radiance(seen.places, falling.sum(axis=1))
@@ -183,7 +185,7 @@ def gathered(seen: Seen, falling: FloatArray, clock: _Clock | None = None) -> Di
     return DirectImage(image, normal, noise, alpha_noise, seen.samples, MappingProxyType(dict(clock.seconds)))
 
 
-def _summed(seen: Seen, values: FloatArray) -> FloatArray:
+def _summed(seen: VisibleSurface, values: FloatArray) -> FloatArray:
     """``(4, rows, columns, channels)`` sums of the samples' ``(n, channels)``, by quarters."""
     camera = seen.camera
     at = seen.quarter * camera.pixels + seen.pixel

@@ -19,7 +19,7 @@ Twist = tuple[Vector, Vector]
 """m/s and rad/s of the tool centre point, in base."""
 
 
-class Body(Protocol):
+class ArmBody(Protocol):
     """What a motion moves.
 
     Attributes:
@@ -50,7 +50,7 @@ class Motion(Protocol):
     def done(self) -> bool:
         """Whether nothing is left to do."""
 
-    def advance(self, body: Body, seconds: float) -> None:
+    def advance(self, body: ArmBody, seconds: float) -> None:
         """Move on by one cycle; ``seconds`` is less than a cycle where the speed slider is below 1."""
 
     def replan(self) -> None:
@@ -75,7 +75,7 @@ class MoveJoints:
         self._time = 0.0
         self.done = False
 
-    def advance(self, body: Body, seconds: float) -> None:
+    def advance(self, body: ArmBody, seconds: float) -> None:
         """Move on."""
         if self._start is None:
             self._begin(body)
@@ -89,7 +89,7 @@ class MoveJoints:
         """From where the arm is."""
         self._start = None
 
-    def _begin(self, body: Body) -> None:
+    def _begin(self, body: ArmBody) -> None:
         speed, acceleration, duration = self._limits
         self._start, self._time = body.joints, 0.0
         furthest = max(abs(b - a) for a, b in zip(self._start, self._goal, strict=True))
@@ -115,7 +115,7 @@ class MoveLine:
         self._time = 0.0
         self.done = False
 
-    def advance(self, body: Body, seconds: float) -> None:
+    def advance(self, body: ArmBody, seconds: float) -> None:
         """Move on."""
         if self._start is None:
             self._begin(body)
@@ -131,7 +131,7 @@ class MoveLine:
         """From where the arm is."""
         self._start = None
 
-    def _begin(self, body: Body) -> None:
+    def _begin(self, body: ArmBody) -> None:
         speed, acceleration, duration = self._limits
         self._start, self._time = body.base_from_tcp, 0.0
         self._turn = poses.rotation_vector(poses.compose(poses.inverse(self._start), self._goal))
@@ -155,7 +155,7 @@ class SpeedJoints:
         self._left = seconds
         self.done = False
 
-    def advance(self, body: Body, seconds: float) -> None:
+    def advance(self, body: ArmBody, seconds: float) -> None:
         """Move on."""
         target = [seconds / CYCLE * speed for speed in self._target]
         speeds, reached = _approached(body.speeds, target, self._acceleration * CYCLE)
@@ -184,7 +184,7 @@ class SpeedLine:
         self._left = seconds
         self.done = False
 
-    def advance(self, body: Body, seconds: float) -> None:
+    def advance(self, body: ArmBody, seconds: float) -> None:
         """Move on."""
         linear, angular = body.twist
         target = [seconds / CYCLE * speed for speed in self._target]
@@ -207,7 +207,7 @@ class ServoJoints:
         self._left = seconds
         self.done = False
 
-    def advance(self, body: Body, seconds: float) -> None:
+    def advance(self, body: ArmBody, seconds: float) -> None:
         """Move on."""
         share = min(1.0, seconds / self._lookahead)
         body.put_joints(_mixed(body.joints, self._target, share))

@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from mocks.ur.arm import poses
-from mocks.ur.arm.motions import Body, Twist, as_six
+from mocks.ur.arm.motions import ArmBody, Twist, as_six
 from mocks.ur.arm.profiles import braking_way
 from mocks.ur.hooks import CYCLE, Matrix, Six
 
@@ -22,7 +22,7 @@ class StopJoints:
         self._time = 0.0
         self.done = False
 
-    def advance(self, body: Body, _seconds: float) -> None:
+    def advance(self, body: ArmBody, _seconds: float) -> None:
         """Move on."""
         if self._start is None:
             self._start = body.joints, body.speeds
@@ -48,7 +48,7 @@ class StopLine:
         self._time = 0.0
         self.done = False
 
-    def advance(self, body: Body, _seconds: float) -> None:
+    def advance(self, body: ArmBody, _seconds: float) -> None:
         """Move on."""
         if self._start is None:
             self._start = body.base_from_tcp, body.twist

@@ -7,7 +7,7 @@ from typing import Any
 from mocks.ur.urscript import syntax, values
 from mocks.ur.urscript.code import Builtin, Code, at_line, combined, located, value_of
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.process import Frame, Steps
+from mocks.ur.urscript.process import CallFrame, Steps
 
 
 class Function:
@@ -43,7 +43,7 @@ def builtin_call(builtin: Builtin, arguments: list[Code], keywords: list[str], c
     if not builtin.takes_time:
         return combined(located(builtin.function if not keywords else invoke, call.line), arguments)
 
-    def steps(frame: Frame) -> Steps:
+    def steps(frame: CallFrame) -> Steps:
         given = []
         for argument in arguments:
             given.append((yield from value_of(argument, frame)))
@@ -55,7 +55,7 @@ def builtin_call(builtin: Builtin, arguments: list[Code], keywords: list[str], c
     return Code(steps=steps)
 
 
-def call_now(function: Function, frame: Frame, names: list[str], given: Sequence[Any], line: int) -> Any:
+def call_now(function: Function, frame: CallFrame, names: list[str], given: Sequence[Any], line: int) -> Any:
     """The result of a function that takes no time."""
     frame.task.spend(line)
     inner = frame.process.frame(frame.task)
@@ -65,14 +65,14 @@ def call_now(function: Function, frame: Frame, names: list[str], given: Sequence
     return inner.result
 
 
-def call_steps(function: Function, inner: Frame, names: list[str], given: Sequence[Any]) -> Steps:
+def call_steps(function: Function, inner: CallFrame, names: list[str], given: Sequence[Any]) -> Steps:
     """The result of a function, in a frame that is still empty."""
     _fill(function, inner, names, given)
     yield from value_of(function.code, inner)
     return inner.result
 
 
-def _fill(function: Function, inner: Frame, names: list[str], given: Sequence[Any]) -> None:
+def _fill(function: Function, inner: CallFrame, names: list[str], given: Sequence[Any]) -> None:
     for name, value in zip(names, given, strict=True):
         inner.variables[name] = values.copied(value)
     for name, default in function.defaults.items():

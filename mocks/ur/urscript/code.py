@@ -6,7 +6,7 @@ from enum import Enum
 from typing import Any
 
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.process import Frame, Steps
+from mocks.ur.urscript.process import CallFrame, Steps
 
 
 class Leave(Enum):
@@ -34,8 +34,8 @@ class Builtin:
 class Code:
     """An expression or statement: ``now`` where it takes no time, ``steps`` where it may."""
 
-    now: Callable[[Frame], Any] | None = None
-    steps: Callable[[Frame], Steps] | None = None
+    now: Callable[[CallFrame], Any] | None = None
+    steps: Callable[[CallFrame], Steps] | None = None
 
 
 def combined(apply: Callable[..., Any], parts: list[Code], *, frame: bool = False) -> Code:
@@ -49,7 +49,7 @@ def combined(apply: Callable[..., Any], parts: list[Code], *, frame: bool = Fals
             return Code(now=lambda here: apply(first(here), second(here)))
         return Code(now=lambda here: apply(*[part(here) for part in quick]))
 
-    def steps(here: Frame) -> Steps:
+    def steps(here: CallFrame) -> Steps:
         given = [here] if frame else []
         for part in parts:
             given.append((yield from value_of(part, here)))
@@ -58,7 +58,7 @@ def combined(apply: Callable[..., Any], parts: list[Code], *, frame: bool = Fals
     return Code(steps=steps)
 
 
-def value_of(code: Code, frame: Frame) -> Steps:
+def value_of(code: Code, frame: CallFrame) -> Steps:
     """The result, after as many cycles as it takes."""
     if code.now is not None:
         return code.now(frame)
@@ -66,7 +66,7 @@ def value_of(code: Code, frame: Frame) -> Steps:
     return (yield from code.steps(frame))
 
 
-def run_block(parts: list[Callable[[Frame], Any]], frame: Frame) -> Any:
+def run_block(parts: list[Callable[[CallFrame], Any]], frame: CallFrame) -> Any:
     """All parts in order; how the block was left, None at its end."""
     for part in parts:
         left = part(frame)
@@ -75,7 +75,7 @@ def run_block(parts: list[Callable[[Frame], Any]], frame: Frame) -> Any:
     return None
 
 
-def step_block(parts: list[Code], frame: Frame) -> Steps:
+def step_block(parts: list[Code], frame: CallFrame) -> Steps:
     """The same where some parts take time."""
     for part in parts:
         left = part.now(frame) if part.now is not None else (yield from value_of(part, frame))

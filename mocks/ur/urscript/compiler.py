@@ -21,7 +21,7 @@ from mocks.ur.urscript.code import (
     value_of,
 )
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.process import Frame, Steps
+from mocks.ur.urscript.process import CallFrame, Steps
 from mocks.ur.urscript.timing import slow_functions
 
 
@@ -39,7 +39,7 @@ class Compiled:
     main: Code
     secondary: bool
 
-    def steps(self, frame: Frame) -> Steps:
+    def steps(self, frame: CallFrame) -> Steps:
         """Run it."""
         yield from value_of(self.main, frame)
 
@@ -118,7 +118,7 @@ class _Compiler:
     ) -> Code:
         parts = [self._expression(value), *(self._expression(index) for index in indices)]
 
-        def apply(frame: Frame, result: Any, *where: Any) -> None:
+        def apply(frame: CallFrame, result: Any, *where: Any) -> None:
             values.set_item(variables.read(frame, name, line), where, result)
 
         return combined(apply, parts, frame=True)
@@ -133,7 +133,7 @@ class _Compiler:
         if len(quick) == len(tests) and last.now is not None:
             otherwise_now = last.now
 
-            def now(frame: Frame) -> Any:
+            def now(frame: CallFrame) -> Any:
                 for test, block in quick:
                     if values.truth(test(frame)):
                         return block(frame)
@@ -141,7 +141,7 @@ class _Compiler:
 
             return Code(now=now)
 
-        def steps(frame: Frame) -> Steps:
+        def steps(frame: CallFrame) -> Steps:
             for condition, block in tried:
                 if values.truth((yield from value_of(condition, frame))):
                     return (yield from value_of(block, frame))
@@ -152,7 +152,7 @@ class _Compiler:
     def _while(self, condition: syntax.Expression, body: syntax.Block, line: int) -> Code:
         test, block = self._expression(condition), self._block(body)
 
-        def steps(frame: Frame) -> Steps:
+        def steps(frame: CallFrame) -> Steps:
             while values.truth((yield from value_of(test, frame))):
                 frame.task.spend(line)
                 left = yield from value_of(block, frame)
@@ -171,7 +171,7 @@ class _Compiler:
         if word == "kill":
             return combined(lambda frame, number: frame.process.kill(number), [handle], frame=True)
 
-        def steps(frame: Frame) -> Steps:
+        def steps(frame: CallFrame) -> Steps:
             number = yield from value_of(handle, frame)
             while frame.process.alive(number):
                 yield
@@ -210,7 +210,7 @@ class _Compiler:
                 )
             )
 
-        def steps(frame: Frame) -> Steps:
+        def steps(frame: CallFrame) -> Steps:
             if values.truth((yield from value_of(left, frame))) is decided:
                 return decided
             return values.truth((yield from value_of(right, frame)))
@@ -254,7 +254,7 @@ class _Compiler:
                 frame=True,
             )
 
-        def steps(frame: Frame) -> Steps:
+        def steps(frame: CallFrame) -> Steps:
             frame.task.spend(call.line)
             given = []
             for argument in arguments:

@@ -37,7 +37,7 @@ class Task:
         self._left = BUDGET
 
 
-class Frame:
+class CallFrame:
     """One call's variables and result."""
 
     __slots__ = ("process", "result", "task", "variables")
@@ -64,7 +64,7 @@ class Process:
 
     def __init__(
         self,
-        main: Callable[[Frame], Steps],
+        main: Callable[[CallFrame], Steps],
         entered: Callable[[int], None],
         released: Callable[[int], None],
     ) -> None:
@@ -78,9 +78,9 @@ class Process:
         self._killed: set[int] = set()
         self._main = self.start(lambda task: main(self.frame(task)))
 
-    def frame(self, task: Task) -> Frame:
+    def frame(self, task: Task) -> CallFrame:
         """An empty frame."""
-        return Frame(self, task)
+        return CallFrame(self, task)
 
     def start(self, steps: Callable[[Task], Steps]) -> int:
         """Begin a thread; its handle."""

@@ -5,12 +5,12 @@ from typing import Any, Final
 from mocks.ur.urscript import values
 from mocks.ur.urscript.code import Leave
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.process import Frame
+from mocks.ur.urscript.process import CallFrame
 
 _MISSING: Final = object()
 
 
-def read(frame: Frame, name: str, line: int) -> Any:
+def read(frame: CallFrame, name: str, line: int) -> Any:
     """The value of a name."""
     value = frame.variables.get(name, _MISSING)
     if value is _MISSING:
@@ -20,7 +20,7 @@ def read(frame: Frame, name: str, line: int) -> Any:
     return value
 
 
-def store(frame: Frame, name: str, value: Any) -> None:
+def store(frame: CallFrame, name: str, value: Any) -> None:
     """``name = value``: into a global of that name where there is one and no local."""
     if name not in frame.variables and name in frame.process.variables:
         frame.process.variables[name] = values.copied(value)
@@ -28,17 +28,17 @@ def store(frame: Frame, name: str, value: Any) -> None:
         frame.variables[name] = values.copied(value)
 
 
-def store_global(frame: Frame, name: str, value: Any) -> None:
+def store_global(frame: CallFrame, name: str, value: Any) -> None:
     """``global name = value``."""
     frame.process.variables[name] = values.copied(value)
 
 
-def store_local(frame: Frame, name: str, value: Any) -> None:
+def store_local(frame: CallFrame, name: str, value: Any) -> None:
     """``local name = value``."""
     frame.variables[name] = values.copied(value)
 
 
-def set_result(frame: Frame, value: Any) -> Leave:
+def set_result(frame: CallFrame, value: Any) -> Leave:
     """``return value``."""
     frame.result = value
     return Leave.RETURN

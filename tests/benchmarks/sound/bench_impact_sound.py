@@ -26,7 +26,7 @@ from harness.authoring.audio.waves import Waves
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.audio import ObjectAudio, open_audio
-from harness.objectfile.audio.blow import Blow
+from harness.objectfile.audio.blow import HammerBlow
 from harness.objectfile.audio.graph import audio_graph
 from harness.objectfile.audio.part import AudioPart, with_audio
 from harness.objectfile.audio.strike import Place, place_of_vertex, strike
@@ -71,7 +71,7 @@ def opened(folder: Path, profile: str, one: Case) -> ObjectAudio:
 
 def row(audio: ObjectAudio, place: Place, one: Case, repeats: int) -> list[str]:
     """Milliseconds of the whole and of its parts, and its error."""
-    blow = Blow.instant(-place.normal)
+    blow = HammerBlow.instant(-place.normal)
     made = strike(audio, place, blow, DURATION, RATE)
     found: list[float] = []
 

@@ -12,7 +12,7 @@ import numpy as np
 from rich.console import Console
 
 from harness.authoring.touch.data import DEPTHS
-from harness.authoring.touch.metrics import Bench
+from harness.authoring.touch.metrics import PressBench
 from harness.authoring.touch.profiles import touch_profile
 from harness.authoring.touch.touch import OFF, opened_codes, spaced_codes
 from harness.basics.arrays import AnyArray
@@ -69,7 +69,7 @@ def measure(name: str, profile: str, presses: int, repeat: int) -> None:
     )
     off = OFF * spacing
     maps = opened_codes(graph, coded.nodes, off, sensor)
-    bench = Bench(mesh, raster, sensor, skirt, coded.nodes, off)
+    bench = PressBench(mesh, raster, sensor, skirt, coded.nodes, off)
     for kind, kind_of in (("trained", bench.at_nodes), ("unseen", bench.between_nodes)):
         found = kind_of(maps, presses, 0)
         CONSOLE.print(f"  {kind} places: {len(found.presses)} of {found.asked} presses possible")

@@ -25,7 +25,7 @@ from harness.basics.arrays import ByteArray
 from harness.objectfile.vision.coverage.outline import is_closed, mesh_outline
 from harness.objectfile.vision.network.graph import FILE, vision_graph, vision_model
 from harness.objectfile.vision.network.network import VisionModel
-from harness.objectfile.vision.network.plain import Asked, evaluate
+from harness.objectfile.vision.network.plain import Query, evaluate
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.settings import RenderSettings
 from harness.objectfile.vision.threads import Crew, Room
@@ -194,7 +194,7 @@ def across_borders(model: VisionModel, lit: LitObject) -> float:
         for row, i in enumerate(both):
             one = slice(i, i + 1)
             light = told.lights[near[i]]
-            asked = Asked(side[one], border[one], told.views[near[i : i + 1]], light, extras[one])
+            asked = Query(side[one], border[one], told.views[near[i : i + 1]], light, extras[one])
             found[k][row] = evaluate(model, asked)[1][0]
     shown = [bytes_from_linear(each).astype(np.float64) for each in found]
     return float(np.sqrt(np.mean((shown[0] - shown[1]) ** 2)))

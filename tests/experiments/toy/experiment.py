@@ -20,9 +20,9 @@ from harness.experiment.experiment import Experiment, Helpers, Planned, Scored
 from harness.experiment.plain import Answered, plain_measurement
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
-from harness.skills.planning import Wanted, plan_run
+from harness.skills.planning import ContactRequest, plan_run
 from harness.skills.press import PressPerformer
-from harness.skills.sites import Presses
+from harness.skills.sites import PressLimits
 from harness.twin.bench_of import way_between
 
 STRIDE = Knob("toy.stride", (8, 1), "poses", "number", 1, "every how manieth pose is read")
@@ -37,7 +37,7 @@ class Toy(Section):
 
 def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
     """Contacts all over the object."""
-    wanted = Wanted(scene.section(Toy).presses, "spread", Presses())
+    wanted = ContactRequest(scene.section(Toy).presses, "spread", PressLimits())
     made = plan_run(scene, station, mesh, seed, wanted)
     return Planned(made.parameters(), made.rehearsal, made.bench)
 

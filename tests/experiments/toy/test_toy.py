@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from harness.bench.experiments import EXPERIMENTS, Row
+from harness.bench.experiments import EXPERIMENTS, ExperimentRow
 from harness.cli import invoke
 from tests.support.whole_run import in_process_run, touch_scene
 
-ROW = Row(
+ROW = ExperimentRow(
     about="How high did the gel stand?",
     value="tests.experiments.toy.experiment:EXPERIMENT",
     section="toy",

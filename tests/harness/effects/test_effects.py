@@ -16,7 +16,7 @@ from harness.basics.store import Store
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.accuracy import Accuracy, Knob, Level
-from harness.effects.effect import Condition, Effect, Facts, Way, by_name, knobs_of
+from harness.effects.effect import Condition, Effect, Facts, Implementation, by_name, knobs_of
 from harness.effects.evaluate import Evaluation, evaluate
 from harness.effects.plan import default_accuracy, plan
 
@@ -235,9 +235,11 @@ HOW = Knob("how", ("guess", "table", "exact"), "", "method", "exact")
 
 def with_ways(guess: Condition | None = ALWAYS, version: int = 1) -> tuple[Effect, ...]:
     """``a`` of ``x``; or guessed, of ``y``; or out of a table, of both; and ``b`` of ``a``."""
-    ways: dict[Level, Way] = {
-        "guess": Way(("y",), lambda g, _: -g["y"], when=guess),
-        "table": Way(("x", "y"), lambda g, levels: g["x"] * levels["b"], knobs=(FACTOR,), version=version),
+    ways: dict[Level, Implementation] = {
+        "guess": Implementation(("y",), lambda g, _: -g["y"], when=guess),
+        "table": Implementation(
+            ("x", "y"), lambda g, levels: g["x"] * levels["b"], knobs=(FACTOR,), version=version
+        ),
     }
     return (
         Effect("a", ("x",), lambda g, _: g["x"], choice=HOW, ways=ways),
@@ -289,6 +291,6 @@ def test_ways_are_told_apart_in_the_store_and_a_new_one_drops_nothing(tmp_path: 
 
 
 def test_a_way_of_no_level_is_refused() -> None:
-    astray = replace(with_ways()[0], ways={"gues": Way((), lambda _g, _l: 0.0)})
+    astray = replace(with_ways()[0], ways={"gues": Implementation((), lambda _g, _l: 0.0)})
     with pytest.raises(ValueError, match="the ways of a are"):
         by_name((astray,))

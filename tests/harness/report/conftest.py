@@ -12,13 +12,13 @@ from harness.bench.kinematics import inverse as joints_for
 from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
 from harness.report.data import (
-    Answer,
+    AnswerRow,
     Artefact,
-    Bench,
-    Contact,
-    Curve,
+    BenchScene,
+    ContactRow,
     EffectRun,
-    Instrument,
+    ErrorCurve,
+    InstrumentRow,
     ReportData,
     TwinDeviation,
 )
@@ -69,14 +69,14 @@ def posterior(mesh: Mesh, truth: FloatArray, number: int) -> Posterior:
     )
 
 
-def contact(mesh: Mesh, raster: RasterMesh, face: int, number: int) -> Contact:
+def contact(mesh: Mesh, raster: RasterMesh, face: int, number: int) -> ContactRow:
     truth = mesh.corners[face].mean(axis=0)
     object_from_gel = transform(frame_facing(-mesh.face_normals[face], 0.4 * number), truth)
     pressed = object_from_gel @ translation(np.array([0.0, 0.0, DEPTH]))
     height = penetration(height_maps(raster, inverse(pressed)[None], GELSIGHT_R15), GELSIGHT_R15)[0]
     noise = np.random.default_rng(number).normal(0.0, 2e-5, height.shape)
     found = posterior(mesh, truth, number)
-    return Contact(
+    return ContactRow(
         number=number,
         step=f"touch-{number:02d}",
         live=looks(height + noise, 3.0),
@@ -92,7 +92,7 @@ def contact(mesh: Mesh, raster: RasterMesh, face: int, number: int) -> Contact:
     )
 
 
-def gel_pose(shown: Contact) -> FloatArray:
+def gel_pose(shown: ContactRow) -> FloatArray:
     assert not isinstance(shown.object_from_gel, Missing)
     return shown.object_from_gel
 
@@ -136,7 +136,7 @@ def sound(mesh: Mesh, truth: FloatArray) -> Sound:
     )
 
 
-def true_point(shown: Contact) -> FloatArray:
+def true_point(shown: ContactRow) -> FloatArray:
     assert shown.truth is not None
     return shown.truth
 
@@ -152,7 +152,7 @@ def sample() -> ReportData:
     contacts = tuple(contact(mesh, raster, f, n) for n, f in enumerate(contact_points(mesh), 1))
     gels = np.array([BASE_FROM_OBJECT @ gel_pose(c) for c in contacts])
     joints = joints_for("ur5e", gels[-1] @ GEL_FROM_FLANGE)[4]
-    bench = Bench(
+    bench = BenchScene(
         (
             object_part(mesh, BASE_FROM_OBJECT),
             *table_and_pedestal(BASE_FROM_OBJECT, 0.25),
@@ -175,7 +175,7 @@ def sample() -> ReportData:
         made="2026-03-02 14:05",
         command="touchstone run contact-localization --station mock --scene scenes/mug_touch.toml",
         recording="runs/20260302-140512-mug",
-        answer=Answer(
+        answer=AnswerRow(
             last.estimate,
             0.231,
             last.credible90,
@@ -189,26 +189,28 @@ def sample() -> ReportData:
         contacts=contacts,
         bench=bench,
         error_by_contact=(
-            Curve("touch", numbers, tuple(c.error or 0.0 for c in contacts)),
-            Curve("geometry + tool axis", numbers, (0.071, 0.052, 0.041, 0.033, 0.028, 0.021)),
-            Curve("geometry only", numbers, (0.082, 0.061, 0.05, 0.041, 0.033, 0.025)),
-            Curve("random point", numbers, (0.082,) * 6),
+            ErrorCurve("touch", numbers, tuple(c.error or 0.0 for c in contacts)),
+            ErrorCurve("geometry + tool axis", numbers, (0.071, 0.052, 0.041, 0.033, 0.028, 0.021)),
+            ErrorCurve("geometry only", numbers, (0.082, 0.061, 0.05, 0.041, 0.033, 0.025)),
+            ErrorCurve("random point", numbers, (0.082,) * 6),
         ),
         error_by_seconds=(
-            Curve(
+            ErrorCurve(
                 "ours",
                 (0.004, 0.012, 0.041, 0.19),
                 (0.011, 0.0042, 0.0019, 0.0015),
                 ("4", "3", "2", "1.5 mm"),
             ),
-            Curve("particle filter", (0.03, 0.09, 0.29, 0.84), (0.019, 0.0045, 0.0025, 0.0017)),
+            ErrorCurve("particle filter", (0.03, 0.09, 0.29, 0.84), (0.019, 0.0045, 0.0025, 0.0017)),
         ),
         instruments=(
-            Instrument("arm", "127.0.0.1:30004", 124.98, 125.0, 4812, 0, 0.0021, 0.0068),
-            Instrument(
+            InstrumentRow("arm", "127.0.0.1:30004", 124.98, 125.0, 4812, 0, 0.0021, 0.0068),
+            InstrumentRow(
                 "gelsight", "http://127.0.0.1:8090/stream", 29.7, 30.0, 1120, 3, 0.019, 0.041, "reopened once"
             ),
-            Instrument("camera", "http://127.0.0.1:8091/stream", None, 10.0, 0, None, None, None, "not used"),
+            InstrumentRow(
+                "camera", "http://127.0.0.1:8091/stream", None, 10.0, 0, None, None, None, "not used"
+            ),
         ),
         calibrations=(
             Artefact("taxim-r15", "mock-0001", "2026-02-20", 10.0, "1.9 grey levels rms", "3f" * 32),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.report.data import Answer, ReportData
+from harness.report.data import AnswerRow, ReportData
 from harness.report.page import write_report
 from harness.report.sound_data import StrikeLine
 from harness.report.values import Missing
@@ -94,7 +94,7 @@ def test_the_headline_says_position_error_certainty_and_ambiguity(
     page: Page, report_data: ReportData
 ) -> None:
     answer = report_data.answer
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, AnswerRow)
     assert answer.error is not None
     x, y, z = answer.position * 1e3
     for part in (

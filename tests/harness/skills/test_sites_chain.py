@@ -14,7 +14,7 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
 from harness.sim.gel.height_map import RasterMesh
 from harness.skills import sites as sites_module
-from harness.skills.sites import SHORTEST_STEP, Presses, Site, Steps, Visit, plan_sites
+from harness.skills.sites import SHORTEST_STEP, PressLimits, Site, Steps, Visit, plan_sites
 
 MESH = build("tray", 2e-3)
 RASTER = RasterMesh(MESH)
@@ -78,7 +78,7 @@ def sites_keep_their_distance(found: tuple[Site, ...], steps: Steps) -> bool:
     points = np.array([site.point_in_object for site in found])
     apart = np.linalg.norm(points[:, None] - points[None], axis=-1)[np.triu_indices(len(points), 1)]
     follow = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    near = steps == "spread" or bool(follow.max() <= Presses().longest_step)
+    near = steps == "spread" or bool(follow.max() <= PressLimits().longest_step)
     return near and bool(apart.min() >= SHORTEST_STEP)
 
 
@@ -100,7 +100,7 @@ def test_a_site_is_where_it_says() -> None:
     for site in sites(4, "spread", None):
         point = apply(inverse(site.base_from_gel) @ POSE, site.point_in_object[None])[0]
         assert point[:2] == pytest.approx(0.0, abs=1e-9)
-        assert -Presses().depth[1] <= point[2] <= -Presses().depth[0]
+        assert -PressLimits().depth[1] <= point[2] <= -PressLimits().depth[0]
 
 
 def numbers(message: str) -> dict[str, int]:

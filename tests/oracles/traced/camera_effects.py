@@ -6,7 +6,7 @@ from typing import Any
 
 from harness.effects.accuracy import Knob, Level
 from harness.effects.camera_effects import camera_effects
-from harness.effects.effect import Compute, Effect, Way
+from harness.effects.effect import Compute, Effect, Implementation
 from tests.oracles.traced.path_traced import PathTraced, TracedImage
 
 Given = Mapping[str, Any]
@@ -26,7 +26,9 @@ def traced_camera_effects(shadow: bool) -> tuple[Effect, ...]:
         shadow: whether the object is in its own light's way.
     """
     *others, image = camera_effects(shadow)
-    paths = Way(("object.traced", "camera", "camera.lights"), _traced(shadow), knobs=(PATHS, BOUNCES))
+    paths = Implementation(
+        ("object.traced", "camera", "camera.lights"), _traced(shadow), knobs=(PATHS, BOUNCES)
+    )
     return (
         *others,
         Effect(

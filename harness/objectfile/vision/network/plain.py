@@ -9,7 +9,7 @@ from harness.objectfile.vision.network.network import NetworkSize, VisionModel, 
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class Query:
     """What networks are asked of samples.
 
     Attributes:
@@ -45,7 +45,7 @@ def looks(weights: VisionWeights) -> bool:
     return bool(weights.scatter[:, scatter_rows(weights.size)["view"]].any())
 
 
-def evaluate(model: VisionModel, asked: Asked) -> tuple[FloatArray, FloatArray]:
+def evaluate(model: VisionModel, asked: Query) -> tuple[FloatArray, FloatArray]:
     """Densities and scattered fractions of samples.
 
     Returns:

@@ -20,7 +20,7 @@ from harness.basics.errors import WrongUse
 from harness.basics.symmetry import find_symmetries
 from harness.bench.scene import scene_from_options
 from harness.experiment.subjects import objects
-from harness.experiment.tables import Row, measure
+from harness.experiment.tables import TableRow, measure
 from harness.experiment.tables import rows as rows_of
 
 Results = dict[Cell, Mapping[str, Any]]
@@ -49,11 +49,11 @@ def runs(errors: list[float], gap: str = "default", spacing: str = "close") -> R
 GROSS = MEASUREMENT.gross
 
 
-def rows(results: Results) -> list[Row]:
+def rows(results: Results) -> list[TableRow]:
     return rows_of(EXPERIMENT, results)
 
 
-def row(found: list[Row], method: str, spacing: str = "close", gap: str = "default") -> Row:
+def row(found: list[TableRow], method: str, spacing: str = "close", gap: str = "default") -> TableRow:
     wanted = (method, spacing, gap)
     (only,) = [r for r in found if (r.method, r.conditions["spacing"], r.conditions["gap"]) == wanted]
     return only

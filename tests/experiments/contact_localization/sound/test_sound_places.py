@@ -12,7 +12,7 @@ from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import MOST_HYPOTHESES, Search
 from experiments.contact_localization.report.sound_pictures import sound_pair, spectrogram
 from experiments.contact_localization.sound.analysis import SoundEvidence, analyse
-from experiments.contact_localization.sound.evidence import Heard, hear
+from experiments.contact_localization.sound.evidence import StrikeEvidence, hear
 from experiments.contact_localization.sound.gains import gain_table
 from experiments.contact_localization.sound.likelihood import SoundTerm
 from experiments.contact_localization.sound.matching import SoundNoise
@@ -83,7 +83,7 @@ def test_draws_that_fall_aside_have_summed_over_it() -> None:
     )
     here = points[0] - np.array([0.0, 0.0, INDENTATION])
     both = np.array([here, here + np.array([4e-3, 0.0, 0.0])])
-    heard = Heard(term, np.arange(K))
+    heard = StrikeEvidence(term, np.arange(K))
     many = at(np.repeat(both, 4000, axis=0), np.zeros(8000))
     drawn = np.exp(heard.nats_of_draws(search, many, rng)).reshape(2, -1)
     nodes, weights = np.polynomial.hermite_e.hermegauss(15)

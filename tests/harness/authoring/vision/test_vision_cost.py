@@ -9,11 +9,19 @@ import numpy as np
 import pytest
 
 from harness.authoring.vision.cells import CellTraining
-from harness.authoring.vision.cost import Asked, Cost, Views, measured, networks_of
+from harness.authoring.vision.cost import Cost, CostRequest, Views, measured, networks_of
 from harness.authoring.vision.cost_networks import trained
 from harness.authoring.vision.data import held_out_pictures
 from harness.authoring.vision.profiles import CellsSpec
-from harness.authoring.vision.trades import HALF, Networks, Way, every_sample, in_bits, kept_bytes, trades
+from harness.authoring.vision.trades import (
+    HALF,
+    Networks,
+    Variation,
+    every_sample,
+    in_bits,
+    kept_bytes,
+    trades,
+)
 from harness.basics.errors import DataRefused, WrongUse
 from harness.objectfile.vision.network.graph import vision_graph
 from harness.objectfile.vision.network.network import NetworkSize, VisionModel
@@ -45,7 +53,7 @@ def model(views: Views, tmp_path_factory: pytest.TempPathFactory) -> VisionModel
 
 def test_every_knob_has_the_default_among_its_levels_and_turns_nothing_else() -> None:
     asked = trades(TINY, SIDE)
-    plain_way = Way(Networks(TINY), RenderSettings(), SIDE)
+    plain_way = Variation(Networks(TINY), RenderSettings(), SIDE)
     for knob in {each.knob for each in asked} - {"grid, cells", "width"}:
         levels = [each.way for each in asked if each.knob == knob]
         assert plain_way in levels, knob
@@ -63,7 +71,7 @@ def test_every_knob_has_the_default_among_its_levels_and_turns_nothing_else() ->
 def test_many_samples_leave_nothing_out_of_themselves_and_few_leave_out_more(
     views: Views, model: VisionModel
 ) -> None:
-    way = Way(Networks(TINY), RenderSettings(), SIDE)
+    way = Variation(Networks(TINY), RenderSettings(), SIDE)
     finest = every_sample(RenderSettings())
     ways = [
         replace(way, settings=each) for each in (finest, replace(finest, step=0.5), RenderSettings(step=4.0))
@@ -81,8 +89,8 @@ def test_many_samples_leave_nothing_out_of_themselves_and_few_leave_out_more(
         assert cost.cpu.middle > 0.0
 
 
-def costs(views: Views, model: VisionModel, ways: list[Way]) -> Mapping[Way, Cost]:
-    return measured(ways, Asked({Networks(TINY): model}, views.lit, 1), views, 2, unsaid)
+def costs(views: Views, model: VisionModel, ways: list[Variation]) -> Mapping[Variation, Cost]:
+    return measured(ways, CostRequest({Networks(TINY): model}, views.lit, 1), views, 2, unsaid)
 
 
 def test_fewer_bits_change_each_weight_by_half_a_step_at_most(model: VisionModel) -> None:

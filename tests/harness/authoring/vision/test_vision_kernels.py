@@ -16,7 +16,7 @@ from harness.authoring.vision.layers import (
 )
 from harness.basics.arrays import AnyArray
 from harness.objectfile.vision.network.network import VisionGrid, VisionModel
-from harness.objectfile.vision.network.plain import Asked, evaluate
+from harness.objectfile.vision.network.plain import Query, evaluate
 from harness.sim.light.direct_image import LitObject
 from tests.samples.taught_ball import SIZE, lit_ball
 
@@ -87,7 +87,7 @@ def test_what_is_written_answers_as_what_was_trained() -> None:
     light = np.array([0.6, 0.0, 0.8])
     extras = random.random((40, 4))
     model = VisionModel(grid, weights_of(flats, size, 7.0))
-    density, colour = evaluate(model, Asked(networks, points, np.tile(light, (40, 1)), light, extras))
+    density, colour = evaluate(model, Query(networks, points, np.tile(light, (40, 1)), light, extras))
     for cell in (0, 1):
         at = np.flatnonzero(networks == cell)
         batch = batch_of(len(at), size.place, layer_shapes(size).told[0], size.width)

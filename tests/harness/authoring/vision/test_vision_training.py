@@ -13,7 +13,7 @@ from harness.authoring.vision.profiles import VisionProfile
 from harness.authoring.vision.vision import CHECKPOINT, STRICT_CHECKPOINT, author_vision
 from harness.basics.errors import DataRefused
 from harness.objectfile.vision.network.network import VisionModel
-from harness.objectfile.vision.network.plain import Asked, evaluate
+from harness.objectfile.vision.network.plain import Query, evaluate
 from harness.picture.linear_image import LinearImage
 from harness.sim.light.direct_image import LitObject
 from tests.samples.taught_ball import RADIUS, SIZE, TINY, grid_for, lit_ball, training_of
@@ -91,7 +91,7 @@ def test_neighbours_agree_at_their_border(lit: LitObject, trained: CellTraining)
     both = (sides[0] >= 0) & (sides[1] >= 0) & (sides[0] != sides[1])
     assert np.count_nonzero(both) > 5
     found = [
-        evaluate(model, Asked(side[both], points[both], -normals[both], light, extras[both]))[1]
+        evaluate(model, Query(side[both], points[both], -normals[both], light, extras[both]))[1]
         for side in sides
     ]
     assert np.sqrt(np.mean((found[0] - found[1]) ** 2)) < 0.04

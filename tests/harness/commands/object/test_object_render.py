@@ -13,7 +13,7 @@ from harness.authoring.audio.data import split_nodes
 from harness.basics.arrays import FloatArray
 from harness.cli import invoke
 from harness.objectfile.audio.audio import open_audio
-from harness.objectfile.audio.blow import Blow
+from harness.objectfile.audio.blow import HammerBlow
 from harness.objectfile.audio.strike import place_near, strike
 from harness.objectfile.file import ObjectFile
 from harness.sim.sound.modal_sound import impulse_response
@@ -211,7 +211,7 @@ def test_a_built_network_and_its_table_differ_by_what_the_file_says(
 
     def gains(level: Any, point: FloatArray) -> FloatArray:
         place = place_near(level.surface, point, level.most)
-        sounds = [strike(level, place, Blow.instant(along), 0.05, 44_100.0) for along in np.eye(3)]
+        sounds = [strike(level, place, HammerBlow.instant(along), 0.05, 44_100.0) for along in np.eye(3)]
         return np.array([sound.gains for sound in sounds])
 
     apart = [

@@ -9,21 +9,21 @@ from hypothesis import strategies as st
 
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
-from harness.objectfile.audio.blow import HAMMERS, LONGEST, Blow, hammer, hammered, pulse_lasting
+from harness.objectfile.audio.blow import HAMMERS, LONGEST, HammerBlow, hammer, hammered, pulse_lasting
 from harness.sim.sound.contact_pulse import HertzPulse, hertz_pulse
 
 CERAMIC = MATERIALS["ceramic"]
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def pulse_of(blow: Blow) -> HertzPulse:
+def pulse_of(blow: HammerBlow) -> HertzPulse:
     assert blow.pulse is not None
     return blow.pulse
 
 
 @given(st.tuples(*3 * [st.floats(-1e3, 1e3)]).filter(lambda force: math.hypot(*force) > 1e-3))
 def test_an_impulse_keeps_its_size_and_direction(force: tuple[float, float, float]) -> None:
-    blow = Blow.instant(force)
+    blow = HammerBlow.instant(force)
     assert np.linalg.norm(blow.direction) == pytest.approx(1.0)
     assert blow.impulse * blow.direction == pytest.approx(np.array(force), abs=1e-12)
 
@@ -41,7 +41,7 @@ def test_an_impulse_keeps_its_size_and_direction(force: tuple[float, float, floa
 )
 def test_a_force_that_strikes_nothing_is_refused(force: list[float], said: str) -> None:
     with pytest.raises(WrongUse, match=said):
-        Blow.instant(force)
+        HammerBlow.instant(force)
 
 
 @given(st.sampled_from(sorted(HAMMERS)), st.floats(0.01, 1e3))
@@ -92,7 +92,7 @@ def test_a_contact_time_is_what_a_tip_of_that_hardness_makes() -> None:
 @pytest.mark.parametrize("turns", [0.0, 0.3, 1.0, 4.0, 30.0])
 def test_a_mode_is_given_the_spectrum_of_the_force(turns: float) -> None:
     pulse = pulse_lasting(1e-3, 0.01, 0.5)
-    given_ = Blow.lasting(DOWN, pulse).given_to(np.array([turns / 1e-3]))
+    given_ = HammerBlow.lasting(DOWN, pulse).given_to(np.array([turns / 1e-3]))
     steps = 200_000
     times = (np.arange(steps) + 0.5) * 1e-3 / steps
     wanted = abs(np.sum(pulse.force(times) * np.exp(-2e3j * np.pi * turns * times))) * 1e-3 / steps
@@ -101,7 +101,7 @@ def test_a_mode_is_given_the_spectrum_of_the_force(turns: float) -> None:
 
 
 def test_an_impulse_gives_every_mode_all_of_it() -> None:
-    assert Blow.instant([0.0, 3.0, 4.0]).given_to(np.array([1.0, 1e4])).tolist() == [5.0, 5.0]
+    assert HammerBlow.instant([0.0, 3.0, 4.0]).given_to(np.array([1.0, 1e4])).tolist() == [5.0, 5.0]
 
 
 def test_what_makes_no_blow_is_refused() -> None:

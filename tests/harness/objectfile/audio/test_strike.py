@@ -13,7 +13,7 @@ from harness.basics.errors import OutOfDomain, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.audio import ObjectAudio, open_audio
-from harness.objectfile.audio.blow import Blow, pulse_lasting
+from harness.objectfile.audio.blow import HammerBlow, pulse_lasting
 from harness.objectfile.audio.part import with_audio
 from harness.objectfile.audio.strike import MOST_SAMPLES, Place, place_near, place_of_vertex, pushes, strike
 from harness.objectfile.entries import Provenance
@@ -48,7 +48,7 @@ def summed(audio: ObjectAudio, amplitudes: FloatArray, samples: int, rate: float
 def test_the_sound_is_the_direct_sum_of_the_modes_to_the_error_it_states(
     audio: ObjectAudio, force: tuple[float, float, float]
 ) -> None:
-    struck = strike(audio, place(audio), Blow.instant(force), DURATION, RATE)
+    struck = strike(audio, place(audio), HammerBlow.instant(force), DURATION, RATE)
     shapes = audio.at(place(audio).point[None])[0]
     wanted = summed(audio, shapes @ np.array(force), len(struck.sound))
     gap = np.abs(struck.sound - wanted).max() / np.abs(wanted).max()
@@ -64,7 +64,7 @@ def test_the_sound_is_linear_in_the_force(audio: ObjectAudio, a: float, b: float
     at = place(audio, vertex)
 
     def sound(force: FloatArray) -> FloatArray:
-        return strike(audio, at, Blow.instant(force), 0.05, RATE, level="double").sound
+        return strike(audio, at, HammerBlow.instant(force), 0.05, RATE, level="double").sound
 
     parts = a * sound(one) + b * sound(other)
     size = abs(a) * np.abs(sound(one)).max() + b * np.abs(sound(other)).max()
@@ -76,7 +76,7 @@ def test_the_table_and_the_network_sound_alike_where_both_know_the_same(egg_obje
     network, table = (open_audio(egg_object, level) for level in ("network", "table"))
     greatest = np.abs(egg_modes(egg()).shapes).max(axis=(0, 2))
     for vertex in (0, 100, 333):
-        at, blow = place(network, vertex), Blow.instant(np.array([0.0, 0.6, 0.8]))
+        at, blow = place(network, vertex), HammerBlow.instant(np.array([0.0, 0.6, 0.8]))
         heard, known = (strike(audio, at, blow, DURATION, RATE) for audio in (network, table))
         allowed = 2.0**-10 * 1.4 * greatest.sum() + SINGLE * known.peak
         assert np.abs(heard.sound - known.sound).max() <= allowed
@@ -84,7 +84,7 @@ def test_the_table_and_the_network_sound_alike_where_both_know_the_same(egg_obje
 
 def test_modes_at_or_above_half_of_the_rate_are_left_out_and_named(audio: ObjectAudio) -> None:
     rate = 2.0 * audio.frequencies[3]
-    struck = strike(audio, place(audio), Blow.instant([1.0, 1.0, 0.0]), DURATION, rate)
+    struck = strike(audio, place(audio), HammerBlow.instant([1.0, 1.0, 0.0]), DURATION, rate)
     assert struck.left_out.tolist() == [False] * 3 + [True] * (MODES - 3)
     wanted = summed(
         audio, np.where(struck.left_out, 0.0, struck.gains) * np.sqrt(2.0), len(struck.sound), rate
@@ -94,7 +94,7 @@ def test_modes_at_or_above_half_of_the_rate_are_left_out_and_named(audio: Object
 
 def test_no_mode_below_half_of_the_rate_is_refused(audio: ObjectAudio) -> None:
     with pytest.raises(WrongUse, match="900 Hz, is not below half of 1800"):
-        strike(audio, place(audio), Blow.instant([1.0, 0.0, 0.0]), DURATION, 1800.0)
+        strike(audio, place(audio), HammerBlow.instant([1.0, 0.0, 0.0]), DURATION, 1800.0)
 
 
 def test_a_force_that_moves_no_mode_is_refused_as_silent(tmp_path: Path) -> None:
@@ -106,19 +106,21 @@ def test_a_force_that_moves_no_mode_is_refused_as_silent(tmp_path: Path) -> None
     of = create_object(tmp_path / "flat", "flat", mesh, MATERIALS["ceramic"], Provenance(licence="CC0-1.0"))
     audio = open_audio(with_audio(of, flat), "table")
     with pytest.raises(WrongUse, match="no mode moves along that force"):
-        strike(audio, place(audio), Blow.instant([0.0, 0.0, 1.0]), DURATION, RATE)
-    assert strike(audio, place(audio), Blow.instant([0.0, 1e-3, 1.0]), DURATION, RATE).peak > 0.0
+        strike(audio, place(audio), HammerBlow.instant([0.0, 0.0, 1.0]), DURATION, RATE)
+    assert strike(audio, place(audio), HammerBlow.instant([0.0, 1e-3, 1.0]), DURATION, RATE).peak > 0.0
 
 
 def test_a_short_pulse_sounds_as_its_impulse_and_a_long_one_spares_the_high_modes(audio: ObjectAudio) -> None:
     along = np.array([0.0, 0.0, -1.0])
-    short = Blow.lasting(along, pulse_lasting(1e-6, 0.01, 0.5))
+    short = HammerBlow.lasting(along, pulse_lasting(1e-6, 0.01, 0.5))
     struck = strike(audio, place(audio), short, DURATION, RATE)
-    instant = strike(audio, place(audio), Blow.instant(0.01 * along), DURATION, RATE)
+    instant = strike(audio, place(audio), HammerBlow.instant(0.01 * along), DURATION, RATE)
     late = slice(2, None)
     assert np.abs(struck.sound - instant.sound)[late].max() < 0.05 * instant.peak
     assert struck.amplitudes == pytest.approx(instant.amplitudes, rel=1e-3)
-    long = strike(audio, place(audio), Blow.lasting(along, pulse_lasting(1e-3, 0.01, 0.5)), DURATION, RATE)
+    long = strike(
+        audio, place(audio), HammerBlow.lasting(along, pulse_lasting(1e-3, 0.01, 0.5)), DURATION, RATE
+    )
     share = np.abs(long.amplitudes / instant.amplitudes)
     assert share[0] > 0.3
     assert share[-1] < 0.01
@@ -127,7 +129,9 @@ def test_a_short_pulse_sounds_as_its_impulse_and_a_long_one_spares_the_high_mode
 def test_a_pulse_leaves_each_mode_with_the_amplitude_that_is_said(audio: ObjectAudio) -> None:
     """One mode at a time is read from the spectrum of what rings on after the contact."""
     pulse = pulse_lasting(0.4e-3, 0.01, 0.5)
-    struck = strike(audio, place(audio), Blow.lasting([0.0, 0.0, -1.0], pulse), 1.0, RATE, level="double")
+    struck = strike(
+        audio, place(audio), HammerBlow.lasting([0.0, 0.0, -1.0], pulse), 1.0, RATE, level="double"
+    )
     times = np.arange(len(struck.sound)) / RATE
     after = times >= pulse.duration
     decay = np.exp(-audio.dampings[:, None] * times[after])
@@ -139,7 +143,7 @@ def test_a_pulse_leaves_each_mode_with_the_amplitude_that_is_said(audio: ObjectA
 
 
 def test_loudness_turns_modes_into_pressure(audio: ObjectAudio) -> None:
-    blow = Blow.instant([0.0, 0.0, -1.0])
+    blow = HammerBlow.instant([0.0, 0.0, -1.0])
     near, far = (radiation(audio.as_modes(), metres) for metres in (0.5, 1.0))
     loud = strike(audio, place(audio), blow, DURATION, RATE, near)
     faint = strike(audio, place(audio), blow, DURATION, RATE, far)
@@ -164,11 +168,11 @@ def test_lengths_and_rates_that_make_no_sound_are_refused(
     audio: ObjectAudio, duration: float, rate: float, said: str
 ) -> None:
     with pytest.raises(WrongUse, match=said):
-        strike(audio, place(audio), Blow.instant([1.0, 0.0, 0.0]), duration, rate)
+        strike(audio, place(audio), HammerBlow.instant([1.0, 0.0, 0.0]), duration, rate)
 
 
 def test_a_contact_of_too_many_samples_is_refused(audio: ObjectAudio) -> None:
-    long = Blow.lasting([0.0, 0.0, -1.0], pulse_lasting(0.1, 0.01, 0.5))
+    long = HammerBlow.lasting([0.0, 0.0, -1.0], pulse_lasting(0.1, 0.01, 0.5))
     with pytest.raises(WrongUse, match=r"a contact of 0\.1 s has more than 65536 samples at 1e"):
         strike(audio, place(audio), long, 0.2, 1e6)
 

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.text import Text
 
 from harness.basics.arrays import FloatArray
-from harness.report.data import Curve
+from harness.report.data import ErrorCurve
 from harness.report.figures.charts import error_chart
 from harness.report.figures.marks import number_marks
 from harness.report.figures.style import blank
@@ -36,11 +36,11 @@ def test_numbers_of_crowded_marks_do_not_touch(seed: int) -> None:
 
 def test_labels_of_a_curve_are_numbered_and_explained_beside_it() -> None:
     curves = (
-        Curve("a", (0.01, 0.011), (1e-3, 1e-3), ("cheap", "dear")),
-        Curve("b", (0.02,), (2e-3,), ("one",)),
+        ErrorCurve("a", (0.01, 0.011), (1e-3, 1e-3), ("cheap", "dear")),
+        ErrorCurve("b", (0.02,), (2e-3,), ("one",)),
     )
     (axes,) = error_chart(curves, "seconds", logarithmic_x=True).axes
     said = [text.get_text() for text in axes.texts]
     assert said == ["1  cheap\n2  dear\n3  one", "1", "2", "3"]
-    (plain,) = error_chart((Curve("a", (1.0, 2.0), (1e-3, 2e-3)),), "contacts", logarithmic_x=False).axes
+    (plain,) = error_chart((ErrorCurve("a", (1.0, 2.0), (1e-3, 2e-3)),), "contacts", logarithmic_x=False).axes
     assert not plain.texts

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.basics.geometry import translation
-from harness.report.data import Curve, Part
+from harness.report.data import BenchPart, ErrorCurve
 from harness.report.figures.camera import back_projected, look_at, see
 from harness.report.figures.charts import error_chart
 from harness.report.figures.pictures import Heat
@@ -18,7 +18,7 @@ from harness.report.values import Posterior
 from harness.report.wording import duration, millimetres
 
 CAMERA = look_at(np.zeros(3), 0.7, 0.4, 0.2, 90, 120)
-CUBE = Part(box(np.full(3, -0.02), np.full(3, 0.02)), np.eye(4), (0.2, 0.6, 0.3), smooth=False)
+CUBE = BenchPart(box(np.full(3, -0.02), np.full(3, 0.02)), np.eye(4), (0.2, 0.6, 0.3), smooth=False)
 
 
 @given(azimuth=st.floats(-7.0, 7.0), elevation=st.floats(-1.5, 1.5), width=st.floats(0.05, 2.0))
@@ -47,7 +47,7 @@ def test_what_is_seen_lies_on_the_bodies_it_is_said_to_lie_on() -> None:
 
 def test_the_nearer_body_hides_the_farther_whatever_their_order() -> None:
     towards = CAMERA.eye / np.linalg.norm(CAMERA.eye)
-    nearer = Part(CUBE.mesh, translation(0.06 * towards), (0.9, 0.1, 0.1), smooth=False)
+    nearer = BenchPart(CUBE.mesh, translation(0.06 * towards), (0.9, 0.1, 0.1), smooth=False)
     one, other = see((CUBE, nearer), CAMERA), see((nearer, CUBE), CAMERA)
     assert one.part[45, 60] == 1
     assert other.part[45, 60] == 0
@@ -55,7 +55,7 @@ def test_the_nearer_body_hides_the_farther_whatever_their_order() -> None:
 
 
 def test_bodies_behind_the_eye_are_not_drawn() -> None:
-    behind = Part(CUBE.mesh, translation(1.5 * CAMERA.eye), (0.9, 0.1, 0.1))
+    behind = BenchPart(CUBE.mesh, translation(1.5 * CAMERA.eye), (0.9, 0.1, 0.1))
     assert (see((behind,), CAMERA).part == -1).all()
     assert (Shot((behind,), CAMERA).picture() == 1.0).all()
 
@@ -74,7 +74,7 @@ def test_the_far_side_is_hidden_and_the_near_side_is_not() -> None:
 
 
 def test_paint_covers_only_the_body_it_is_meant_for() -> None:
-    other = Part(CUBE.mesh, translation(np.array([0.0, 0.0, 0.05])), (0.2, 0.6, 0.3), smooth=False)
+    other = BenchPart(CUBE.mesh, translation(np.array([0.0, 0.0, 0.05])), (0.2, 0.6, 0.3), smooth=False)
     shot = Shot((CUBE, other), CAMERA)
     red = (np.array([1.0, 0.0, 0.0]), 1.0)
     painted = shot.picture(
@@ -143,7 +143,7 @@ def test_a_flat_height_map_has_a_picture() -> None:
 
 def test_errors_of_zero_are_drawn_on_a_logarithmic_scale() -> None:
     figure = error_chart(
-        (Curve("ours", (1.0, 2.0), (0.01, 0.0)), Curve("other", (), ())), "contacts used", False
+        (ErrorCurve("ours", (1.0, 2.0), (0.01, 0.0)), ErrorCurve("other", (), ())), "contacts used", False
     )
     line = figure.axes[0].lines[0]
     assert np.isfinite(np.asarray(line.get_ydata())).all()
@@ -152,7 +152,7 @@ def test_errors_of_zero_are_drawn_on_a_logarithmic_scale() -> None:
 
 def test_what_answers_has_one_colour_in_every_chart() -> None:
     def colours(*named: str) -> dict[str, str]:
-        curves = tuple(Curve(by, (1.0, 2.0), (1e-3, 2e-3), by=by) for by in named)
+        curves = tuple(ErrorCurve(by, (1.0, 2.0), (1e-3, 2e-3), by=by) for by in named)
         lines = error_chart(curves, "contacts used", False).axes[0].lines
         return {str(line.get_label()): str(line.get_color()) for line in lines}
 

@@ -20,7 +20,7 @@ from harness.objectfile.vision.network.network import (
     VisionModel,
     VisionWeights,
 )
-from harness.objectfile.vision.network.plain import Asked, encoded, evaluate, scatter_rows
+from harness.objectfile.vision.network.plain import Query, encoded, evaluate, scatter_rows
 from harness.objectfile.vision.network.tensors import vision_tensors
 from harness.objectfile.vision.network.tiles import LANES, SAMPLES
 from harness.objectfile.vision.network.weights_codec import WEIGHTS, held_weights, kept_weights
@@ -45,17 +45,17 @@ def phase(size: NetworkSize) -> float:
     return 2.0**size.octaves * 2.0**-24 * 8.0
 
 
-def asked(model: VisionModel, count: int, seed: int) -> Asked:
+def asked(model: VisionModel, count: int, seed: int) -> Query:
     random = np.random.default_rng(seed)
     networks = random.integers(0, len(model.grid), count)
     points = model.grid.low + model.grid.cell * (model.grid.cells[networks] + random.random((count, 3)))
     views = random.standard_normal((count, 3))
     views /= np.linalg.norm(views, axis=1, keepdims=True)
     extras = random.uniform(-1.0, 1.0, (count, model.weights.size.extras))
-    return Asked(networks, points, views, np.array([0.48, -0.6, 0.64]), extras)
+    return Query(networks, points, views, np.array([0.48, -0.6, 0.64]), extras)
 
 
-def by_graph(model: VisionModel, query: Asked, block: int = 4) -> tuple[AnyArray, AnyArray]:
+def by_graph(model: VisionModel, query: Query, block: int = 4) -> tuple[AnyArray, AnyArray]:
     """Every sample in a block of its own, which it fills."""
     network = Network(file_of(model, block), "vision.onnx", *vision_tensors(model, block))
     count = len(query.points)
@@ -75,7 +75,7 @@ def by_graph(model: VisionModel, query: Asked, block: int = 4) -> tuple[AnyArray
     return found["density"][:, 0, 0], found["scattered"][:, 0]
 
 
-def by_kernel(model: VisionModel, query: Asked, block: int) -> tuple[AnyArray, AnyArray]:
+def by_kernel(model: VisionModel, query: Query, block: int) -> tuple[AnyArray, AnyArray]:
     """Sorted by network into blocks of at most so many."""
     folds, count = folded(model.weights), len(query.points)
     order = np.argsort(query.networks, kind="stable").astype(np.int32)
