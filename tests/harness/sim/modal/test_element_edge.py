@@ -122,7 +122,9 @@ def test_all_modes_of_a_thin_plate_up_to_a_frequency_are_within_a_thousandth_of_
     solved = solve_mesh(curved(inside, plate, inside), STEEL, limit)
     assert len(solved.modes.frequencies) == count
     assert np.abs(solved.modes.frequencies / exact[:count] - 1.0).max() < 1e-3
-    assert solved.unknowns < 150_000
+    # Cells as fine as these and no finer: half the edge would be eight times as many. fTetWild fills
+    # otherwise every time: ten fillings of the second plate had 133 to 146 thousand unknowns, another 162.
+    assert solved.unknowns < 200_000
 
 
 def test_a_flat_wall_is_cut_by_the_wave_that_bends_it_at_the_limit() -> None:
