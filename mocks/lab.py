@@ -37,9 +37,9 @@ from harness.bench.kinematics import forward
 from harness.bench.station_sections import ArmSection
 from mocks.camera.lab_cameras import CameraView, stream
 from mocks.faults import parse
-from mocks.lab_processes import CAMERA_PORT, GEL_PORT, LabChild, Line, free_address, keep_time
+from mocks.lab_processes import CAMERA_PORT, GEL_PORT, ChildPipe, LabChild, free_address, keep_time
 from mocks.lab_scene import read_lab_scene
-from mocks.shared_pose import Mark, SharedPose
+from mocks.shared_pose import SharedPose, StepMark
 from mocks.ur.hooks import LEFT_ABOVE, ControllerConfig
 from mocks.ur.serve import serve
 from mocks.world.sound_of_run import strikes_of
@@ -81,7 +81,7 @@ class Lab:
     def __init__(
         self,
         world: World,
-        controller: Callable[[str, Line], None],
+        controller: Callable[[str, ChildPipe], None],
         shared: SharedPose,
         truth: TruthFile,
         address: str,
@@ -161,7 +161,7 @@ class Lab:
 
     def _mark(self, step: int, sample: int) -> Mapping[str, int]:
         """Set the step and sample, and wait until the gel has shown them."""
-        mark = Mark(self._shared.mark.number + 1, step, sample)
+        mark = StepMark(self._shared.mark.number + 1, step, sample)
         self._shared.set_mark(mark)
         if sample >= 0:
             self._truth.append(self._shared.base_from_flange, step, sample)
@@ -211,7 +211,9 @@ def _compile(world: World, bench: NominalBench, away: FloatArray) -> None:
         world.true_contact(pose, 0)
 
 
-def _controller(world: World, arm: ArmSection, shared: SharedPose, seed: int) -> Callable[[str, Line], None]:
+def _controller(
+    world: World, arm: ArmSection, shared: SharedPose, seed: int
+) -> Callable[[str, ChildPipe], None]:
     """What the arm's process does."""
     striker = 0 if arm.striker_output is None else 1 << (TOOL_OUTPUTS + arm.striker_output)
     switched = 0
@@ -230,7 +232,7 @@ def _controller(world: World, arm: ArmSection, shared: SharedPose, seed: int) ->
             shared.fire()
         switched = bits
 
-    def run(address: str, line: Line) -> None:
+    def run(address: str, line: ChildPipe) -> None:
         keep_time()
         serve(
             ControllerConfig(host=address, model=arm.model, seed=seed, joints=LEFT_ABOVE),

@@ -32,7 +32,7 @@ _PUNCTUAL = -10
 _CONTEXT = multiprocessing.get_context("fork")
 
 
-class Line:
+class ChildPipe:
     """A child's end of the lab: what to do there, and whether to go on.
 
     Args:
@@ -68,10 +68,10 @@ class LabChild:
 
     Args:
         name: of the instrument, as messages call it.
-        run: what it does; it ends when ``Line.should_stop`` says so.
+        run: what it does; it ends when ``ChildPipe.should_stop`` says so.
     """
 
-    def __init__(self, name: str, run: Callable[[Line], None]) -> None:
+    def __init__(self, name: str, run: Callable[[ChildPipe], None]) -> None:
         self.name = name
         self._connection, theirs = _CONTEXT.Pipe()
         self._process = _CONTEXT.Process(
@@ -111,12 +111,12 @@ class LabChild:
         return self._process.sentinel
 
 
-def _begin(run: Callable[[Line], None], connection: Connection, parent: int) -> None:
+def _begin(run: Callable[[ChildPipe], None], connection: Connection, parent: int) -> None:
     _die_with_parent(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the lab's to answer
     _leave_standard_streams()
     try:
-        run(Line(connection, parent))
+        run(ChildPipe(connection, parent))
     except Exception as error:  # noqa: BLE001 - reported to the lab in one sentence, and in full on stderr
         traceback.print_exc()
         with contextlib.suppress(OSError):

@@ -21,7 +21,7 @@ _ATTEMPTS = 10_000
 
 
 @dataclass(frozen=True)
-class Mark:
+class StepMark:
     """The step and sample that the run is at.
 
     Attributes:
@@ -89,7 +89,7 @@ class SharedPose:
         self._firing = _Cell(memory, 2, "<12d3q")
         self._shown = [_Cell(memory, 3 + viewer, "<q") for viewer in range(viewers)]
         self.set_pose(base_from_flange)
-        self.set_mark(Mark(0, -1, -1))
+        self.set_mark(StepMark(0, -1, -1))
         self._firing.write(*base_from_flange[:3].ravel(), 0, -1, -1)
         for viewer in range(viewers):
             self.set_shown(viewer, 0)
@@ -114,15 +114,15 @@ class SharedPose:
         *pose, number, step, sample = self._firing.read()
         return Firing(int(number), _matrix(pose), int(step), int(sample))
 
-    def set_mark(self, mark: Mark) -> None:
+    def set_mark(self, mark: StepMark) -> None:
         """Which step and sample the run is at."""
         self._mark.write(mark.number, mark.step, mark.sample)
 
     @property
-    def mark(self) -> Mark:
+    def mark(self) -> StepMark:
         """The newest mark."""
         number, step, sample = self._mark.read()
-        return Mark(int(number), int(step), int(sample))
+        return StepMark(int(number), int(step), int(sample))
 
     def set_shown(self, viewer: int, number: int) -> None:
         """A camera has sent a frame of mark ``number``."""

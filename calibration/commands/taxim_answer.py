@@ -11,7 +11,7 @@ from calibration.commands.taxim_shadow import shadow_answer, shadow_lines
 from harness.commands.output import ANSWERS, CONSOLE
 
 if TYPE_CHECKING:
-    from calibration.taxim.arm.moves import ArmScale, Measured
+    from calibration.taxim.arm.moves import ArmScale, Uncertain
     from calibration.taxim.arm.record import ArmPresses
     from calibration.taxim.mark_free import MarkFree
 
@@ -103,7 +103,7 @@ def scale_answer(scale: "ArmScale | None", arm: "ArmPresses | None") -> dict[str
     }
 
 
-def _measured(name: str, unit: str, one: "Measured") -> dict[str, float]:
+def _measured(name: str, unit: str, one: "Uncertain") -> dict[str, float]:
     return {
         f"{name}{unit}": one.value,
         f"{name}_sigma{unit}": one.sigma,

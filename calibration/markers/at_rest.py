@@ -17,7 +17,7 @@ from calibration.markers.lattice import lay_lattice
 from calibration.taxim.arm.moves import ArmScale, arm_scale
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused, OutOfDomain
-from harness.picture.dot_lattice import Lattice
+from harness.picture.dot_lattice import DotLattice
 
 LARGEST_LOCAL = 0.06
 """Of the spacing, by which a dot of a resting gel may be off its smooth grid. In two published pictures of a
@@ -64,7 +64,7 @@ class RestingMarkers:
 
     picture: ByteArray
     dots: Dots
-    lattice: Lattice
+    lattice: DotLattice
     scale: ArmScale | None
     pitch: float | None
     wander: float | None
@@ -114,7 +114,7 @@ def _check(pictures: Sequence[ByteArray], printed: Printed) -> None:
         )
 
 
-def _resting(dots: Dots, lattice: Lattice) -> tuple[int, ...]:
+def _resting(dots: Dots, lattice: DotLattice) -> tuple[int, ...]:
     """Dots that were misprinted; refuses a gel that is touched."""
     off = np.hypot(lattice.local[:, 0], lattice.local[:, 1]) / lattice.spacing
     far = np.flatnonzero(off > LARGEST_LOCAL)
@@ -129,7 +129,7 @@ def _resting(dots: Dots, lattice: Lattice) -> tuple[int, ...]:
     return tuple(int(k) for k in far)
 
 
-def _wander(pictures: Sequence[ByteArray], dots: Dots, lattice: Lattice) -> float | None:
+def _wander(pictures: Sequence[ByteArray], dots: Dots, lattice: DotLattice) -> float | None:
     """Pixels rms of a coordinate between single pictures; dots that only some show do not count."""
     if len(pictures) < 2:
         return None
@@ -153,7 +153,7 @@ def _wander(pictures: Sequence[ByteArray], dots: Dots, lattice: Lattice) -> floa
     return wander
 
 
-def _scale(dots: Dots, lattice: Lattice, spacing: float) -> ArmScale:
+def _scale(dots: Dots, lattice: DotLattice, spacing: float) -> ArmScale:
     """The picture on the gel, where the print's rows are the gel's own x; errors are those of the places."""
     on = lattice.on
     try:

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
-from harness.picture.dot_lattice import Lattice
+from harness.picture.dot_lattice import DotLattice
 
 LEAST_DOTS = 12
 LEAST_LINES = 3
@@ -31,7 +31,7 @@ _OFF = 4.0
 _TURNS = 8
 
 
-def lay_lattice(places: FloatArray) -> Lattice:
+def lay_lattice(places: FloatArray) -> DotLattice:
     """Lay a grid through dots at ``(n, 2)`` pixels (column, row).
 
     Raises:
@@ -58,7 +58,7 @@ def lay_lattice(places: FloatArray) -> Lattice:
     local[on] = _bent(index[on].astype(np.float64), affine[on])
     every = {(c, r) for c in range(int(index[:, 0].max()) + 1) for r in range(int(index[:, 1].max()) + 1)}
     missing = sorted(every - {(int(c), int(r)) for c, r in index[on]})
-    return Lattice(
+    return DotLattice(
         read_only(index),
         read_only(origin),
         read_only(step),

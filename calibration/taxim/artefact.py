@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calibration.taxim.held_out import Model
+from calibration.taxim.held_out import FittedModel
 from calibration.taxim.light_fit import per_metre
 from harness.basics.arrays import ByteArray
 from harness.sim.optics.lit_calibration import LitCalibration
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def calibration_of(
     background: ByteArray,
-    model: Model,
+    model: FittedModel,
     identity: "Identity",
     made_from: str,
     error: Float32Array | None = None,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calibration.taxim.held_out import WITHIN, Model, decibels
+from calibration.taxim.held_out import WITHIN, FittedModel, decibels
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Refused
 from calibration.taxim.smooth_fit import residual, strength_by_radius
@@ -25,7 +25,7 @@ def too_large(name: str, radius: float, ball: float, what: str) -> Refused | Non
 
 
 def unexplained(
-    pack: PressPack, change: FloatArray, model: Model, ball: float, names: list[str]
+    pack: PressPack, change: FloatArray, model: FittedModel, ball: float, names: list[str]
 ) -> dict[int, Refused]:
     """Presses that are not this ball after all, by their place in the pack."""
     worse: dict[int, Refused] = {}
@@ -46,7 +46,9 @@ def unexplained(
     return worse
 
 
-def _own_gain(pack: PressPack, clean: FloatArray, centre: FloatArray, model: Model, ball: float) -> float:
+def _own_gain(
+    pack: PressPack, clean: FloatArray, centre: FloatArray, model: FittedModel, ball: float
+) -> float:
     edge = WITHIN * model.fit.edge
     left = residual(pack, clean, centre, model.fit.colours, edge, ball)
     nothing = residual(pack, clean, centre, np.zeros_like(model.fit.colours), edge, ball)

@@ -6,7 +6,7 @@ import numpy as np
 
 from calibration.taxim.arm.rest import rest_change
 from calibration.taxim.contact_circle import ContactCircle, contact_circle
-from calibration.taxim.light_fit import Light, fit_light, light_shades
+from calibration.taxim.light_fit import GelLight, fit_light, light_shades
 from calibration.taxim.pack import PressPack
 from calibration.taxim.smooth_fit import (
     Manner,
@@ -31,7 +31,7 @@ _SETTLE = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class FittedModel:
     """What is taught by a set of presses.
 
     Attributes:
@@ -49,7 +49,7 @@ class Model:
     plain: SmoothFit
     fit: SmoothFit
     circle: ContactCircle
-    light: Light
+    light: GelLight
     table: Float32Array
     support: BoolArray
     rest: FloatArray
@@ -73,7 +73,7 @@ class Score:
     nothing: float
 
 
-def teach(pack: PressPack, change: FloatArray, ball: float) -> Model:
+def teach(pack: PressPack, change: FloatArray, ball: float) -> FittedModel:
     """Fit everything a calibration holds to presses.
 
     Args:
@@ -94,7 +94,7 @@ def teach(pack: PressPack, change: FloatArray, ball: float) -> Model:
     table, support = fit_table(pack, fit, ball, clean)
     bias = np.median(fit.centres - pack.centres, axis=0)
     light = fit_light(pack, clean, fit.centres, circle.radius, ball)
-    return Model(plain, fit, circle, light, table, support, rest, np.asarray(bias))
+    return FittedModel(plain, fit, circle, light, table, support, rest, np.asarray(bias))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ class HeldOut:
     left: FloatArray
     count: FloatArray
     centres: FloatArray
-    folds: list[tuple[Model, IntArray, IntArray]]
+    folds: list[tuple[FittedModel, IntArray, IntArray]]
 
 
 def held_out(pack: PressPack, change: FloatArray, ball: float, radius: float) -> HeldOut:
@@ -128,7 +128,7 @@ def held_out(pack: PressPack, change: FloatArray, ball: float, radius: float) ->
     shape = change.shape[1:3]
     scores: dict[int, Score] = {}
     left, count, centres = np.zeros(shape), np.zeros(shape), np.zeros((len(change), 2))
-    folds: list[tuple[Model, IntArray, IntArray]] = []
+    folds: list[tuple[FittedModel, IntArray, IntArray]] = []
     for fold in range(FOLDS):
         out = np.arange(len(change)) % FOLDS == fold
         taught: IntArray = np.nonzero(~out)[0]
@@ -143,7 +143,7 @@ def held_out(pack: PressPack, change: FloatArray, ball: float, radius: float) ->
 
 
 def score(
-    pack: PressPack, change: FloatArray, found: FloatArray, model: Model, ball: float, radius: float
+    pack: PressPack, change: FloatArray, found: FloatArray, model: FittedModel, ball: float, radius: float
 ) -> tuple[Score, IntArray, FloatArray]:
     """Score one press; also the pixels of it ``(n, 2)`` and what the table leaves over ``(n, 3)``."""
     clean = change - model.rest
@@ -158,7 +158,7 @@ def score(
 
 
 def settled_centre(
-    pack: PressPack, clean: FloatArray, found: FloatArray, model: Model, ball: float
+    pack: PressPack, clean: FloatArray, found: FloatArray, model: FittedModel, ball: float
 ) -> FloatArray:
     """``(2,)`` pixels (column, row): where a model puts a press that the detector ``found``."""
     start = found + model.bias

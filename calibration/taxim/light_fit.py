@@ -42,7 +42,7 @@ _RIDGE, _PLACE_RIDGE = 1e-6, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class RadialProfile:
     """A ball in the gel, by the distance from its axis; 0, 1, 2, ... pixels.
 
     Attributes:
@@ -55,7 +55,7 @@ class Profile:
 
 
 @dataclass(frozen=True, eq=False)
-class Light:
+class GelLight:
     """The skirt and the colours of contact and skirt.
 
     Attributes:
@@ -71,13 +71,13 @@ class Light:
     skirt: GelSkirt
     lit: FloatArray
     depth: float
-    profile: Profile
+    profile: RadialProfile
     edge: float
     limit: float
     residual_rms: float
 
 
-def fit_light(pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float) -> Light:
+def fit_light(pack: PressPack, change: FloatArray, centres: FloatArray, edge: float, ball: float) -> GelLight:
     """Fit skirt and colours.
 
     Args:
@@ -106,17 +106,19 @@ def fit_light(pack: PressPack, change: FloatArray, centres: FloatArray, edge: fl
     return _with_skirt(pack, change, centres, best, edge, ball)
 
 
-def with_skirt(pack: PressPack, change: FloatArray, centres: FloatArray, light: Light, ball: float) -> Light:
+def with_skirt(
+    pack: PressPack, change: FloatArray, centres: FloatArray, light: GelLight, ball: float
+) -> GelLight:
     """Fit colours alone, to the skirt and contact line of ``light``; otherwise as ``fit_light``."""
     return _with_skirt(pack, change, centres, light.skirt, light.edge, ball)
 
 
 def _with_skirt(
     pack: PressPack, change: FloatArray, centres: FloatArray, skirt: GelSkirt, edge: float, ball: float
-) -> Light:
+) -> GelLight:
     profile = ball_profile(skirt, edge, ball, "exact")
     lit, rms = _solved(_samples(pack, change, centres, edge, _MANY), profile, edge, ball)
-    return Light(skirt, read_only(lit), depth_of(skirt, edge, ball), profile, edge, edge / ball, rms)
+    return GelLight(skirt, read_only(lit), depth_of(skirt, edge, ball), profile, edge, edge / ball, rms)
 
 
 def skirt_of(widest: float, core: float) -> GelSkirt:
@@ -132,7 +134,7 @@ def depth_of(skirt: GelSkirt, edge: float, ball: float) -> float:
     return _cap(np.array(edge), ball).item() / (1.0 - skirt.core)
 
 
-def ball_profile(skirt: GelSkirt, edge: float, ball: float, level: GelLevel) -> Profile:
+def ball_profile(skirt: GelSkirt, edge: float, ball: float, level: GelLevel) -> RadialProfile:
     """The surface around a ball that touches out to ``edge``; pixels."""
     reach = int(np.ceil(REACH * edge)) + 2
     size = reach + skirt.kernels[0] // 2
@@ -141,7 +143,7 @@ def ball_profile(skirt: GelSkirt, edge: float, ball: float, level: GelLevel) -> 
     height = surface[size, size : size + reach]
     slope = np.zeros(reach)
     slope[1:-1] = (height[:-2] - height[2:]) / 2.0
-    return Profile(read_only((slope / np.hypot(1.0, slope))[:-1]), read_only(height[:-1].copy()))
+    return RadialProfile(read_only((slope / np.hypot(1.0, slope))[:-1]), read_only(height[:-1].copy()))
 
 
 def pressed_ball(away: FloatArray, depth: float, ball: float) -> FloatArray:
@@ -160,7 +162,7 @@ def per_metre(lit: FloatArray, pitch: float) -> FloatArray:
     return scaled
 
 
-def light_shades(pack: PressPack, light: Light, centre: FloatArray, place: IntArray) -> FloatArray:
+def light_shades(pack: PressPack, light: GelLight, centre: FloatArray, place: IntArray) -> FloatArray:
     """``(n, 3)`` grey levels that contact and skirt of a press give pixels ``(n, 2)``, row and column."""
     places = place_products(scaled_place(pack, place))
     return _terms(light.profile, place[:, ::-1] - centre, places, light.limit).shades(light.lit)
@@ -197,7 +199,7 @@ def _samples(
 
 
 def _solved(
-    samples: _Samples, profile: Profile, edge: float, ball: float, turns: int = 2
+    samples: _Samples, profile: RadialProfile, edge: float, ball: float, turns: int = 2
 ) -> tuple[FloatArray, float]:
     """The coefficients ``(156, 3)`` and the weighted rms of what they leave over, grey levels."""
     terms = _terms(profile, samples.offset, samples.places, edge / ball)
@@ -213,7 +215,7 @@ def _solved(
     return lit, rms
 
 
-def _terms(profile: Profile, offset: FloatArray, places: FloatArray, limit: float) -> ColourTerms:
+def _terms(profile: RadialProfile, offset: FloatArray, places: FloatArray, limit: float) -> ColourTerms:
     away: FloatArray = np.hypot(offset[:, 0], offset[:, 1])
     radii = np.arange(len(profile.sine), dtype=np.float64)
     slope: FloatArray = np.interp(away, radii, profile.sine, right=0.0)

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from calibration.taxim.artefact import calibration_of
 from calibration.taxim.explained import contact_radius, too_large, unexplained
 from calibration.taxim.gates import CONTACT, LEAST_PRESSES, check_set, reached, refusals, sightings
-from calibration.taxim.held_out import WITHIN, Model, Score, held_out, teach
+from calibration.taxim.held_out import WITHIN, FittedModel, Score, held_out, teach
 from calibration.taxim.likeness import check_order
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures, Refused, in_order_of_content
@@ -199,7 +199,7 @@ def _calibrated(
     )
 
 
-def _lean(model: Model, ball: float) -> float:
+def _lean(model: FittedModel, ball: float) -> float:
     apart = np.median(model.plain.centres - model.fit.centres, axis=0)
     return float(np.arcsin(min(1.0, float(np.hypot(*apart)) / ball)))
 
@@ -267,7 +267,7 @@ def _check_gain(scores: list[Score]) -> None:
 def _artefact(
     pictures: Pictures,
     presses: int,
-    model: Model,
+    model: FittedModel,
     identity: Identity,
     scores: list[Score],
     shadow: ShadowFit | None,

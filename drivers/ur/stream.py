@@ -17,7 +17,7 @@ AT_REST: Final = 1e-3  # rad/s of the fastest joint
 CONTACT_PACKETS: Final = 2  # in a row above the threshold; one alone may be noise
 
 
-class Source(Protocol):
+class PacketSource(Protocol):
     """What packets come from."""
 
     rate: float
@@ -54,7 +54,9 @@ class Trip:
 class Stream:
     """Reads every packet in a thread, hands each on, watches the force."""
 
-    def __init__(self, source: Source, send: Callable[[FloatArray], None], wake: Callable[[], None]) -> None:
+    def __init__(
+        self, source: PacketSource, send: Callable[[FloatArray], None], wake: Callable[[], None]
+    ) -> None:
         self._source = source
         self._send = send
         self._wake = wake

@@ -51,7 +51,7 @@ class MarkerFigure(Sourced):
     radius: Annotated[Length, Positive]
 
 
-class ShadowFigure(Sourced):
+class ShadowStatement(Sourced):
     """Whether grazing light makes shadows worth simulating."""
 
     casts: bool
@@ -84,4 +84,4 @@ class SensorFile(StrictModel):
     gel_radius: LengthFigure | None = None
     housing: HousingFigure
     markers: MarkerFigure | None = None
-    shadow: ShadowFigure
+    shadow: ShadowStatement

@@ -57,7 +57,7 @@ class Placement(StrictModel):
         return read_only(transform(rotation_from_vector(np.array(self.rotation)), np.array(self.position)))
 
 
-class Safety(StrictModel):
+class SafetySection(StrictModel):
     """What the arm may be asked to do; nothing outside is ever sent. SI, as ``drivers.ur.safety`` names them.
 
     Attributes:
@@ -122,7 +122,7 @@ class ArmSection(StrictModel):
     serial: str = ""
     rate: Annotated[Frequency, Positive] = 500.0
     striker_output: Literal[0, 1] | None = None
-    safety: Safety
+    safety: SafetySection
 
 
 class Markers(StrictModel):

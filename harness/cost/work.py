@@ -16,7 +16,7 @@ _ALIKE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class ObjectLine:
     """One object's runs at a setting, in logarithms.
 
     Attributes:
@@ -31,7 +31,7 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class ParallelLines:
     """All objects of a setting: parallel lines, one each.
 
     Attributes:
@@ -40,7 +40,7 @@ class Lines:
         squares: of the works about their objects' means, summed; 0 where work is not looked at or alike.
     """
 
-    of: Mapping[str, Line]
+    of: Mapping[str, ObjectLine]
     slope: float
     squares: float
 
@@ -50,7 +50,7 @@ class Lines:
         return sum(len(line.rest) - 1 for line in self.of.values())
 
 
-def lines(point: Point, by_work: bool) -> Lines:
+def lines(point: Point, by_work: bool) -> ParallelLines:
     """Parallel lines of the logarithm of seconds over that of work, one an object, by least squares.
 
     An analysis of covariance (Montgomery, Design and Analysis of Experiments, section 15.3).
@@ -72,9 +72,9 @@ def lines(point: Point, by_work: bool) -> Lines:
         squares = slope = 0.0
     else:
         slope = float(np.clip(aside[:, 0] @ aside[:, 1] / squares, 0.0, _STEEPEST))
-    return Lines({name: _line(pairs, slope) for name, pairs in arrays.items()}, slope, squares)
+    return ParallelLines({name: _line(pairs, slope) for name, pairs in arrays.items()}, slope, squares)
 
 
-def _line(pairs: FloatArray, slope: float) -> Line:
+def _line(pairs: FloatArray, slope: float) -> ObjectLine:
     work, seconds = pairs.mean(axis=0)
-    return Line(float(work), float(seconds), pairs[:, 1] - seconds - slope * (pairs[:, 0] - work))
+    return ObjectLine(float(work), float(seconds), pairs[:, 1] - seconds - slope * (pairs[:, 0] - work))

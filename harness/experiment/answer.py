@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -87,17 +88,57 @@ def finish(
         since: s on the bench clock, when the last step was on the disk; the result says how long after.
     """
     folder = folder or recording.folder
+    told = tell_answer(experiment, recording, accuracy, folder, answering, tell, more, since)
+    return add_report(experiment, told, draw, health, folder)
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """An answer that is written and told, and not yet compared.
+
+    Attributes:
+        scored: the answer.
+        result: as it was written.
+    """
+
+    scored: Scored
+    result: dict[str, Any]
+
+
+def tell_answer(
+    experiment: Experiment,
+    recording: Recording,
+    accuracy: Accuracy,
+    folder: Path,
+    answering: Answering | None = None,
+    tell: Tell = lambda _: None,
+    more: Mapping[str, Any] | None = None,
+    since: float | None = None,
+) -> Told:
+    """Answer, write ``result.json``, tell; the arguments are ``finish``'s."""
     scored = score(experiment, recording, accuracy, answering)
     result = {**common(experiment, scored), **experiment.result(scored), **(more or {})}
     result["warnings"] = [*scored.warnings, *result.get("warnings", ())]
     result["answered_after_s"] = None if since is None else now() - since
     _write(folder / RESULT, result)
     tell(result)
+    return Told(scored, result)
+
+
+def add_report(
+    experiment: Experiment,
+    told: Told,
+    draw: Draw,
+    health: Mapping[str, Health] | None,
+    folder: Path,
+) -> dict[str, Any]:
+    """Compare, draw the report, and write the result again with both; the arguments are ``finish``'s."""
+    scored = told.scored
     comparison = compare(scored, experiment.sources(scored))
-    drawn = experiment.report or draw
-    page = drawn(scored, comparison, health, folder / "report")
+    page = (experiment.report or draw)(scored, comparison, health, folder / "report")
     np.savez_compressed(folder / OBSERVED, **comparison.arrays())  # type: ignore[arg-type]
-    result |= {
+    result = {
+        **told.result,
         "plan": plan_json(comparison),
         "observed": comparison.observed(),
         "report": str(page),

@@ -51,6 +51,7 @@ def perform_on_bench(
     ask: Ask | None = None,
     accuracy: Accuracy | None = None,
     say: Callable[[str], None] = lambda _: None,
+    conclude: Callable[[Performed], None] = lambda _: None,
 ) -> Performed:
     """Open the run's bench and perform what is left.
 
@@ -64,6 +65,7 @@ def perform_on_bench(
         ask: shows a person what to do, where the station has one strike; None where nobody is there.
         accuracy: of the answer; None where no readings are to be taken in on the way.
         say: tells how a step goes.
+        conclude: is given what came of it while the bench is still open: closing one takes its time.
 
     Raises:
         MeshRefused: the scene calls for sound, and the object's surface cannot be filled.
@@ -85,7 +87,10 @@ def perform_on_bench(
     ahead.shutdown(wait=False)  # a bench that does not open says so at once
     with open_station(run.station, run.scene, context) as bench:
         made = None if answering is None else answering.result()
-        return perform_on(procedure, bench, recording, progress, ask, made, say)
+        performed = perform_on(procedure, bench, recording, progress, ask, made, say)
+        if performed.complete:
+            conclude(performed)
+    return performed
 
 
 def perform_on(

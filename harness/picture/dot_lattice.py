@@ -8,7 +8,7 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
+class DotLattice:
     """A grid laid through dots.
 
     Attributes:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from harness.basics.arrays import ByteArray, FloatArray
-from harness.picture.dot_lattice import Lattice
+from harness.picture.dot_lattice import DotLattice
 from harness.report.figures.figures import Album
 from harness.report.figures.style import ANSWER, SOFT, TOOL, blank, styled
 from harness.report.template import rendered
@@ -49,7 +49,7 @@ class MarkerReport:
     places: FloatArray
     radius: FloatArray
     sigma: FloatArray
-    lattice: Lattice
+    lattice: DotLattice
 
 
 def write_marker_page(report: MarkerReport, folder: Path) -> Path:

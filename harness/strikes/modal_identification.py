@@ -17,8 +17,8 @@ from threadpoolctl import threadpool_limits
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, read_only
 from harness.basics.clipping import is_clipped
 from harness.basics.errors import DataRefused, WrongUse
-from harness.strikes.pole_fit import ComplexArray, Lines, PoleFit, fit_poles
-from harness.strikes.pole_search import Search, new_poles
+from harness.strikes.pole_fit import ComplexArray, PoleFit, SpectralLines, fit_poles
+from harness.strikes.pole_search import PoleSearch, new_poles
 
 _LEAST_SAMPLES = 64
 _LINES_A_MODE = 6
@@ -81,7 +81,7 @@ class Identified:
     clipped: BoolArray
 
 
-def modes_of_decay(decays: AnyArray, rate: float, search: Search | None = None) -> Identified:
+def modes_of_decay(decays: AnyArray, rate: float, search: PoleSearch | None = None) -> Identified:
     """The modes of free decays of one structure.
 
     Seconds grow with the lines of the band and the square of the modes: say the band of interest.
@@ -96,21 +96,21 @@ def modes_of_decay(decays: AnyArray, rate: float, search: Search | None = None) 
         DataRefused: silence, values that are not finite, or too few.
         WrongUse: a rate or a band that cannot be.
     """
-    search = search or Search()
+    search = search or PoleSearch()
     signals = np.atleast_2d(np.asarray(decays, np.float64))
     if not (np.isfinite(rate) and rate > 0.0):
         raise WrongUse(f"a rate of {rate:g} samples per second; say one above 0")
     _check(signals, "the decay", "sample")
     samples = signals.shape[1]
     inner = slice(1, (samples + 1) // 2)
-    lines = Lines(rfftfreq(samples, 1.0 / rate)[inner], rfft(signals)[:, inner], rate)
+    lines = SpectralLines(rfftfreq(samples, 1.0 / rate)[inner], rfft(signals)[:, inner], rate)
     rounding = float(np.finfo(np.asarray(decays).dtype).eps) if np.asarray(decays).dtype.kind == "f" else 0.0
     found = _identified(_banded(lines, search), search, max(rounding * np.sqrt(samples), _ROUNDING))
     return replace(found, clipped=read_only(np.array([is_clipped(signal) for signal in signals])))
 
 
 def modes_of_response(
-    frequencies: FloatArray, responses: ComplexArray, search: Search | None = None, decay: float = 0.0
+    frequencies: FloatArray, responses: ComplexArray, search: PoleSearch | None = None, decay: float = 0.0
 ) -> Identified:
     """The modes of measured transfer functions of one structure.
 
@@ -127,7 +127,7 @@ def modes_of_response(
         DataRefused: silence, values that are not finite, too few, or lines that are not evenly spaced.
         WrongUse: a band that cannot be.
     """
-    search = search or Search()
+    search = search or PoleSearch()
     values = np.atleast_2d(np.asarray(responses, np.complex128))
     _check(values, "the transfer function", "line")
     steps = np.diff(frequencies)
@@ -137,7 +137,7 @@ def modes_of_response(
             "Hz apart; a response is read on evenly spaced frequencies, one a line"
         )
     inner = frequencies > 0.0
-    lines = Lines(np.asarray(frequencies, np.float64)[inner], values[:, inner], None)
+    lines = SpectralLines(np.asarray(frequencies, np.float64)[inner], values[:, inner], None)
     found = _identified(_banded(lines, search), search, _ROUNDING)
     return replace(found, modes=tuple(_without(mode, decay) for mode in found.modes)) if decay else found
 
@@ -163,7 +163,7 @@ def _check(values: AnyArray, what: str, each: str) -> None:
         raise DataRefused(f"{what} is silent: every {each} has one value; there is nothing to identify")
 
 
-def _banded(lines: Lines, search: Search) -> Lines:
+def _banded(lines: SpectralLines, search: PoleSearch) -> SpectralLines:
     high = float(lines.frequencies[-1]) if search.high is None else search.high
     kept = lines.between(search.low, high)
     if len(kept.frequencies) < _LEAST_SAMPLES // 2:
@@ -174,13 +174,13 @@ def _banded(lines: Lines, search: Search) -> Lines:
     return kept
 
 
-def _identified(lines: Lines, search: Search, rounding: float) -> Identified:
+def _identified(lines: SpectralLines, search: PoleSearch, rounding: float) -> Identified:
     # The products are too small for a second core, which would wait for them where anything else runs.
     with threadpool_limits(limits=1, user_api="blas"):
         return _searched(lines, search, rounding)
 
 
-def _searched(lines: Lines, search: Search, rounding: float) -> Identified:
+def _searched(lines: SpectralLines, search: PoleSearch, rounding: float) -> Identified:
     fit = fit_poles(lines, np.zeros(0), np.zeros(0), search.skirt)
     most = min(search.most, len(lines.frequencies) // _LINES_A_MODE)
     full = False
@@ -196,7 +196,7 @@ def _searched(lines: Lines, search: Search, rounding: float) -> Identified:
     return _told(lines, fit, full)
 
 
-def _told(lines: Lines, fit: PoleFit, full: bool) -> Identified:
+def _told(lines: SpectralLines, fit: PoleFit, full: bool) -> Identified:
     powers = np.sum(np.abs(fit.model) ** 2, axis=(1, 2))
     loudest = float(powers.max(initial=0.0))
     count = len(fit.omegas)

@@ -43,7 +43,7 @@ _NEIGHBOURS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class SpectralLines:
     """Spectral lines of one structure.
 
     Attributes:
@@ -61,10 +61,10 @@ class Lines:
         """Hz from line to line."""
         return float(self.frequencies[1] - self.frequencies[0])
 
-    def between(self, low: float, high: float) -> "Lines":
+    def between(self, low: float, high: float) -> "SpectralLines":
         """Those of a band, in Hz."""
         kept = (self.frequencies >= low) & (self.frequencies <= high)
-        return Lines(self.frequencies[kept], self.values[:, kept], self.rate)
+        return SpectralLines(self.frequencies[kept], self.values[:, kept], self.rate)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class PoleFit:
     residual: ComplexArray
 
 
-def fit_poles(lines: Lines, omegas: FloatArray, decays: FloatArray, skirt: int) -> PoleFit:
+def fit_poles(lines: SpectralLines, omegas: FloatArray, decays: FloatArray, skirt: int) -> PoleFit:
     """Refine poles until the lines are fitted best.
 
     Args:
@@ -116,7 +116,7 @@ class _Problem:
     The unknowns are ``log(w / w0)`` and ``d / w0`` of every mode, ``w0`` where it starts.
     """
 
-    def __init__(self, lines: Lines, starts: FloatArray, skirt: int) -> None:
+    def __init__(self, lines: SpectralLines, starts: FloatArray, skirt: int) -> None:
         self._lines = lines
         self._starts = starts
         self._size = float(np.linalg.norm(lines.values)) or 1.0
@@ -217,7 +217,7 @@ class _Problem:
 
 
 def _characteristic(
-    lines: Lines, omegas: FloatArray, decays: FloatArray
+    lines: SpectralLines, omegas: FloatArray, decays: FloatArray
 ) -> tuple[AnyArray, AnyArray, AnyArray, AnyArray]:
     """``(f, m)``: the second numerator, ``1 / A``, and the slopes of ``log A`` by ``w`` and by ``d``."""
     turns = 2j * np.pi * lines.frequencies[:, None]

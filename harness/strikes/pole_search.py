@@ -8,7 +8,7 @@ from scipy.signal import find_peaks
 from scipy.stats import f as f_distribution
 
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.strikes.pole_fit import Lines, PoleFit
+from harness.strikes.pole_fit import PoleFit, SpectralLines
 
 _MEDIAN_COSTS = 1.0 / np.log(2.0) ** 2
 """Variance of the median of an exponential distribution over that of its mean, both scaled to the mean."""
@@ -18,7 +18,7 @@ _APART = 8
 
 
 @dataclass(frozen=True)
-class Search:
+class PoleSearch:
     """How modes are looked for.
 
     Attributes:
@@ -42,7 +42,9 @@ class Search:
     skirt: int = 3
 
 
-def new_poles(lines: Lines, fit: PoleFit, search: Search, rounding: float) -> list[tuple[float, float]]:
+def new_poles(
+    lines: SpectralLines, fit: PoleFit, search: PoleSearch, rounding: float
+) -> list[tuple[float, float]]:
     """Where the residual stands out, strongest first: ``w`` in rad/s and ``d`` in 1/s to start a fit from.
 
     Args:
@@ -70,7 +72,9 @@ def new_poles(lines: Lines, fit: PoleFit, search: Search, rounding: float) -> li
     return _spread_out(lines, fit, left, tops[np.argsort(-left[tops])])
 
 
-def _spread_out(lines: Lines, fit: PoleFit, power: FloatArray, tops: AnyArray) -> list[tuple[float, float]]:
+def _spread_out(
+    lines: SpectralLines, fit: PoleFit, power: FloatArray, tops: AnyArray
+) -> list[tuple[float, float]]:
     """Those peaks that no stronger one can have caused: its skirt, or the other side of a misfit mode."""
     chosen: list[tuple[float, float]] = []
     reach: list[tuple[float, float]] = []
@@ -86,7 +90,7 @@ def _spread_out(lines: Lines, fit: PoleFit, power: FloatArray, tops: AnyArray) -
     return chosen
 
 
-def _half_width(lines: Lines, power: FloatArray, top: int) -> float:
+def _half_width(lines: SpectralLines, power: FloatArray, top: int) -> float:
     """Hz from a peak to where it has half its power, on its steeper side."""
     below = power < 0.5 * power[top]
     up = np.flatnonzero(below[top:])

@@ -29,7 +29,7 @@ _NOT_FOUND = b"HTTP/1.0 404 Not Found\r\nConnection: close\r\nServer: MJPG-Strea
 _REQUEST_TIMEOUT = 5.0
 
 
-class View(Protocol):
+class StreamedView(Protocol):
     """What a camera sees."""
 
     def state(self) -> Hashable:
@@ -65,7 +65,7 @@ class MjpegServer:
         rate: frames a second.
     """
 
-    def __init__(self, host: str, port: int, view: View, rate: float = 25.0) -> None:
+    def __init__(self, host: str, port: int, view: StreamedView, rate: float = 25.0) -> None:
         self._listener = socket.create_server((host, port))
         self.port: int = self._listener.getsockname()[1]
         self.fault = ActiveFault()

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 
 from harness.basics.arrays import ByteArray, FloatArray
 from mocks.camera.gelsight_stream import MjpegServer
-from mocks.lab_processes import Line
+from mocks.lab_processes import ChildPipe
 from mocks.shared_pose import SharedPose
 
 
@@ -35,7 +35,7 @@ class CameraView:
         self._shared.set_shown(self._viewer, self._mark.number)
 
 
-def stream(address: str, port: int, view: CameraView, rate: float, line: Line) -> None:
+def stream(address: str, port: int, view: CameraView, rate: float, line: ChildPipe) -> None:
     """Serve a view as MJPEG until the lab is gone.
 
     Args:

@@ -21,7 +21,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.basics.clock import now
-from mocks.daq.instrument import MODELS, Instrument
+from mocks.daq.instrument import MODELS, CommandInterpreter
 from mocks.daq.memory import Fifo
 from mocks.faults import ActiveFault, Fault
 from mocks.lab_processes import keep_time
@@ -46,7 +46,7 @@ was at its own moment."""
 
 
 class Cues(Protocol):
-    """What ``mocks.lab_processes.Line`` is."""
+    """What ``mocks.lab_processes.ChildPipe`` is."""
 
     def ready(self) -> None:
         """Say that the instrument answers."""
@@ -87,7 +87,7 @@ class DaqBox:
         echoes_start: bool = False,
     ) -> None:
         self._model = MODELS[model]
-        self._instrument = Instrument(self._model, serial, echoes_start)
+        self._instrument = CommandInterpreter(self._model, serial, echoes_start)
         self._source = source
         self._speed = 1.0 + 1e-6 * drift_ppm
         self._memory = Fifo(memory)

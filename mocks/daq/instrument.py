@@ -19,7 +19,7 @@ _INFO_QUESTIONS = range(10)
 
 
 @dataclass(frozen=True)
-class Model:
+class MockedBoxModel:
     """What one model of the family is.
 
     Attributes:
@@ -36,12 +36,12 @@ class Model:
 
 
 MODELS = {
-    "DI-1110": Model("1110", 12, 60_000_000, (375, 65535)),
-    "DI-2108": Model("2108", 16, 60_000_000, (375, 65535)),
+    "DI-1110": MockedBoxModel("1110", 12, 60_000_000, (375, 65535)),
+    "DI-2108": MockedBoxModel("2108", 16, 60_000_000, (375, 65535)),
 }
 
 
-class Instrument:
+class CommandInterpreter:
     """The command interpreter.
 
     Args:
@@ -56,7 +56,7 @@ class Instrument:
         packet: bytes that leave at once.
     """
 
-    def __init__(self, model: Model, serial: str, echoes_start: bool = False) -> None:
+    def __init__(self, model: MockedBoxModel, serial: str, echoes_start: bool = False) -> None:
         self.scanning = False
         self.scan_list: list[int] = [0]
         self.divisor = model.divisors[1]

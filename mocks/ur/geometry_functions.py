@@ -8,7 +8,7 @@ from mocks.ur.arm import poses
 from mocks.ur.hooks import Matrix
 from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.values import Pose, number, show, six
+from mocks.ur.urscript.values import PoseValue, number, show, six
 
 
 def matrix(value: Any, what: str) -> Matrix:
@@ -16,29 +16,29 @@ def matrix(value: Any, what: str) -> Matrix:
     return poses.matrix_from_pose(six(value, what))
 
 
-def pose(value: Matrix) -> Pose:
+def pose(value: Matrix) -> PoseValue:
     """The pose of a transform."""
-    return Pose(poses.pose_from_matrix(value))
+    return PoseValue(poses.pose_from_matrix(value))
 
 
-def pose_trans(p_from: Any, p_from_to: Any) -> Pose:
+def pose_trans(p_from: Any, p_from_to: Any) -> PoseValue:
     """``p_from`` carried on by ``p_from_to``, given in its frame."""
     return pose(poses.compose(matrix(p_from, "pose_trans"), matrix(p_from_to, "pose_trans")))
 
 
-def pose_inv(p_from: Any) -> Pose:
+def pose_inv(p_from: Any) -> PoseValue:
     """The way back."""
     return pose(poses.inverse(matrix(p_from, "pose_inv")))
 
 
-def pose_add(p_1: Any, p_2: Any) -> Pose:
+def pose_add(p_1: Any, p_2: Any) -> PoseValue:
     """Positions added, rotations one after the other."""
     first, second = matrix(p_1, "pose_add"), matrix(p_2, "pose_add")
     x, y, z = (a + b for a, b in zip(poses.translation(first), poses.translation(second), strict=True))
     return pose(poses.moved_to(poses.compose(first, second), (x, y, z)))
 
 
-def pose_sub(p_to: Any, p_from: Any) -> Pose:
+def pose_sub(p_to: Any, p_from: Any) -> PoseValue:
     """Positions subtracted, and the turn from ``p_from`` to ``p_to`` in base."""
     to, start = matrix(p_to, "pose_sub"), matrix(p_from, "pose_sub")
     x, y, z = (a - b for a, b in zip(poses.translation(to), poses.translation(start), strict=True))
@@ -55,7 +55,7 @@ def point_dist(p_from: Any, p_to: Any) -> float:
     return math.dist(six(p_from, "point_dist")[:3], six(p_to, "point_dist")[:3])
 
 
-def interpolate_pose(p_from: Any, p_to: Any, alpha: Any) -> Pose:
+def interpolate_pose(p_from: Any, p_to: Any, alpha: Any) -> PoseValue:
     """The pose at a share of the straight way."""
     start, goal = matrix(p_from, "interpolate_pose"), matrix(p_to, "interpolate_pose")
     turn = poses.rotation_vector(poses.compose(poses.inverse(start), goal))

@@ -8,7 +8,7 @@ from typing import Any
 
 from mocks.ur.arm import kinematics, poses
 from mocks.ur.arm.motions import (
-    Motion,
+    ArmMotion,
     MoveJoints,
     MoveLine,
     ServoJoints,
@@ -23,7 +23,7 @@ from mocks.ur.hooks import Matrix, Six
 from mocks.ur.robot import Robot
 from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.values import Pose, number, six
+from mocks.ur.urscript.values import PoseValue, number, six
 
 Cycles = Generator[None, None, None]
 
@@ -106,7 +106,7 @@ class MoveFunctions:
         if not self._mover.at_rest:
             yield from self._perform(StopJoints(PROGRAM_STOP))
 
-    def _perform(self, motion: Motion, *, goes_on: bool = False) -> Cycles:
+    def _perform(self, motion: ArmMotion, *, goes_on: bool = False) -> Cycles:
         """Until it is done; a motion that ``goes_on`` is not over when the program may continue."""
         self._require_free()
         thread = self._robot.thread
@@ -125,12 +125,12 @@ class MoveFunctions:
             raise ScriptError("another thread is already controlling the robot")
 
     def _joints(self, value: Any, what: str) -> Six:
-        if isinstance(value, Pose):
+        if isinstance(value, PoseValue):
             return solved(self._robot, self._flange(value, what), self._mover.joints)
         return as_six(six(value, what))
 
     def _tcp(self, value: Any, what: str) -> Matrix:
-        if isinstance(value, Pose):
+        if isinstance(value, PoseValue):
             goal = matrix(value, what)
         else:
             flange = kinematics.forward(self._robot.arm, six(value, what))

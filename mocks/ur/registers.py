@@ -71,7 +71,7 @@ _DIGITAL: Final = {
 
 
 @dataclass(frozen=True)
-class Watchdog:
+class RegisterWatchdog:
     """An input that a client must keep writing.
 
     Attributes:

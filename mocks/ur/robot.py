@@ -8,7 +8,7 @@ from mocks.ur.arm.force_sensor import ForceSensor
 from mocks.ur.arm.kinematics import arm_model
 from mocks.ur.arm.mover import Mover
 from mocks.ur.hooks import ControllerConfig
-from mocks.ur.registers import Bank, Outputs, Watchdog
+from mocks.ur.registers import Bank, Outputs, RegisterWatchdog
 from mocks.ur.safety import Safety
 
 BOOTED: Final = 100.0
@@ -53,7 +53,7 @@ class Robot:
         self.outputs = Outputs()
         self.payload = Payload()
         self.gravity = [0.0, 0.0, 9.82]
-        self.watchdog: Watchdog | None = None
+        self.watchdog: RegisterWatchdog | None = None
         self.written: dict[str, int] = {}
         self.remote = config.remote
         self.thread = 0

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from mocks.ur import wire
 from mocks.ur.controller import Controller
-from mocks.ur.variables import INPUTS, OUTPUTS, Input, Read
+from mocks.ur.variables import INPUTS, OUTPUTS, InputVariable, Read
 from mocks.ur.wire import BadPacket, Kind, packet
 
 CYCLES_PER_SECOND: Final = 500
@@ -55,7 +55,7 @@ class OutputRecipe:
 class InputRecipe:
     """What one client writes."""
 
-    def __init__(self, names: list[str], inputs: list[Input]) -> None:
+    def __init__(self, names: list[str], inputs: list[InputVariable]) -> None:
         self._fields = list(zip(names, inputs, strict=True))
         self._layout = wire.layout([field.type for field in inputs])
 

@@ -12,7 +12,7 @@ from mocks.ur.move_functions import solved
 from mocks.ur.robot import Robot
 from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.values import Pose, number, six
+from mocks.ur.urscript.values import PoseValue, number, six
 
 
 class StateFunctions:
@@ -60,7 +60,7 @@ class StateFunctions:
             raise ScriptError(f"the history goes back 0 to {HISTORY - 1} steps, not {back}")
         return list(history[max(0, len(history) - 1 - int(back))])
 
-    def get_forward_kin(self, q: Any = None, tcp: Any = "active_tcp") -> Pose:
+    def get_forward_kin(self, q: Any = None, tcp: Any = "active_tcp") -> PoseValue:
         """The tool's pose at joints."""
         joints = self._mover.joints if q is None else as_six(six(q, "get_forward_kin"))
         offset = self._offset(tcp)
@@ -96,7 +96,7 @@ class StateFunctions:
 
     def is_within_safety_limits(self, pose: Any) -> bool:
         """Whether a pose is in reach, or joints are in their range."""
-        if isinstance(pose, Pose):
+        if isinstance(pose, PoseValue):
             return self.get_inverse_kin_has_solution(pose)
         return kinematics.within_limits(six(pose, "is_within_safety_limits"))
 

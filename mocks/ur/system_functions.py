@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator
 from typing import Any, Final
 
 from mocks.ur.geometry_functions import matrix
-from mocks.ur.registers import BITS, INT32, NUMERIC, Watchdog
+from mocks.ur.registers import BITS, INT32, NUMERIC, RegisterWatchdog
 from mocks.ur.robot import Robot
 from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
@@ -96,7 +96,7 @@ class SystemFunctions:
         if frequency == 0.0 or action == "ignore":
             self._robot.watchdog = None
             return
-        self._robot.watchdog = Watchdog(str(variable_name), 1.0 / frequency, action)
+        self._robot.watchdog = RegisterWatchdog(str(variable_name), 1.0 / frequency, action)
         self._robot.written[str(variable_name)] = self._robot.cycles
 
     def set_tcp(self, pose: Any, tcp_name: Any = "") -> None:

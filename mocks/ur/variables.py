@@ -31,7 +31,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Input:
+class InputVariable:
     """A variable that one client may write; ``write`` is None where the outputs take it by its mask."""
 
     type: str
@@ -200,7 +200,7 @@ def _set_bit(index: int) -> Write:
     return write
 
 
-def _inputs() -> dict[str, Input]:
+def _inputs() -> dict[str, InputVariable]:
     masked = {
         "speed_slider_mask": "UINT32",
         "speed_slider_fraction": "DOUBLE",
@@ -216,13 +216,17 @@ def _inputs() -> dict[str, Input]:
         "standard_analog_output_1": "DOUBLE",
     }
     return {
-        **{name: Input(kind, None) for name, kind in masked.items()},
-        **{f"input_int_register_{i}": Input("INT32", _set_int(i)) for i in range(NUMERIC)},
-        **{f"input_double_register_{i}": Input("DOUBLE", _set_double(i)) for i in range(NUMERIC)},
-        **{f"input_bit_register_{i}": Input("BOOL", _set_bit(i)) for i in range(_LAST_WORD, BITS)},
-        "input_bit_registers0_to_31": Input("UINT32", lambda c, value: c.robot.inputs.set_word(0, value)),
-        "input_bit_registers32_to_63": Input("UINT32", lambda c, value: c.robot.inputs.set_word(32, value)),
-        "external_force_torque": Input("VECTOR6D", lambda _c, _value: None),
+        **{name: InputVariable(kind, None) for name, kind in masked.items()},
+        **{f"input_int_register_{i}": InputVariable("INT32", _set_int(i)) for i in range(NUMERIC)},
+        **{f"input_double_register_{i}": InputVariable("DOUBLE", _set_double(i)) for i in range(NUMERIC)},
+        **{f"input_bit_register_{i}": InputVariable("BOOL", _set_bit(i)) for i in range(_LAST_WORD, BITS)},
+        "input_bit_registers0_to_31": InputVariable(
+            "UINT32", lambda c, value: c.robot.inputs.set_word(0, value)
+        ),
+        "input_bit_registers32_to_63": InputVariable(
+            "UINT32", lambda c, value: c.robot.inputs.set_word(32, value)
+        ),
+        "external_force_torque": InputVariable("VECTOR6D", lambda _c, _value: None),
     }
 
 

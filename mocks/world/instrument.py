@@ -18,7 +18,7 @@ from harness.sim.solid.walls import walled
 from harness.sim.sound.modal_radiation import radiation
 from mocks.world.gap_draw import GapDraw
 from mocks.world.modes import perturbed, uneven
-from mocks.world.sound import Instrument
+from mocks.world.sound import SoundingObject
 from mocks.world.sound_draw import SoundDraw
 from mocks.world.world import World
 
@@ -38,7 +38,7 @@ DISTANCE = 0.25
 """m from the object to the microphone."""
 
 
-def instrument_of(world: World, scene: SceneFile, draw: GapDraw) -> Instrument:
+def instrument_of(world: World, scene: SceneFile, draw: GapDraw) -> SoundingObject:
     """The true object's modes and how loud each is at the microphone.
 
     Args:
@@ -53,7 +53,7 @@ def instrument_of(world: World, scene: SceneFile, draw: GapDraw) -> Instrument:
     solid = walled(world.nominal, scene.object.wall)
     edge = FINER * default_edge(solid, made_of, LIMIT)
     modes = _modes(solid, made_of, edge, SoundDraw(draw), Store(default_folder()))
-    return Instrument(modes, dampings(modes.frequencies, made_of), radiation(modes, DISTANCE))
+    return SoundingObject(modes, dampings(modes.frequencies, made_of), radiation(modes, DISTANCE))
 
 
 def _modes(solid: Mesh, made_of: Material, edge: float, draw: SoundDraw, store: Store) -> Modes:

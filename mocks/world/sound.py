@@ -33,7 +33,7 @@ _PLACES = 400
 
 
 @dataclass(frozen=True, eq=False)
-class Instrument:
+class SoundingObject:
     """The true object as something that sounds.
 
     Attributes:
@@ -100,7 +100,7 @@ class WorldSound:
     def __init__(
         self,
         world: World,
-        instrument: Instrument,
+        instrument: SoundingObject,
         gap: Gap,
         seed: int,
         flange_from_hammer: FloatArray,

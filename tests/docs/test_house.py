@@ -1,5 +1,6 @@
 """The house is as ARCHITECTURE.md says: its rooms are there, none holds too much, its rows resolve."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -50,3 +51,13 @@ def test_every_row_of_the_table_of_experiments_resolves(name: str) -> None:
     assert issubclass(section, Section)
     assert section.table == row.section
     assert experiment.section is section
+
+
+def test_no_two_public_classes_share_a_name() -> None:
+    homes: dict[str, list[str]] = {}
+    for room in rooms():
+        for path in room.glob("*.py"):
+            for node in ast.parse(path.read_text(encoding="utf-8")).body:
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    homes.setdefault(node.name, []).append(path.relative_to(ROOT).as_posix())
+    assert {name: paths for name, paths in homes.items() if len(paths) > 1} == {}

@@ -13,8 +13,8 @@ import pytest
 
 from harness.basics.errors import BenchFault
 from mocks.faults import Fault
-from mocks.lab_processes import ARM_PORTS, LabChild, Line, free_address
-from mocks.shared_pose import Mark, SharedPose
+from mocks.lab_processes import ARM_PORTS, ChildPipe, LabChild, free_address
+from mocks.shared_pose import SharedPose, StepMark
 
 _PARENT = """
 import sys, time
@@ -56,7 +56,7 @@ def test_a_child_dies_with_a_parent_that_is_killed() -> None:
     assert not _alive(child)
 
 
-def _echo(line: Line) -> None:
+def _echo(line: ChildPipe) -> None:
     """Ends by itself once it has heard of the fault that the test cues."""
     line.ready()
     while not line.should_stop():
@@ -75,7 +75,7 @@ def test_a_fault_reaches_the_child() -> None:
     child.kill()
 
 
-def _fail(line: Line) -> None:
+def _fail(line: ChildPipe) -> None:
     raise OSError("port 8080 is taken")
 
 
@@ -108,12 +108,12 @@ def test_pose_and_mark_pass_between_processes() -> None:
     pose[:3] = np.random.default_rng(0).standard_normal((3, 4))
     if os.fork() == 0:
         shared.set_pose(pose)
-        shared.set_mark(Mark(7, 3, 1))
+        shared.set_mark(StepMark(7, 3, 1))
         shared.set_shown(1, 7)
         os._exit(0)
     os.wait()
     assert np.array_equal(shared.base_from_flange, pose)
-    assert shared.mark == Mark(7, 3, 1)
+    assert shared.mark == StepMark(7, 3, 1)
     assert (shared.shown(0), shared.shown(1)) == (0, 7)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.objectfile.vision.surface import SurfaceExtras
-from harness.objectfile.vision.threads import Room
+from harness.objectfile.vision.threads import Workspace
 
 UNKNOWN = np.empty(0, np.int32)
 """Faces, where no outline is asked."""
@@ -22,5 +22,5 @@ def told_of(
     lit = extras.under(eye, light)
     assert lit is not None, "these networks are told nothing"
     found = np.empty((len(ways), extras.count), np.float32)
-    lit.tell(ways, depth, likely, found, Room())
+    lit.tell(ways, depth, likely, found, Workspace())
     return found

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from calibration.taxim.artefact import calibration_of
 from calibration.taxim.gates import CONTACT, check_set, refusals, sightings
-from calibration.taxim.held_out import FOLDS, WITHIN, Model, decibels, teach
+from calibration.taxim.held_out import FOLDS, WITHIN, FittedModel, decibels, teach
 from calibration.taxim.light_fit import depth_of, pressed_ball
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pack import PressPack
@@ -61,7 +61,7 @@ class HeldOut:
 
     name: str
     live: ByteArray
-    model: Model
+    model: FittedModel
     calibration: LitCalibration
     start: FloatArray
     ball: float

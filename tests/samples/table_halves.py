@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from calibration.taxim.held_out import Model, teach
+from calibration.taxim.held_out import FittedModel, teach
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures, in_order_of_content
@@ -23,7 +23,7 @@ class Taught:
         error: of its table.
     """
 
-    model: Model
+    model: FittedModel
     error: FloatArray
 
 

@@ -1,7 +1,7 @@
 """A ball of one colour, and small networks that learn it."""
 
 from harness.authoring.vision.cells import CellTraining
-from harness.authoring.vision.data import HeldOut
+from harness.authoring.vision.data import HeldOutViews
 from harness.authoring.vision.lessons import OPAQUE, draw_lamps, draw_lessons
 from harness.authoring.vision.profiles import CellsSpec
 from harness.objectfile.vision.network.network import NetworkSize, VisionGrid
@@ -12,7 +12,7 @@ from tests.oracles.seen_shapes import ball
 
 SIZE = NetworkSize(width=16, octaves=3, turns=2, kind="osf-v")
 TINY = CellsSpec(SIZE, cells=4, places=6000, steps=300, batch=64, least=64)
-NOTHING = HeldOut((), ())
+NOTHING = HeldOutViews((), ())
 RADIUS = 0.05
 COLOUR = (0.7, 0.4, 0.1)
 

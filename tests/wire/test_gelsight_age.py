@@ -15,7 +15,7 @@ from harness.basics.errors import BenchFault
 from harness.bench.sensor import GELSIGHT_R15
 from mocks.camera.gelsight_stream import MjpegServer
 from mocks.faults import Fault
-from mocks.lab_processes import LabChild, Line, free_address
+from mocks.lab_processes import ChildPipe, LabChild, free_address
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux")
 
@@ -45,7 +45,7 @@ def shown_time(image: ByteArray) -> float:
     return float(np.sum(blocks.astype(np.int64) << np.arange(BITS))) * 1e-6
 
 
-def _serve(line: Line, address: str) -> None:
+def _serve(line: ChildPipe, address: str) -> None:
     server = MjpegServer(address, PORT, ClockFace(), 25.0)
     line.ready()
 

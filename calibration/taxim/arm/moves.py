@@ -37,7 +37,7 @@ _STEP = 1e-6
 
 
 @dataclass(frozen=True)
-class Measured:
+class Uncertain:
     """A number with its uncertainty.
 
     Attributes:
@@ -71,12 +71,12 @@ class ArmScale:
         residuals: ``(presses, 2)`` m, of all of them.
     """
 
-    wide: Measured
-    high: Measured
-    pitch: Measured
-    aspect: Measured
-    rotation: Measured
-    skew: Measured
+    wide: Uncertain
+    high: Uncertain
+    pitch: Uncertain
+    aspect: Uncertain
+    rotation: Uncertain
+    skew: Uncertain
     gel_from_pixels: FloatArray
     scatter: float
     used: tuple[int, ...]
@@ -123,7 +123,7 @@ def arm_scale(
     factor = float(student.ppf(0.975, freedom))
     first = maps[0]
     pitch, aspect, rotation, skew, wide, high = (
-        Measured(float(v), float(np.hypot(a, b)), float(a), factor * float(np.hypot(a, b)))
+        Uncertain(float(v), float(np.hypot(a, b)), float(a), factor * float(np.hypot(a, b)))
         for v, a, b in zip(values, by_scatter, by_seeing, strict=True)
     )
     _require_square(skew)
@@ -203,7 +203,7 @@ def _require_spread(seen: FloatArray, found: _Map) -> None:
         )
 
 
-def _require_square(skew: Measured) -> None:
+def _require_square(skew: Uncertain) -> None:
     if abs(skew.value) > max(LARGEST_SKEW, skew.within95):
         raise CalibrationRefused(
             f"rows and columns stand {np.degrees(skew.value):+.2f} deg (to {np.degrees(skew.within95):.2f}) "

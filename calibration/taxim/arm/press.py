@@ -12,7 +12,7 @@ import numpy as np
 from calibration.taxim.arm.channels import DESCENT, STATE, UNREST, UNTOUCHED, WAY
 from calibration.taxim.arm.plan import PressMotion, PressSettings, settings_of
 from calibration.taxim.arm.settled import Settling, look, settle
-from calibration.taxim.arm.watch import Watch, touch_seen
+from calibration.taxim.arm.watch import PressWatch, touch_seen
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, NotTouched
 from harness.bench.reading import Channel, Reading
@@ -69,7 +69,7 @@ class BallPresses:
         self._speeds = speeds or PressSpeeds()
         self._say = say
         self._settings = PressSettings()
-        self._watch = Watch(ball)
+        self._watch = PressWatch(ball)
 
     def steps(self, recording: Recording) -> Iterator[Step]:
         """What is not yet on the disk.
@@ -79,7 +79,7 @@ class BallPresses:
             CalibrationRefused: most presses so far are refused, or light or gel have drifted.
         """
         self._settings = settings_of(dict(recording.header.plan))
-        self._watch = Watch.of(recording, self._ball)
+        self._watch = PressWatch.of(recording, self._ball)
         for index, planned in enumerate(recording.header.plan["steps"]):
             if index >= recording.committed:
                 self._watch.require_sense(MISSES)

@@ -30,7 +30,7 @@ def touch_seen(change: FloatArray) -> float:
     return float(np.abs(blurred).max())
 
 
-class Watch:
+class PressWatch:
     """What the presses so far say of the next ones.
 
     Args:
@@ -47,7 +47,7 @@ class Watch:
         self._verdicts: list[Refused | None] = []
 
     @classmethod
-    def of(cls, recording: Recording, ball: float) -> "Watch":
+    def of(cls, recording: Recording, ball: float) -> "PressWatch":
         """As it was after the steps that are on the disk."""
         watch = cls(ball)
         for record in recording.steps():

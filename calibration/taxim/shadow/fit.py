@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from calibration.taxim.light_fit import Light
+from calibration.taxim.light_fit import GelLight
 from calibration.taxim.pack import PressPack
 from calibration.taxim.shadow.polar import DIRECTIONS, SAMPLE_STEP, Around, around
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
@@ -112,7 +112,7 @@ class ShadowFit:
         )
 
 
-def fit_shadow(pack: PressPack, clean: FloatArray, centres: FloatArray, light: Light) -> ShadowFit:
+def fit_shadow(pack: PressPack, clean: FloatArray, centres: FloatArray, light: GelLight) -> ShadowFit:
     """Fit the shadows of presses.
 
     Args:

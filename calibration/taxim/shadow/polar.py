@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from calibration.taxim.light_fit import REACH, Light, light_shades
+from calibration.taxim.light_fit import REACH, GelLight, light_shades
 from calibration.taxim.pack import PressPack
 from harness.basics.arrays import FloatArray, read_only
 from harness.sim.optics.shadow import RIM
@@ -41,7 +41,7 @@ class Around:
     within: FloatArray
 
 
-def around(pack: PressPack, clean: FloatArray, centres: FloatArray, light: Light) -> Around:
+def around(pack: PressPack, clean: FloatArray, centres: FloatArray, light: GelLight) -> Around:
     """Look at presses along rays from their rims.
 
     Args:

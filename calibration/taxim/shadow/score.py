@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.taxim.held_out import HeldOut, decibels
-from calibration.taxim.light_fit import REACH, Light, light_shades, pressed_ball
+from calibration.taxim.light_fit import REACH, GelLight, light_shades, pressed_ball
 from calibration.taxim.pack import PressPack
 from calibration.taxim.shadow.fit import ShadowFit, fit_shadow
 from calibration.taxim.smooth_fit import distance
@@ -99,7 +99,7 @@ def _press(
     pack: PressPack,
     clean: FloatArray,
     centre: FloatArray,
-    light: Light,
+    light: GelLight,
     fit: ShadowFit,
     pitch: float,
     ball: float,
@@ -116,7 +116,7 @@ def _press(
 
 
 def shaded_press(
-    pack: PressPack, centre: FloatArray, light: Light, table: ShadowTable, pitch: float, ball: float
+    pack: PressPack, centre: FloatArray, light: GelLight, table: ShadowTable, pitch: float, ball: float
 ) -> tuple[FloatArray, FloatArray]:
     """A press without its shadows, and what they take from it: ``(rows, columns, 3)`` grey levels each.
 

@@ -16,7 +16,7 @@ from experiments.contact_localization.posterior.consistency import (
 )
 from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise
 from experiments.contact_localization.posterior.levels import Levels, Senses
-from experiments.contact_localization.posterior.methods import Solution, lap, solve_run
+from experiments.contact_localization.posterior.methods import PosteriorSolution, lap, solve_run
 from experiments.contact_localization.posterior.posterior import (
     Mode,
     Region,
@@ -171,7 +171,7 @@ def locate(
 
 def _judged(
     search: Search,
-    found: Solution,
+    found: PosteriorSolution,
     levels: Levels,
     heard: StrikeEvidence | None,
     count: int,
@@ -194,7 +194,7 @@ def _judged(
 def _answer(
     search: Search,
     count: int,
-    found: Solution,
+    found: PosteriorSolution,
     seconds: dict[str, float],
     floor: float,
     doubts: tuple[str, ...],
@@ -228,7 +228,9 @@ def _answer(
     return result
 
 
-def _everywhere(search: Search, count: int, found: Solution) -> tuple[Hypotheses, list[FloatArray], IntArray]:
+def _everywhere(
+    search: Search, count: int, found: PosteriorSolution
+) -> tuple[Hypotheses, list[FloatArray], IntArray]:
     """Hypotheses spread over turns that the object does not show, contacts' points, and whose each is."""
     hypotheses, clouds = found.hypotheses, [_points(search, k, found) for k in range(count)]
     if search.turning is None:
@@ -240,7 +242,7 @@ def _everywhere(search: Search, count: int, found: Solution) -> tuple[Hypotheses
     return spread, [search.turning.turned(cloud[owners], turns) for cloud in clouds], owners
 
 
-def _points(search: Search, contact: int, found: Solution) -> FloatArray:
+def _points(search: Search, contact: int, found: PosteriorSolution) -> FloatArray:
     if found.pictured:
         return search.surface_points(contact, found.hypotheses)
     places = search.contact_places(contact, found.hypotheses)

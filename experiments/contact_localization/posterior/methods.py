@@ -21,7 +21,7 @@ _SUSPICIOUS_BELOW = -8.0
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class PosteriorSolution:
     """Hypotheses with how the best of them fits.
 
     Attributes:
@@ -45,7 +45,7 @@ def solve_run(
     seed: int,
     seconds: dict[str, float],
     heard: StrikeEvidence | None,
-) -> Solution:
+) -> PosteriorSolution:
     """The posterior of the first ``count`` contacts.
 
     Args:
@@ -67,7 +67,7 @@ def solve_run(
         refuse_bad_fit(search, members, np.empty(0))
     if levels.method == "particle":
         return _by_particles(search, count, members, levels, seed, seconds)
-    best: Solution | None = None
+    best: PosteriorSolution | None = None
     clear = -np.inf
     for anchor in anchors(members, _ANCHORS):
         found = _by_grid(search, members, int(anchor), levels, seed, seconds, heard)
@@ -89,7 +89,7 @@ def _by_grid(
     seed: int,
     seconds: dict[str, float],
     heard: StrikeEvidence | None,
-) -> Solution:
+) -> PosteriorSolution:
     start = time.perf_counter()
     coarse = on_samples(search, members, anchor, heard)
     lap(seconds, "grid", start)
@@ -98,20 +98,22 @@ def _by_grid(
     refined = refine(search, coarse, members, samples, levels.rounds, seed, heard)
     fits = search.gates(refined.top, members)
     lap(seconds, "refine", start)
-    return Solution(refined, members, fits)
+    return PosteriorSolution(refined, members, fits)
 
 
-def _by_sound(search: Search, count: int, heard: StrikeEvidence, seconds: dict[str, float]) -> Solution:
+def _by_sound(
+    search: Search, count: int, heard: StrikeEvidence, seconds: dict[str, float]
+) -> PosteriorSolution:
     start = time.perf_counter()
     everyone = np.arange(count, dtype=np.int64)
     found = by_sound(search, heard.term, heard.struck, everyone)
     lap(seconds, "grid", start)
-    return Solution(found, np.empty(0, dtype=np.int64), np.empty(0), pictured=False)
+    return PosteriorSolution(found, np.empty(0, dtype=np.int64), np.empty(0), pictured=False)
 
 
 def _by_particles(
     search: Search, count: int, members: IntArray, levels: Levels, seed: int, seconds: dict[str, float]
-) -> Solution:
+) -> PosteriorSolution:
     start = time.perf_counter()
     particles = particle_filter(search, count, levels.particles, seed)
     rotations = search.prior.object_from_base(particles.yaws)
@@ -122,7 +124,7 @@ def _by_particles(
     found = Hypotheses(gels, particles.yaws, particles.log_weights)
     fits = search.gates(found.top, members)
     lap(seconds, "particles", start)
-    return Solution(found, members, fits)
+    return PosteriorSolution(found, members, fits)
 
 
 def lap(seconds: dict[str, float], stage: str, start: float) -> None:

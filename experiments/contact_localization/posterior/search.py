@@ -16,7 +16,7 @@ from experiments.contact_localization.posterior.shared_errors import log_prior, 
 from experiments.contact_localization.touch.contact_scales import contact_scales, place_noise
 from experiments.contact_localization.touch.touch import TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
-from harness.sim.gel.view import View, half_as_fine, view_along
+from harness.sim.gel.view import ToolView, half_as_fine, view_along
 from harness.sim.solid.surface_samples import Surface
 
 _KNOWN_YAWS = np.radians(np.arange(-5.0, 5.5, 1.0))
@@ -56,16 +56,16 @@ class Search:
         shown = np.array([contact.shows_contact for contact in contacts])
         self._shared_moves = moves(noise.shared, self.positions, attitudes, shown if shown.any() else ~shown)
         self._turned = self.axes, self.axes  # no yaws have been asked for
-        self._views: dict[tuple[int, int, bool], View] = {}
+        self._views: dict[tuple[int, int, bool], ToolView] = {}
 
-    def view(self, contact: int, picture: int, coarse: bool = False) -> View:
+    def view(self, contact: int, picture: int, coarse: bool = False) -> ToolView:
         """The object along the tool at a contact, under the yaw of a numbered picture."""
         key = (contact, picture, coarse)
         if key not in self._views:
             self._views[key] = self._seen(contact, picture, coarse)
         return self._views[key]
 
-    def _seen(self, contact: int, picture: int, coarse: bool) -> View:
+    def _seen(self, contact: int, picture: int, coarse: bool) -> ToolView:
         sensor = self.model.sensor
         if coarse and self.prior.yaw == "known":
             # The fine picture will be asked for as well.
@@ -170,7 +170,7 @@ class Search:
 
     def placed(
         self, contact: int, at: Hypotheses, coarse: bool = False
-    ) -> Iterator[tuple[IntArray, View, FloatArray]]:
+    ) -> Iterator[tuple[IntArray, ToolView, FloatArray]]:
         """Hypotheses by the picture that serves them, with the gel's centre in view coordinates."""
         places_in_object = self.gel_centres(contact, at)
         pictures = self.pictures(at.yaws, coarse)

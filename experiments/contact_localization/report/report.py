@@ -14,7 +14,7 @@ from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.comparison import object_from_gels
 from experiments.contact_localization.report.result import flags_of, result_of, true_points, without_images
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
-from experiments.contact_localization.report.sweep import Point, trade
+from experiments.contact_localization.report.sweep import SweepPoint, trade
 from experiments.contact_localization.report.twin_check import deviations
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, WrongUse
@@ -194,15 +194,15 @@ def _errors(points: Sequence[FloatArray], true: FloatArray) -> tuple[float, ...]
     return tuple(float(np.linalg.norm(point - at)) for point, at in zip(points, true, strict=True))
 
 
-def _sweep(scored: Scored) -> tuple[Point, ...]:
+def _sweep(scored: Scored) -> tuple[SweepPoint, ...]:
     true = true_points(scored)
     return () if true is None else trade(scored.answering.readings, true[-1])
 
 
-def _by_seconds(trade: tuple[Point, ...]) -> tuple[ErrorCurve, ...] | Missing:
+def _by_seconds(trade: tuple[SweepPoint, ...]) -> tuple[ErrorCurve, ...] | Missing:
     if not trade:
         return NO_TRUTH
-    methods: dict[str, list[Point]] = {}
+    methods: dict[str, list[SweepPoint]] = {}
     heard = any(point.levels.senses == "audio" for point in trade)
     for point in trade:
         methods.setdefault(_method(point.levels, heard), []).append(point)

@@ -61,7 +61,7 @@ BY_SENSE: dict[str, Setting] = {
 
 
 @dataclass(frozen=True)
-class Point:
+class SweepPoint:
     """One level of accuracy on one recording.
 
     Attributes:
@@ -77,7 +77,7 @@ class Point:
     error: float
 
 
-def trade(readings: Readings, true: FloatArray) -> tuple[Point, ...]:
+def trade(readings: Readings, true: FloatArray) -> tuple[SweepPoint, ...]:
     """Estimate the same readings again at every level; a level that refuses the fit is left out.
 
     Args:
@@ -92,5 +92,5 @@ def trade(readings: Readings, true: FloatArray) -> tuple[Point, ...]:
             continue
         seconds = (readings.shared[1] + solved.wall) / len(readings.observations)
         error = float(np.linalg.norm(solved.estimate.position_in_object - true))
-        points.append(Point(name, levels_at(setting), seconds, error))
+        points.append(SweepPoint(name, levels_at(setting), seconds, error))
     return tuple(points)

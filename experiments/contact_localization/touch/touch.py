@@ -17,7 +17,7 @@ from experiments.contact_localization.touch.kernels import (
     terms_at,
 )
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
-from harness.sim.gel.view import View
+from harness.sim.gel.view import ToolView
 
 LEVEL_SLOPE = 0.06
 """Mean slope of a pixel below which it may be the gel at rest."""
@@ -123,7 +123,7 @@ def _level(heights: FloatArray, pitch: float, block: int) -> BoolArray:
     return np.asarray(block_means(steep, block) < LEVEL_SLOPE)
 
 
-def view_scores(view: View, touch: TouchMap, noise: TouchNoise, pixels: IntArray) -> None:
+def view_scores(view: ToolView, touch: TouchMap, noise: TouchNoise, pixels: IntArray) -> None:
     """Fill in the touch term at ``(n, 2)`` pixels (row, column) of a view."""
     fill_scores(
         view.depth,
@@ -136,7 +136,7 @@ def view_scores(view: View, touch: TouchMap, noise: TouchNoise, pixels: IntArray
 
 
 def touch_terms(
-    view: View,
+    view: ToolView,
     touch: TouchMap,
     noise: TouchNoise,
     places: FloatArray,
@@ -183,7 +183,7 @@ def touch_terms(
     )
 
 
-def best_fit(view: View, touch: TouchMap, noise: TouchNoise, place: FloatArray, shift: float) -> float:
+def best_fit(view: ToolView, touch: TouchMap, noise: TouchNoise, place: FloatArray, shift: float) -> float:
     """How well a contact fits near one place: nats of its best cell, untempered and uncapped.
 
     Args:
@@ -209,7 +209,7 @@ def best_fit(view: View, touch: TouchMap, noise: TouchNoise, place: FloatArray, 
     return float(fits.max(initial=-np.inf))
 
 
-def similarities(view: View, touch: TouchMap, places: FloatArray, behind: float = 1.5e-3) -> FloatArray:
+def similarities(view: ToolView, touch: TouchMap, places: FloatArray, behind: float = 1.5e-3) -> FloatArray:
     """Cosine between what the gel read and what it would have read at each place.
 
     Args:

@@ -8,7 +8,7 @@ import numpy as np
 from onnx import ModelProto
 from threadpoolctl import threadpool_limits
 
-from harness.authoring.audio.data import Samples, Split, split_nodes, wave_number
+from harness.authoring.audio.data import SoundSamples, Split, split_nodes, wave_number
 from harness.authoring.audio.export import waves_graph
 from harness.authoring.audio.metrics import (
     DURATION,
@@ -19,7 +19,7 @@ from harness.authoring.audio.metrics import (
     relative_errors,
     sound_distances,
 )
-from harness.authoring.audio.profiles import PerceptronSpec, Profile
+from harness.authoring.audio.profiles import AudioProfile, PerceptronSpec
 from harness.authoring.audio.waves import fit_enough_waves
 from harness.authoring.training import Report, median_seconds, train
 from harness.basics.arrays import AnyArray, FloatArray
@@ -65,7 +65,7 @@ class AuthoredAudio:
 def author_audio(
     modes: Modes,
     dampings: FloatArray,
-    profile: Profile,
+    profile: AudioProfile,
     seed: int,
     folder: Path,
     report: Report,
@@ -96,13 +96,13 @@ def author_audio(
 
 
 def _made(
-    modes: Modes, split: Split, profile: Profile, seed: int, folder: Path, report: Report, threads: int
+    modes: Modes, split: Split, profile: AudioProfile, seed: int, folder: Path, report: Report, threads: int
 ) -> tuple[ModelProto, dict[str, str | float | int | bool | None]]:
     spec = profile.network
     if isinstance(spec, PerceptronSpec):
         return _perceptrons(modes, split, spec, seed, folder, report, threads)
     report("fitting waves", 0.0)
-    nodes = Samples(modes.points[split.trained], modes.shapes[split.trained])
+    nodes = SoundSamples(modes.points[split.trained], modes.shapes[split.trained])
     number = wave_number(modes)
     fitted = fit_enough_waves(nodes, np.arange(len(nodes.points)), number, spec, seed)
     return waves_graph(fitted.network), {
@@ -121,10 +121,10 @@ def _perceptrons(
     # Heavy, and only here: waves are made without it.
     import torch
 
-    from harness.authoring.audio.mlp import Training
+    from harness.authoring.audio.mlp import AudioTraining
 
     torch.set_num_threads(threads)
-    training = Training(spec, modes, split.trained, seed)
+    training = AudioTraining(spec, modes, split.trained, seed)
     train(training, spec.epochs, folder / CHECKPOINT, report)
     trained = training.finish()
     graph = audio_graph(trained.branches, trained.normaliser, trained.scales, trained.encoding)

@@ -36,7 +36,7 @@ class Split:
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class SoundSamples:
     """Places on a surface and the shapes there.
 
     Attributes:
@@ -139,7 +139,7 @@ def wave_number(modes: Modes) -> float:
     return float(np.quantile(np.sqrt(slopes[moving] / levels[moving]), 0.95))
 
 
-def between_nodes(modes: Modes, allowed: BoolArray, each: int, seed: int) -> Samples:
+def between_nodes(modes: Modes, allowed: BoolArray, each: int, seed: int) -> SoundSamples:
     """Random places between nodes, with the shapes that the elements give there.
 
     Quadratic in each face of a ten-node cell where ``modes`` lists them as ``harness.sim.modal.modal`` does,
@@ -159,7 +159,7 @@ def between_nodes(modes: Modes, allowed: BoolArray, each: int, seed: int) -> Sam
     shapes = np.zeros((len(faces), *modes.shapes.shape[1:]))
     for node in range(faces.shape[1]):
         shapes += weights[:, node, None, None] * modes.shapes[faces[:, node]]
-    return Samples(points, shapes)
+    return SoundSamples(points, shapes)
 
 
 def _elements(faces: IntArray) -> tuple[IntArray, bool]:

@@ -74,7 +74,7 @@ class Perceptrons(nn.Module):
             yield [layer for layer in branch if isinstance(layer, nn.Linear)]
 
 
-class Training:
+class AudioTraining:
     """A training that can stop after any epoch and go on from its checkpoint, bit for bit.
 
     Nothing random has a state: the order of an epoch and its places between nodes are drawn from the

@@ -52,7 +52,7 @@ class PerceptronSpec:
 
 
 @dataclass(frozen=True)
-class Profile:
+class AudioProfile:
     """One trade of time for accuracy.
 
     Attributes:
@@ -66,17 +66,17 @@ class Profile:
 
 _SMALL = PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epochs=300)
 
-PROFILES: Mapping[str, Profile] = MappingProxyType({
-    "smoke": Profile(WavesSpec(768, (1.0,)), sounds=8),
-    "standard": Profile(WavesSpec(1536, widest=3072), sounds=40),
-    "small": Profile(_SMALL, sounds=40),
-    "paper": Profile(PerceptronSpec(epochs=120), sounds=40),
+PROFILES: Mapping[str, AudioProfile] = MappingProxyType({
+    "smoke": AudioProfile(WavesSpec(768, (1.0,)), sounds=8),
+    "standard": AudioProfile(WavesSpec(1536, widest=3072), sounds=40),
+    "small": AudioProfile(_SMALL, sounds=40),
+    "paper": AudioProfile(PerceptronSpec(epochs=120), sounds=40),
 })  # fmt: skip
 """``smoke`` and ``standard`` need no torch; ``paper`` is the network of ObjectFolder 2.0, ``small`` one
 trunk for all three directions."""
 
 
-def profile(name: str) -> Profile:
+def profile(name: str) -> AudioProfile:
     """The profile of that name.
 
     Raises:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.authoring.audio.data import Samples
+from harness.authoring.audio.data import SoundSamples
 from harness.authoring.audio.profiles import WavesSpec
 from harness.authoring.audio.readout import Readout, error_shares, solve_readout
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
@@ -72,7 +72,12 @@ class FittedWaves:
 
 
 def fit_waves(
-    samples: Samples, measured: IntArray, number: float, width: int, seed: int, reaches: tuple[float, ...]
+    samples: SoundSamples,
+    measured: IntArray,
+    number: float,
+    width: int,
+    seed: int,
+    reaches: tuple[float, ...],
 ) -> FittedWaves:
     """The network of the reach that predicts best what it was not shown.
 
@@ -98,7 +103,7 @@ def fit_waves(
 
 
 def fit_enough_waves(
-    samples: Samples, measured: IntArray, number: float, spec: WavesSpec, seed: int
+    samples: SoundSamples, measured: IntArray, number: float, spec: WavesSpec, seed: int
 ) -> FittedWaves:
     """As ``fit_waves``; with twice the waves while the error foretold is above ``ENOUGH``.
 

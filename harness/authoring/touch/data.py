@@ -93,7 +93,7 @@ def smooth_normals(mesh: Mesh, points: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class ReferenceMaps:
+class SimulatedMaps:
     """What the reference simulator gives.
 
     Attributes:
@@ -107,7 +107,7 @@ class ReferenceMaps:
 
 def reference_maps(
     raster: RasterMesh, presses: Presses, sensor: TactileSensor, skirt: GelSkirt
-) -> ReferenceMaps:
+) -> SimulatedMaps:
     """The maps of presses by rasteriser and skirt, the reference level of touch.
 
     Raises:
@@ -122,4 +122,4 @@ def reference_maps(
         gap = height_maps(raster, inverse(presses[part].object_from_gel), sensor)
         held, beyond = over_range(penetration(gap, sensor), sensor)
         maps[part], possible[part] = deform(held, skirt), beyond <= _IN_THE_WAY * sensor.gel_thickness
-    return ReferenceMaps(maps, possible)
+    return SimulatedMaps(maps, possible)

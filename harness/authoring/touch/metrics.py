@@ -45,7 +45,7 @@ def psnr(found: AnyArray, reference: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MapErrors:
     """Maps of one kind of press against the reference.
 
     Attributes:
@@ -97,18 +97,18 @@ class PressBench:
     nodes: SurfaceNodes
     most_off: float
 
-    def at_nodes(self, maps: Maps, count: int, seed: int) -> Measured:
+    def at_nodes(self, maps: Maps, count: int, seed: int) -> MapErrors:
         """Poses that were never shown, at trained places."""
         random = np.random.default_rng([seed, 8])
         chosen = np.sort(random.permutation(len(self.nodes))[:count])
         return self.measure(maps, draw_presses(self.mesh, self.nodes.points[chosen], seed + 1))
 
-    def between_nodes(self, maps: Maps, count: int, seed: int) -> Measured:
+    def between_nodes(self, maps: Maps, count: int, seed: int) -> MapErrors:
         """Poses that were never shown, at places of the surface that were never shown."""
         points = SurfaceSearch(self.mesh).spread(count, seed + _OTHER_PLACES)[0]
         return self.measure(maps, draw_presses(self.mesh, points, seed + 2))
 
-    def measure(self, maps: Maps, presses: Presses) -> Measured:
+    def measure(self, maps: Maps, presses: Presses) -> MapErrors:
         """Maps of presses against the reference; presses with a part of the object in the way are left out.
 
         So are those whose place cannot be seen from straight outside: no gel gets there.
@@ -129,6 +129,6 @@ class PressBench:
             *(np.zeros(len(presses)), np.zeros(len(presses)), presses.yaws),
         )
         beside = reference_maps(self.raster, neighbours, self.sensor, self.skirt).maps
-        return Measured(
+        return MapErrors(
             presses, asked, psnr(found, truth), psnr(beside, truth), psnr(np.zeros_like(truth), truth)
         )

@@ -94,7 +94,7 @@ class Perceptron(nn.Module):
         return MlpWeights(tuple(arrays), (self._skip,) if self._skip else ())
 
 
-class Training:
+class TouchTraining:
     """A training that can stop after any epoch and go on from its checkpoint, bit for bit.
 
     Nothing random has a state: the pixels of an epoch are drawn from the seed and the epoch's number.

@@ -166,11 +166,11 @@ def _trained(
     # Heavy, and only here: codes are made without it.
     import torch
 
-    from harness.authoring.touch.mlp import Training, learned_from
+    from harness.authoring.touch.mlp import TouchTraining, learned_from
 
     torch.set_num_threads(threads)
     report("simulating presses", 0.0)
-    training = Training(spec, learned_from(bench, spec.presses, seed), seed)
+    training = TouchTraining(spec, learned_from(bench, spec.presses, seed), seed)
     train(training, spec.epochs, folder / CHECKPOINT, report)
     settings: Settings = {f"perceptron_{key}": value for key, value in asdict(spec).items()}
     return training.finish(), settings | {"perceptron_last_loss": training.losses[-1]}

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from harness.authoring.training import Report
-from harness.authoring.vision.data import HeldOut
+from harness.authoring.vision.data import HeldOutViews
 from harness.authoring.vision.metrics import network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision.trades import Networks, Trade, Variation, every_sample, in_bits, kept_bytes
 from harness.objectfile.vision.network.graph import vision_graph
@@ -86,13 +86,13 @@ class Views:
     """
 
     lit: LitObject
-    held_out: HeldOut
+    held_out: HeldOutViews
     samples: int = 4
 
-    def of_side(self, side: int) -> HeldOut:
+    def of_side(self, side: int) -> HeldOutViews:
         """The same cameras with so many pixels a side."""
         kept = self.held_out
-        return HeldOut(tuple(each.resized(side, side) for each in kept.cameras), kept.lights, kept.apart)
+        return HeldOutViews(tuple(each.resized(side, side) for each in kept.cameras), kept.lights, kept.apart)
 
     def exact(self, side: int) -> list[LinearImage]:
         """Exact pictures of so many pixels a side."""
@@ -125,7 +125,7 @@ class CostRequest:
             self._opened[networks] = VisionRenderer(data, self.lit.appearance.mesh, self.threads)
         return self._opened[networks]
 
-    def picture(self, way: Variation, view: int, held_out: HeldOut) -> Rendered:
+    def picture(self, way: Variation, view: int, held_out: HeldOutViews) -> Rendered:
         """One picture, in the pixels of ``held_out``."""
         renderer = self.renderer(way.networks)
         return renderer.render(held_out.cameras[view], held_out.lights[view], way.settings)
@@ -171,7 +171,7 @@ class _Sight:
     _many: dict[tuple[Networks, RenderSettings], list[LinearImage]] = field(default_factory=dict)
 
     @cached_property
-    def held_out(self) -> HeldOut:
+    def held_out(self) -> HeldOutViews:
         return self.views.of_side(self.side)
 
     @cached_property
@@ -199,7 +199,7 @@ def _worth(way: Variation, asked: CostRequest, sight: _Sight) -> Worth:
     )
 
 
-def _seconds(way: Variation, asked: CostRequest, held_out: HeldOut) -> tuple[float, float]:
+def _seconds(way: Variation, asked: CostRequest, held_out: HeldOutViews) -> tuple[float, float]:
     """On the clock and of CPU time, of one picture in the mean of all views."""
     clocks: tuple[Callable[[], float], ...] = (time.perf_counter, time.process_time)
     begun = [clock() for clock in clocks]

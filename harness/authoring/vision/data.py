@@ -2,8 +2,8 @@
 
 All of it is the direct level's, without noise. Places are as dense on the surface as pixels of pictures
 taken from everywhere far away would be; nothing is drawn for what no camera outside can see. What is kept
-back for judging, ``HeldOut``, is never drawn: neither a light within an angle of one kept back, nor a place
-seen within that angle of how a camera kept back sees it.
+back for judging, ``HeldOutViews``, is never drawn: neither a light within an angle of one kept back, nor a
+place seen within that angle of how a camera kept back sees it.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ LEAST_YIELD = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class HeldOut:
+class HeldOutViews:
     """Cameras and lights that only judge.
 
     Attributes:
@@ -96,7 +96,7 @@ class Tuples:
 
 def held_out_pictures(
     mesh: Mesh, count: int, width: int, height: int, seed: int, distance: float = 2.0, apart: float = APART
-) -> HeldOut:
+) -> HeldOutViews:
     """Cameras all around an object, each with a light of its own.
 
     Args:
@@ -106,7 +106,7 @@ def held_out_pictures(
         height: rows of pixels.
         seed: of the cameras and the lights.
         distance: of the cameras, in diagonals of the object's box; more than a half.
-        apart: rad, as of ``HeldOut``.
+        apart: rad, as of ``HeldOutViews``.
 
     Raises:
         WrongUse: no picture, or a camera inside the object's box.
@@ -119,7 +119,7 @@ def held_out_pictures(
     random = np.random.default_rng([seed, 71])
     cameras = tuple(around(mesh, way, width, height, distance) for way in sphere(count, random))
     lights = tuple(DirectionalLight(way) for way in _facing(cameras, mesh, random))
-    return HeldOut(cameras, lights, apart)
+    return HeldOutViews(cameras, lights, apart)
 
 
 def around(mesh: Mesh, way: FloatArray, width: int, height: int, distance: float) -> Pinhole:
@@ -143,7 +143,7 @@ def around(mesh: Mesh, way: FloatArray, width: int, height: int, distance: float
 
 
 def draw_views(
-    mesh: Mesh, count: int, width: int, height: int, seed: int, held_out: HeldOut, distance: float = 2.0
+    mesh: Mesh, count: int, width: int, height: int, seed: int, held_out: HeldOutViews, distance: float = 2.0
 ) -> tuple[tuple[Pinhole, DirectionalLight], ...]:
     """Cameras and lights of pictures to learn from, clear of those kept back.
 
@@ -171,7 +171,7 @@ def draw_views(
     )
 
 
-def draw_tuples(lit: LitObject, count: int, seed: int, held_out: HeldOut) -> Tuples:
+def draw_tuples(lit: LitObject, count: int, seed: int, held_out: HeldOutViews) -> Tuples:
     """So many tuples; the same seed gives the same, and the first of more are those of fewer.
 
     Views are drawn with the cosine to the face, as pixels are that look at it from everywhere; those that
@@ -205,7 +205,7 @@ def draw_tuples(lit: LitObject, count: int, seed: int, held_out: HeldOut) -> Tup
     )
 
 
-def _chunk(lit: LitObject, random: np.random.Generator, held_out: HeldOut, both: bool) -> Tuples:
+def _chunk(lit: LitObject, random: np.random.Generator, held_out: HeldOutViews, both: bool) -> Tuples:
     mesh, size = lit.appearance.mesh, lit.appearance.mesh.diagonal
     faces, weights = surface_places(mesh, _CHUNK, random)
     side = np.where(random.random(_CHUNK) < 0.5, -1.0, 1.0) if both else np.ones(_CHUNK)

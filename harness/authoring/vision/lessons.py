@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from harness.authoring.vision.data import FACING, LEAST_YIELD, HeldOut
+from harness.authoring.vision.data import FACING, LEAST_YIELD, HeldOutViews
 from harness.authoring.vision.places import cosine_about, is_closed, sphere, surface_places, uniform_about
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import OutOfDomain
@@ -71,7 +71,7 @@ class Lessons:
 
 
 def draw_for(
-    kind: Kind, lit: LitObject, count: int, voxel: float, seed: int, held_out: HeldOut
+    kind: Kind, lit: LitObject, count: int, voxel: float, seed: int, held_out: HeldOutViews
 ) -> tuple[Lessons, AnyArray]:
     """Lessons of so many places for networks of a kind, and the ``(m, 3)`` lamps that they are lit by anew.
 
@@ -84,7 +84,7 @@ def draw_for(
 
 
 def draw_lessons(
-    lit: LitObject, count: int, voxel: float, seed: int, held_out: HeldOut, lamps: int = 0
+    lit: LitObject, count: int, voxel: float, seed: int, held_out: HeldOutViews, lamps: int = 0
 ) -> Lessons:
     """So many places, as dense as pixels of pictures from everywhere far away.
 
@@ -115,7 +115,7 @@ def draw_lessons(
     return Lessons(*(np.concatenate([part.__dict__[name] for part in parts])[:count] for name in names))
 
 
-def draw_lamps(count: int, seed: int, held_out: HeldOut) -> AnyArray:
+def draw_lamps(count: int, seed: int, held_out: HeldOutViews) -> AnyArray:
     """``(count, 3)`` float32 unit directions: neither one of them nor its opposite is near one kept back.
 
     Raises:
@@ -135,7 +135,7 @@ def draw_lamps(count: int, seed: int, held_out: HeldOut) -> AnyArray:
 
 
 def _chunk(
-    lit: LitObject, voxel: float, random: np.random.Generator, held_out: HeldOut, both: bool, lamps: int
+    lit: LitObject, voxel: float, random: np.random.Generator, held_out: HeldOutViews, both: bool, lamps: int
 ) -> Lessons:
     faces, weights, points, views = _looked_at(lit.appearance.mesh, random, both)
     offsets = _offsets(random)
@@ -161,7 +161,7 @@ def _lit(
     places: Places,
     lessons: Lessons,
     random: np.random.Generator,
-    held_out: HeldOut,
+    held_out: HeldOutViews,
     lamps: int,
 ) -> Lessons:
     """Each place so many times, under a lamp of its own each time; those near one kept back are left out."""

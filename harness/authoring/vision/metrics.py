@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from harness.authoring.vision.data import HeldOut
+from harness.authoring.vision.data import HeldOutViews
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.settings import RenderSettings
 from harness.picture.image_metrics import psnr, ssim
@@ -16,7 +16,7 @@ BEHIND = 1.0
 """White, as ObjectFolder's pictures have it."""
 
 
-def reference_pictures(lit: LitObject, held_out: HeldOut, samples: int) -> list[LinearImage]:
+def reference_pictures(lit: LitObject, held_out: HeldOutViews, samples: int) -> list[LinearImage]:
     """Exact ones, anti-aliased.
 
     Args:
@@ -28,7 +28,7 @@ def reference_pictures(lit: LitObject, held_out: HeldOut, samples: int) -> list[
 
 
 def network_pictures(
-    renderer: VisionRenderer, held_out: HeldOut, settings: RenderSettings | None = None
+    renderer: VisionRenderer, held_out: HeldOutViews, settings: RenderSettings | None = None
 ) -> list[LinearImage]:
     """The same from networks.
 
@@ -40,7 +40,7 @@ def network_pictures(
     return [renderer.render(camera, light, settings).image for camera, light in _kept(held_out)]
 
 
-def _kept(held_out: HeldOut) -> "zip[tuple[Pinhole, DirectionalLight]]":
+def _kept(held_out: HeldOutViews) -> "zip[tuple[Pinhole, DirectionalLight]]":
     return zip(held_out.cameras, held_out.lights, strict=True)
 
 

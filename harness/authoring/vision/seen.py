@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from harness.authoring.training import Report
-from harness.authoring.vision.data import HeldOut, draw_views
+from harness.authoring.vision.data import HeldOutViews, draw_views
 from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.cores import own_cores
@@ -72,7 +72,7 @@ def pictures_to_learn(
     lit: LitObject,
     wanted: CellsFinish,
     seed: int,
-    held_out: HeldOut,
+    held_out: HeldOutViews,
     report: Report,
     threads: int | None = None,
 ) -> list[Exact]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from harness.authoring.training import Laps, Report, train
 from harness.authoring.vision.cells import CellTraining
-from harness.authoring.vision.data import HeldOut, held_out_pictures
+from harness.authoring.vision.data import HeldOutViews, held_out_pictures
 from harness.authoring.vision.finish import CellFinishing
 from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.authoring.vision.lessons import OPAQUE, draw_for
@@ -122,7 +122,7 @@ def _asked(profile: VisionProfile) -> list[tuple[CellsSpec, str, str]]:
 
 def networks_alone(
     lit: LitObject,
-    held_out: HeldOut,
+    held_out: HeldOutViews,
     spec: CellsSpec,
     seed: int,
     checkpoint: Path,
@@ -144,7 +144,7 @@ def networks_alone(
 
 
 def cells_to_train(
-    lit: LitObject, held_out: HeldOut, spec: CellsSpec, seed: int, threads: int | None = None
+    lit: LitObject, held_out: HeldOutViews, spec: CellsSpec, seed: int, threads: int | None = None
 ) -> CellTraining:
     """An object's networks with what they are to learn, not trained yet.
 
@@ -167,7 +167,7 @@ class _Making:
     """What all networks of an object have in common; names of their times and errors begin with a word."""
 
     lit: LitObject
-    held_out: HeldOut
+    held_out: HeldOutViews
     seed: int
     report: Report
     threads: int | None

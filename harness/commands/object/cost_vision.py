@@ -11,7 +11,13 @@ import typer
 from harness.basics.whole_file import write_text_whole
 from harness.commands import options
 from harness.commands.object import vision_options
-from harness.commands.object.cost_vision_answer import Measured, as_json, draw, load_of_others, print_answer
+from harness.commands.object.cost_vision_answer import (
+    MeasuredCurves,
+    as_json,
+    draw,
+    load_of_others,
+    print_answer,
+)
 from harness.commands.output import emit, share_progress, warn
 
 if TYPE_CHECKING:
@@ -86,7 +92,9 @@ class _Asking:
     threads: int | None
 
 
-def _measured(chosen: "tuple[Trade, ...]", sight: "Views", asking: _Asking, report: "Report") -> Measured:
+def _measured(
+    chosen: "tuple[Trade, ...]", sight: "Views", asking: _Asking, report: "Report"
+) -> MeasuredCurves:
     from harness.authoring.vision.cost import CostRequest, measured, networks_of
     from harness.authoring.vision.cost_networks import trained
 
@@ -100,7 +108,7 @@ def _measured(chosen: "tuple[Trade, ...]", sight: "Views", asking: _Asking, repo
     asked, ways = CostRequest(models, sight.lit, asking.threads), [each.way for each in chosen]
     costs = measured(ways, asked, sight, asking.repeat, report)
     seconds["pictures"] = time.perf_counter() - begun
-    return Measured(chosen, costs, asked.threads, asking.repeat, before, seconds)
+    return MeasuredCurves(chosen, costs, asked.threads, asking.repeat, before, seconds)
 
 
 def _chosen(spec: "CellsSpec", size: int, knobs: list[str] | None) -> "tuple[Trade, ...]":

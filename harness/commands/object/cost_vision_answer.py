@@ -24,7 +24,7 @@ _BITS = "weights, bits"
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredCurves:
     """Curves and how they came about.
 
     Attributes:
@@ -66,7 +66,7 @@ def load_of_others() -> float | None:
     return max(os.getloadavg()[0] - 1.0, 0.0) if hasattr(os, "getloadavg") else None
 
 
-def draw(found: Measured, mesh: str, out: Path) -> Path:
+def draw(found: MeasuredCurves, mesh: str, out: Path) -> Path:
     """Write the picture of all curves."""
     from harness.report.figures.figures import Album
     from harness.report.figures.vision_cost import vision_cost_figure
@@ -76,18 +76,20 @@ def draw(found: Measured, mesh: str, out: Path) -> Path:
     return out / Album(out).drawing("curve", vision_cost_figure(panels, title)).file
 
 
-def _panel(found: Measured, knob: str) -> Any:
-    from harness.report.figures.vision_cost import Mark, Panel
+def _panel(found: MeasuredCurves, knob: str) -> Any:
+    from harness.report.figures.vision_cost import LevelMark, Panel
 
     def cost(of: "Cost") -> float:
         return of.worth.weight_bytes / 1e6 if knob == _BITS else 1e3 * of.cpu.middle
 
     rows = [(each.level, found.costs[each.way]) for each in found.trades if each.knob == knob]
-    marks = [Mark(level, cost(of), of.worth.exact["psnr_db"], of.worth.many["psnr_db"]) for level, of in rows]
+    marks = [
+        LevelMark(level, cost(of), of.worth.exact["psnr_db"], of.worth.many["psnr_db"]) for level, of in rows
+    ]
     return Panel(knob, "MB of weights" if knob == _BITS else "ms of CPU time a picture", tuple(marks))
 
 
-def as_json(found: Measured, mesh: str, profile: str, seed: int, picture: Path) -> dict[str, Any]:
+def as_json(found: MeasuredCurves, mesh: str, profile: str, seed: int, picture: Path) -> dict[str, Any]:
     """As scripts read it; the decibels of equal pictures are null."""
     from harness.cost.provenance import code, machine
 
@@ -134,7 +136,7 @@ def _finite(errors: Mapping[str, float]) -> dict[str, float | None]:
     return {name: value if math.isfinite(value) else None for name, value in errors.items()}
 
 
-def print_answer(found: Measured, picture: Path) -> None:
+def print_answer(found: MeasuredCurves, picture: Path) -> None:
     """For people: a table of every knob."""
     drawn = Table(title=f"{_threads(found)}, {found.repeat} times each; load before {_said(found.load)}")
     for heading in (
@@ -161,7 +163,7 @@ def _cells(cost: "Cost") -> tuple[str, ...]:
     )
 
 
-def _threads(found: Measured) -> str:
+def _threads(found: MeasuredCurves) -> str:
     return "1 thread" if found.cores == 1 else f"{found.cores} threads"
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from harness.commands import options
-from harness.commands.object.render_answer import Rendered, as_json, draw, print_answer
+from harness.commands.object.render_answer import RenderedSound, as_json, draw, print_answer
 from harness.commands.output import emit
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def _rendered(
     duration: float,
     rate: float,
     distance: float | None,
-) -> Rendered:
+) -> RenderedSound:
     from harness.objectfile.audio.audio import open_audio
     from harness.objectfile.audio.strike import strike
     from harness.objectfile.file import ObjectFile
@@ -170,7 +170,7 @@ def _rendered(
     heard = {} if distance is None else {"radiation": time.perf_counter() - begun}
     made = strike(audio, place, blow, duration, rate, loudness)
     seconds = {"load": loaded, **heard, **made.seconds}
-    return Rendered(of, audio, place, blow, made, duration, distance, seconds)
+    return RenderedSound(of, audio, place, blow, made, duration, distance, seconds)
 
 
 def _level(text: str) -> "AudioLevel":

@@ -17,7 +17,7 @@ _LISTED = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Rendered:
+class RenderedSound:
     """A sound, and all that is said of it.
 
     Attributes:
@@ -41,7 +41,7 @@ class Rendered:
     seconds: dict[str, float]
 
 
-def draw(rendered: Rendered, path: Path) -> None:
+def draw(rendered: RenderedSound, path: Path) -> None:
     """Write the picture; it counts among the seconds."""
     from harness.objectfile.audio.strike import pushes
     from harness.report.figures.figures import Album
@@ -66,7 +66,7 @@ def draw(rendered: Rendered, path: Path) -> None:
     rendered.seconds["picture"] = time.perf_counter() - begun
 
 
-def _unit(rendered: Rendered) -> str:
+def _unit(rendered: RenderedSound) -> str:
     return "sqrt(kg) m/s" if rendered.distance is None else "Pa"
 
 
@@ -76,7 +76,7 @@ def _blow_said(blow: "HammerBlow") -> str:
     return f"at most {blow.pulse.peak:.3g} N over {1e3 * blow.pulse.duration:.3g} ms"
 
 
-def _title(rendered: Rendered) -> str:
+def _title(rendered: RenderedSound) -> str:
     description = rendered.of.description
     x, y, z = (round(1e3 * float(value), 1) + 0.0 for value in rendered.place.point)
     return (
@@ -85,7 +85,7 @@ def _title(rendered: Rendered) -> str:
     )
 
 
-def as_json(rendered: Rendered, out: Path, full_scale: float, picture: Path | None) -> dict[str, Any]:
+def as_json(rendered: RenderedSound, out: Path, full_scale: float, picture: Path | None) -> dict[str, Any]:
     """As scripts read it."""
     from harness.objectfile.audio.sound_wav import BITS
 
@@ -128,7 +128,7 @@ def as_json(rendered: Rendered, out: Path, full_scale: float, picture: Path | No
     }
 
 
-def print_answer(rendered: Rendered, out: Path, full_scale: float, picture: Path | None) -> None:
+def print_answer(rendered: RenderedSound, out: Path, full_scale: float, picture: Path | None) -> None:
     """For people."""
     import numpy as np
 

@@ -7,8 +7,11 @@ from typing import Annotated, Any
 import typer
 
 from harness.basics.errors import WrongUse
+from harness.bench.experiments import EXPERIMENTS
 from harness.commands import options
 from harness.commands.output import ANSWERS, CONSOLE, emit, resumable, step_progress, warn
+
+RUNNABLE = tuple(name for name, row in EXPERIMENTS.items() if row.value is not None)
 
 DEFAULT = "contact-localization"
 """Run where no experiment is named."""
@@ -37,7 +40,8 @@ class Yaw(StrEnum):
 
 def run(
     experiment: Annotated[
-        str | None, typer.Argument(help="What to run; contact-localization if left out.", metavar="NAME")
+        str | None,
+        typer.Argument(help=f"What to run: {', '.join(RUNNABLE)}; {DEFAULT} if left out.", metavar="NAME"),
     ] = None,
     station: options.StationOrOwn = None,
     scene: options.SceneOption = None,
@@ -84,7 +88,7 @@ def run(
     """
     from harness.bench.station_file import load_station, station_path
     from harness.commands.scenes import resolve
-    from harness.experiment.answer import finish
+    from harness.experiment.answer import add_report, finish, tell_answer
     from harness.experiment.begin import begin
     from harness.experiment.levels import chosen_levels
     from harness.experiment.lookup import experiment_of, named, require_of
@@ -129,9 +133,21 @@ def run(
         begun = begin(kind, wanted, bench, seed, gap, out)
         recording = begun.recording
         _describe(kind, begun, accuracy)
-    done = _perform(kind, recording, accuracy, json, early=target is None)
+    told: list[Any] = []
+
+    def conclude(done: Any) -> None:
+        if target is None:
+            tell = teller(kind, json)
+            folder, since = recording.folder, done.ended
+            told.append(tell_answer(kind, recording, accuracy, folder, done.answering, tell, None, since))
+
+    done = _perform(kind, recording, accuracy if target is None else None, json, conclude)
     if not done.complete:
         return _stopped(kind, recording, json)
+    if told:
+        health = done.health or None
+        show_report(add_report(kind, told[0], drawing(kind), health, recording.folder), json)
+        return 0
     more: dict[str, Any] = {}
     if target is not None:
         for doubt in _budgets(kind).doubts(recording, target):
@@ -225,8 +241,8 @@ def _stopped(kind: Any, recording: Any, as_json: bool) -> int:
     return 130
 
 
-def _perform(kind: Any, recording: Any, accuracy: Any, as_json: bool, early: bool) -> Any:
-    """What is left of the run; ``early`` takes the readings in on the way."""
+def _perform(kind: Any, recording: Any, accuracy: Any, as_json: bool, conclude: Any) -> Any:
+    """What is left of the run; with an accuracy, its readings are taken in on the way."""
     from harness.experiment.perform import Performed, perform_on_bench, steps_planned
 
     total = steps_planned(kind, recording)
@@ -236,7 +252,7 @@ def _perform(kind: Any, recording: Any, accuracy: Any, as_json: bool, early: boo
     how = f"touchstone run {kind.name} --resume {recording.folder}"
     with resumable(how), step_progress(recording.committed, total, kind.step) as progress:
         ask = None if as_json else _ask
-        return perform_on_bench(kind, recording, progress, ask, accuracy if early else None)
+        return perform_on_bench(kind, recording, progress, ask, accuracy, conclude=conclude)
 
 
 def _ask(what: str) -> None:

@@ -11,7 +11,7 @@ from harness.objectfile.vision.network.graph import graph_block, vision_model
 from harness.objectfile.vision.network.plain import Query, evaluate
 from harness.objectfile.vision.part import blocks_inside
 from harness.objectfile.vision.settings import RenderSettings
-from harness.objectfile.vision.threads import Crew, Room
+from harness.objectfile.vision.threads import Crew, Workspace
 from harness.objectfile.vision.view import camera_for, light_for, turned
 from harness.objectfile.vision.vision import open_vision, require_described
 from harness.objectfile.vision_entry import VisionEntry
@@ -81,7 +81,7 @@ def look_at_looks(of: ObjectFile) -> str:
     middle = vision.surface.bounds.mean(axis=0)
     for step in range(_VIEWS):
         view, light = turned(camera, light_for(camera), middle, 2.0 * np.pi * step / _VIEWS)
-        outline = mesh_outline(vision.surface, False, view, 3, Crew(1), Room())
+        outline = mesh_outline(vision.surface, False, view, 3, Crew(1), Workspace())
         covered = outline.pixels[outline.cover == outline.cover.max()]
         alpha = vision.picture(view, light, RenderSettings(level="onnx")).image.alpha
         medians.append(float(np.median(alpha.ravel()[covered])))

@@ -13,7 +13,7 @@ from harness.objectfile.vision.network.network import VisionModel
 from harness.objectfile.vision.samples import Asker, Samples, Scene
 from harness.objectfile.vision.settings import RenderSettings
 from harness.objectfile.vision.shell import Shell
-from harness.objectfile.vision.threads import Crew, Room
+from harness.objectfile.vision.threads import Crew, Workspace
 
 _LEAST = 256
 """Rays that another thread is asked to follow: fewer are followed sooner than it wakes."""
@@ -31,11 +31,11 @@ _FEW = 64
 _LAST = 4
 """Waves that they take at once."""
 
-Aim = Callable[[int, int, Room], None]
+Aim = Callable[[int, int, Workspace], None]
 """Fills in the rays from one to before another, with a room that arrays may be taken from."""
 
 
-class Watch:
+class PassTimes:
     """Seconds of parts that follow each other."""
 
     def __init__(self) -> None:
@@ -130,9 +130,9 @@ class Follower:
 
     def __init__(self, volume: Volume, crew: Crew) -> None:
         self._volume, self._crew = volume, crew
-        self._rooms = [Room() for _ in range(_BANDS * crew.threads)]
+        self._rooms = [Workspace() for _ in range(_BANDS * crew.threads)]
 
-    def follow(self, rays: Rays, aim: Aim, asker: Asker, chosen: RenderSettings, watch: Watch) -> int:
+    def follow(self, rays: Rays, aim: Aim, asker: Asker, chosen: RenderSettings, watch: PassTimes) -> int:
         """Fill in what rays see; the number of samples that were asked for is returned.
 
         Args:
@@ -147,7 +147,7 @@ class Follower:
         bands = self._crew.threads * (_BANDS if count >= _MANY else 1) if count >= 2 * _LEAST else 1
         bands = 1 if self._crew.threads == 1 else bands
         ends = np.linspace(0, count, bands + 1).astype(int).tolist()
-        totals, watches = [0] * bands, [Watch() for _ in range(bands)]
+        totals, watches = [0] * bands, [PassTimes() for _ in range(bands)]
 
         def work(first: int, last: int) -> None:
             for band in range(first, last):
@@ -162,7 +162,9 @@ class Follower:
         watch.split("follow", [each.seconds for each in watches])
         return sum(totals)
 
-    def _band(self, rays: Rays, asker: Asker, chosen: RenderSettings, watch: Watch, room: Room) -> int:
+    def _band(
+        self, rays: Rays, asker: Asker, chosen: RenderSettings, watch: PassTimes, room: Workspace
+    ) -> int:
         going, total, is_first = np.arange(len(rays.ways), dtype=np.int32), 0, True
         while len(going):
             wave = chosen.wave if len(going) > _FEW else _LAST * chosen.wave
@@ -198,7 +200,7 @@ class Follower:
             )
             rays.resume[going] = np.inf
 
-    def _sorted(self, samples: Samples, block: int, room: Room) -> tuple[AnyArray, AnyArray]:
+    def _sorted(self, samples: Samples, block: int, room: Workspace) -> tuple[AnyArray, AnyArray]:
         every = len(self._volume.model.grid)
         order = room.take("order", (len(samples.networks),), np.int32)
         blocks = room.take("blocks", (len(samples.networks) // block + every + 1, 3), np.int32)

@@ -17,12 +17,12 @@ from harness.objectfile.vision.coverage.outline import Outline, is_closed, mesh_
 from harness.objectfile.vision.network.fold import folded
 from harness.objectfile.vision.network.graph import FILE, graph_block, vision_model
 from harness.objectfile.vision.network.tensors import vision_tensors
-from harness.objectfile.vision.passes import Aim, Follower, Rays, Volume, Watch
+from harness.objectfile.vision.passes import Aim, Follower, PassTimes, Rays, Volume
 from harness.objectfile.vision.samples import Asker, FusedAsker, GraphAsker, Scene
 from harness.objectfile.vision.settings import Rendered, RenderSettings, VisionLevel
 from harness.objectfile.vision.shell import DEEP, PER_CELL, shell_for
 from harness.objectfile.vision.surface import SurfaceExtras
-from harness.objectfile.vision.threads import Crew, Room
+from harness.objectfile.vision.threads import Crew, Workspace
 from harness.picture.linear_image import LinearImage, binned
 from harness.picture.pinhole import DirectionalLight, Pinhole
 
@@ -55,7 +55,7 @@ class VisionRenderer:
         self.model = vision_model(data, name)
         self.shell = shell_for(mesh, self.model.grid, per_cell, deep)
         self._closed, self._contours = is_closed(mesh), Contours.of(mesh)
-        self._crew, self._room = Crew(threads), Room()
+        self._crew, self._room = Crew(threads), Workspace()
         self._follower = Follower(Volume(self.model, self.shell, per_cell), self._crew)
         extras = self.model.weights.size.extras
         self._extras = SurfaceExtras(mesh, extras, self._closed)
@@ -82,7 +82,7 @@ class VisionRenderer:
 
     def _one_ray(self, camera: Pinhole, light: DirectionalLight, chosen: RenderSettings) -> Rendered:
         """A picture of one ray a pixel."""
-        watch = Watch()
+        watch = PassTimes()
         asker = self._asker(chosen.level)
         watch.lap("open")
         outline = self._outline(camera, chosen)
@@ -115,7 +115,7 @@ class VisionRenderer:
         lit = self._extras.under(camera.eye, light.direction)
         rotation = np.ascontiguousarray(camera.object_from_camera[:3, :3])
 
-        def aimed(first: int, last: int, room: Room) -> None:
+        def aimed(first: int, last: int, room: Workspace) -> None:
             at = slice(first, last)
             places, drawn = outline.places[at], (ways[at], views[at], slant[at])
             aim(places, camera.focal_px, x, y, rotation, *drawn)

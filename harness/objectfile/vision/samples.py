@@ -12,7 +12,7 @@ from harness.objectfile.vision.network.kernels import ask_blocks
 from harness.objectfile.vision.network.network import VisionGrid
 from harness.objectfile.vision.network.tiles import SAMPLES
 from harness.objectfile.vision.query import fill_asked, take_answers
-from harness.objectfile.vision.threads import Room
+from harness.objectfile.vision.threads import Workspace
 
 _AT_ONCE = 48
 """Blocks in a run of the graph: what it computes between then stays in the second cache."""
@@ -45,7 +45,7 @@ class Samples:
     scattered: AnyArray
 
     @classmethod
-    def room_for(cls, rays: AnyArray, most: int, room: Room) -> "Samples":
+    def room_for(cls, rays: AnyArray, most: int, room: Workspace) -> "Samples":
         """Places for samples, not filled."""
         count = len(rays) * most
         flat = {

@@ -83,7 +83,7 @@ class Shell:
 
 
 @dataclass(frozen=True)
-class Lattice:
+class VoxelLattice:
     """Cubes around an object.
 
     Attributes:
@@ -110,7 +110,7 @@ class Lattice:
         return self.cell / self.per_cell
 
 
-def lattice_of(mesh: Mesh, cells: int = CELLS, per_cell: int = PER_CELL) -> Lattice:
+def lattice_of(mesh: Mesh, cells: int = CELLS, per_cell: int = PER_CELL) -> VoxelLattice:
     """The cubes around a surface.
 
     Args:
@@ -133,10 +133,10 @@ def lattice_of(mesh: Mesh, cells: int = CELLS, per_cell: int = PER_CELL) -> Latt
     cell = longest * BOX / cells
     sides = np.maximum(np.ceil((high - low) / cell + 2.0 * _MARGIN), 1.0).astype(np.int64)
     x, y, z = (0.5 * (low + high) - 0.5 * cell * sides).tolist()
-    return Lattice((x, y, z), cell, (int(sides[0]), int(sides[1]), int(sides[2])), per_cell)
+    return VoxelLattice((x, y, z), cell, (int(sides[0]), int(sides[1]), int(sides[2])), per_cell)
 
 
-def surface_shell(mesh: Mesh, lattice: Lattice, deep: float = DEEP) -> Shell:
+def surface_shell(mesh: Mesh, lattice: VoxelLattice, deep: float = DEEP) -> Shell:
     """The voxels that a surface touches, and those a little behind it.
 
     Args:
@@ -154,7 +154,7 @@ def surface_shell(mesh: Mesh, lattice: Lattice, deep: float = DEEP) -> Shell:
     return Shell(read_only(origin), voxel, read_only(words))
 
 
-def grid_of(shell: Shell, lattice: Lattice) -> VisionGrid:
+def grid_of(shell: Shell, lattice: VoxelLattice) -> VisionGrid:
     """A network for every cell that holds some of a shell."""
     return VisionGrid(shell.low, lattice.cell, shell.cells(lattice.per_cell))
 
@@ -167,7 +167,7 @@ def shell_for(mesh: Mesh, grid: VisionGrid, per_cell: int = PER_CELL, deep: floa
     """
     x, y, z = grid.low.tolist()
     i, j, k = grid.shape.tolist()
-    lattice = Lattice((x, y, z), grid.cell, (i, j, k), per_cell)
+    lattice = VoxelLattice((x, y, z), grid.cell, (i, j, k), per_cell)
     shell = surface_shell(mesh, lattice, deep)
     lost = np.count_nonzero(grid.table[tuple(shell.cells(per_cell).T)] < 0)
     outside = float(np.maximum(grid.low - mesh.bounds[0], mesh.bounds[1] - grid.high).max())

@@ -10,7 +10,7 @@ from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage.faces import FaceCubes
 from harness.objectfile.vision.light import LampGrid
 from harness.objectfile.vision.surface_inputs import Surface, tell
-from harness.objectfile.vision.threads import Room
+from harness.objectfile.vision.threads import Workspace
 from harness.sim.light.appearance import plain
 
 _EARLY = 0.25
@@ -37,7 +37,9 @@ class LitSurface:
     surface: Surface
     grid: LampGrid
 
-    def tell(self, ways: FloatArray, depth: FloatArray, likely: AnyArray, told: AnyArray, room: Room) -> None:
+    def tell(
+        self, ways: FloatArray, depth: FloatArray, likely: AnyArray, told: AnyArray, room: Workspace
+    ) -> None:
         """Fill in what is told of some rays: 1 where the light is seen, else 0; the unit normal that is seen.
 
         All four are 0 for a ray that meets nothing.

@@ -59,7 +59,7 @@ class Crew:
                 job.result()
 
 
-class Room:
+class Workspace:
     """Arrays by name, made once and used again while they are large enough."""
 
     def __init__(self) -> None:

@@ -50,7 +50,7 @@ def back_projected(camera: Pinhole, depth: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class CameraPicture:
     """What a camera sees, pixel by pixel.
 
     Attributes:
@@ -66,7 +66,7 @@ class View:
     face: IntArray
 
 
-def see(parts: tuple[BenchPart, ...], camera: Pinhole) -> View:
+def see(parts: tuple[BenchPart, ...], camera: Pinhole) -> CameraPicture:
     """Draw bodies into one depth buffer.
 
     Orthographic drawing of (x / z, y / z, -1 / z) is perspective drawing: that map keeps
@@ -86,7 +86,7 @@ def see(parts: tuple[BenchPart, ...], camera: Pinhole) -> View:
         nearer = distance < depth
         depth[nearer], owner[nearer] = distance[nearer], index
         face[nearer] = kept[image.face[nearer]]
-    return View(camera, depth, owner, face)
+    return CameraPicture(camera, depth, owner, face)
 
 
 def _warped(part: BenchPart, camera: Pinhole) -> tuple[Mesh, IntArray]:

@@ -10,7 +10,7 @@ from harness.basics.geometry import apply, inverse, transform
 from harness.basics.mesh import Mesh
 from harness.picture.pinhole import Pinhole
 from harness.report.data import BenchPart
-from harness.report.figures.camera import View, back_projected, see
+from harness.report.figures.camera import CameraPicture, back_projected, see
 from harness.sim.gel.height_map import RasterMesh, depth_image
 
 Paint = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
@@ -67,7 +67,9 @@ class Shot:
         return block_means(picture, _OVERSAMPLING)
 
 
-def _normals(view: View, parts: tuple[BenchPart, ...], points: FloatArray, filled: BoolArray) -> FloatArray:
+def _normals(
+    view: CameraPicture, parts: tuple[BenchPart, ...], points: FloatArray, filled: BoolArray
+) -> FloatArray:
     """``(n, 3)`` shading normals in the world, turned towards the eye."""
     normals = np.zeros((len(points), 3))
     owner, face = view.part[filled], view.face[filled]
@@ -175,7 +177,7 @@ def _lit(
     return lit / len(offsets)
 
 
-def _depth_cue(view: View) -> FloatArray:
+def _depth_cue(view: CameraPicture) -> FloatArray:
     """Darkens what lies close behind something else, and outlines (Luft et al., SIGGRAPH 2006)."""
     filled = view.part >= 0
     least, most = view.depth[filled].min(), view.depth[filled].max()

@@ -15,7 +15,7 @@ _COLUMNS, _WIDE, _HIGH = 4, 3.3, 2.7
 
 
 @dataclass(frozen=True)
-class Mark:
+class LevelMark:
     """One level of a knob.
 
     Attributes:
@@ -43,7 +43,7 @@ class Panel:
 
     knob: str
     unit: str
-    marks: tuple[Mark, ...]
+    marks: tuple[LevelMark, ...]
 
 
 def vision_cost_figure(panels: Sequence[Panel], title: str) -> Figure:

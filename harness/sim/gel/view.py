@@ -22,7 +22,7 @@ POOL = 4
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class ToolView:
     """The object seen along the tool, with the touch term at each place filled in on demand.
 
     Attributes:
@@ -50,7 +50,7 @@ class View:
 
 def view_along(
     raster: RasterMesh, samples: FloatArray, object_from_gel: FloatArray, pitch: float, sensor: TactileSensor
-) -> View:
+) -> ToolView:
     """The object as the gel would meet it, everywhere at once.
 
     Args:
@@ -70,19 +70,19 @@ def view_along(
     return _view_of(depth, object_from_gel, origin, pitch, sensor)
 
 
-def half_as_fine(view: View, sensor: TactileSensor) -> View:
+def half_as_fine(view: ToolView, sensor: TactileSensor) -> ToolView:
     """Every second pixel each way of a view."""
     return _view_of(view.depth[::2, ::2], view.object_from_view, view.origin, 2.0 * view.pitch, sensor)
 
 
 def _view_of(
     depth: FloatArray, object_from_gel: FloatArray, origin: FloatArray, pitch: float, sensor: TactileSensor
-) -> View:
+) -> ToolView:
     pooled = _pooled(depth)
     nearest = _front(pooled, pitch, sensor.window, _SLACK) - _SLACK
     farthest = _front(pooled, pitch, sensor.window, -_SLACK) + sensor.gel_thickness + _SLACK
     missing = np.full(depth.shape, np.nan)
-    return View(
+    return ToolView(
         read_only(object_from_gel.copy()),
         read_only(origin),
         pitch,

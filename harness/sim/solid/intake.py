@@ -13,7 +13,7 @@ from harness.basics.mesh import Mesh
 from harness.sim.solid.mesh_holes import fill_holes, join_bodies
 from harness.sim.solid.mesh_read import RawMesh, read_mesh
 from harness.sim.solid.mesh_repair import (
-    Surface,
+    RepairedSurface,
     boundary_edges,
     drop_collapsed,
     drop_duplicates,
@@ -157,9 +157,9 @@ def _check_arguments(units: str | None, scale: float, wall: float | None) -> Non
         )
 
 
-def _cleaned(raw: RawMesh, name: str) -> Surface:
+def _cleaned(raw: RawMesh, name: str) -> RepairedSurface:
     """Welded, without collapsed or repeated faces and specks; still in the file's unit."""
-    surface = Surface(raw.vertices, raw.faces)
+    surface = RepairedSurface(raw.vertices, raw.faces)
     surface.keep(np.ones(len(raw.faces), dtype=np.bool_))
     bad = int(np.count_nonzero(~np.isfinite(surface.vertices).all(axis=1)))
     if bad:
@@ -176,7 +176,7 @@ def _cleaned(raw: RawMesh, name: str) -> Surface:
     return surface
 
 
-def _check_surface(surface: Surface, name: str) -> None:
+def _check_surface(surface: RepairedSurface, name: str) -> None:
     area = float(surface.areas().sum())
     if len(surface.faces) < 4 or not area > 1e-13 * surface.size**2:
         raise MeshRefused(
@@ -185,7 +185,7 @@ def _check_surface(surface: Surface, name: str) -> None:
         )
 
 
-def _closed(surface: Surface) -> tuple[int, bool]:
+def _closed(surface: RepairedSurface) -> tuple[int, bool]:
     orient(surface)
     fill_holes(surface)
     pieces = join_bodies(surface)

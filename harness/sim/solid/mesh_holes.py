@@ -5,12 +5,12 @@ from manifold3d import Error, Manifold
 from manifold3d import Mesh as ManifoldMesh
 
 from harness.basics.arrays import FloatArray, IntArray
-from harness.sim.solid.mesh_repair import Surface, bodies, boundary_edges, is_watertight
+from harness.sim.solid.mesh_repair import RepairedSurface, bodies, boundary_edges, is_watertight
 
 _LARGEST_HOLE = 0.08
 
 
-def fill_holes(surface: Surface) -> None:
+def fill_holes(surface: RepairedSurface) -> None:
     """Close holes whose box is under 8 % of the size with a fan about their middle.
 
     Larger ones are mouths of vessels as often as damage: they stay.
@@ -35,7 +35,7 @@ def fill_holes(surface: Surface) -> None:
         surface.repairs.append(f"left {slits} slits without width")
 
 
-def join_bodies(surface: Surface) -> int:
+def join_bodies(surface: RepairedSurface) -> int:
     """Unite closed bodies that overlap, so that no face lies inside the material.
 
     Returns:

@@ -18,7 +18,7 @@ _FEW = 0.05
 
 
 @dataclass
-class Surface:
+class RepairedSurface:
     """Triangles under repair, and the list of what was done to them."""
 
     vertices: FloatArray
@@ -48,7 +48,7 @@ class Surface:
         return areas
 
 
-def weld(surface: Surface) -> None:
+def weld(surface: RepairedSurface) -> None:
     """Make one vertex of those closer than two millionths of the size: textures and STL split them."""
     places, index = np.unique(surface.vertices, axis=0, return_inverse=True)
     # One stray vertex must not decide what "close" means for all the others.
@@ -62,19 +62,19 @@ def weld(surface: Surface) -> None:
         surface.repairs.append(f"welded {before} vertices into {len(first)}")
 
 
-def drop_collapsed(surface: Surface) -> None:
+def drop_collapsed(surface: RepairedSurface) -> None:
     """Drop faces that name a vertex twice."""
     f = surface.faces
     sound = (f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])
     _drop(surface, sound, "collapsed faces")
 
 
-def drop_flat(surface: Surface) -> None:
+def drop_flat(surface: RepairedSurface) -> None:
     """Drop faces whose corners lie on one line; the slit they leave has no width."""
     _drop(surface, surface.areas() > _FLAT * surface.size**2, "faces without area")
 
 
-def drop_duplicates(surface: Surface) -> None:
+def drop_duplicates(surface: RepairedSurface) -> None:
     """Keep one face of those with the same three corners.
 
     A few pairs that face against each other are flaps that welding has pressed flat: both go.
@@ -99,7 +99,7 @@ def _parity(faces: IntArray) -> FloatArray:
     return np.where(rolled[:, 1] < rolled[:, 2], 1.0, -1.0)
 
 
-def drop_specks(surface: Surface) -> None:
+def drop_specks(surface: RepairedSurface) -> None:
     """Drop separate crumbs: small, nearly without area, and not the most of the surface."""
     body = bodies(surface)
     area = np.bincount(body, surface.areas())
@@ -110,7 +110,7 @@ def drop_specks(surface: Surface) -> None:
         surface.repairs.append(f"removed {int(speck.sum())} floating specks")
 
 
-def bodies(surface: Surface) -> IntArray:
+def bodies(surface: RepairedSurface) -> IntArray:
     """``(m,)`` which connected body each face belongs to."""
     f = surface.faces
     graph = _graph(np.vstack([f[:, :2], f[:, 1:]]), len(surface.vertices))
@@ -119,7 +119,7 @@ def bodies(surface: Surface) -> IntArray:
     return renumbered
 
 
-def orient(surface: Surface) -> None:
+def orient(surface: RepairedSurface) -> None:
     """Make neighbours agree, then turn every patch to face the room.
 
     A closed patch faces outward if its volume is positive, unless an odd number of other
@@ -162,7 +162,7 @@ def is_watertight(faces: IntArray) -> bool:
     return once and len(boundary_edges(faces)) == 0
 
 
-def _drop(surface: Surface, sound: BoolArray, what: str) -> None:
+def _drop(surface: RepairedSurface, sound: BoolArray, what: str) -> None:
     dropped = int(np.count_nonzero(~sound))
     if dropped:
         surface.keep(sound)
@@ -173,7 +173,7 @@ def _graph(pairs: IntArray, size: int) -> coo_array:
     return coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
 
 
-def _extent(surface: Surface, faces: BoolArray) -> float:
+def _extent(surface: RepairedSurface, faces: BoolArray) -> float:
     return float(np.ptp(surface.corners[faces].reshape(-1, 3), axis=0).max())
 
 
@@ -181,7 +181,7 @@ def _is_closed(faces: IntArray) -> bool:
     return len(boundary_edges(faces)) == 0
 
 
-def _consistent(surface: Surface) -> tuple[IntArray, BoolArray]:
+def _consistent(surface: RepairedSurface) -> tuple[IntArray, BoolArray]:
     """Patches joined over edges of exactly two faces, and the faces to flip so that they agree."""
     f = surface.faces
     count = len(f)
@@ -208,7 +208,7 @@ def _consistent(surface: Surface) -> tuple[IntArray, BoolArray]:
     return patch, flipped
 
 
-def _faces_room(surface: Surface, mine: BoolArray, closed: bool, others: list[BoolArray]) -> bool:
+def _faces_room(surface: RepairedSurface, mine: BoolArray, closed: bool, others: list[BoolArray]) -> bool:
     corners = surface.corners
     if not closed:
         return openness(np.flatnonzero(mine), corners) >= 0.0

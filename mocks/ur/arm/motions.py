@@ -43,7 +43,7 @@ class ArmBody(Protocol):
         """Command a pose on the present branch; a stop where no joints reach it."""
 
 
-class Motion(Protocol):
+class ArmMotion(Protocol):
     """One cycle at a time."""
 
     @property

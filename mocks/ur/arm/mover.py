@@ -6,7 +6,7 @@ from typing import Final
 
 from mocks.ur.arm import kinematics, poses
 from mocks.ur.arm.kinematics import ArmModel
-from mocks.ur.arm.motions import Motion, Twist
+from mocks.ur.arm.motions import ArmMotion, Twist
 from mocks.ur.arm.stops import StopJoints
 from mocks.ur.hooks import CYCLE, Matrix, Six
 
@@ -57,9 +57,9 @@ class Mover:
         self._flange_from_tcp = poses.IDENTITY
         self._tcp_from_flange = poses.IDENTITY
         self._base_from_tcp = self.base_from_flange
-        self._motion: Motion | None = None
+        self._motion: ArmMotion | None = None
         self._owner = 0
-        self._suspended: tuple[Motion, int] | None = None
+        self._suspended: tuple[ArmMotion, int] | None = None
         self._still = STEADY_CYCLES
 
     @property
@@ -93,7 +93,7 @@ class Mover:
         """The thread that moves the arm; 0 where none does, or where the controller stops it."""
         return max(self._owner, 0) if self._motion is not None else 0
 
-    def begin(self, motion: Motion, owner: int) -> None:
+    def begin(self, motion: ArmMotion, owner: int) -> None:
         """Take the arm over, from wherever it is and at whatever speed."""
         if self._motion is None:
             self.motions += 1
@@ -131,7 +131,7 @@ class Mover:
         self.moving_cycles += 1
         self.history.append(self.joints)
 
-    def finish(self, motion: Motion) -> None:
+    def finish(self, motion: ArmMotion) -> None:
         """A move has come to rest: its last step's mean speed is over."""
         if self._motion is motion:
             self._motion, self._owner = None, 0

@@ -21,7 +21,7 @@ class Function:
         defaults: of the parameters that have one.
     """
 
-    def __init__(self, source: syntax.Function, takes_time: bool) -> None:
+    def __init__(self, source: syntax.FunctionDefinition, takes_time: bool) -> None:
         self.source = source
         self.takes_time = takes_time
         self.names = [name for name, _ in source.parameters]

@@ -9,7 +9,7 @@ from mocks.ur.urscript.syntax import (
     Call,
     Evaluate,
     Expression,
-    Function,
+    FunctionDefinition,
     If,
     Index,
     Literal,
@@ -54,7 +54,7 @@ class _Parser:
     def __init__(self, words: list[Token]) -> None:
         self._words = words
         self._at = 0
-        self._functions: dict[str, Function] = {}
+        self._functions: dict[str, FunctionDefinition] = {}
 
     def program(self) -> Program:
         """The whole text."""
@@ -91,7 +91,7 @@ class _Parser:
         name, parameters = self._heading()
         body = self._block()
         self._take("end")
-        self._functions[name] = Function(name, parameters, body, word.text == "thread", word.line)
+        self._functions[name] = FunctionDefinition(name, parameters, body, word.text == "thread", word.line)
 
     def _block(self) -> Block:
         found: list[Statement] = []

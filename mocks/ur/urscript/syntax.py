@@ -131,7 +131,7 @@ Block = tuple[Statement, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Function:
+class FunctionDefinition:
     """``def`` or ``thread``; parameters with their defaults."""
 
     name: str
@@ -154,5 +154,5 @@ class Program:
 
     name: str
     body: Block
-    functions: dict[str, Function] = field(default_factory=dict)
+    functions: dict[str, FunctionDefinition] = field(default_factory=dict)
     secondary: bool = False

@@ -13,7 +13,7 @@ INT32: Final = 2**31
 LONGEST_STRING: Final = 10_000
 
 
-class Pose(list[float]):
+class PoseValue(list[float]):
     """Six numbers that name a place rather than joint angles."""
 
 
@@ -27,9 +27,9 @@ def make_list(*items: Any) -> list[Any]:
     return list(items)
 
 
-def make_pose(*items: Any) -> Pose:
+def make_pose(*items: Any) -> PoseValue:
     """``p[...]``."""
-    return Pose(number(item) for item in items)
+    return PoseValue(number(item) for item in items)
 
 
 def number(value: Any) -> float:
@@ -58,7 +58,7 @@ def truth(value: Any) -> bool:
 
 def show(value: Any) -> str:
     """As the log shows it, cut short."""
-    if isinstance(value, Pose):
+    if isinstance(value, PoseValue):
         return "p" + show(list(value))
     if isinstance(value, list):
         return "[" + ", ".join(show(item) for item in value[:8]) + "]"

@@ -43,7 +43,7 @@ from harness.sim.optics.tactile_calibration import shipped_calibration
 from harness.sim.solid.surface_measure import thin_wall
 from harness.sim.sound.modal_radiation import radiation
 from harness.skills.sites import Steps, plan_sites
-from mocks.world.sound import Instrument, WorldSound
+from mocks.world.sound import SoundingObject, WorldSound
 from mocks.world.world import NominalBench, World
 
 SPACING = 2.0e-3
@@ -113,7 +113,7 @@ def run_of(thing: Thing, true_modes: Modes, gap: Gap, seed: int, steps: Steps, c
         "gelsight_r15_world",
     )
     world = World(bench, gap, seed)
-    heard = Instrument(
+    heard = SoundingObject(
         true_modes, dampings(true_modes.frequencies, thing.material), radiation(true_modes, DISTANCE)
     )
     sound = WorldSound(world, heard, gap, seed, flange_from_tool, RATE)

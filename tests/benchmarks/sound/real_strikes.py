@@ -27,7 +27,7 @@ from harness.strikes.blow import measure_blow
 from harness.strikes.frequency_response import frequency_response
 from harness.strikes.modal_identification import Identified, IdentifiedMode, modes_of_decay, modes_of_response
 from harness.strikes.pole_fit import ComplexArray
-from harness.strikes.pole_search import Search
+from harness.strikes.pole_search import PoleSearch
 from tests.oracles.measured_beams import (
     HAMMER_RATE,
     RULER_STEP,
@@ -43,9 +43,9 @@ from tests.support.real_data import WHY_NOT, find_shared_data
 
 _Result = TypeVar("_Result")
 
-BEAM = Search(low=20.0)
-RULER = Search(low=20.0, high=800.0, misfit=0.2)
-STRUCK = Search(low=100.0, high=2800.0)
+BEAM = PoleSearch(low=20.0)
+RULER = PoleSearch(low=20.0, high=800.0, misfit=0.2)
+STRUCK = PoleSearch(low=100.0, high=2800.0)
 BEGUN = 40
 STRONG = -40.0
 PLACES = np.linspace(0.0, 1.0, 10)

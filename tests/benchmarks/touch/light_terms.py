@@ -12,7 +12,7 @@ from rich.table import Table
 
 from calibration.taxim import light_fit
 from calibration.taxim.held_out import FOLDS, WITHIN, decibels, teach
-from calibration.taxim.light_fit import Light, light_shades
+from calibration.taxim.light_fit import GelLight, light_shades
 from calibration.taxim.pack import PressPack
 from calibration.taxim.smooth_fit import changes, distance
 from harness.basics.arrays import FloatArray
@@ -65,7 +65,7 @@ def _by_radius(pack: PressPack, clean: FloatArray, centres: FloatArray, edge: fl
 
 
 def _scores(
-    pack: PressPack, clean: FloatArray, centres: FloatArray, light: Light, ball: float
+    pack: PressPack, clean: FloatArray, centres: FloatArray, light: GelLight, ball: float
 ) -> list[tuple[float, float]]:
     scores = []
     place = np.argwhere(np.ones(pack.shape, np.bool_))[::EVERY]

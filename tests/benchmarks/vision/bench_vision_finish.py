@@ -18,7 +18,7 @@ from rich.console import Console
 
 from harness.authoring.training import train
 from harness.authoring.vision.cells import CellTraining
-from harness.authoring.vision.data import HeldOut, held_out_pictures
+from harness.authoring.vision.data import HeldOutViews, held_out_pictures
 from harness.authoring.vision.finish import CellFinishing
 from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.authoring.vision.metrics import network_pictures, picture_errors, reference_pictures
@@ -89,7 +89,7 @@ def measure(name: str, given: argparse.Namespace) -> None:
 
 
 def taught(
-    lit: LitObject, held_out: HeldOut, name: str, given: argparse.Namespace
+    lit: LitObject, held_out: HeldOutViews, name: str, given: argparse.Namespace
 ) -> tuple[CellTraining, float]:
     """By the surface, to its end, as ``author_vision`` does; CPU seconds."""
     since = time.process_time()
@@ -111,7 +111,7 @@ def judged(
     word: str,
     model: VisionModel,
     lit: LitObject,
-    held_out: HeldOut,
+    held_out: HeldOutViews,
     exact: Sequence[LinearImage],
     took: str,
 ) -> None:

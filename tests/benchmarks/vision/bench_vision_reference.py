@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from harness.authoring.vision.data import HeldOut, around, draw_tuples, held_out_pictures
+from harness.authoring.vision.data import HeldOutViews, around, draw_tuples, held_out_pictures
 from harness.basics.arrays import ByteArray
 from harness.picture.image_file import write_png
 from harness.picture.image_metrics import psnr, ssim
@@ -133,7 +133,7 @@ def by_tuples(lit: LitObject, count: int) -> None:
     """How fast tuples are drawn, clear of twelve pictures and of none."""
     held_out = held_out_pictures(lit.appearance.mesh, 12, 256, 256, 0)
     draw_tuples(lit, 1, 0, held_out)
-    for kept in (HeldOut((), ()), held_out):
+    for kept in (HeldOutViews((), ()), held_out):
         begun, on_core = time.perf_counter(), time.process_time()
         drawn = draw_tuples(lit, count, 1, kept)
         wall, core = time.perf_counter() - begun, time.process_time() - on_core

@@ -27,7 +27,7 @@ from harness.objectfile.vision.network.network import SIZES
 from harness.objectfile.vision.network.tiles import LANES
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.settings import COVERS, RenderSettings, VisionLevel
-from harness.objectfile.vision.threads import Crew, Room
+from harness.objectfile.vision.threads import Crew, Workspace
 from harness.objects.household import build
 from harness.picture.image_file import write_png
 from harness.picture.pinhole import DirectionalLight, Pinhole
@@ -82,7 +82,7 @@ def errors(data: bytes, mesh: Mesh) -> None:
 
 def covered(mesh: Mesh, camera: Pinhole, side: int) -> FloatArray:
     """``(pixels,)`` share of each that the mesh covers."""
-    found, cover = mesh_outline(mesh, True, camera, side, Crew(1), Room()), np.zeros(camera.pixels)
+    found, cover = mesh_outline(mesh, True, camera, side, Crew(1), Workspace()), np.zeros(camera.pixels)
     cover[found.pixels] = found.cover
     return cover
 

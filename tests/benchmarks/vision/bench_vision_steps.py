@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from harness.authoring.vision.cells import CellTraining
-from harness.authoring.vision.data import HeldOut
+from harness.authoring.vision.data import HeldOutViews
 from harness.authoring.vision.lessons import OPAQUE, draw_for
 from harness.authoring.vision.profiles import vision_profile
 from harness.commands.output import ANSWERS
@@ -36,7 +36,7 @@ def main() -> None:
     lit = LitObject(appearance_of(given.mesh, "m"))
     lattice = lattice_of(lit.appearance.mesh, spec.cells)
     shell = surface_shell(lit.appearance.mesh, lattice)
-    lessons, lamps = draw_for(spec.size.kind, lit, spec.places, shell.voxel, 0, HeldOut((), ()))
+    lessons, lamps = draw_for(spec.size.kind, lit, spec.places, shell.voxel, 0, HeldOutViews((), ()))
     grid = grid_of(shell, lattice)
     middle = grid.cells[len(grid) // 2 :][:1]
     for steps in (1, *given.steps):

@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from rich.console import Console
 
-from harness.authoring.vision.data import HeldOut, draw_tuples, held_out_pictures
+from harness.authoring.vision.data import HeldOutViews, draw_tuples, held_out_pictures
 from harness.authoring.vision.metrics import BEHIND, network_pictures, picture_errors, reference_pictures
 from harness.authoring.vision.profiles import VisionProfile, vision_profile
 from harness.authoring.vision.vision import author_vision
@@ -28,7 +28,7 @@ from harness.objectfile.vision.network.network import VisionModel
 from harness.objectfile.vision.network.plain import Query, evaluate
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.settings import RenderSettings
-from harness.objectfile.vision.threads import Crew, Room
+from harness.objectfile.vision.threads import Crew, Workspace
 from harness.picture.image_file import write_png
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole
@@ -146,7 +146,7 @@ def by_ways(
 def one_ray(lit: LitObject, camera: Pinhole, light: DirectionalLight, side: int) -> LinearImage:
     """What networks without error would give: exact light where the renderer's outline asks for it."""
     mesh, (x, y) = lit.appearance.mesh, camera.centre_px
-    outline = mesh_outline(mesh, is_closed(mesh), camera, side, Crew(1), Room())
+    outline = mesh_outline(mesh, is_closed(mesh), camera, side, Crew(1), Workspace())
     across, down = (outline.places[:, k] - centre for k, centre in enumerate((x, y)))
     ways = np.stack([across, down, np.full(len(down), camera.focal_px)], axis=1).astype(np.float64)
     ways = ways / np.linalg.norm(ways, axis=1, keepdims=True) @ camera.object_from_camera[:3, :3].T
@@ -162,7 +162,7 @@ def one_ray(lit: LitObject, camera: Pinhole, light: DirectionalLight, side: int)
     return LinearImage(colour.reshape(*shape, 3), alpha.reshape(shape), np.full(shape, np.inf))
 
 
-def _pairs(held_out: HeldOut) -> list[tuple[Pinhole, DirectionalLight]]:
+def _pairs(held_out: HeldOutViews) -> list[tuple[Pinhole, DirectionalLight]]:
     return list(zip(held_out.cameras, held_out.lights, strict=True))
 
 
@@ -174,7 +174,7 @@ def difference(one: LinearImage, other: LinearImage) -> float:
 
 def across_borders(model: VisionModel, lit: LitObject) -> float:
     """Root mean square of what two neighbours differ by at their border, grey levels as shown; lit places."""
-    grid, told = model.grid, draw_tuples(lit, 200_000, 7, HeldOut((), ()))
+    grid, told = model.grid, draw_tuples(lit, 200_000, 7, HeldOutViews((), ()))
     scaled = (told.points - grid.low) / grid.cell
     away = np.abs(scaled - np.round(scaled))
     axis = np.argmin(away, axis=1)

@@ -7,7 +7,7 @@ import pytest
 
 from calibration.taxim.light_fit import (
     REACH,
-    Light,
+    GelLight,
     ball_profile,
     depth_of,
     fit_light,
@@ -53,14 +53,14 @@ def _drawn(skirt: GelSkirt, count: int = 20) -> tuple[PressPack, FloatArray, Flo
 
 
 @pytest.fixture(scope="module")
-def fitted() -> tuple[PressPack, FloatArray, FloatArray, Light]:
+def fitted() -> tuple[PressPack, FloatArray, FloatArray, GelLight]:
     pack, change, centres = _drawn(TRUE)
     some = np.arange(1, 20)
     light = fit_light(pack.of(some), change[some], centres[some], CONTACT, BALL)
     return pack, change, centres, light
 
 
-def test_the_skirt_is_found_again(fitted: tuple[PressPack, FloatArray, FloatArray, Light]) -> None:
+def test_the_skirt_is_found_again(fitted: tuple[PressPack, FloatArray, FloatArray, GelLight]) -> None:
     light = fitted[3]
     assert light.skirt.kernels[0] == pytest.approx(TRUE.kernels[0], rel=0.35)
     assert light.skirt.core == pytest.approx(TRUE.core, abs=0.051)
@@ -68,7 +68,7 @@ def test_the_skirt_is_found_again(fitted: tuple[PressPack, FloatArray, FloatArra
 
 
 def test_a_press_left_out_is_drawn_to_the_noise_over_the_whole_frame(
-    fitted: tuple[PressPack, FloatArray, FloatArray, Light],
+    fitted: tuple[PressPack, FloatArray, FloatArray, GelLight],
 ) -> None:
     pack, change, centres, light = fitted
     place = np.argwhere(np.ones(pack.shape, np.bool_))
@@ -81,7 +81,7 @@ def test_a_press_left_out_is_drawn_to_the_noise_over_the_whole_frame(
 
 
 def test_what_dims_a_flat_gel_is_found_at_its_apex(
-    fitted: tuple[PressPack, FloatArray, FloatArray, Light],
+    fitted: tuple[PressPack, FloatArray, FloatArray, GelLight],
 ) -> None:
     pack, _, _, light = fitted
     centre = np.array([60.0, 50.0])

@@ -8,7 +8,7 @@ from harness.basics.errors import DataRefused
 from harness.sim.sound.modal_sound import half_sine, ring
 from harness.strikes.frequency_response import FrequencyResponse, frequency_response
 from harness.strikes.modal_identification import modes_of_response
-from harness.strikes.pole_search import Search
+from harness.strikes.pole_search import PoleSearch
 
 RATE = 8000.0
 SAMPLES = 8000
@@ -79,7 +79,7 @@ def test_noise_of_the_cell_after_the_contact_is_left_out() -> None:
 @pytest.mark.parametrize("window", [0.0, 10.0])
 def test_modes_of_a_measured_response(window: float) -> None:
     measured = frequency_response(*blows(3, hiss=1e-4), RATE, decay=window)
-    search = Search(low=20.0, high=measured.band[1])
+    search = PoleSearch(low=20.0, high=measured.band[1])
     modes = modes_of_response(measured.frequencies, measured.h1, search, window).modes
     assert [mode.frequency for mode in modes] == pytest.approx(FREQUENCIES, abs=0.02)
     assert [mode.damping for mode in modes] == pytest.approx(DAMPINGS, rel=0.01)

@@ -10,8 +10,8 @@ from harness.basics.clipping import is_clipped
 from harness.basics.errors import DataRefused, WrongUse
 from harness.sim.sound.modal_sound import impulse_response
 from harness.strikes.modal_identification import Identified, modes_of_decay, modes_of_response
-from harness.strikes.pole_fit import ComplexArray, Lines, fit_poles
-from harness.strikes.pole_search import Search
+from harness.strikes.pole_fit import ComplexArray, SpectralLines, fit_poles
+from harness.strikes.pole_search import PoleSearch
 
 RATE = 4000.0
 SAMPLES = 2000
@@ -80,7 +80,7 @@ def test_channels_that_disagree_widen_what_is_stated() -> None:
     random = np.random.default_rng(4)
     centres = 200.0 + 0.2 * random.normal(size=10)
     signals = np.array([decay(np.array([f]), np.array([8.0]), random) for f in centres])
-    mode = modes_of_decay(signals, RATE, Search(misfit=0.2)).modes[0]
+    mode = modes_of_decay(signals, RATE, PoleSearch(misfit=0.2)).modes[0]
     assert mode.frequency == pytest.approx(200.0, abs=3.0 * mode.frequency_sigma)
     assert 0.5 < mode.frequency_sigma / (0.2 / np.sqrt(10.0)) < 2.0
 
@@ -92,7 +92,7 @@ def test_a_close_pair_is_two_modes(widths: float) -> None:
     pair = np.array([300.0, 300.0 + widths * bandwidth])
     random = np.random.default_rng(1)
     noisy = decay(pair, np.array([10.0, 10.0]), random) + 1e-3 * random.normal(size=SAMPLES)
-    got, lost = found(modes_of_decay(noisy, RATE, Search(misfit=1e-4)))
+    got, lost = found(modes_of_decay(noisy, RATE, PoleSearch(misfit=1e-4)))
     assert got == pytest.approx(pair, abs=0.02)
     assert lost == pytest.approx([10.0, 10.0], rel=0.02)
 
@@ -126,7 +126,7 @@ def test_a_record_that_ends_early_changes_nothing() -> None:
 def test_modes_out_of_the_band_leave_those_in_it_alone() -> None:
     random = np.random.default_rng(3)
     noisy = decay(FREQUENCIES, DAMPINGS, random) + 1e-3 * random.normal(size=SAMPLES)
-    identified = modes_of_decay(noisy, RATE, Search(low=250.0, high=400.0))
+    identified = modes_of_decay(noisy, RATE, PoleSearch(low=250.0, high=400.0))
     assert found(identified)[0] == pytest.approx([310.0, 317.0], abs=0.02)
 
 
@@ -140,7 +140,7 @@ def test_half_the_digits_give_the_same_modes() -> None:
 
 def test_no_more_modes_than_asked_for_and_said() -> None:
     random = np.random.default_rng(6)
-    identified = modes_of_decay(decay(FREQUENCIES, DAMPINGS, random), RATE, Search(most=2))
+    identified = modes_of_decay(decay(FREQUENCIES, DAMPINGS, random), RATE, PoleSearch(most=2))
     assert len(identified.modes) == 2
     assert identified.full
 
@@ -149,7 +149,7 @@ def test_a_clipped_channel_is_flagged_and_a_coarsely_counted_one_is_not() -> Non
     random = np.random.default_rng(7)
     signal = decay(FREQUENCIES, DAMPINGS, random)
     signals = np.array([signal, np.clip(signal, -0.4, 0.4), np.round(64.0 * signal) / 64.0])
-    assert modes_of_decay(signals, RATE, Search(most=4)).clipped.tolist() == [False, True, False]
+    assert modes_of_decay(signals, RATE, PoleSearch(most=4)).clipped.tolist() == [False, True, False]
     slow = np.cos(np.arange(4000) * 1e-3)
     assert not is_clipped(np.round(2048.0 * slow))
     assert is_clipped(np.clip(np.round(2048.0 * slow * np.cos(np.arange(4000.0))), -1000.0, 1000.0))
@@ -169,7 +169,7 @@ def test_poles_of_transfer_functions() -> None:
     frequencies = np.arange(401.0)
     random = np.random.default_rng(8)
     noise = random.normal(size=(3, 401)) + 1j * random.normal(size=(3, 401))
-    identified = modes_of_response(frequencies, accelerance(frequencies) + 1e-3 * noise, Search(low=5.0))
+    identified = modes_of_response(frequencies, accelerance(frequencies) + 1e-3 * noise, PoleSearch(low=5.0))
     assert found(identified)[0] == pytest.approx([52.0, 142.0, 278.0], abs=2e-3)
     assert [mode.ratio for mode in identified.modes] == pytest.approx([1e-3] * 3, rel=0.05)
 
@@ -191,7 +191,7 @@ def test_the_slopes_of_a_fit_are_those_of_its_residual(rate: float | None) -> No
     random = np.random.default_rng(9)
     frequencies = np.arange(1.0, 400.0)
     values = random.normal(size=(2, 399)) + 1j * random.normal(size=(2, 399))
-    problem = _Problem(Lines(frequencies, values, rate), 2.0 * np.pi * np.array([80.0, 200.0]), 3)
+    problem = _Problem(SpectralLines(frequencies, values, rate), 2.0 * np.pi * np.array([80.0, 200.0]), 3)
     at = np.array([0.01, -0.02, 0.05, 1.3])
     slope = problem.jacobian(at).T @ problem.residual(at)
     for unknown, step in enumerate(1e-6 * np.eye(4)):
@@ -201,7 +201,9 @@ def test_the_slopes_of_a_fit_are_those_of_its_residual(rate: float | None) -> No
 
 def test_no_poles_leave_all_but_the_skirt() -> None:
     frequencies = np.arange(1.0, 100.0)
-    fit = fit_poles(Lines(frequencies, np.ones((1, 99), np.complex128), None), np.zeros(0), np.zeros(0), 1)
+    fit = fit_poles(
+        SpectralLines(frequencies, np.ones((1, 99), np.complex128), None), np.zeros(0), np.zeros(0), 1
+    )
     assert np.abs(fit.residual).max() < 1e-13
 
 
@@ -223,7 +225,7 @@ def test_what_holds_no_decay_is_refused(signal: FloatArray, said: str) -> None:
 def test_a_band_without_lines_and_a_rate_of_nothing_are_refused() -> None:
     signal = np.sin(np.arange(500.0))
     with pytest.raises(WrongUse, match="lines"):
-        modes_of_decay(signal, RATE, Search(low=100.0, high=101.0))
+        modes_of_decay(signal, RATE, PoleSearch(low=100.0, high=101.0))
     with pytest.raises(WrongUse, match="rate"):
         modes_of_decay(signal, 0.0)
     with pytest.raises(DataRefused, match="evenly"):

@@ -17,7 +17,7 @@ from harness.bench.acquisition_channels import BLOCK, CaptureForm, readings_of_c
 from harness.strikes.blow import Blow, measure_blow
 from harness.strikes.frequency_response import frequency_response
 from harness.strikes.modal_identification import Identified, IdentifiedMode, modes_of_decay, modes_of_response
-from harness.strikes.pole_search import Search
+from harness.strikes.pole_search import PoleSearch
 from tests.oracles.measured_beams import (
     HAMMER_RATE,
     MAINS,
@@ -34,7 +34,7 @@ from tests.oracles.measured_beams import (
 STRONG = -40.0
 """dB: weaker ones are what little else there is."""
 
-RULER_BAND = Search(low=20.0, high=800.0, misfit=0.2)
+RULER_BAND = PoleSearch(low=20.0, high=800.0, misfit=0.2)
 """Its places were measured one after another, and its poles moved by a half per cent meanwhile."""
 
 BEGUN = 40
@@ -43,7 +43,7 @@ BEGUN = 40
 
 @pytest.fixture(scope="module")
 def beam(shared_data: Path) -> Identified:
-    return modes_of_response(*suspended_beam(shared_data), Search(low=20.0))
+    return modes_of_response(*suspended_beam(shared_data), PoleSearch(low=20.0))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def steel_ruler(shared_data: Path) -> Identified:
 @pytest.fixture(scope="module")
 def ringing(shared_data: Path) -> Identified:
     decays = hammer_blows(shared_data)[1][:, BEGUN:]
-    return modes_of_decay(decays, HAMMER_RATE, Search(low=100.0, high=2800.0))
+    return modes_of_decay(decays, HAMMER_RATE, PoleSearch(low=100.0, high=2800.0))
 
 
 def strong(identified: Identified) -> list[IdentifiedMode]:
@@ -85,7 +85,7 @@ def test_every_place_of_the_beam_has_the_same_peaks(shared_data: Path, beam: Ide
     frequencies, values = suspended_beam(shared_data)
     for row in values:
         alone = np.array(
-            [mode.frequency for mode in modes_of_response(frequencies, row, Search(low=20.0)).modes]
+            [mode.frequency for mode in modes_of_response(frequencies, row, PoleSearch(low=20.0)).modes]
         )
         for mode in strong(beam):
             assert np.abs(alone - mode.frequency).min() < 0.05
@@ -136,7 +136,7 @@ def test_free_decay_and_transfer_function_have_the_same_poles(shared_data: Path,
     assert measured.coherence is not None
     assert np.median(measured.coherence[100:2800]) > 0.999
     assert measured.band[1] > 4000.0
-    other = modes_of_response(measured.frequencies, measured.h1, Search(low=100.0, high=2800.0)).modes
+    other = modes_of_response(measured.frequencies, measured.h1, PoleSearch(low=100.0, high=2800.0)).modes
     pairs = [(mode, min(other, key=lambda o: abs(o.frequency - mode.frequency))) for mode in strong(ringing)]
     for one, two in pairs:
         assert abs(one.frequency - two.frequency) < 4.0 * np.hypot(one.frequency_sigma, two.frequency_sigma)

@@ -2,12 +2,12 @@
 
 import pytest
 
-from mocks.daq.instrument import MODELS, Instrument
+from mocks.daq.instrument import MODELS, CommandInterpreter
 from mocks.daq.memory import Fifo
 
 
-def box(model: str = "DI-2108", echoes_start: bool = False) -> Instrument:
-    return Instrument(MODELS[model], "5C8A0711", echoes_start)
+def box(model: str = "DI-2108", echoes_start: bool = False) -> CommandInterpreter:
+    return CommandInterpreter(MODELS[model], "5C8A0711", echoes_start)
 
 
 @pytest.mark.parametrize(

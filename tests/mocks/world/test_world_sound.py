@@ -12,7 +12,7 @@ from harness.bench.acquisition_channels import judge
 from harness.bench.gap import Gap, load_gap
 from harness.sim.modal.modes import Modes
 from mocks.daq.strike_counts import StrikeCounts
-from mocks.world.sound import Instrument, WorldSound
+from mocks.world.sound import SoundingObject, WorldSound
 from mocks.world.sound_draw import IMPULSE
 from mocks.world.world import NominalBench, World
 
@@ -50,7 +50,7 @@ def bench(mug_bench: NominalBench) -> NominalBench:
 
 def sound_of(bench: NominalBench, gap: Gap, seed: int = 3) -> WorldSound:
     world = World(bench, gap, seed)
-    instrument = Instrument(modes_on(world), DAMPINGS, LEVELS)
+    instrument = SoundingObject(modes_on(world), DAMPINGS, LEVELS)
     return WorldSound(world, instrument, gap, seed, FLANGE_FROM_HAMMER, RATE)
 
 

@@ -10,7 +10,7 @@ from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage.contour import Contours, covered, crossed
 from harness.objectfile.vision.coverage.front import find_front, gathered, nearest_of, projected
 from harness.objectfile.vision.coverage.raster import NEAREST, draw, look_through, placed
-from harness.objectfile.vision.threads import Crew, Room
+from harness.objectfile.vision.threads import Crew, Workspace
 from harness.picture.pinhole import Pinhole
 
 _LEAST = 512
@@ -60,7 +60,7 @@ def mesh_outline(
     camera: Pinhole,
     side: int,
     crew: Crew,
-    room: Room,
+    room: Workspace,
     is_told: bool = False,
     contours: Contours | None = None,
 ) -> Outline:
@@ -103,7 +103,7 @@ def _fronts(
     offsets: AnyArray,
     side: int,
     crew: Crew,
-    room: Room,
+    room: Workspace,
 ) -> tuple[AnyArray, AnyArray]:
     """Inverse depth and face in front: each thread draws some faces, then the nearer ones are taken."""
     parts = min(crew.threads, max(len(shown) // _LEAST, 1))
@@ -123,7 +123,7 @@ def _fronts(
 
 
 def drawn_outline(
-    mesh: Mesh, hides: bool, camera: Pinhole, side: int, crew: Crew, room: Room, is_told: bool
+    mesh: Mesh, hides: bool, camera: Pinhole, side: int, crew: Crew, room: Workspace, is_told: bool
 ) -> Outline:
     """As ``mesh_outline``, face by face at every sub-pixel: of a mesh that reaches behind the camera."""
     rows, columns = camera.height, camera.width

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibration.taxim.arm.moves import LEAST, ArmScale, Measured, arm_scale
+from calibration.taxim.arm.moves import LEAST, ArmScale, Uncertain, arm_scale
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused
 
@@ -78,7 +78,14 @@ def test_errors_are_what_they_are_said_to_be() -> None:
     for seed in range(300):
         places = pixels(20, seed)
         found = arm_scale([places], moved(places, matrix(), NOISE, seed + 1000))
-        each: list[Measured] = [found.pitch, found.aspect, found.rotation, found.skew, found.wide, found.high]
+        each: list[Uncertain] = [
+            found.pitch,
+            found.aspect,
+            found.rotation,
+            found.skew,
+            found.wide,
+            found.high,
+        ]
         off = np.concatenate([values(found), steps(found)]) - true
         over.append(off / [one.sigma for one in each])
         within.append(np.abs(off) <= [one.within95 for one in each])

@@ -16,7 +16,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_about
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.view import View, view_along
+from harness.sim.gel.view import ToolView, view_along
 from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
 
 NOISE = TouchNoise()
@@ -41,7 +41,7 @@ def block() -> RasterMesh:
     return RasterMesh(stepped_block())
 
 
-def seen(block: RasterMesh, press: Press, off: float = 0.0) -> View:
+def seen(block: RasterMesh, press: Press, off: float = 0.0) -> ToolView:
     """Along the tool as it is believed to have stood, ``off`` rad about the gel's y axis from how it did."""
     rotation = press.object_from_gel[:3, :3] @ rotation_about(np.array([0.0, 1.0, 0.0]), off)
     return view_along(block, block.mesh.vertices, rotation, 0.5 * PITCH, GELSIGHT_R15)
@@ -51,18 +51,18 @@ def read(block: RasterMesh, press: Press) -> TouchMap:
     return touch_map(felt(block, press), GELSIGHT_R15.pitch, BLOCK, NOISE.skirt, NOISE.edge, THRESHOLD)
 
 
-def centre_in(view: View, press: Press) -> FloatArray:
+def centre_in(view: ToolView, press: Press) -> FloatArray:
     return np.asarray(press.object_from_gel[:3, 3] @ view.object_from_view)
 
 
-def every_place(view: View, press: Press) -> FloatArray:
+def every_place(view: ToolView, press: Press) -> FloatArray:
     """The gel's centre ``depth`` beyond the first surface, at every pixel that has one."""
     rows, columns = np.nonzero(np.isfinite(view.depth))
     xy = view.origin + view.pitch * np.column_stack([columns, rows])
     return np.column_stack([xy, view.depth[rows, columns] + press.depth])
 
 
-def terms(view: View, touch: TouchMap, places: FloatArray) -> FloatArray:
+def terms(view: ToolView, touch: TouchMap, places: FloatArray) -> FloatArray:
     return touch_terms(view, touch, NOISE, places, step=1, rings=2, shift=NOISE.shift, temperature=1.0)
 
 

@@ -17,7 +17,7 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.geometry import rotation_about
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.view import POOL, View, view_along
+from harness.sim.gel.view import POOL, ToolView, view_along
 from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
 
 NOISE = TouchNoise()
@@ -33,7 +33,7 @@ def block() -> RasterMesh:
 
 
 @pytest.fixture
-def view(block: RasterMesh) -> View:
+def view(block: RasterMesh) -> ToolView:
     """Along the tool; nothing asked for yet."""
     pitch = 0.5 * BLOCK * GELSIGHT_R15.pitch
     return view_along(block, block.mesh.vertices, VIEWED, pitch, GELSIGHT_R15)
@@ -46,7 +46,7 @@ def reading(block: RasterMesh) -> TouchMap:
     return touch_map(heights, GELSIGHT_R15.pitch, BLOCK, NOISE.skirt, NOISE.edge, 0.12e-3)
 
 
-def cropped(view: View, row: int, column: int, shape: tuple[int, int]) -> tuple[FloatArray, float]:
+def cropped(view: ToolView, row: int, column: int, shape: tuple[int, int]) -> tuple[FloatArray, float]:
     """Depth at every second pixel, the map's centre on the pixel; inf beyond the picture."""
     reach = 2 * max(shape)
     padded = np.pad(view.depth, reach, constant_values=np.inf)
@@ -97,7 +97,7 @@ def cost_of(predicted: FloatArray, plane: FloatArray, touch: TouchMap) -> float:
     return float((gap**2).sum() / (len(touch.touched) * NOISE.rms**2) + tilt)
 
 
-def reference(view: View, row: int, column: int, touch: TouchMap) -> tuple[float, float]:
+def reference(view: ToolView, row: int, column: int, touch: TouchMap) -> tuple[float, float]:
     """The term at one pixel and the depth of the gel's centre."""
     crop, first = cropped(view, row, column, touch.heights.shape)
     if not np.isfinite(first):
@@ -113,7 +113,7 @@ def reference(view: View, row: int, column: int, touch: TouchMap) -> tuple[float
     return -0.5 * cost, first - float(plane[0])
 
 
-def some_pixels(view: View, count: int, seed: int = 0) -> IntArray:
+def some_pixels(view: ToolView, count: int, seed: int = 0) -> IntArray:
     """Half of them anywhere, half where the press was."""
     rng = np.random.default_rng(seed)
     near = np.round((np.array(EDGE.point) @ view.object_from_view)[:2] - view.origin, 9) / view.pitch
@@ -122,7 +122,7 @@ def some_pixels(view: View, count: int, seed: int = 0) -> IntArray:
     return np.vstack([anywhere, there])
 
 
-def test_scores_are_those_of_the_plain_reference(view: View, reading: TouchMap) -> None:
+def test_scores_are_those_of_the_plain_reference(view: ToolView, reading: TouchMap) -> None:
     pixels = some_pixels(view, 150)
     view_scores(view, reading, NOISE, pixels)
     expected = np.array([reference(view, int(r), int(c), reading) for r, c in pixels])
@@ -131,7 +131,7 @@ def test_scores_are_those_of_the_plain_reference(view: View, reading: TouchMap) 
     assert view.gel_depth[tuple(pixels.T)] == pytest.approx(expected[:, 1], abs=1e-9, nan_ok=True)
 
 
-def test_only_the_pixels_asked_for_are_filled_in_and_each_once(view: View, reading: TouchMap) -> None:
+def test_only_the_pixels_asked_for_are_filled_in_and_each_once(view: ToolView, reading: TouchMap) -> None:
     pixels = some_pixels(view, 20)
     view_scores(view, reading, NOISE, pixels)
     filled = np.zeros(view.score.shape, np.bool_)
@@ -143,7 +143,7 @@ def test_only_the_pixels_asked_for_are_filled_in_and_each_once(view: View, readi
     assert view.score[mark] == 123.0
 
 
-def test_single_precision_gives_the_same_term_to_its_own_digits(view: View, reading: TouchMap) -> None:
+def test_single_precision_gives_the_same_term_to_its_own_digits(view: ToolView, reading: TouchMap) -> None:
     """The least-squares plane is solved by determinants: they must not lose what float32 keeps."""
     pixels = some_pixels(view, 100)
     view_scores(view, reading, NOISE, pixels)
@@ -157,7 +157,7 @@ def test_single_precision_gives_the_same_term_to_its_own_digits(view: View, read
         reading.edge,
     )
     depth = read_only(view.depth.astype(np.float32).astype(np.float64))
-    again = View(
+    again = ToolView(
         view.object_from_view,
         view.origin,
         view.pitch,
@@ -176,7 +176,7 @@ def test_single_precision_gives_the_same_term_to_its_own_digits(view: View, read
 
 
 def term_of(
-    view: View,
+    view: ToolView,
     touch: TouchMap,
     place: FloatArray,
     step: int,
@@ -208,7 +208,7 @@ def term_of(
 
 @pytest.mark.parametrize(("step", "rings", "temperature"), [(1, 2, 0.3), (2, 2, 0.3), (2, 1, 1.0)])
 def test_terms_are_the_mixture_over_the_cells_around_a_place(
-    view: View, reading: TouchMap, step: int, rings: int, temperature: float
+    view: ToolView, reading: TouchMap, step: int, rings: int, temperature: float
 ) -> None:
     rng = np.random.default_rng(4)
     true = EDGE.object_from_gel[:3, 3] @ view.object_from_view
@@ -221,7 +221,7 @@ def test_terms_are_the_mixture_over_the_cells_around_a_place(
     assert (found < -0.99 * NOISE.cap).any()
 
 
-def test_similarities_are_the_cosines_of_the_two_maps(view: View, reading: TouchMap) -> None:
+def test_similarities_are_the_cosines_of_the_two_maps(view: ToolView, reading: TouchMap) -> None:
     pixels = some_pixels(view, 80, seed=2)
     depth = view.depth[tuple(pixels.T)]
     pixels, depth = pixels[np.isfinite(depth)], depth[np.isfinite(depth)]
@@ -236,7 +236,7 @@ def test_similarities_are_the_cosines_of_the_two_maps(view: View, reading: Touch
 
 
 def test_what_lies_behind_the_first_surface_or_beyond_the_picture_is_like_nothing(
-    view: View, reading: TouchMap
+    view: ToolView, reading: TouchMap
 ) -> None:
     rows, columns = view.depth.shape
     middle = np.array([columns // 2, rows // 2])

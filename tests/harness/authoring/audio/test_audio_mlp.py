@@ -7,13 +7,13 @@ import pytest
 from harness.authoring.audio.audio import CHECKPOINT, author_audio, opened
 from harness.authoring.audio.data import split_nodes
 from harness.authoring.audio.metrics import relative_errors
-from harness.authoring.audio.profiles import PerceptronSpec, Profile
+from harness.authoring.audio.profiles import AudioProfile, PerceptronSpec
 from harness.basics.errors import DataRefused, WrongUse
 from harness.objectfile.audio.graph import audio_graph
 from harness.sim.modal.modes import Modes
 
 torch = pytest.importorskip("torch")
-from harness.authoring.audio.mlp import Training  # noqa: E402
+from harness.authoring.audio.mlp import AudioTraining  # noqa: E402
 
 TINY = PerceptronSpec(branches=3, depth=3, width=16, octaves=3, skip=2, epochs=6, batch=64, rate=3e-3)
 
@@ -27,11 +27,11 @@ def one_thread() -> None:
 def test_a_killed_training_ends_in_the_same_bits(egg: Modes, tmp_path: Path, branches: int) -> None:
     spec = replace(TINY, branches=branches)
     trained = split_nodes(len(egg.points)).trained
-    whole = Training(spec, egg, trained, seed=3)
+    whole = AudioTraining(spec, egg, trained, seed=3)
     while not whole.done:
         whole.step_epoch()
     for stop in (2, 4, 6):
-        part = Training(spec, egg, trained, seed=3)
+        part = AudioTraining(spec, egg, trained, seed=3)
         if (tmp_path / "kept.npz").exists():
             part.load(tmp_path / "kept.npz")
         while part.epoch < stop:
@@ -45,17 +45,17 @@ def test_a_killed_training_ends_in_the_same_bits(egg: Modes, tmp_path: Path, bra
 
 def test_a_checkpoint_of_another_training_is_refused(egg: Modes, tmp_path: Path) -> None:
     trained = split_nodes(len(egg.points)).trained
-    Training(TINY, egg, trained, seed=3).save(tmp_path / "kept.npz")
+    AudioTraining(TINY, egg, trained, seed=3).save(tmp_path / "kept.npz")
     with pytest.raises(DataRefused, match="another network"):
-        Training(TINY, egg, trained, seed=4).load(tmp_path / "kept.npz")
+        AudioTraining(TINY, egg, trained, seed=4).load(tmp_path / "kept.npz")
     (tmp_path / "kept.npz").write_bytes(b"PK\x03\x04 half a file")
     with pytest.raises(DataRefused, match="cannot be read"):
-        Training(TINY, egg, trained, seed=3).load(tmp_path / "kept.npz")
+        AudioTraining(TINY, egg, trained, seed=3).load(tmp_path / "kept.npz")
 
 
 @pytest.mark.parametrize("branches", [1, 3])
 def test_the_graph_of_perceptrons_is_the_trained_network(egg: Modes, branches: int) -> None:
-    training = Training(replace(TINY, branches=branches), egg, np.arange(len(egg.points)), seed=0)
+    training = AudioTraining(replace(TINY, branches=branches), egg, np.arange(len(egg.points)), seed=0)
     first = training.step_epoch()
     while not training.done:
         last = training.step_epoch()
@@ -76,20 +76,20 @@ def test_the_graph_of_perceptrons_is_the_trained_network(egg: Modes, branches: i
 )
 def test_a_network_that_cannot_be_is_refused(egg: Modes, spec: PerceptronSpec) -> None:
     with pytest.raises(WrongUse):
-        Training(spec, egg, np.arange(len(egg.points)), seed=0)
+        AudioTraining(spec, egg, np.arange(len(egg.points)), seed=0)
 
 
 def test_authoring_goes_on_from_a_checkpoint(egg: Modes, tmp_path: Path) -> None:
     def said_of(folder: Path) -> tuple[list[str], bytes]:
         folder.mkdir(exist_ok=True)
         said: list[str] = []
-        rates, profile = np.full(6, 20.0), Profile(TINY, sounds=2)
+        rates, profile = np.full(6, 20.0), AudioProfile(TINY, sounds=2)
         made = author_audio(egg, rates, profile, 0, folder, lambda doing, share: said.append(doing))
         return said, made.graph.SerializeToString(deterministic=True)
 
     whole, wanted = said_of(tmp_path / "whole")
     assert sum(one.startswith("training") for one in whole) == TINY.epochs
-    part = Training(TINY, egg, split_nodes(len(egg.points)).trained, seed=0)
+    part = AudioTraining(TINY, egg, split_nodes(len(egg.points)).trained, seed=0)
     part.step_epoch()
     (tmp_path / "part").mkdir()
     part.save(tmp_path / "part" / CHECKPOINT)

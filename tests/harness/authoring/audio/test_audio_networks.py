@@ -6,10 +6,10 @@ import pytest
 from numpy.random import default_rng
 
 from harness.authoring.audio.audio import author_audio, opened
-from harness.authoring.audio.data import Samples, split_nodes, wave_number
+from harness.authoring.audio.data import SoundSamples, split_nodes, wave_number
 from harness.authoring.audio.export import waves_graph
 from harness.authoring.audio.metrics import interpolated, relative_errors
-from harness.authoring.audio.profiles import Profile, WavesSpec, profile
+from harness.authoring.audio.profiles import AudioProfile, WavesSpec, profile
 from harness.authoring.audio.readout import error_shares, solve_readout
 from harness.authoring.audio.waves import ENOUGH, FittedWaves, fit_enough_waves, fit_waves
 from harness.basics.errors import WrongUse
@@ -21,7 +21,7 @@ SINGLE = 1e-5
 
 def fitted(modes: Modes, width: int = 300) -> FittedWaves:
     split = split_nodes(len(modes.points))
-    samples = Samples(modes.points[split.trained], modes.shapes[split.trained])
+    samples = SoundSamples(modes.points[split.trained], modes.shapes[split.trained])
     return fit_waves(samples, np.arange(len(samples.points)), wave_number(modes), width, 0, (1.0, 1.4))
 
 
@@ -45,7 +45,7 @@ def test_more_waves_err_less(egg: Modes) -> None:
 
 
 def test_waves_are_doubled_until_they_are_enough_or_as_many_as_may_be(egg: Modes) -> None:
-    samples = Samples(egg.points, egg.shapes)
+    samples = SoundSamples(egg.points, egg.shapes)
 
     def fitted_within(widest: int) -> FittedWaves:
         spec = WavesSpec(10, (1.0,), widest)
@@ -118,7 +118,7 @@ def test_authoring_measures_on_nodes_it_never_saw(egg: Modes, tmp_path: Path) ->
     made = author_audio(
         egg,
         np.full(6, 20.0),
-        Profile(WavesSpec(200), sounds=2),
+        AudioProfile(WavesSpec(200), sounds=2),
         0,
         tmp_path,
         lambda doing, share: said.append((doing, share)),

@@ -25,7 +25,7 @@ from tests.samples import touch_bench as tb
 
 pytest.importorskip("torch")
 
-from harness.authoring.touch.mlp import LearnedMaps, Training, learned_from
+from harness.authoring.touch.mlp import LearnedMaps, TouchTraining, learned_from
 
 SMALL = TouchPerceptronSpec(depth=3, width=24, octaves=3, skip=2, presses=12, epochs=3, steps=4, batch=64)
 
@@ -42,12 +42,12 @@ def inputs(count: int) -> FloatArray:
 
 
 def test_a_resumed_training_ends_in_the_same_bits(learned: LearnedMaps, tmp_path: Path) -> None:
-    whole, first = Training(SMALL, learned, 0), Training(SMALL, learned, 0)
+    whole, first = TouchTraining(SMALL, learned, 0), TouchTraining(SMALL, learned, 0)
     while not whole.done:
         whole.step_epoch()
     first.step_epoch()
     first.save(tmp_path / "checkpoint.npz")
-    again = Training(SMALL, learned, 0)
+    again = TouchTraining(SMALL, learned, 0)
     again.load(tmp_path / "checkpoint.npz")
     while not again.done:
         again.step_epoch()
@@ -58,12 +58,12 @@ def test_a_resumed_training_ends_in_the_same_bits(learned: LearnedMaps, tmp_path
 
 def test_a_checkpoint_of_something_else_is_refused(learned: LearnedMaps, tmp_path: Path) -> None:
     path = tmp_path / "checkpoint.npz"
-    training = Training(SMALL, learned, 0)
+    training = TouchTraining(SMALL, learned, 0)
     training.save(path)
     with pytest.raises(DataRefused, match="another network, object, data or seed"):
-        Training(SMALL, learned, 1).load(path)
+        TouchTraining(SMALL, learned, 1).load(path)
     with pytest.raises(DataRefused, match="another network, object, data or seed"):
-        Training(SMALL, replace(learned, maps=learned.maps * 2), 0).load(path)
+        TouchTraining(SMALL, replace(learned, maps=learned.maps * 2), 0).load(path)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(DataRefused, match="delete it to begin anew"):
         training.load(path)
@@ -73,7 +73,7 @@ def test_the_papers_network_in_onnx_is_torchs(learned: LearnedMaps) -> None:
     """Its sizes, and its answers to 1e-5 of the range of what it can say."""
     spec = touch_profile("paper").perceptron
     assert spec is not None
-    training = Training(spec, learned, 0)
+    training = TouchTraining(spec, learned, 0)
     graph = training.finish().graph
     weights = [numpy_helper.to_array(each) for each in graph.graph.initializer if len(each.dims) == 2]
     shapes = [each.shape for each in weights if each.shape[0] > 9]
@@ -106,7 +106,7 @@ def test_pixels_are_asked_row_by_row_and_half_a_turn_backwards() -> None:
 
 
 def test_the_network_is_a_level_of_the_object(learned: LearnedMaps, tmp_path: Path) -> None:
-    training = Training(SMALL, learned, 0)
+    training = TouchTraining(SMALL, learned, 0)
     part = replace(tb.peg_part(), perceptron=training.finish())
     made = with_touch(
         create_object(tmp_path / "peg", "peg", tb.peg(), MATERIALS["steel"], tb.PROVENANCE), part
@@ -120,7 +120,7 @@ def test_the_network_is_a_level_of_the_object(learned: LearnedMaps, tmp_path: Pa
 
 def test_what_is_no_network_is_refused(learned: LearnedMaps) -> None:
     with pytest.raises(WrongUse, match="no network is"):
-        Training(replace(SMALL, skip=3), learned, 0)
+        TouchTraining(replace(SMALL, skip=3), learned, 0)
     least, most = np.zeros(9), np.ones(9)
     with pytest.raises(WrongUse, match="2 outputs"):
         perceptron_graph(MlpWeights([(np.zeros((189, 2)), np.zeros(2))]), paper_normaliser(least, most), 1.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.authoring.vision.data import (
-    HeldOut,
+    HeldOutViews,
     around,
     draw_tuples,
     draw_views,
@@ -20,7 +20,7 @@ from harness.sim.light.appearance_source import builtin_appearance
 from harness.sim.light.direct_image import LitObject
 from tests.oracles.seen_shapes import ball, cuboid, square, together
 
-NOTHING = HeldOut((), ())
+NOTHING = HeldOutViews((), ())
 GREY = (0.8, 0.5, 0.2)
 
 
@@ -151,9 +151,9 @@ def test_bad_questions_are_refused(mug: LitObject) -> None:
     with pytest.raises(WrongUse, match="half a diagonal"):
         held_out_pictures(mesh, 1, 8, 8, 0, distance=0.4)
     with pytest.raises(WrongUse, match="one light"):
-        HeldOut(held_out_pictures(mesh, 1, 8, 8, 0).cameras, ())
+        HeldOutViews(held_out_pictures(mesh, 1, 8, 8, 0).cameras, ())
     with pytest.raises(WrongUse, match="45 deg"):
-        HeldOut((), (), 1.0)
+        HeldOutViews((), (), 1.0)
     everywhere = held_out_pictures(mesh, 200, 8, 8, 0, apart=0.7)
     with pytest.raises(OutOfDomain, match="keep back fewer"):
         draw_views(mesh, 1, 8, 8, 0, everywhere)

@@ -10,7 +10,7 @@ from harness.objectfile.vision.coverage.faces import FaceCubes, first_met
 from harness.objectfile.vision.coverage.outline import is_closed, mesh_outline
 from harness.objectfile.vision.light import LampGrid
 from harness.objectfile.vision.surface import SurfaceExtras
-from harness.objectfile.vision.threads import Crew, Room
+from harness.objectfile.vision.threads import Crew, Workspace
 from harness.objects.household import build
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance import plain
@@ -115,7 +115,7 @@ def told_by_all_faces(mesh: Mesh, eye: FloatArray, ways: FloatArray, light: Floa
 
 def seen_from(mesh: Mesh, camera: Pinhole) -> tuple[FloatArray, FloatArray, AnyArray]:
     """Rays of a picture, and the depth and faces that its outline tells."""
-    outline = mesh_outline(mesh, is_closed(mesh), camera, 3, Crew(1), Room(), True)
+    outline = mesh_outline(mesh, is_closed(mesh), camera, 3, Crew(1), Workspace(), True)
     (x, y), centres = camera.centre_px, outline.places.astype(np.float64)
     across = (centres - (x, y)) / camera.focal_px
     slant = 1.0 / np.sqrt((across**2).sum(axis=1) + 1.0)

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from harness.report.figures.vision_cost import Mark, Panel, vision_cost_figure
+from harness.report.figures.vision_cost import LevelMark, Panel, vision_cost_figure
 
 PANEL = Panel(
     "step, voxels",
     "ms",
-    (Mark("2", 5.0, 30.0, 40.0), Mark("1", 9.0, 33.0, 50.0), Mark("0", 20.0, 34.0, math.inf)),
+    (LevelMark("2", 5.0, 30.0, 40.0), LevelMark("1", 9.0, 33.0, 50.0), LevelMark("0", 20.0, 34.0, math.inf)),
 )
 
 
@@ -24,7 +24,7 @@ def test_each_knob_has_a_panel_and_equal_pictures_are_left_out() -> None:
     assert [text.get_text() for text in shown[0].texts] == ["2", "1", "0"]
 
 
-@pytest.mark.parametrize("panels", [[], [Panel("a", "ms", (Mark("1", 0.0, 1.0, 1.0),))]])
+@pytest.mark.parametrize("panels", [[], [Panel("a", "ms", (LevelMark("1", 0.0, 1.0, 1.0),))]])
 def test_nothing_to_draw_is_refused(panels: list[Panel]) -> None:
     with pytest.raises(ValueError, match="one panel or more"):
         vision_cost_figure(panels, "title")

@@ -9,7 +9,7 @@ from harness.basics.geometry import frame_facing, rotation_from_vector
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.gel.height_map import RasterMesh
-from harness.sim.gel.view import POOL, View, view_along, window_depth
+from harness.sim.gel.view import POOL, ToolView, view_along, window_depth
 from harness.sim.solid.surface_samples import sample_surface
 from tests.samples.synthetic_press import Press, box, solid, stepped_block
 
@@ -18,11 +18,11 @@ RADIUS = 0.02
 AWAY = np.array([0.3, -0.2, 0.5])
 
 
-def pictured(mesh: Mesh, rotation: FloatArray, pitch: float = PITCH) -> View:
+def pictured(mesh: Mesh, rotation: FloatArray, pitch: float = PITCH) -> ToolView:
     return view_along(RasterMesh(mesh), mesh.vertices, rotation, pitch, GELSIGHT_R15)
 
 
-def places(view: View) -> FloatArray:
+def places(view: ToolView) -> FloatArray:
     """``(rows, columns, 2)`` metres: x and y of every pixel."""
     rows, columns = np.indices(view.depth.shape)
     return view.origin + view.pitch * np.stack([columns, rows], axis=-1)

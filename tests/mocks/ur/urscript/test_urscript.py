@@ -10,7 +10,7 @@ from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.parser import parse
 from mocks.ur.urscript.process import Process
 from mocks.ur.urscript.tokens import whole_length
-from mocks.ur.urscript.values import Pose
+from mocks.ur.urscript.values import PoseValue
 
 
 class Bench:
@@ -74,7 +74,7 @@ def test_lines_mean_nothing() -> None:
 def test_six_values_after_p_are_a_pose_and_one_is_an_index() -> None:
     said = values_of("p = p[1, 2, 3, 4, 5, 6]", "p[0] = p[1] * 10", "say(p)")
     assert said == [[20, 2, 3, 4, 5, 6]]
-    assert isinstance(said[0], Pose)
+    assert isinstance(said[0], PoseValue)
 
 
 def test_lists_are_copied_where_they_are_assigned_or_passed() -> None:

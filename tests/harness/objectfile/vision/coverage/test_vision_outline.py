@@ -7,7 +7,7 @@ from harness.basics.arrays import AnyArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage.outline import centre_out, drawn_outline, is_closed, mesh_outline
-from harness.objectfile.vision.threads import Crew, Room
+from harness.objectfile.vision.threads import Crew, Workspace
 from harness.objects.household import build
 from harness.picture.pinhole import Pinhole
 from tests.oracles.plain_look import looking
@@ -18,7 +18,7 @@ MUG = build("mug", 8e-3)
 
 def outlined(mesh: Mesh, camera: Pinhole, side: int, closed: bool = False) -> tuple[AnyArray, AnyArray]:
     """Cover and depth of every pixel."""
-    found = mesh_outline(mesh, closed, camera, side, Crew(1), Room())
+    found = mesh_outline(mesh, closed, camera, side, Crew(1), Workspace())
     cover, depth = np.zeros(camera.pixels), np.zeros(camera.pixels)
     cover[found.pixels], depth[found.pixels] = found.cover, found.depth
     return cover, depth
@@ -67,7 +67,7 @@ def test_cover_of_a_square_is_its_area(side: int) -> None:
 def test_a_pixel_half_covered_looks_where_it_is() -> None:
     mesh, side = square(0.1), 5
     camera = Pinhole.looking_at((0, 0, 0.4), (0, 0, 0), (0, 1, 0), 41, 41, np.radians(31.0))
-    found = mesh_outline(mesh, False, camera, side, Crew(1), Room())
+    found = mesh_outline(mesh, False, camera, side, Crew(1), Workspace())
     met = RayMesh(mesh).first_hits(camera.eye, camera.directions_at(found.places.astype(np.float64))).face
     assert (met >= 0).all()
     partly = (found.cover > 0.0) & (found.cover < 1.0)
@@ -83,7 +83,7 @@ def test_more_threads_see_what_one_sees(closed: bool) -> None:
     twice = Mesh(MUG.vertices, np.concatenate([MUG.faces, MUG.faces]))
     camera = looking(MUG, 1.5, 33, 47)
     for mesh in (MUG, twice):
-        one, *more = (mesh_outline(mesh, closed, camera, 3, Crew(n), Room(), True) for n in (1, 2, 3))
+        one, *more = (mesh_outline(mesh, closed, camera, 3, Crew(n), Workspace(), True) for n in (1, 2, 3))
         assert (one.faces < len(MUG.faces)).all()
         for found in more:
             for kind in ("pixels", "cover", "places", "depth", "faces"):
@@ -112,8 +112,8 @@ def test_going_around_says_what_every_face_drawn_says(mesh: Mesh, side: int) -> 
     closed, middle = is_closed(mesh), mesh.bounds.mean(axis=0)
     for away, width in ((np.array([0.4, 0.5, 0.3]), 90), (np.array([0.0, 0.1, 2.0]), 31)):
         camera = Pinhole.looking_at(middle + away, middle, (0, 1, 0), width, 40, 12.0 / (width + 40))
-        one = mesh_outline(mesh, closed, camera, side, Crew(1), Room(), True)
-        other = drawn_outline(mesh, closed, camera, side, Crew(1), Room(), True)
+        one = mesh_outline(mesh, closed, camera, side, Crew(1), Workspace(), True)
+        other = drawn_outline(mesh, closed, camera, side, Crew(1), Workspace(), True)
         assert len(one.pixels) > 50
         assert len(np.setxor1d(one.pixels, other.pixels)) <= 1
         _, a, b = np.intersect1d(one.pixels, other.pixels, return_indices=True)
