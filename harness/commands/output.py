@@ -15,6 +15,7 @@ from rich.progress import (
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
+    TimeRemainingColumn,
 )
 
 from harness.basics.errors import TouchstoneError
@@ -75,6 +76,21 @@ def step_progress(done: int, total: int, noun: str = "step") -> Iterator[StepPro
 
 
 @contextmanager
+def run_progress(total: int) -> Iterator[Callable[[], None]]:
+    """A progress bar over many runs, and what counts one of them as done."""
+    columns = (
+        TextColumn("runs"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("left:"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=CONSOLE, transient=True) as bar:
+        task = bar.add_task("runs", total=total)
+        yield lambda: bar.advance(task)
+
+
+@contextmanager
 def share_progress() -> Iterator[Callable[[str, float], None]]:
     """A progress bar for the length of a work, and what tells it: what is being done, and the share done."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
@@ -85,8 +101,3 @@ def share_progress() -> Iterator[Callable[[str, float], None]]:
             bar.update(task, description=doing, completed=share)
 
         yield report
-
-
-def millimetres(metres: float | None) -> str:
-    """For people; "unknown" where there is nothing to say."""
-    return "unknown" if metres is None else f"{metres * 1e3:.1f} mm"

@@ -4,12 +4,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from harness.basics.cores import own_cores
 from harness.commands import options
-from harness.commands.output import ANSWERS, CONSOLE, emit, warn
+from harness.commands.output import ANSWERS, emit, run_progress, warn
 from harness.commands.run.conditions import WhereOption, levels_of
 
 
@@ -78,12 +77,11 @@ def cost(
     station = load_station(station_path("mock"))
     points: list[Any] = []
     models: dict[str, Any] = {}
-    with _bar() as bar:
-        task = bar.add_task("runs", total=len(wanted))
+    with run_progress(len(wanted)) as advance:
         cells = out / "cells"
         for _, found in measure(kind, work, scenes, station, cells, warn, own_cores(), models):
             points += found
-            bar.advance(task)
+            advance()
     if not points:
         raise DataRefused("no run could be performed; the reasons stand above")
     curve = gathered(
@@ -119,17 +117,6 @@ def _gap(name: str) -> str:
     if name not in ("default", "none"):
         raise WrongUse(f"--gap {name!r} is not known; {nearest(name, ('default', 'none'))}")
     return name
-
-
-def _bar() -> Progress:
-    columns = (
-        TextColumn("runs"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("left:"),
-        TimeRemainingColumn(),
-    )
-    return Progress(*columns, console=CONSOLE, transient=True)
 
 
 def _scenes(only: list[str] | None, scene: Path | None) -> dict[str, Any]:

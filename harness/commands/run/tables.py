@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from harness.commands import options
-from harness.commands.output import ANSWERS, CONSOLE, emit, warn
+from harness.commands.output import ANSWERS, emit, run_progress, warn
 from harness.commands.run.conditions import WhereOption, levels_of
 
 
@@ -74,20 +73,12 @@ def tables(
     }
     wanted = measured.cells(only or list(scenes), range(first_seed, first_seed + seeds), chosen)
     results: dict[Any, Any] = {}
-    columns = (
-        TextColumn("runs"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("left:"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=CONSOLE, transient=True) as bar:
-        task = bar.add_task("runs", total=len(wanted))
+    with run_progress(len(wanted)) as advance:
         for cell, result in measure(kind, wanted, scenes, out, workers):
             results[cell] = result
             if "failed" in result:
                 warn(f"{cell.name}: {result['failed']}")
-            bar.advance(task)
+            advance()
     table = rows(kind, results)
     failed = sum("failed" in result for result in results.values())
     if json:
