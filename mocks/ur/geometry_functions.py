@@ -6,7 +6,6 @@ from typing import Any, Final
 
 from mocks.ur.arm import poses
 from mocks.ur.hooks import Matrix
-from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import PoseValue, number, show, six
 
@@ -81,22 +80,22 @@ def to_str(val: Any) -> str:
     return show(val)
 
 
-def _one(function: Callable[[float], float]) -> Builtin:
-    return Builtin(lambda f: function(float(number(f))))
+def _one(function: Callable[[float], float]) -> Callable[[Any], float]:
+    return lambda f: function(float(number(f)))
 
 
-FUNCTIONS: Final[dict[str, Builtin]] = {
-    "pose_trans": Builtin(pose_trans),
-    "pose_inv": Builtin(pose_inv),
-    "pose_add": Builtin(pose_add),
-    "pose_sub": Builtin(pose_sub),
-    "pose_dist": Builtin(pose_dist),
-    "point_dist": Builtin(point_dist),
-    "interpolate_pose": Builtin(interpolate_pose),
-    "norm": Builtin(norm),
-    "length": Builtin(length),
-    "get_list_length": Builtin(length),
-    "to_str": Builtin(to_str),
+FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
+    "pose_trans": pose_trans,
+    "pose_inv": pose_inv,
+    "pose_add": pose_add,
+    "pose_sub": pose_sub,
+    "pose_dist": pose_dist,
+    "point_dist": point_dist,
+    "interpolate_pose": interpolate_pose,
+    "norm": norm,
+    "length": length,
+    "get_list_length": length,
+    "to_str": to_str,
     "sin": _one(math.sin),
     "cos": _one(math.cos),
     "tan": _one(math.tan),
@@ -108,7 +107,7 @@ FUNCTIONS: Final[dict[str, Builtin]] = {
     "r2d": _one(math.degrees),
     "floor": _one(math.floor),
     "ceil": _one(math.ceil),
-    "atan2": Builtin(lambda x, y: math.atan2(number(x), number(y))),
-    "pow": Builtin(lambda base, exponent: math.pow(number(base), number(exponent))),
-    "log": Builtin(lambda b, f: math.log(number(f), number(b))),
+    "atan2": lambda x, y: math.atan2(number(x), number(y)),
+    "pow": lambda base, exponent: math.pow(number(base), number(exponent)),
+    "log": lambda b, f: math.log(number(f), number(b)),
 }

@@ -3,7 +3,7 @@
 Blends (``r``) are accepted and not performed: every move comes to rest.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import Any
 
 from mocks.ur.arm import kinematics, poses
@@ -21,7 +21,6 @@ from mocks.ur.arm.stops import StopJoints, StopLine
 from mocks.ur.geometry_functions import matrix
 from mocks.ur.hooks import Matrix, Six
 from mocks.ur.robot import Robot
-from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import PoseValue, number, six
 
@@ -35,16 +34,16 @@ class MoveFunctions:
         self._robot = robot
         self._mover = robot.mover
 
-    def table(self) -> dict[str, Builtin]:
+    def table(self) -> dict[str, Callable[..., Any]]:
         """By name."""
         return {
-            "movej": Builtin(self.movej, takes_time=True),
-            "movel": Builtin(self.movel, takes_time=True),
-            "speedj": Builtin(self.speedj, takes_time=True),
-            "speedl": Builtin(self.speedl, takes_time=True),
-            "servoj": Builtin(self.servoj, takes_time=True),
-            "stopj": Builtin(self.stopj, takes_time=True),
-            "stopl": Builtin(self.stopl, takes_time=True),
+            "movej": self.movej,
+            "movel": self.movel,
+            "speedj": self.speedj,
+            "speedl": self.speedl,
+            "servoj": self.servoj,
+            "stopj": self.stopj,
+            "stopl": self.stopl,
         }
 
     def movej(self, q: Any, a: Any = 1.4, v: Any = 1.05, t: Any = 0, r: Any = 0) -> Cycles:

@@ -2,15 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
-from typing import Final
+from typing import Any, Final
 
 from mocks.ur.arm.mover import PROGRAM_STOP
 from mocks.ur.robot import Robot
-from mocks.ur.urscript.code import Builtin
-from mocks.ur.urscript.compiler import Compiled, compile_program
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.parser import parse
 from mocks.ur.urscript.process import Process
+from mocks.ur.urscript.program import Program, translate
 
 _SECONDARY: Final = -2
 _CACHED: Final = 32
@@ -38,34 +36,34 @@ class Player:
     """
 
     def __init__(
-        self, robot: Robot, builtins: Mapping[str, Builtin], complain: Callable[[str], None]
+        self, robot: Robot, builtins: Mapping[str, Callable[..., Any]], complain: Callable[[str], None]
     ) -> None:
         self._robot = robot
         self._builtins = builtins
         self._complain = complain
-        self._cache: dict[str, Compiled] = {}
+        self._cache: dict[str, Program] = {}
         self._main: Process | None = None
         self._secondary: list[Process] = []
         self.state = RuntimeState.STOPPED
         self.name = ""
 
-    def translate(self, text: str) -> Compiled:
-        """A program's closures; slow, so not for the controller's cycle. The newest texts are remembered.
+    def translate(self, text: str) -> Program:
+        """A program's functions; slow, so not for the controller's cycle. The newest texts are remembered.
 
         Raises:
             ScriptError: it is not URScript, or names what is not there.
         """
         if text not in self._cache:
-            compiled = compile_program(parse(text), self._builtins)
+            program = translate(text, self._builtins)
             while len(self._cache) >= _CACHED:
                 self._cache.pop(next(iter(self._cache)))
-            self._cache[text] = compiled
+            self._cache[text] = program
         return self._cache[text]
 
-    def start(self, program: Compiled) -> None:
+    def start(self, program: Program) -> None:
         """Run it from its first line; a main program replaces the one that runs."""
         if program.secondary:
-            self._secondary.append(Process(program.steps, self._enter_secondary, lambda _: None))
+            self._secondary.append(Process(program.main, self._enter_secondary, lambda _: None))
             return
         self.stop()
         if not self._robot.safety.may_move:
@@ -73,7 +71,7 @@ class Player:
                 f"program '{program.name}' was not started: {self._robot.safety.mode.name.lower()}"
             )
             return
-        self._main = Process(program.steps, self._enter, self._robot.mover.release)
+        self._main = Process(program.main, self._enter, self._robot.mover.release)
         self.name = program.name
         self.state = RuntimeState.PLAYING
 

@@ -10,7 +10,6 @@ from mocks.ur.geometry_functions import matrix, pose
 from mocks.ur.hooks import CYCLE, Matrix
 from mocks.ur.move_functions import solved
 from mocks.ur.robot import Robot
-from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import PoseValue, number, six
 
@@ -22,10 +21,10 @@ class StateFunctions:
         self._robot = robot
         self._mover = robot.mover
 
-    def table(self) -> dict[str, Builtin]:
+    def table(self) -> dict[str, Callable[..., Any]]:
         """By name; the mock's arm is where it is commanded to be, so actual and target agree."""
         mover = self._mover
-        quick: dict[str, Callable[..., Any]] = {
+        return {
             "get_steptime": lambda: CYCLE,
             "get_actual_tcp_pose": lambda: pose(mover.base_from_tcp),
             "get_target_tcp_pose": lambda: pose(mover.base_from_tcp),
@@ -50,7 +49,6 @@ class StateFunctions:
             "tool_contact": self.tool_contact,
             "zero_ftsensor": self._robot.force.zero,
         }
-        return {name: Builtin(function) for name, function in quick.items()}
 
     def get_actual_joint_positions_history(self, steps: Any = 0) -> list[float]:
         """Joints some cycles ago."""

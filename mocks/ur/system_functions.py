@@ -7,7 +7,6 @@ from typing import Any, Final
 from mocks.ur.geometry_functions import matrix
 from mocks.ur.registers import BITS, INT32, NUMERIC, RegisterWatchdog
 from mocks.ur.robot import Robot
-from mocks.ur.urscript.code import Builtin
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.values import number, show, truth
 
@@ -34,10 +33,12 @@ class SystemFunctions:
         self._robot = robot
         self._protective_stop = protective_stop
 
-    def table(self) -> dict[str, Builtin]:
+    def table(self) -> dict[str, Callable[..., Any]]:
         """By name."""
         robot = self._robot
-        quick: dict[str, Callable[..., Any]] = {
+        return {
+            "sync": _sync,
+            "sleep": self.sleep,
             "textmsg": self.textmsg,
             "popup": self.popup,
             "rtde_set_watchdog": self.rtde_set_watchdog,
@@ -58,8 +59,6 @@ class SystemFunctions:
             **self._digital_outputs(),
             **{name: _unmodelled(name) for name in UNMODELLED},
         }
-        timed = {"sync": Builtin(_sync, takes_time=True), "sleep": Builtin(self.sleep, takes_time=True)}
-        return {name: Builtin(function) for name, function in quick.items()} | timed
 
     def sleep(self, t: Any) -> Generator[None, None, None]:
         """Do nothing for a time."""

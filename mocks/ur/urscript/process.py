@@ -1,9 +1,11 @@
 """A program at work: its threads, each resumed once a cycle, and the variables they share."""
 
+import traceback
 from collections.abc import Callable, Generator
 from typing import Any, Final
 
-from mocks.ur.urscript.errors import ScriptError
+from mocks.ur.urscript import values
+from mocks.ur.urscript.errors import PROGRAM, ScriptError
 
 Steps = Generator[None, None, Any]
 
@@ -26,11 +28,11 @@ class Task:
         self.number = number
         self._left = BUDGET
 
-    def spend(self, line: int) -> None:
+    def spend(self) -> None:
         """Count one turn; ``ScriptError`` where a cycle's worth is used up."""
         self._left -= 1
         if self._left < 0:
-            raise ScriptError("a loop that takes no time: 'sync()' is missing", line)
+            raise ScriptError("a loop that takes no time: 'sync()' is missing")
 
     def renew(self) -> None:
         """A new cycle begins."""
@@ -38,15 +40,81 @@ class Task:
 
 
 class CallFrame:
-    """One call's variables and result."""
+    """One call's variables; a name means one of these, else the program's global of that name."""
 
-    __slots__ = ("process", "result", "task", "variables")
+    __slots__ = ("_process", "_task", "_variables")
 
     def __init__(self, process: "Process", task: Task) -> None:
-        self.process = process
-        self.task = task
-        self.variables: dict[str, Any] = {}
-        self.result: Any = None
+        self._process = process
+        self._task = task
+        self._variables: dict[str, Any] = {}
+
+    def spend(self) -> None:
+        """Count one turn of a loop."""
+        self._task.spend()
+
+    # Variables
+
+    def read(self, name: str) -> Any:
+        """The value of a name."""
+        if name in self._variables:
+            return self._variables[name]
+        if name in self._process.variables:
+            return self._process.variables[name]
+        raise ScriptError(f"variable '{name}' has no value yet")
+
+    def store(self, name: str, value: Any) -> None:
+        """``name = value``: into a global of that name where there is one and no local."""
+        own = name in self._variables or name not in self._process.variables
+        (self._variables if own else self._process.variables)[name] = values.copied(value)
+
+    def store_global(self, name: str, value: Any) -> None:
+        """``global name = value``."""
+        self._process.variables[name] = values.copied(value)
+
+    def store_local(self, name: str, value: Any) -> None:
+        """``local name = value``."""
+        self._variables[name] = values.copied(value)
+
+    def default(self, name: str, value: Any) -> None:
+        """The value of a parameter that the call does not give."""
+        self._variables.setdefault(name, values.copied(value))
+
+    def set_item(self, name: str, value: Any, *indices: Any) -> None:
+        """``name[indices] = value``."""
+        values.set_item(self.read(name), indices, value)
+
+    # Calls and threads
+
+    def enter(self, names: tuple[str, ...], *given: Any) -> "CallFrame":
+        """The frame of a call of one of the program's functions, given some of its parameters."""
+        self._task.spend()
+        return self._process.frame(self._task, names, given)
+
+    def start(self, function: Callable[["CallFrame"], Steps], names: tuple[str, ...], *given: Any) -> int:
+        """``run name(...)``: begin a thread; its handle."""
+        return self._process.start(lambda task: function(self._process.frame(task, names, given)))
+
+    def kill(self, handle: Any) -> None:
+        """``kill handle``."""
+        self._process.kill(handle)
+
+    def join(self, handle: Any) -> Steps:
+        """``join handle``: until the thread has ended."""
+        while self._process.alive(handle):
+            yield
+
+    def halt(self) -> None:
+        """End the program."""
+        raise Halted
+
+    def enter_critical(self) -> None:
+        """Until ``exit_critical`` only this thread runs."""
+        self._process.holder = self._task
+
+    def exit_critical(self) -> None:
+        """Let the other threads run again."""
+        self._process.holder = None
 
 
 class Process:
@@ -60,6 +128,7 @@ class Process:
     Attributes:
         variables: the globals.
         current: number of the thread that runs now.
+        holder: the only thread that runs, in its critical section.
     """
 
     def __init__(
@@ -74,13 +143,16 @@ class Process:
         self._released = released
         self._tasks: dict[int, tuple[Task, Steps]] = {}
         self._started = 0
-        self._holder: Task | None = None
+        self.holder: Task | None = None
         self._killed: set[int] = set()
         self._main = self.start(lambda task: main(self.frame(task)))
 
-    def frame(self, task: Task) -> CallFrame:
-        """An empty frame."""
-        return CallFrame(self, task)
+    def frame(self, task: Task, names: tuple[str, ...] = (), given: tuple[Any, ...] = ()) -> CallFrame:
+        """A new call's frame, given some parameters."""
+        frame = CallFrame(self, task)
+        for name, value in zip(names, given, strict=True):
+            frame.store_local(name, value)
+        return frame
 
     def start(self, steps: Callable[[Task], Steps]) -> int:
         """Begin a thread; its handle."""
@@ -102,14 +174,6 @@ class Process:
         """Whether a thread still runs."""
         return handle in self._tasks
 
-    def halt(self) -> None:
-        """End the program."""
-        raise Halted
-
-    def hold(self, task: Task | None) -> None:
-        """Until ``hold(None)`` only this thread runs."""
-        self._holder = task
-
     def step(self) -> bool:
         """Resume each thread once, those just begun too; whether the program goes on.
 
@@ -118,7 +182,7 @@ class Process:
         """
         number = 0
         while number := min((later for later in self._tasks if later > number), default=0):
-            if self._holder is not None and self._holder.number != number:
+            if self.holder is not None and self.holder.number != number:
                 continue
             task, steps = self._tasks[number]
             task.renew()
@@ -130,8 +194,10 @@ class Process:
                 self._end(number)
             except Halted:
                 self._end(self._main)
+            except ScriptError as error:
+                raise ScriptError(str(error), _line_of(error)) from error
             except (TypeError, ValueError, ArithmeticError, RecursionError) as error:
-                raise ScriptError(f"{type(error).__name__}: {error}") from error
+                raise ScriptError(f"{type(error).__name__}: {error}", _line_of(error)) from error
             finally:
                 self.current = 0
                 self._entered(0)
@@ -152,7 +218,13 @@ class Process:
             return
         task, steps = self._tasks.pop(number)
         self._killed.discard(number)
-        if self._holder is task:
-            self._holder = None
+        if self.holder is task:
+            self.holder = None
         steps.close()
         self._released(number)
+
+
+def _line_of(error: Exception) -> int:
+    """The last of the program's lines that an error came through."""
+    frames = traceback.walk_tb(error.__traceback__)
+    return next((line for frame, line in reversed([*frames]) if frame.f_code.co_filename == PROGRAM), 0)

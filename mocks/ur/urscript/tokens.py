@@ -8,32 +8,9 @@ from mocks.ur.urscript.errors import ScriptError
 
 KEYWORDS: Final = frozenset(
     (
-        "def",
-        "sec",
-        "thread",
-        "end",
-        "if",
-        "elif",
-        "else",
-        "while",
-        "return",
-        "break",
-        "continue",
-        "global",
-        "local",
-        "halt",
-        "pass",
-        "run",
-        "kill",
-        "join",
-        "enter_critical",
-        "exit_critical",
-        "and",
-        "or",
-        "not",
-        "xor",
-        "True",
-        "False",
+        *("def", "sec", "thread", "end", "if", "elif", "else", "while", "return", "break", "continue"),
+        *("global", "local", "halt", "pass", "run", "kill", "join", "enter_critical", "exit_critical"),
+        *("and", "or", "not", "xor", "True", "False"),
     )
 )
 
@@ -62,12 +39,59 @@ class Token:
     line: int
 
 
-def tokens(text: str) -> list[Token]:
-    """All words, and an end of text.
+class Tokens:
+    """All words of a text, taken one after the other.
 
     Raises:
-        ScriptError: a character that begins no word.
+        ScriptError: a character that begins no word; a method: another word than the one that must come.
     """
+
+    def __init__(self, text: str) -> None:
+        self.words = _tokens(text)
+        self.at = 0
+
+    @property
+    def next(self) -> Token:
+        """The word that comes next."""
+        return self.words[self.at]
+
+    def take_any(self) -> Token:
+        """Step over the next word."""
+        word = self.next
+        if word.kind == "end of text":
+            raise self.unexpected("more text")
+        self.at += 1
+        return word
+
+    def comes(self, *texts: str) -> bool:
+        """Whether one of these comes next, as a word of the grammar."""
+        return self.next.text in texts and self.next.kind in ("symbol", "keyword")
+
+    def accept(self, text: str) -> bool:
+        """Step over a word if it comes next."""
+        comes = self.comes(text)
+        self.at += comes
+        return comes
+
+    def take(self, text: str) -> None:
+        """Step over a word, which must come next."""
+        if not self.accept(text):
+            raise self.unexpected(f"'{text}'")
+
+    def name(self) -> str:
+        """Step over a name, which must come next."""
+        if self.next.kind != "word":
+            raise self.unexpected("a name")
+        return self.take_any().text
+
+    def unexpected(self, wanted: str) -> ScriptError:
+        """What to raise where something else was wanted."""
+        return ScriptError(
+            f"expected {wanted}, found '{self.next.text or 'the end of the text'}'", self.next.line
+        )
+
+
+def _tokens(text: str) -> list[Token]:
     found: list[Token] = []
     position, line = 0, 1
     while position < len(text):

@@ -22,11 +22,6 @@ def copied(value: Any) -> Any:
     return type(value)(copied(item) for item in value) if isinstance(value, list) else value
 
 
-def make_list(*items: Any) -> list[Any]:
-    """``[...]``."""
-    return list(items)
-
-
 def make_pose(*items: Any) -> PoseValue:
     """``p[...]``."""
     return PoseValue(number(item) for item in items)

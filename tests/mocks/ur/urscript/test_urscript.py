@@ -1,14 +1,13 @@
 """URScript: its grammar, its values, its threads."""
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from mocks.ur.urscript.code import Builtin
-from mocks.ur.urscript.compiler import compile_program
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.parser import parse
 from mocks.ur.urscript.process import Process
+from mocks.ur.urscript.program import translate
 from mocks.ur.urscript.tokens import whole_length
 from mocks.ur.urscript.values import PoseValue
 
@@ -24,9 +23,9 @@ class Bench:
         def sync() -> Any:
             yield
 
-        builtins = {"say": Builtin(self.say), "sync": Builtin(sync, takes_time=True)}
-        program = compile_program(parse(text), builtins)
-        self.process = Process(program.steps, lambda _: None, self.released.append)
+        builtins: dict[str, Callable[..., Any]] = {"say": self.say, "sync": sync}
+        program = translate(text, builtins)
+        self.process = Process(program.main, lambda _: None, self.released.append)
 
     def say(self, x: Any, at: Any = None) -> None:
         self.said.append(x if at is None else (x, self.cycle))
@@ -201,6 +200,8 @@ def test_halt_ends_it_at_once() -> None:
         ("def f():\n 5 end", "stands alone"),
         ("def f():\n x = 1 ? 2 end", "unexpected character '\\?'"),
         ("def f() x = 1 end", "expected ':'"),
+        ("def f():\n break end", "line 2: 'break' outside loop"),
+        ("def f():\n def g(x): sync() say(1 / x) end\n g(0) end", "line 2: division by zero"),
         ("def f():\n x = 1 end y", "expected the end of the text"),
         ("def f():\n __class__.x() end", "line 2"),
         ("def f():\n x = " + "(" * 5000 + " end", "nested too deeply"),
