@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
+from mocks.ur.connection import Connection
 from mocks.ur.controller import Controller
 from mocks.ur.player import RuntimeState
 from mocks.ur.safety import SafetyMode
@@ -41,13 +42,8 @@ class Dashboard:
         words = command.lower()
         if words in self._asked:
             return self._asked[words]()
-        if words.startswith(("popup ", "addtolog ")):
-            self._robot.log.append(command)
-            return "showing popup" if words.startswith("popup") else "Added log message"
         if words in self._done:
             return self._done[words]() if self._robot.remote else LOCAL
-        if words.startswith("load "):
-            return f"File not found: {command[5:].strip()}" if self._robot.remote else LOCAL
         return f"could not understand: {command}"
 
     def _questions(self) -> dict[str, Callable[[], str]]:
@@ -55,7 +51,6 @@ class Dashboard:
         version = ".".join(map(str, robot.config.polyscope))
         return {
             "polyscopeversion": lambda: f"URSoftware {version} (Mar 22 2022)",
-            "version": lambda: version,
             "get serial number": lambda: robot.config.serial,
             "get robot model": lambda: robot.arm.name,
             "is in remote control": lambda: str(robot.remote).lower(),
@@ -64,10 +59,6 @@ class Dashboard:
             "safetystatus": lambda: f"Safetystatus: {robot.safety.mode.name}",
             "running": lambda: f"Program running: {str(player.state is RuntimeState.PLAYING).lower()}",
             "programstate": lambda: f"{_PROGRAM_STATES[player.state]} {player.name or 'unnamed'}",
-            "isprogramsaved": lambda: f"true {player.name or 'unnamed'}",
-            "get loaded program": lambda: "No program loaded",
-            "get operational mode": lambda: "NONE",
-            "get user role": lambda: "LOCKED",
             "quit": lambda: "Disconnected",
         }
 
@@ -80,9 +71,7 @@ class Dashboard:
             "power off": self._power_off,
             "brake release": self._release_brakes,
             "unlock protective stop": self._unlock,
-            "close popup": lambda: "closing popup",
             "close safety popup": lambda: "closing safety popup",
-            "restart safety": lambda: "Restarting safety",
         }
 
     def _play(self) -> str:
@@ -118,44 +107,33 @@ class Dashboard:
         return "Protective stop releasing"
 
 
-class DashboardConnection(asyncio.Protocol):
+class DashboardConnection(Connection):
     """One client; it is greeted, and gone after ``quit``."""
 
     def __init__(self, dashboard: Dashboard, connections: set["DashboardConnection"]) -> None:
+        super().__init__()
         self._dashboard = dashboard
         self._connections = connections
         self._waiting = b""
-        self._transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client has come."""
-        assert isinstance(transport, asyncio.Transport), "a stream server makes stream transports"
-        self._transport = transport
+        super().connection_made(transport)
         self._connections.add(self)
-        transport.write(GREETING)
+        self.send(GREETING)
 
-    def connection_lost(self, _error: Exception | None) -> None:
+    def connection_lost(self, error: Exception | None) -> None:
         """It has gone."""
-        self._transport = None
+        super().connection_lost(error)
         self._connections.discard(self)
-
-    def abort(self) -> None:
-        """Reset the connection."""
-        if self._transport is not None:
-            self._transport.abort()
 
     def data_received(self, data: bytes) -> None:
         """Answer every whole line; a line that does not end closes the connection."""
         *lines, self._waiting = (self._waiting + data).split(b"\n")
         for line in lines:
             text = line.decode("utf-8", "replace").strip()
-            if self._transport is not None:
-                self._transport.write(self._dashboard.reply(text).encode() + b"\n")
+            self.send(self._dashboard.reply(text).encode() + b"\n")
             if text.lower() == "quit":
-                self._close()
+                self.close()
         if len(self._waiting) > LONGEST_LINE:
-            self._close()
-
-    def _close(self) -> None:
-        if self._transport is not None:
-            self._transport.close()
+            self.close()

@@ -8,6 +8,7 @@ import struct
 from typing import Any, Final
 
 from mocks.ur import wire
+from mocks.ur.connection import Connection
 from mocks.ur.controller import Controller
 from mocks.ur.variables import INPUTS, OUTPUTS, InputVariable, Read
 from mocks.ur.wire import BadPacket, Kind, packet
@@ -125,10 +126,11 @@ class RtdeServer:
         self.claims = {name: owner for name, owner in self.claims.items() if owner is not connection}
 
 
-class RtdeConnection(asyncio.Protocol):
+class RtdeConnection(Connection):
     """One client."""
 
     def __init__(self, server: RtdeServer) -> None:
+        super().__init__()
         self._server = server
         self._packets = wire.Packets()
         self._output: OutputRecipe | None = None
@@ -136,27 +138,19 @@ class RtdeConnection(asyncio.Protocol):
         self._next_input = 1
         self._protocol = 1
         self._started = False
-        self._transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client has come."""
-        assert isinstance(transport, asyncio.Transport), "a stream server makes stream transports"
-        self._transport = transport
+        super().connection_made(transport)
         self._server.add(self)
         if self._server.refusing:
-            transport.abort()
-        elif self._server.frozen:
-            transport.pause_reading()
+            self.abort()
+        self.set_reading(not self._server.frozen)
 
-    def connection_lost(self, _error: Exception | None) -> None:
+    def connection_lost(self, error: Exception | None) -> None:
         """It has gone."""
-        self._transport = None
+        super().connection_lost(error)
         self._server.remove(self)
-
-    def abort(self) -> None:
-        """Reset the connection."""
-        if self._transport is not None:
-            self._transport.abort()
 
     def set_reading(self, reading: bool) -> None:
         """Take in what the client sends, or leave it in the cable."""
@@ -169,9 +163,8 @@ class RtdeConnection(asyncio.Protocol):
             for kind, payload in self._packets.feed(data):
                 self._answer(kind, payload)
         except BadPacket as error:
-            self._send(wire.text_message(f"{error}; the connection is closed"))
-            if self._transport is not None:
-                self._transport.close()
+            self.send(wire.text_message(f"{error}; the connection is closed"))
+            self.close()
 
     def publish(self) -> None:
         """Send this cycle's packet, if one is due; drop a client that does not read."""
@@ -183,35 +176,31 @@ class RtdeConnection(asyncio.Protocol):
             if transport.get_write_buffer_size() > SLOWEST:
                 transport.abort()
 
-    def _send(self, data: bytes) -> None:
-        if self._transport is not None:
-            self._transport.write(data)
-
     def _answer(self, kind: int, payload: bytes) -> None:
         match kind:
             case Kind.PROTOCOL_VERSION:
                 accepted = payload == _VERSION.pack(PROTOCOL)
                 self._protocol = PROTOCOL if accepted else self._protocol
-                self._send(packet(Kind.PROTOCOL_VERSION, bytes((accepted,))))
+                self.send(packet(Kind.PROTOCOL_VERSION, bytes((accepted,))))
             case Kind.CONTROL_VERSION:
                 version = struct.pack(">4I", *self._server.controller.robot.config.polyscope)
-                self._send(packet(Kind.CONTROL_VERSION, version))
+                self.send(packet(Kind.CONTROL_VERSION, version))
             case Kind.SETUP_OUTPUTS:
                 self._set_up_outputs(payload)
             case Kind.SETUP_INPUTS:
                 self._set_up_inputs(payload)
             case Kind.START:
                 self._started = self._output is not None and self._output.valid
-                self._send(packet(Kind.START, bytes((self._started,))))
+                self.send(packet(Kind.START, bytes((self._started,))))
             case Kind.PAUSE:
                 self._started = False
-                self._send(packet(Kind.PAUSE, b"\x01"))
+                self.send(packet(Kind.PAUSE, b"\x01"))
             case Kind.DATA:
                 self._take(payload)
             case Kind.TEXT:
                 pass
             case _:
-                self._send(wire.text_message(f"packet type {kind} is not known"))
+                self.send(wire.text_message(f"packet type {kind} is not known"))
 
     def _set_up_outputs(self, payload: bytes) -> None:
         if self._protocol != PROTOCOL or len(payload) < _FREQUENCY.size:
@@ -219,15 +208,13 @@ class RtdeConnection(asyncio.Protocol):
         (frequency,) = _FREQUENCY.unpack_from(payload)
         names = wire.names_in(payload[_FREQUENCY.size :])
         if not 1.0 <= frequency <= CYCLES_PER_SECOND:
-            self._send(
-                wire.text_message(f"frequency {frequency} Hz is not between 1 and {CYCLES_PER_SECOND}")
-            )
+            self.send(wire.text_message(f"frequency {frequency} Hz is not between 1 and {CYCLES_PER_SECOND}"))
             frequency = 0.0
         recipe = OutputRecipe(names, frequency)
         recipe.valid = recipe.valid and frequency > 0.0
         if recipe.valid:
             self._output = recipe
-        self._send(packet(Kind.SETUP_OUTPUTS, bytes((recipe.valid,)) + ",".join(recipe.types).encode()))
+        self.send(packet(Kind.SETUP_OUTPUTS, bytes((recipe.valid,)) + ",".join(recipe.types).encode()))
 
     def _set_up_inputs(self, payload: bytes) -> None:
         names = wire.names_in(payload)
@@ -245,11 +232,11 @@ class RtdeConnection(asyncio.Protocol):
             number, self._next_input = self._next_input, self._next_input + 1
             claims.update(dict.fromkeys(names, self))
             self._inputs[number] = InputRecipe(names, [INPUTS[name] for name in names])
-        self._send(packet(Kind.SETUP_INPUTS, bytes((number,)) + ",".join(types).encode()))
+        self.send(packet(Kind.SETUP_INPUTS, bytes((number,)) + ",".join(types).encode()))
 
     def _take(self, payload: bytes) -> None:
         number = payload[0] if payload else 0
         if number not in self._inputs:
-            self._send(wire.text_message(f"there is no input recipe {number}"))
+            self.send(wire.text_message(f"there is no input recipe {number}"))
             return
         self._inputs[number].apply(self._server.controller, payload[1:])

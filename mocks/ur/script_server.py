@@ -9,6 +9,7 @@ import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
+from mocks.ur.connection import Connection
 from mocks.ur.controller import Controller
 from mocks.ur.urscript.errors import ScriptError
 from mocks.ur.urscript.tokens import whole_length
@@ -57,29 +58,23 @@ class ScriptServer:
             controller.complain("a program was refused: the pendant is in local control")
 
 
-class ScriptConnection(asyncio.Protocol):
+class ScriptConnection(Connection):
     """One client."""
 
     def __init__(self, server: ScriptServer) -> None:
+        super().__init__()
         self._server = server
         self._waiting = ""
-        self._transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client has come."""
-        assert isinstance(transport, asyncio.Transport), "a stream server makes stream transports"
-        self._transport = transport
+        super().connection_made(transport)
         self._server.connections.add(self)
 
-    def connection_lost(self, _error: Exception | None) -> None:
+    def connection_lost(self, error: Exception | None) -> None:
         """It has gone; what it left unfinished is not run."""
-        self._transport = None
+        super().connection_lost(error)
         self._server.connections.discard(self)
-
-    def abort(self) -> None:
-        """Reset the connection."""
-        if self._transport is not None:
-            self._transport.abort()
 
     def data_received(self, data: bytes) -> None:
         """Run every whole program."""

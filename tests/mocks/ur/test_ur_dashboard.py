@@ -18,10 +18,8 @@ CONFIG = ControllerConfig(host="127.0.0.2")
         ("get serial number", "20225500001"),
         ("get robot model", "UR5"),
         ("programState", "STOPPED unnamed"),
-        ("close popup", "closing popup"),
         ("stop", "Stopped"),
         ("play", "Failed to execute: play"),
-        ("popup hello", "showing popup"),
         ("no such thing", "could not understand: no such thing"),
         ("", "could not understand: "),
     ],
@@ -37,4 +35,3 @@ def test_local_control_answers_questions_and_refuses_commands() -> None:
     assert dashboard.reply("is in remote control") == "false"
     assert dashboard.reply("robotmode") == "Robotmode: RUNNING"
     assert dashboard.reply("stop") == LOCAL
-    assert dashboard.reply("load x.urp") == LOCAL
