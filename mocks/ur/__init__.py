@@ -6,6 +6,6 @@ client uploads (``urscript``), so a client's commands are not imitated one by on
 Assumed where the manuals are silent: 0 as the number of a recipe that failed, ``runtime_state``
 4 in a protective stop, the words of runtime errors, rest for 0.1 s as "steady", one radian of
 turning counted as 0.1 m of a line's way, contact told by a force threshold. Not modelled: blends,
-force mode, freedrive, dynamics (currents, torques, the mass matrix), a program counter, analog and
-digital inputs, the binary state on ports 30001 to 30003, version 1 of the exchange.
+servoing, joint speeds, force mode, freedrive, dynamics (currents, torques, the mass matrix), a program
+counter, analog and digital inputs, the binary state on ports 30001 to 30003, version 1 of the exchange.
 """

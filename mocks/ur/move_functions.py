@@ -11,8 +11,6 @@ from mocks.ur.arm.motions import (
     ArmMotion,
     MoveJoints,
     MoveLine,
-    ServoJoints,
-    SpeedJoints,
     SpeedLine,
     as_six,
 )
@@ -39,9 +37,7 @@ class MoveFunctions:
         return {
             "movej": self.movej,
             "movel": self.movel,
-            "speedj": self.speedj,
             "speedl": self.speedl,
-            "servoj": self.servoj,
             "stopj": self.stopj,
             "stopl": self.stopl,
         }
@@ -60,34 +56,11 @@ class MoveFunctions:
         yield from self._from_rest()
         yield from self._perform(motion)
 
-    def speedj(self, qd: Any, a: Any, t: Any = None) -> Cycles:
-        """Towards joint speeds."""
-        seconds = None if t is None else _not_below(t, "t")
-        yield from self._perform(
-            SpeedJoints(as_six(six(qd, "speedj")), _above(a, "a"), seconds), goes_on=True
-        )
-
     def speedl(self, xd: Any, a: Any, t: Any = None, aRot: Any = "a") -> Cycles:  # noqa: N803 - UR's name
         """Towards a velocity of the tool centre point."""
         seconds = None if t is None else _not_below(t, "t")
         turning = _above(a if aRot == "a" else aRot, "aRot")
         motion = SpeedLine(as_six(six(xd, "speedl")), _above(a, "a"), turning, seconds)
-        yield from self._perform(motion, goes_on=True)
-
-    def servoj(
-        self,
-        q: Any,
-        a: Any = 0,
-        v: Any = 0,
-        t: Any = 0.002,
-        lookahead_time: Any = 0.1,
-        gain: Any = 300,
-    ) -> Cycles:
-        """Towards joints that are sent again and again; ``a``, ``v`` and the gain are not used."""
-        for unused in (a, v, gain):
-            number(unused)
-        lookahead, seconds = _above(lookahead_time, "lookahead_time"), _above(t, "t")
-        motion = ServoJoints(self._joints(q, "servoj"), lookahead, seconds)
         yield from self._perform(motion, goes_on=True)
 
     def stopj(self, a: Any = 2.0) -> Cycles:

@@ -42,10 +42,6 @@ class Outputs:
     analog_types: int = 0
     slider: float = 1.0
 
-    def set_digital(self, bit: int, on: bool) -> None:
-        """Switch one output."""
-        self.digital = self.digital & ~(1 << bit) | on << bit
-
     def apply(self, sent: Mapping[str, Any]) -> None:
         """What a client sent: of each value, only what its mask names; the rest may be garbage."""
         for group, shift in _DIGITAL.items():

@@ -27,15 +27,8 @@ class StateFunctions:
         return {
             "get_steptime": lambda: CYCLE,
             "get_actual_tcp_pose": lambda: pose(mover.base_from_tcp),
-            "get_target_tcp_pose": lambda: pose(mover.base_from_tcp),
             "get_actual_tool_flange_pose": lambda: pose(mover.base_from_flange),
-            "get_target_tool_flange_pose": lambda: pose(mover.base_from_flange),
-            "get_actual_tcp_speed": lambda: [*mover.twist[0], *mover.twist[1]],
             "get_target_tcp_speed": lambda: [*mover.twist[0], *mover.twist[1]],
-            "get_actual_joint_positions": lambda: list(mover.joints),
-            "get_target_joint_positions": lambda: list(mover.joints),
-            "get_actual_joint_speeds": lambda: list(mover.speeds),
-            "get_target_joint_speeds": lambda: list(mover.speeds),
             "get_actual_joint_positions_history": self.get_actual_joint_positions_history,
             "get_target_waypoint": lambda: pose(mover.base_from_tcp),
             "get_tcp_offset": lambda: pose(mover.flange_from_tcp),
@@ -44,8 +37,6 @@ class StateFunctions:
             "get_inverse_kin_has_solution": self.get_inverse_kin_has_solution,
             "is_within_safety_limits": self.is_within_safety_limits,
             "is_steady": lambda: mover.steady,
-            "get_tcp_force": self._tcp_force,
-            "force": lambda: sum(part * part for part in self._tcp_force()[:3]) ** 0.5,
             "tool_contact": self.tool_contact,
             "zero_ftsensor": self._robot.force.zero,
         }
@@ -102,10 +93,6 @@ class StateFunctions:
         """Cycles since something first resisted the motion along a direction in base; 0 without contact."""
         x, y, z = six(list(direction), "tool_contact")[:3]
         return self._robot.force.contact_cycles((x, y, z))
-
-    def _tcp_force(self) -> list[float]:
-        mover = self._mover
-        return list(self._robot.force.at_tcp(mover.base_from_flange, mover.flange_from_tcp))
 
     def _offset(self, tcp: Any) -> Matrix:
         return self._mover.flange_from_tcp if tcp == "active_tcp" else matrix(tcp, "tcp")

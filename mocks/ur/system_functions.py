@@ -5,13 +5,14 @@ from collections.abc import Callable, Generator
 from typing import Any, Final
 
 from mocks.ur.geometry_functions import matrix
-from mocks.ur.registers import BITS, INT32, NUMERIC, RegisterWatchdog
+from mocks.ur.registers import INT32, NUMERIC, RegisterWatchdog
 from mocks.ur.robot import Robot
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.values import number, show, truth
+from mocks.ur.urscript.values import number, show
 
 UNMODELLED: Final = (
-    *("movec", "movep", "servoc", "force_mode", "teach_mode", "freedrive_mode", "get_freedrive_status"),
+    *("movec", "movep", "servoc", "servoj", "speedj"),
+    *("force_mode", "teach_mode", "freedrive_mode", "get_freedrive_status"),
     *("get_joint_torques", "ft_rtde_input_enable", "enable_external_ft_sensor", "direct_torque"),
     *("get_mass_matrix", "get_coriolis_and_centrifugal_torques", "get_target_joint_accelerations"),
     *("get_jacobian", "get_jacobian_time_derivative"),
@@ -40,7 +41,6 @@ class SystemFunctions:
             "sync": _sync,
             "sleep": self.sleep,
             "textmsg": self.textmsg,
-            "popup": self.popup,
             "rtde_set_watchdog": self.rtde_set_watchdog,
             "protective_stop": lambda: self._protective_stop("the program asked for it"),
             "set_tcp": self.set_tcp,
@@ -56,7 +56,6 @@ class SystemFunctions:
             "force_mode_set_damping": lambda damping: _share(damping),
             "force_mode_set_gain_scaling": lambda scaling: _not_negative(scaling, "scaling"),
             **self._registers(),
-            **self._digital_outputs(),
             **{name: _unmodelled(name) for name in UNMODELLED},
         }
 
@@ -71,19 +70,6 @@ class SystemFunctions:
     def textmsg(self, s1: Any, s2: Any = "") -> None:
         """Write to the log."""
         self._robot.log.append(show(s1) + show(s2))
-
-    def popup(
-        self,
-        s: Any,
-        title: Any = "Popup",
-        warning: Any = False,
-        error: Any = False,
-        blocking: Any = False,
-    ) -> None:
-        """Logged; there is no pendant to show it, so a blocking one is refused."""
-        if warning is True or error is True or blocking is True:
-            raise ScriptError(f"popup '{show(s)}' waits for an operator at the pendant, and there is none")
-        self._robot.log.append(f"popup {show(title)}: {show(s)}")
 
     def rtde_set_watchdog(self, variable_name: Any, min_frequency: Any, action: Any = "pause") -> None:
         """Watch an input that clients must keep writing."""
@@ -132,38 +118,11 @@ class SystemFunctions:
         def set_double(address: Any, value: Any) -> None:
             results.doubles[_address(address, NUMERIC)] = float(number(value))
 
-        def set_bit(address: Any, value: Any) -> None:
-            results.bits[_address(address, BITS)] = truth(value)
-
         return {
             "read_input_integer_register": lambda address: inputs.ints[_address(address, NUMERIC)],
             "read_input_float_register": lambda address: inputs.doubles[_address(address, NUMERIC)],
-            "read_input_boolean_register": lambda address: inputs.bits[_address(address, BITS)],
-            "read_output_integer_register": lambda address: results.ints[_address(address, NUMERIC)],
-            "read_output_float_register": lambda address: results.doubles[_address(address, NUMERIC)],
-            "read_output_boolean_register": lambda address: results.bits[_address(address, BITS)],
             "write_output_integer_register": set_int,
             "write_output_float_register": set_double,
-            "write_output_boolean_register": set_bit,
-        }
-
-    def _digital_outputs(self) -> dict[str, Callable[..., Any]]:
-        outputs = self._robot.outputs
-
-        def setter(first: int, count: int) -> Callable[[Any, Any], None]:
-            return lambda n, b: outputs.set_digital(first + _address(n, count), truth(b))
-
-        def getter(first: int, count: int) -> Callable[[Any], bool]:
-            return lambda n: bool(outputs.digital >> (first + _address(n, count)) & 1)
-
-        return {
-            "set_digital_out": setter(0, 8),
-            "set_standard_digital_out": setter(0, 8),
-            "set_configurable_digital_out": setter(8, 8),
-            "set_tool_digital_out": setter(16, 2),
-            "get_standard_digital_out": getter(0, 8),
-            "get_configurable_digital_out": getter(8, 8),
-            "get_tool_digital_out": getter(16, 2),
         }
 
 

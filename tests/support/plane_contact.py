@@ -17,7 +17,7 @@ class PlaneContact:
         self._height = height
         self._stiffness = stiffness
 
-    def wrench(self, base_from_flange: Sequence[Sequence[float]], time: float) -> Six:  # noqa: ARG002
+    def wrench(self, base_from_flange: Sequence[Sequence[float]], time: float) -> Six:
         """``(6,)`` N and N m on the flange, in base."""
         depth = self._height - base_from_flange[2][3]
         return 0.0, 0.0, self._stiffness * max(depth, 0.0), 0.0, 0.0, 0.0

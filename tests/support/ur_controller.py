@@ -1,4 +1,4 @@
-"""A mocked UR controller in a process of its own: ``python -m mocks.ur --host 127.0.0.2``.
+"""A mocked UR controller in a process of its own: ``python -m tests.support.ur_controller --host 127.0.0.2``.
 
 It says ``{"ready": true, ...}`` on standard output when all ports listen. Each line of JSON on
 standard input, ``{"kind": "freeze", "seconds": 2}``, begins a fault (``mocks.ur.faults``) and is
@@ -13,9 +13,9 @@ import sys
 from dataclasses import dataclass
 
 from mocks.ur.arm.motions import as_six
-from mocks.ur.arm.plane import PlaneContact
 from mocks.ur.hooks import HOME, ContactModel, ControllerConfig
 from mocks.ur.serve import serve
+from tests.support.plane_contact import PlaneContact
 
 
 @dataclass(frozen=True)

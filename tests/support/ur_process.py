@@ -26,11 +26,11 @@ READY_WITHIN = 20.0
 
 
 class UrProcess:
-    """``python -m mocks.ur`` on a free loopback address; ends with the ``with`` block."""
+    """``python -m tests.support.ur_controller`` on a free loopback address; ends with the ``with`` block."""
 
     def __init__(self, *options: str) -> None:
         self.host = free_host()
-        command = [sys.executable, "-m", "mocks.ur", "--host", self.host, *options]
+        command = [sys.executable, "-m", "tests.support.ur_controller", "--host", self.host, *options]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def __enter__(self) -> Self:

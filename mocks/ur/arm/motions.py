@@ -140,34 +140,6 @@ class MoveLine:
         self._profile = lasting(duration) if duration > 0.0 else trapezoid(way, speed, acceleration)
 
 
-class SpeedJoints:
-    """``speedj``: towards joint speeds; done after ``seconds``, or once they are reached.
-
-    Args:
-        target: rad/s.
-        acceleration: rad/s^2, of the joint that changes most.
-        seconds: None for as long as it takes.
-    """
-
-    def __init__(self, target: Six, acceleration: float, seconds: float | None) -> None:
-        self._target = target
-        self._acceleration = acceleration
-        self._left = seconds
-        self.done = False
-
-    def advance(self, body: ArmBody, seconds: float) -> None:
-        """Move on."""
-        target = [seconds / CYCLE * speed for speed in self._target]
-        speeds, reached = _approached(body.speeds, target, self._acceleration * CYCLE)
-        joints = [q + speed * CYCLE for q, speed in zip(body.joints, speeds, strict=True)]
-        body.put_joints(as_six(joints))
-        self._left = None if self._left is None else self._left - CYCLE
-        self.done = reached if self._left is None else self._left < 0.5 * CYCLE
-
-    def replan(self) -> None:
-        """Nothing to plan."""
-
-
 class SpeedLine:
     """``speedl``: towards a velocity of the tool; done after ``seconds``, or once it is reached.
 
@@ -188,31 +160,11 @@ class SpeedLine:
         """Move on."""
         linear, angular = body.twist
         target = [seconds / CYCLE * speed for speed in self._target]
-        velocity, there = _approached(linear, target[:3], self._rates[0] * CYCLE, norm=True)
-        turning, turned = _approached(angular, target[3:], self._rates[1] * CYCLE, norm=True)
+        velocity, there = _approached(linear, target[:3], self._rates[0] * CYCLE)
+        turning, turned = _approached(angular, target[3:], self._rates[1] * CYCLE)
         body.put_tcp(poses.carried(body.base_from_tcp, (*velocity, *turning), CYCLE))
         self._left = None if self._left is None else self._left - CYCLE
         self.done = (there and turned) if self._left is None else self._left < 0.5 * CYCLE
-
-    def replan(self) -> None:
-        """Nothing to plan."""
-
-
-class ServoJoints:
-    """``servoj``: towards joints that keep changing, smoothed over the look-ahead time."""
-
-    def __init__(self, target: Six, lookahead: float, seconds: float) -> None:
-        self._target = target
-        self._lookahead = lookahead
-        self._left = seconds
-        self.done = False
-
-    def advance(self, body: ArmBody, seconds: float) -> None:
-        """Move on."""
-        share = min(1.0, seconds / self._lookahead)
-        body.put_joints(_mixed(body.joints, self._target, share))
-        self._left -= seconds
-        self.done = self._left < 0.5 * seconds
 
     def replan(self) -> None:
         """Nothing to plan."""
@@ -228,12 +180,10 @@ def _mixed(start: Six, goal: Six, share: float) -> Six:
     return as_six([a + share * (b - a) for a, b in zip(start, goal, strict=True)])
 
 
-def _approached(
-    present: Sequence[float], target: Sequence[float], step: float, *, norm: bool = False
-) -> tuple[list[float], bool]:
+def _approached(present: Sequence[float], target: Sequence[float], step: float) -> tuple[list[float], bool]:
     """The speed a step nearer to the target, and whether that is the target."""
     change = [b - a for a, b in zip(present, target, strict=True)]
-    size = math.hypot(*change) if norm else max(map(abs, change))
+    size = math.hypot(*change)
     if size <= step:
         return list(target), True
     return [a + step / size * d for a, d in zip(present, change, strict=True)], False

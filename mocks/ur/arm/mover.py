@@ -41,7 +41,6 @@ class Mover:
         twist: of the tool centre point, over the last cycle.
         base_from_flange: as commanded.
         motions: how many motions have begun from rest.
-        moving_cycles: cycles since the newest of them began.
     """
 
     def __init__(self, arm: ArmModel, joints: Six) -> None:
@@ -53,7 +52,6 @@ class Mover:
         self.base_from_flange = kinematics.forward(arm, joints)
         self.history: deque[Six] = deque([joints], maxlen=HISTORY)
         self.motions = 0
-        self.moving_cycles = 0
         self._flange_from_tcp = poses.IDENTITY
         self._tcp_from_flange = poses.IDENTITY
         self._base_from_tcp = self.base_from_flange
@@ -97,7 +95,6 @@ class Mover:
         """Take the arm over, from wherever it is and at whatever speed."""
         if self._motion is None:
             self.motions += 1
-            self.moving_cycles = 0
         self._motion, self._owner = motion, owner
 
     def release(self, owner: int) -> None:
@@ -128,7 +125,6 @@ class Mover:
             if motion.done and self._owner == _CONTROLLER:
                 self._motion = None
         self._differentiate(*before)
-        self.moving_cycles += 1
         self.history.append(self.joints)
 
     def finish(self, motion: ArmMotion) -> None:

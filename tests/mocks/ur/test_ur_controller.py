@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from mocks.ur.arm.plane import PlaneContact
 from mocks.ur.arm.profiles import trapezoid
 from mocks.ur.controller import Controller
 from mocks.ur.dashboard import TOO_EARLY, Dashboard
 from mocks.ur.hooks import CYCLE, HOME, ControllerConfig, Six
 from mocks.ur.player import RuntimeState
 from mocks.ur.safety import SafetyMode
+from tests.support.plane_contact import PlaneContact
 
 CONFIG = ControllerConfig(host="127.0.0.2")
 FAR = "[1.0, -1.5707963267948966, 1.5707963267948966, -1.5707963267948966, -1.5707963267948966, 0]"
@@ -105,7 +105,7 @@ def test_a_stop_takes_over_at_the_speed_the_arm_has(stop: str) -> None:
 
 
 def test_a_program_that_ends_during_a_motion_brakes() -> None:
-    controller = _controller("speedj([0.5, 0, 0, 0, 0, 0], a=2.0, t=0.5)")
+    controller = _controller(f"thread t(): movej({FAR}, a=2.0, v=0.5) end run t() sleep(0.5)")
     speeds = np.diff(_run(controller, 1.0)[:, 0]) / CYCLE
     assert speeds.max() == pytest.approx(0.5)
     assert speeds[-1] == 0.0
@@ -121,14 +121,6 @@ def test_speed_commands_ramp_and_follow_the_slider() -> None:
     controller.robot.outputs.slider = 0.25
     _run(controller, 0.3)
     assert controller.robot.mover.twist[0] == pytest.approx((0.0, 0.025, 0.0), abs=1e-9)
-
-
-def test_servoing_follows_with_its_look_ahead() -> None:
-    controller = _controller(
-        f"while True: servoj({FAR.replace('1.0,', '0.01,')}, t=0.002, lookahead_time=0.1) end"
-    )
-    joints = _run(controller, 0.1)[:, 0]
-    assert joints[-1] == pytest.approx(0.01 * (1 - math.exp(-1)), rel=0.05)
 
 
 def test_too_fast_is_a_protective_stop() -> None:
@@ -275,7 +267,6 @@ def test_a_watchdog_stops_a_program_whose_input_falls_silent() -> None:
         "movel([1, 2])",
         "set_tcp(p[0, 0, 0, 0, 0, 1e999])",
         "force_mode(1)",
-        "popup(1, blocking=True)",
     ],
 )
 def test_bad_arguments_stop_the_program_where_the_arm_stands(script: str) -> None:
@@ -288,9 +279,9 @@ def test_bad_arguments_stop_the_program_where_the_arm_stands(script: str) -> Non
 
 def test_a_secondary_program_runs_beside_the_first_and_must_not_move() -> None:
     controller = _controller("while True: sync() end")
-    for body in ("set_tool_digital_out(1, True)", "movej([0, 0, 0, 0, 0, 0])"):
+    for body in ("write_output_integer_register(1, 7)", "movej([0, 0, 0, 0, 0, 0])"):
         controller.player.start(controller.player.translate(f"sec s():\n{body}\nend\n"))
     joints = _run(controller, 0.1)
-    assert controller.robot.outputs.digital == 1 << 17
+    assert controller.robot.results.ints[1] == 7
     assert (joints == HOME).all()
     assert controller.player.state is RuntimeState.PLAYING
