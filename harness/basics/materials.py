@@ -1,36 +1,11 @@
-"""What objects are made of: the seven materials of the paper, and those an operator describes.
-
-A file of materials has one table for each::
-
-    [materials.stoneware]
-    density = "2450 kg/m^3"
-    young = "45 GPa"
-    poisson = 0.2
-    alpha = "12 1/s"
-    beta = "0.1 us"
-    source = "ring-down of our own bowls, 14 March"
-
-    [materials.stoneware.uncertainty]
-    density = "2 %"
-    young = "10 %"
-    poisson = "10 %"
-    alpha = "30 %"
-    beta = "50 %"
-
-The table of uncertainties may be left out, and then nothing is known of them.
-"""
+"""What objects are made of: the seven materials of the paper."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated
-
-from pydantic import Field, model_validator
 
 from harness.basics.errors import WrongUse
-from harness.basics.quantities import DENSITY, PRESSURE, Decay, Nonnegative, Positive, Ratio, Time
-from harness.basics.toml_file import StrictModel, load_toml, nearest
+from harness.basics.toml_file import nearest
 
 
 @dataclass(frozen=True)
@@ -82,14 +57,14 @@ class KnownMaterial:
     Attributes:
         material: its constants.
         source: of the constants.
-        uncertainty: of an object said to be of it; None where nobody has said.
-        basis: of the uncertainty, ``""`` where there is none.
+        uncertainty: of an object said to be of it.
+        basis: of the uncertainty.
     """
 
     material: Material
     source: str
-    uncertainty: Uncertainty | None
-    basis: str = ""
+    uncertainty: Uncertainty
+    basis: str
 
 
 _KLEINPAT = (
@@ -137,72 +112,13 @@ MATERIALS: MappingProxyType[str, Material] = MappingProxyType(
 """The seven by name."""
 
 
-def material(name: str, own: Mapping[str, KnownMaterial] = MappingProxyType({})) -> Material:
-    """The material of that name, in any case.
-
-    Args:
-        name: of one of the seven, or of an own one.
-        own: beside the seven, from ``load_materials``.
+def material(name: str) -> Material:
+    """The material of that name, one of the seven, in any case.
 
     Raises:
         WrongUse: there is none; the nearest known one is named.
     """
-    known = {**KNOWN, **own}
-    found = known.get(name.strip().lower())
+    found = MATERIALS.get(name.strip().lower())
     if found is None:
-        raise WrongUse(f"no material {name!r}; {nearest(name, known)}")
-    return found.material
-
-
-def load_materials(path: Path) -> Mapping[str, KnownMaterial]:
-    """The materials that a file describes, by name.
-
-    Raises:
-        WrongUse: the file cannot be read, or says something no material has; each mistake is named
-            with its key, its value and what was expected.
-    """
-    tables = load_toml(path, _File).materials
-    return MappingProxyType({name: table.known(name) for name, table in tables.items()})
-
-
-class _UncertaintyTable(StrictModel):
-    density: Annotated[Ratio, Nonnegative]
-    young: Annotated[Ratio, Nonnegative]
-    poisson: Annotated[Ratio, Nonnegative]
-    alpha: Annotated[Ratio, Nonnegative]
-    beta: Annotated[Ratio, Nonnegative]
-
-
-class _MaterialTable(StrictModel):
-    density: Annotated[float, DENSITY, Positive]
-    young: Annotated[float, PRESSURE, Positive]
-    poisson: float = Field(gt=-1.0, lt=0.5)
-    alpha: Annotated[Decay, Nonnegative]
-    beta: Annotated[Time, Nonnegative]
-    source: str = Field(min_length=1)
-    uncertainty: _UncertaintyTable | None = None
-
-    def known(self, name: str) -> KnownMaterial:
-        constants = Material(name, self.density, self.young, self.poisson, self.alpha, self.beta)
-        given = self.uncertainty
-        if given is None:
-            return KnownMaterial(constants, self.source, None)
-        spread = Uncertainty(given.density, given.young, given.poisson, given.alpha, given.beta)
-        return KnownMaterial(constants, self.source, spread, self.source)
-
-
-class _File(StrictModel):
-    materials: dict[str, _MaterialTable]
-
-    @model_validator(mode="after")
-    def _names_are_new(self) -> "_File":
-        for name in self.materials:
-            if name in KNOWN:
-                raise ValueError(
-                    f"[materials.{name}] would replace a built-in material; give it another name"
-                )
-            if name != name.strip().lower() or not name:
-                raise ValueError(
-                    f"[materials.{name}] is not a name in lower case; write {name.strip().lower()!r}"
-                )
-        return self
+        raise WrongUse(f"no material {name!r}; {nearest(name, MATERIALS)}")
+    return found
