@@ -49,10 +49,6 @@ class SampleClock:
         """Bench-clock seconds of samples, ``(n,)``."""
         return self.time + (indices - self.index) / self.rate
 
-    def index_at(self, time: float) -> float:
-        """The (fractional) number of the sample taken at a bench-clock second."""
-        return self.index + (time - self.time) * self.rate
-
 
 def fit_clock(indices: FloatArray, times: FloatArray, nominal_rate: float) -> SampleClock:
     """The line through blocks' measured times, late blocks given little weight.

@@ -24,7 +24,6 @@ RUNTIME_STATES: Final = {
 }
 RUNNING: Final = 7
 PLAYING: Final = 2
-PROGRAM_RUNNING: Final = 0b10
 TOOL_OUTPUT_BIT: Final = 16
 
 _SAFETY: Final = (

@@ -114,14 +114,9 @@ PRESSURE = Dimension("a pressure", {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa"
 TIME = Dimension("a time", {"s": "1", "ms": "1e-3", "us": "1e-6", "µs": "1e-6", "min": "60"}, "50 ms")
 FREQUENCY = Dimension("a frequency", {"Hz": "1", "kHz": "1e3", "MHz": "1e6"}, "500 Hz")
 DECAY = Dimension("a rate of decay", {"1/s": "1"}, "6 1/s")
-FORCE_SENSITIVITY = Dimension(
-    "a force cell's sensitivity", {"V/N": "1", "mV/N": "1e-3", "uV/N": "1e-6"}, "22.5 mV/N"
-)
-PRESSURE_SENSITIVITY = Dimension("a microphone's sensitivity", {"V/Pa": "1", "mV/Pa": "1e-3"}, "50 mV/Pa")
 RATIO = Dimension("a share", {"1": "1", "%": "1e-2"}, "5 %")
 LEVEL = Dimension("a level", {"dB": "1"}, "35 dB")
 PIXELS = Dimension("a distance in the image", {"px": "1"}, "600 px")
-CAPACITY = Dimension("a size on disk", {"B": "1", "kB": "1e3", "MB": "1e6", "GB": "1e9"}, "2 GB")
 
 
 Length: TypeAlias = Annotated[float, LENGTH]
@@ -131,7 +126,6 @@ Acceleration: TypeAlias = Annotated[float, ACCELERATION]
 AngularSpeed: TypeAlias = Annotated[float, ANGULAR_SPEED]
 AngularAcceleration: TypeAlias = Annotated[float, ANGULAR_ACCELERATION]
 Force: TypeAlias = Annotated[float, FORCE]
-Mass: TypeAlias = Annotated[float, MASS]
 Time: TypeAlias = Annotated[float, TIME]
 Frequency: TypeAlias = Annotated[float, FREQUENCY]
 Decay: TypeAlias = Annotated[float, DECAY]

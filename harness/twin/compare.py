@@ -32,15 +32,11 @@ class ContactDeviation:
         step: of the experiment.
         point_in_object: ``(3,)`` m, where the recorded pose meets the nominal object.
         distance: m between that and the rehearsed point.
-        gel_distance: m between the recorded and the rehearsed position of the gel.
-        gel_angle: rad between their attitudes.
     """
 
     step: int
     point_in_object: FloatArray
     distance: float
-    gel_distance: float
-    gel_angle: float
 
 
 def compare_arm(model: str, joints: FloatArray, base_from_flange: FloatArray) -> ArmDeviation:
@@ -69,11 +65,5 @@ def compare_contact(
         base_from_gel: ``(4, 4)``, recorded while the gel was pressed.
     """
     point = contact_point(bench, base_from_gel)
-    turn = rehearsed.base_from_gel[:3, :3].T @ base_from_gel[:3, :3]
-    return ContactDeviation(
-        rehearsed.step,
-        read_only(point),
-        float(np.linalg.norm(point - rehearsed.point_in_object)),
-        float(np.linalg.norm(base_from_gel[:3, 3] - rehearsed.base_from_gel[:3, 3])),
-        float(np.linalg.norm(vector_from_rotation(turn))),
-    )
+    distance = float(np.linalg.norm(point - rehearsed.point_in_object))
+    return ContactDeviation(rehearsed.step, read_only(point), distance)

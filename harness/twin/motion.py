@@ -84,11 +84,6 @@ def reachable(bench: TwinBench, base_from_gel: FloatArray, stand_off: float = ST
     return next(_approaches(bench, base_from_gel, stand_off), None) is not None
 
 
-def approaches(bench: TwinBench, base_from_gel: FloatArray, stand_off: float = STAND_OFF) -> list[Approach]:
-    """Every branch that :func:`reachable` would accept."""
-    return list(_approaches(bench, base_from_gel, stand_off))
-
-
 def plan_contact(
     bench: TwinBench,
     base_from_gel: FloatArray,

@@ -89,14 +89,6 @@ class StrikePlanner:
         self._hammer_from_flange = inverse(flange_from_hammer)
         self._stand_off = stand_off
 
-    def can_reach(self, base_from_gel: FloatArray) -> bool:
-        """Whether some posture brings the hammer before the place a press touches; the way is not looked at.
-
-        Args:
-            base_from_gel: ``(4, 4)``, of the press.
-        """
-        return next(self._postures(base_from_gel), None) is not None
-
     def plan(
         self, base_from_gel: FloatArray, seed_joints: FloatArray, seed: int = 0, searched: int = 0
     ) -> PlannedStrike | None:

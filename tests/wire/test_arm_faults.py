@@ -39,7 +39,7 @@ def arm(far_end: FarEnd, tmp_path: Path) -> Iterator[UrArm]:
 
 @pytest.fixture
 def patient_arm(far_end: FarEnd, tmp_path: Path) -> Iterator[UrArm]:
-    """An arm whose watchdog waits as long as a mocked station's: this computer's own delays are no fault here."""
+    """An arm whose watchdog waits as long as a mocked station's: this computer's delays are no fault here."""
     arm = make_arm(far_end.address, tmp_path, patience=0.5)
     arm.open()
     yield arm

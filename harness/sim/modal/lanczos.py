@@ -54,16 +54,13 @@ class EigenPairs:
     certified: bool
 
 
-def modes_below(
-    system: ModalSystem, limit: float, most: int | None = None, certify: bool = True
-) -> tuple[EigenPairs, float]:
+def modes_below(system: ModalSystem, limit: float, most: int | None = None) -> tuple[EigenPairs, float]:
     """Every elastic mode up to ``limit`` Hz, or the lowest ``most`` of them.
 
     Args:
         system: free or held.
         limit: Hz; infinite for as many as ``most`` says.
         most: modes at most; fewer where that would part modes of one frequency.
-        certify: whether to count them by the inertia of the system.
 
     Returns:
         The modes, and up to which frequency in Hz they are all; infinite where the system has no more.
@@ -82,7 +79,7 @@ def modes_below(
         )
     for seed, block in ((1, _BLOCK), (2, 2 * _BLOCK)):
         values, vectors, ceiling = _Lanczos(system, factor, seed, block).run((2 * np.pi * limit) ** 2, most)
-        expected = _count_below(system, ceiling) if certify else None
+        expected = _count_below(system, ceiling)
         if expected is None or len(values) >= expected:
             pairs = EigenPairs(values, vectors, _residual(system, values, vectors), len(values) == expected)
             return pairs, float(np.sqrt(ceiling) / (2.0 * np.pi))

@@ -51,20 +51,6 @@ def is_heavy(frequencies: FloatArray, dampings: FloatArray) -> BoolArray:
     return np.asarray(dampings > _HEAVY * 2.0 * np.pi * frequencies)
 
 
-def half_sine(rate: float, duration: float, peak: float) -> FloatArray:
-    """``(t,)`` N, a blow of ``duration`` s that rises to ``peak`` N and falls as half a sine.
-
-    Raises:
-        WrongUse: a rate or a duration that is not above zero.
-    """
-    check_rate(rate)
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise WrongUse(f"a blow of {duration:g} s is none; say a duration above 0")
-    times = np.arange(int(np.floor(duration * rate)) + 1) / rate
-    pulse: FloatArray = peak * np.sin(np.pi * times / duration)
-    return pulse
-
-
 def impulse_response(
     times: FloatArray, frequencies: FloatArray, dampings: FloatArray, quadrature: bool = False
 ) -> FloatArray:

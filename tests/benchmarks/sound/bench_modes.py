@@ -20,7 +20,8 @@ from harness.sim.modal.modal import HEARING, default_edge, solve_modes
 from harness.sim.modal.modes import Modes, dampings
 from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedralize
 from harness.sim.sound.modal_radiation import radiation
-from harness.sim.sound.modal_sound import half_sine, ring
+from harness.sim.sound.modal_sound import ring
+from tests.samples.blows import half_sine
 
 RATE = 44.1e3
 MOST = 128

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.basics import quantities
-from harness.basics.quantities import ANGLE, FORCE, FORCE_SENSITIVITY, LENGTH, RATIO, SPEED, Dimension
+from harness.basics.quantities import ANGLE, FORCE, LENGTH, RATIO, SPEED, Dimension
 
 DIMENSIONS = [value for value in vars(quantities).values() if isinstance(value, Dimension)]
 
@@ -26,7 +26,6 @@ DIMENSIONS = [value for value in vars(quantities).values() if isinstance(value, 
         (ANGLE, "15 deg", 0.26179938779914943654),
         (SPEED, "10 mm/s", 0.01),
         (FORCE, "5 N", 5.0),
-        (FORCE_SENSITIVITY, "22.5 mV/N", 0.0225),
         (RATIO, "5 %", 0.05),
     ],
 )

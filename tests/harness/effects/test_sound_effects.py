@@ -21,8 +21,9 @@ from harness.effects.plan import default_accuracy, plan
 from harness.objects.solid import from_manifold
 from harness.sim.modal.modal import from_arrays
 from harness.sim.sound.microphone_response import MicrophoneResponse
-from harness.sim.sound.modal_sound import Strikes, half_sine
+from harness.sim.sound.modal_sound import Strikes
 from harness.sim.sound.room import RoomField
+from tests.samples.blows import half_sine
 
 SILENT = scene_from_options("builtin:mug")
 HEARD = SILENT.model_copy(update={"sensors": Sensors(sound=True)})

@@ -5,10 +5,11 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused
-from harness.sim.sound.modal_sound import half_sine, ring
+from harness.sim.sound.modal_sound import ring
 from harness.strikes.frequency_response import FrequencyResponse, frequency_response
 from harness.strikes.modal_identification import modes_of_response
 from harness.strikes.pole_search import PoleSearch
+from tests.samples.blows import half_sine
 
 RATE = 8000.0
 SAMPLES = 8000

@@ -23,7 +23,7 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
 from harness.twin.bench import TwinBench
 from harness.twin.compare import compare_arm, compare_contact
-from harness.twin.motion import PlannedContact, approaches, plan_contact, reachable
+from harness.twin.motion import PlannedContact, plan_contact, reachable
 from harness.twin.rehearsal import Segment, contact_point, rehearse
 from harness.twin.sweep import sweep
 from harness.twin.ways import LONGEST_MOVE, connect, search
@@ -216,15 +216,14 @@ def test_the_housing_beside_the_gel() -> None:
     assert ("housing", "object") in report.refusals[0].bodies
 
 
-def test_reach_agrees_with_planning_and_no_branch_is_offered_from_below(
+def test_reach_agrees_with_planning_and_nothing_reaches_from_below(
     bench: TwinBench, seven: list[PlannedContact]
 ) -> None:
     base_from_gel = seven[0].base_from_pressed @ TOOL
     assert reachable(bench, base_from_gel)
-    for approach in approaches(bench, base_from_gel):
-        gel = bench.base_from_gel(approach.pressed_joints)
-        assert np.abs(gel - base_from_gel).max() < 1e-9
-        assert bench.hits(approach.stand_off_joints) == ()
+    gel = bench.base_from_gel(seven[0].pressed_joints)
+    assert np.abs(gel - base_from_gel).max() < 1e-9
+    assert bench.hits(seven[0].stand_off_joints) == ()
     from_below = transform(np.eye(3), apply(BASE_FROM_OBJECT, np.array([[0.0, 0.0, 4.5e-3]]))[0])
     assert not reachable(bench, from_below)
     assert plan_contact(bench, from_below, HOME) is None
@@ -258,10 +257,8 @@ def test_a_contact_performed_elsewhere_is_reported_as_far_as_it_was(
     rehearsed = report.contacts[0]
     same = compare_contact(bench, rehearsed, rehearsed.base_from_gel)
     assert same.distance < 1e-12
-    assert same.gel_distance == 0.0
     moved = translation(np.array([0.0, 0.0, 1.5e-3])) @ rehearsed.base_from_gel
     deviation = compare_contact(bench, rehearsed, moved)
-    assert deviation.gel_distance == pytest.approx(1.5e-3)
     assert deviation.distance == pytest.approx(1.5e-3, rel=0.1)  # along a wall that is nearly upright
 
 

@@ -28,8 +28,8 @@ from harness.experiment.truth import Truth
 from harness.report.sound_data import Sound
 from harness.report.values import Missing
 from harness.sim.optics.tactile_calibration import shipped_calibration
-from harness.sim.sound.modal_sound import half_sine
 from tests.samples import sounding_plate as plate
+from tests.samples.blows import half_sine
 
 K = 5
 SCALE = 1.03

@@ -13,9 +13,10 @@ from harness.basics.materials import MATERIALS
 from harness.sim.modal.modal import solve_modes
 from harness.sim.sound.microphone_response import MicrophoneResponse, as_heard
 from harness.sim.sound.modal_radiation import AIR_DENSITY, SPEED_OF_SOUND, radiation
-from harness.sim.sound.modal_sound import audible, half_sine, impulse_response, ring
+from harness.sim.sound.modal_sound import audible, impulse_response, ring
 from harness.sim.sound.room import reverberated, room_response
 from tests.oracles.volume_meshes import ball
+from tests.samples.blows import half_sine
 
 RATE = 48e3
 
@@ -123,15 +124,6 @@ def test_a_strike_later_sounds_later_and_twice_as_hard_twice_as_loud() -> None:
     late = ring(frequencies, dampings, 2.0 * np.ones((1, 2)), blow(3000, 777), RATE)
     assert late[0, 777:] == pytest.approx(2.0 * first[0, :-777], abs=1e-10)
     assert not late[0, :777].any()
-
-
-def test_half_a_sine_has_the_impulse_of_one() -> None:
-    pulse = half_sine(1e6, 2e-4, 50.0)
-    assert pulse.sum() / 1e6 == pytest.approx(2.0 * 50.0 * 2e-4 / np.pi, rel=1e-4)
-    assert pulse.max() == pytest.approx(50.0)
-    assert pulse[0] == 0.0
-    with pytest.raises(WrongUse, match="duration above 0"):
-        half_sine(RATE, 0.0, 1.0)
 
 
 def test_what_does_not_belong_together_is_refused() -> None:
