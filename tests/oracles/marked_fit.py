@@ -1,4 +1,4 @@
-"""Fit a tactile calibration to ball presses: ``python -m calibration.taxim.fit PACK --out FILE``."""
+"""The shipped calibrations' fit, from marks: ``python -m tests.oracles.marked_fit PACK --out FILE``."""
 
 import argparse
 import sys
@@ -7,10 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
+from calibration.taxim.held_out import decibels
 from calibration.taxim.pack import PressPack, read_pack
-from calibration.taxim.smooth_fit import changes, contact_pixels, fit_smooth, refined_centre, residual
+from calibration.taxim.smooth_fit import (
+    Manner,
+    SmoothFit,
+    aligned,
+    changes,
+    contact_pixels,
+    refined_centre,
+    residual,
+    settled,
+)
 from calibration.taxim.table_fit import fit_table, table_shades
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import IntArray
 from harness.basics.errors import CalibrationRefused, WrongUse
 from harness.sim.optics.tactile_calibration import (
     CalibrationHeader,
@@ -49,7 +59,7 @@ def fit_calibration(
         )
     ball = ball_radius / pitch
     fit = fit_smooth(pack, ball)
-    table, support = fit_table(pack, fit, ball)
+    table, support = fit_table(pack, fit, ball, changes(pack))
     smooth_db, table_db = held_out(pack, ball)
     if smooth_db < LEAST_DB:
         raise CalibrationRefused(
@@ -71,7 +81,18 @@ def fit_calibration(
         residual_rms=fit.residual_rms,
         condition=fit.condition,
     )
-    return TactileCalibration(header, pack.background, table, support, fit.smooth)
+    return TactileCalibration(header, pack.background, table, support, fit.colours)
+
+
+def fit_smooth(pack: PressPack, ball: float) -> SmoothFit:
+    """Colours and centres of presses, in turns from the marks; ``ball`` in pixels.
+
+    Raises:
+        CalibrationRefused: the presses contradict the ball.
+    """
+    change = changes(pack)
+    centres, edge = aligned(pack, change, ball, Manner())
+    return settled(pack, change, centres, edge, ball, Manner())
 
 
 def held_out(pack: PressPack, ball: float) -> tuple[float, float]:
@@ -81,21 +102,17 @@ def held_out(pack: PressPack, ball: float) -> tuple[float, float]:
         out = np.arange(len(pack.images)) % _FOLDS == fold
         taught, kept = pack.of(np.nonzero(~out)[0]), pack.of(np.nonzero(out)[0])
         fit = fit_smooth(taught, ball)
-        table, _ = fit_table(taught, fit, ball)
+        table, _ = fit_table(taught, fit, ball, changes(taught))
         change, bias = changes(kept), (fit.centres - taught.centres).mean(axis=0)
         for k in range(len(change)):
             centre = refined_centre(
-                kept, change[k], kept.centres[k] + bias, fit.smooth, fit.edge, ball, steps=8
+                kept, change[k], kept.centres[k] + bias, fit.colours, fit.edge, ball, steps=8
             )
-            smooth_db.append(_decibels(residual(kept, change[k], centre, fit.smooth, fit.edge, ball)))
+            smooth_db.append(decibels(residual(kept, change[k], centre, fit.colours, fit.edge, ball)))
             place = contact_pixels(kept.shape, centre, fit.edge, 1)
             shown = table_shades(table, centre, place, ball)
-            table_db.append(_decibels(shown - change[k][place[:, 0], place[:, 1]]))
+            table_db.append(decibels(shown - change[k][place[:, 0], place[:, 1]]))
     return float(np.median(smooth_db)), float(np.median(table_db))
-
-
-def _decibels(left: FloatArray) -> float:
-    return float(10.0 * np.log10(255.0**2 / np.mean(left**2)))
 
 
 def chosen(presses: int, subset: str) -> IntArray:
@@ -137,7 +154,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m calibration.taxim.fit", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.oracles.marked_fit", description=__doc__)
     parser.add_argument("pack", type=Path, help="dataPack.npz of Taxim or ObjectFolder")
     parser.add_argument("--out", type=Path, required=True, help="the calibration to write, .npz")
     parser.add_argument("--subset", default="all", help="even, odd or all presses")
