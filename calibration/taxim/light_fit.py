@@ -103,19 +103,13 @@ def fit_light(pack: PressPack, change: FloatArray, centres: FloatArray, edge: fl
     best = min((skirt_of(width * edge, _START) for width in _WIDTHS), key=misfit)
     best = min((GelSkirt(best.kernels, best.final, core) for core in _CORES), key=misfit)
     best = min((skirt_of(wider * best.kernels[0], best.core) for wider in _BESIDE), key=misfit)
-    return _with_skirt(pack, change, centres, best, edge, ball)
+    return with_skirt(pack, change, centres, best, edge, ball)
 
 
 def with_skirt(
-    pack: PressPack, change: FloatArray, centres: FloatArray, light: GelLight, ball: float
-) -> GelLight:
-    """Fit colours alone, to the skirt and contact line of ``light``; otherwise as ``fit_light``."""
-    return _with_skirt(pack, change, centres, light.skirt, light.edge, ball)
-
-
-def _with_skirt(
     pack: PressPack, change: FloatArray, centres: FloatArray, skirt: GelSkirt, edge: float, ball: float
 ) -> GelLight:
+    """Fit colours alone, to a known skirt; otherwise as ``fit_light``."""
     profile = ball_profile(skirt, edge, ball, "exact")
     lit, rms = _solved(_samples(pack, change, centres, edge, _MANY), profile, edge, ball)
     return GelLight(skirt, read_only(lit), depth_of(skirt, edge, ball), profile, edge, edge / ball, rms)

@@ -94,13 +94,11 @@ class BenchScene:
         parts: bodies; the object among them.
         base_from_gels: ``(n, 4, 4)`` of the contacts, drawn as tool axes.
         focus: ``(3,)`` metres, the point looked at.
-        width: metres across the picture at the focus.
     """
 
     parts: tuple[BenchPart, ...]
     base_from_gels: FloatArray
     focus: FloatArray
-    width: float = 1.1
 
 
 @dataclass(frozen=True)

@@ -103,9 +103,9 @@ def modes_of(peak: PeakLine) -> str:
     return str(first) if first == last else f"{first} to {last}"
 
 
-def percent(share: float | None, digits: int = 2) -> str:
+def percent(share: float | None) -> str:
     """A signed relative difference, or a dash."""
-    return NONE if share is None else f"{100.0 * share:+.{digits}f} %"
+    return NONE if share is None else f"{100.0 * share:+.2f} %"
 
 
 def quantity(value: float | None, unit: str, digits: int = 3) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from harness.basics.arrays import FloatArray
-from harness.sim.gel.layer_compliance import layer_share
+from harness.sim.gel.layer_compliance import taken_back
 
 _NODES = 80
 _WAVES, _WEIGHTS = np.polynomial.legendre.leggauss(600)
@@ -39,7 +39,7 @@ def _solved(
     """Force over the modulus, and ``f`` at the contact's edge, which is zero where the object is smooth."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     t, weights = 0.5 * radius * (nodes + 1.0), 0.5 * radius * weights
-    taken = (1.0 - layer_share(_WAVES, poisson)) * _WEIGHTS
+    taken = (1.0 - (1.0 + taken_back(_WAVES, poisson))) * _WEIGHTS
 
     def kernel(at: FloatArray) -> FloatArray:
         waves = (np.cos(np.outer(place, _WAVES) / thickness) for place in (at, t))

@@ -13,6 +13,7 @@ from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures
 from calibration.taxim.smooth_fit import changes
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
+from harness.sim.optics.inverse_error import HeightErrors
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 R15 = Identity("GelSight R1.5", "ObjectFolder 2.0", "CC BY 4.0", "2026-01-01", 0.1245e-3, 2.0e-3)
@@ -127,3 +128,17 @@ def taught(pack: PressPack, change: FloatArray | None, which: IntArray, who: Ide
     made_from = f"sha256 {pack.sha256}, {len(which)} presses"
     calibration = calibration_of(pack.background, model, who, made_from)
     return Taught(calibration, model.bias, model.fit.edge)
+
+
+def sigma_without(errors: HeightErrors, terms: FloatArray, inside: BoolArray) -> FloatArray:
+    """``(n,)`` metres of one deviation where some of the error has been fitted away, as by a known shape.
+
+    Args:
+        errors: of a height map.
+        terms: ``(n, terms)`` what was fitted at the pixels of ``inside``: ones for an offset, say.
+        inside: ``(rows, columns)``.
+    """
+    basis = np.linalg.qr(terms)[0]
+    there = errors.draws[:, inside]
+    left = there - (there @ basis) @ basis.T
+    return np.asarray(np.hypot(np.sqrt(np.mean(left**2, axis=0)), errors.floor))

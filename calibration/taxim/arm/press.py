@@ -5,7 +5,7 @@ from nothing. The picture does: it shows a ball that is a few hundredths of a mi
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,23 +28,14 @@ MISSES = 3
 """Presses in a row that met nothing, after which the ball is taken to be somewhere else."""
 
 
-@dataclass(frozen=True)
-class PressSpeeds:
-    """How fast the arm may go (SI).
+_TRAVEL, _TRAVEL_ACCELERATION = 0.9, 1.2
+"""rad/s and rad/s^2 of the fastest joint between presses."""
 
-    Attributes:
-        travel: rad/s of the fastest joint between presses.
-        travel_acceleration: rad/s^2.
-        approach: m/s down to where looking begins, and back.
-        press: m/s of a step.
-        acceleration: m/s^2 of every straight line.
-    """
+_APPROACH, _PRESS = 0.040, 0.005
+"""m/s: down to where looking begins, and back; of a step."""
 
-    travel: float = 0.9
-    travel_acceleration: float = 1.2
-    approach: float = 0.040
-    press: float = 0.005
-    acceleration: float = 0.2
+_ACCELERATION = 0.2
+"""m/s^2 of every straight line."""
 
 
 class BallPresses:
@@ -53,20 +44,12 @@ class BallPresses:
     Args:
         way: used where the arm is not where a step's travel was planned from.
         ball: radius in pixels, by the stated pitch.
-        speeds: of the motions.
         say: is told in words how each press went.
     """
 
-    def __init__(
-        self,
-        way: Trajectory,
-        ball: float,
-        speeds: PressSpeeds | None = None,
-        say: Callable[[str], None] = lambda _: None,
-    ) -> None:
+    def __init__(self, way: Trajectory, ball: float, say: Callable[[str], None] = lambda _: None) -> None:
         self._way = way
         self._ball = ball
-        self._speeds = speeds or PressSpeeds()
         self._say = say
         self._settings = PressSettings()
         self._watch = PressWatch(ball)
@@ -118,7 +101,7 @@ class BallPresses:
         seen, way = self._descend(motion, look(rest.frames), bench)
         touched = bool(seen)
         if touched:
-            self._to(bench, motion, min(way[0] + self._settings.depth, motion.lowest), self._speeds.press)
+            self._to(bench, motion, min(way[0] + self._settings.depth, motion.lowest), _PRESS)
         pressed = settle(bench.gel, bench.pause, self._settings.still)
         bench.mark(step.index, PRESS)
         history = bench.arm.history(AT_REST)
@@ -155,7 +138,7 @@ class BallPresses:
         seen: list[Reading] = []
         way: list[float] = []
         down = max(first, 0.0)
-        self._to(bench, motion, down, self._speeds.approach)
+        self._to(bench, motion, down, _APPROACH)
         while down <= last and len(seen) < wanted.pictures:
             # The frame before the last may have been exposed while the arm still moved.
             frame = _last(bench.gel.read(2, wanted.still.timeout))
@@ -165,21 +148,20 @@ class BallPresses:
                 last = min(way[0] + wanted.depth, motion.lowest - wanted.step)
             down += wanted.step
             if down <= last and len(seen) < wanted.pictures:
-                self._to(bench, motion, down, self._speeds.press)
+                self._to(bench, motion, down, _PRESS)
         return seen, way
 
     def _to(self, bench: Bench, motion: PressMotion, down: float, speed: float) -> None:
         """To ``down`` m from the stand-off along the axis."""
         pose = motion.base_from_stand_off.copy()
         pose[:3, 3] += down * motion.axis
-        bench.arm.move_line(pose, speed, self._speeds.acceleration)
+        bench.arm.move_line(pose, speed, _ACCELERATION)
 
     def _back(self, bench: Bench, motion: PressMotion) -> None:
-        self._to(bench, motion, 0.0, self._speeds.approach)
+        self._to(bench, motion, 0.0, _APPROACH)
 
     def _travel(self, motion: PressMotion, bench: Bench) -> None:
-        speeds = self._speeds
-        travel(bench, motion.start, motion.travel, self._way, speeds.travel, speeds.travel_acceleration)
+        travel(bench, motion.start, motion.travel, self._way, _TRAVEL, _TRAVEL_ACCELERATION)
 
 
 def _numbers(settling: Settling, touched: bool) -> tuple[Reading, Reading]:

@@ -23,6 +23,8 @@ _STEEPEST = np.radians(85.0)
 _KERNEL = 2.5e-3
 _PITCH = 1.25e-3
 _LIFT = 3e-3
+_BENCH_WIDTH = 1.1
+"""Metres across the picture of the bench at its focus."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +115,7 @@ class Heat:
 
 def bench_figure(bench: BenchScene) -> Figure:
     """Bench and object, the tool axis of every contact drawn into it."""
-    camera = look_at(bench.focus, np.radians(-118.0), np.radians(22.0), bench.width, 680, 1040)
+    camera = look_at(bench.focus, np.radians(-118.0), np.radians(22.0), _BENCH_WIDTH, 680, 1040)
     shot = Shot(bench.parts, camera)
     figure, axes = _canvas(camera)
     picture = shot.picture()

@@ -53,25 +53,16 @@ class DepthImage:
     face: IntArray
 
 
-def height_maps(
-    raster: RasterMesh,
-    gel_from_object: FloatArray,
-    sensor: TactileSensor,
-    *,
-    stand_off: float = STAND_OFF,
-    search_depth: float = SEARCH_DEPTH,
-) -> FloatArray:
+def height_maps(raster: RasterMesh, gel_from_object: FloatArray, sensor: TactileSensor) -> FloatArray:
     """The gap between the flat gel plane and the object, at every pixel of every contact.
 
-    The value is the gel-frame z of the first surface along +z from ``-stand_off``: positive
-    where the object is clear of the plane z = 0, negative where it reaches behind it.
+    The value is the gel-frame z of the first surface along +z, from ``-STAND_OFF`` to ``SEARCH_DEPTH``:
+    positive where the object is clear of the plane z = 0, negative where it reaches behind it.
 
     Args:
         raster: the object.
         gel_from_object: ``(n, 4, 4)`` rigid.
         sensor: gives rows, columns and pitch; its dome, if any, is not subtracted here.
-        stand_off: metres, greater than zero; surfaces farther behind the plane are not seen.
-        search_depth: metres; surfaces farther in front count as none.
 
     Returns:
         ``(n, rows, columns)`` metres, float64; +inf where there is no object.
@@ -83,7 +74,7 @@ def height_maps(
     gap = np.empty((len(poses), sensor.rows, sensor.columns))
     no_faces = np.empty((0, 0, 0), np.int64)
     corner = -0.5 * np.array(sensor.window)
-    _run(raster, poses, corner, sensor.pitch, (-stand_off, search_depth), gap, no_faces)
+    _run(raster, poses, corner, sensor.pitch, (-STAND_OFF, SEARCH_DEPTH), gap, no_faces)
     return read_only(gap)
 
 

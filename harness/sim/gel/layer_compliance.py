@@ -23,18 +23,13 @@ _KNOTS = 40.0
 """To one thickness: between them the smooth part is a cubic within 1e-7 of its largest value."""
 
 
-def layer_share(waves: FloatArray, poisson: float) -> FloatArray:
-    """``S``: the share that a layer gives of what a half-space would.
+def taken_back(waves: FloatArray, poisson: float) -> FloatArray:
+    """``S - 1``, without the cancellation, and without overflow for short waves.
 
     Args:
         waves: wavenumber times thickness, 0 or more.
         poisson: Poisson's ratio.
     """
-    return 1.0 + _taken_back(waves, poisson)
-
-
-def _taken_back(waves: FloatArray, poisson: float) -> FloatArray:
-    """``S - 1``, without the cancellation, and without overflow for short waves."""
     first, last = 3.0 - 4.0 * poisson, 5.0 - 12.0 * poisson + 8.0 * poisson**2
     decay = np.exp(-2.0 * waves)
     above = first * decay**2 + (2.0 * waves + 2.0 * waves**2 + last) * decay
@@ -82,7 +77,7 @@ def _plate(poisson: float, reach: float) -> CubicSpline:
     """What the plate takes back, of the distance in thicknesses, times ``pi E* h`` for a point load."""
     waves, weights = _nodes(reach)
     apart = np.linspace(0.0, reach, int(_KNOTS * reach) + 1)
-    taken = _taken_back(waves, poisson) * weights
+    taken = taken_back(waves, poisson) * weights
     return CubicSpline(apart, j0(np.outer(apart, waves)) @ taken)
 
 
@@ -101,7 +96,7 @@ def disc_stiffness(radius: float, poisson: float) -> float:
     if radius > 0.0:
         waves, weights = _nodes(float(np.ceil(radius)))
         shape = (j1(waves * radius) / waves) ** 2 * weights
-        gives += float(_taken_back(waves, poisson) @ shape) / radius
+        gives += float(taken_back(waves, poisson) @ shape) / radius
     return 1.0 / (4.0 * gives)
 
 

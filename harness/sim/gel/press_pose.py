@@ -43,22 +43,22 @@ class ContactPlace:
     moved: float
 
 
-def contact_place(mesh: Mesh, asked: FloatArray, most: float = MOST_MOVED) -> ContactPlace:
+def contact_place(mesh: Mesh, asked: FloatArray) -> ContactPlace:
     """The place of a surface nearest to ``(3,)`` metres in the object's frame.
 
     Raises:
         WrongUse: it is not three finite numbers.
-        OutOfDomain: it is farther than ``most`` metres; the distance is named.
+        OutOfDomain: it is farther than ``MOST_MOVED``; the distance is named.
     """
     point = np.asarray(asked, dtype=np.float64)
     if point.shape != (3,) or not np.isfinite(point).all():
         raise WrongUse(f"a contact at {asked} is no place; give three finite numbers, x y z in metres")
     place, face = _nearest(mesh, point)
     moved = float(np.linalg.norm(place - point))
-    if moved > most:
+    if moved > MOST_MOVED:
         raise OutOfDomain(
             f"the contact ({point[0]:g}, {point[1]:g}, {point[2]:g}) m is {moved * 1e3:.4g} mm off the "
-            f"surface; the limit is {most * 1e3:g} mm{_hint(mesh, point, most)}"
+            f"surface; the limit is {MOST_MOVED * 1e3:g} mm{_hint(mesh, point)}"
         )
     normal = _smooth_normal(mesh, place, face)
     if not normal.any():
@@ -104,9 +104,9 @@ def _nearest(mesh: Mesh, point: FloatArray) -> tuple[FloatArray, int]:
     return places[0], int(faces[0])
 
 
-def _hint(mesh: Mesh, point: FloatArray, most: float) -> str:
+def _hint(mesh: Mesh, point: FloatArray) -> str:
     place, _ = _nearest(mesh, point * 1e-3)
-    if np.linalg.norm(place - point * 1e-3) <= most:
+    if np.linalg.norm(place - point * 1e-3) <= MOST_MOVED:
         return "; read as millimetres it would be on it: write metres"
     return "; give a point of the surface, in metres in the mesh file's frame"
 

@@ -11,7 +11,7 @@ from harness.basics.geometry import apply
 from harness.picture.square_pixels import aspect_stated, made_square
 from harness.sim.optics.contact_depth import Depth, read_depth
 from harness.sim.optics.inverse import Detection
-from harness.sim.optics.inverse_error import ColourError, height_errors
+from harness.sim.optics.inverse_error import height_errors
 from harness.sim.optics.tactile_calibration import TactileCalibration, with_background
 
 
@@ -79,7 +79,6 @@ def read_press(
     calibration: TactileCalibration,
     detection: Detection,
     background: ByteArray | None = None,
-    assumed: ColourError | None = None,
 ) -> DepthReading:
     """Read one press as a camera gave it.
 
@@ -89,7 +88,6 @@ def read_press(
         detection: what counts as a change; one that is ``drifting`` also asks for the light of the moment.
         background: ``(rows, columns, 3)`` RGB of the untouched gel as it looks now; None for the
             calibration's.
-        assumed: what colours are off by; None for the usual.
 
     Raises:
         DataRefused: no frames, or of another shape or type than the calibration's.
@@ -104,8 +102,7 @@ def read_press(
     began = process_time()
     depth = read_depth(mean[None], by, detection)
     read_in = process_time() - began
-    usual = assumed if assumed is not None else ColourError()
-    sigma = height_errors(mean[None], depth, usual)[0].sigma
+    sigma = height_errors(mean[None], depth)[0].sigma
     stated_in = process_time() - began - read_in
     return DepthReading(
         read_only(mean),

@@ -82,21 +82,6 @@ class HeightErrors:
         """``(rows, columns)`` metres, one standard deviation of each pixel's height."""
         return np.asarray(np.hypot(np.sqrt(np.mean(self.draws**2, axis=0)), self.floor))
 
-    def sigma_without(self, terms: FloatArray, inside: BoolArray) -> FloatArray:
-        """The same where some of the error has been fitted away, as a comparison with a known shape does.
-
-        Args:
-            terms: ``(n, terms)`` what was fitted at the pixels of ``inside``: ones for an offset, say.
-            inside: ``(rows, columns)``.
-
-        Returns:
-            ``(n,)`` metres.
-        """
-        basis = np.linalg.qr(terms)[0]
-        there = self.draws[:, inside]
-        left = there - (there @ basis) @ basis.T
-        return np.asarray(np.hypot(np.sqrt(np.mean(left**2, axis=0)), self.floor))
-
 
 def height_errors(
     images: ByteArray, depth: Depth, assumed: ColourError = USUAL, seed: int = 0

@@ -143,11 +143,6 @@ class ShadowedCalibration(LitCalibration):
         lists = (self.shadow_directions, self.shadow_lengths, self.shadow_values)
         return ShadowTable(*lists, *(float(value) for value in self.shadow_rays[:5]))
 
-    @property
-    def shadow_depth(self) -> float:
-        """Metres of indentation of the rims whose shadows were seen."""
-        return float(self.shadow_rays[5])
-
 
 def _require_errors(found: Float32Array, bins: int) -> None:
     fits = found.shape in ((bins, bins, 3), (0, 0, 3)) and found.dtype == np.float32
@@ -174,15 +169,6 @@ def with_shadow(calibration: LitCalibration, table: ShadowTable, seen: float) ->
 def shadow_of(calibration: TactileCalibration) -> ShadowTable | None:
     """The shadows of a calibration; None where it has none."""
     return calibration.shadow if isinstance(calibration, ShadowedCalibration) else None
-
-
-def light_design(normal: FloatArray, position: FloatArray) -> FloatArray:
-    """``(n, 36)`` the light's terms at ``(n, 2)`` normals and scaled positions, for unit indentation."""
-    powers = np.empty((len(normal), len(LIGHT_POWERS)))
-    for k, (a, b) in enumerate(LIGHT_POWERS):
-        powers[:, k] = normal[:, 0] ** a * normal[:, 1] ** b
-    terms: FloatArray = (powers[:, :, None] * place_terms(position)[:, None, :]).reshape(len(normal), -1)
-    return terms
 
 
 def place_terms(where: FloatArray) -> FloatArray:

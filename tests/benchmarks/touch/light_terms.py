@@ -72,7 +72,9 @@ def _scores(
     for fold in range(FOLDS):
         out = np.arange(len(clean)) % FOLDS == fold
         kept = np.nonzero(~out)[0]
-        taught = light_fit.with_skirt(pack.of(kept), clean[kept], centres[kept], light, ball)
+        taught = light_fit.with_skirt(
+            pack.of(kept), clean[kept], centres[kept], light.skirt, light.edge, ball
+        )
         for k in np.nonzero(out)[0]:
             left = light_shades(pack, taught, centres[k], place) - clean[k][place[:, 0], place[:, 1]]
             near = distance(pack.shape, centres[k])[place[:, 0], place[:, 1]] <= WITHIN * light.edge

@@ -23,7 +23,7 @@ from harness.sim.optics.inverse import DRIFTING, invert
 from harness.sim.optics.inverse_error import height_errors
 from harness.sim.optics.poisson import free_heights
 from tests.oracles.truemap import read_tmd
-from tests.samples.ball_depth import FOTS, R15, WITHIN, BallFit, fit_ball, taught, usable
+from tests.samples.ball_depth import FOTS, R15, WITHIN, BallFit, fit_ball, sigma_without, taught, usable
 from tests.support.real_data import WHY_NOT, find_shared_data
 
 CONSOLE = Console(width=118, highlight=False)
@@ -103,7 +103,7 @@ def _presses(pictures: Pictures, who: Identity, folds: int, chosen: list[int], e
             ball = fit_ball(height, near, contact, who.pitch, who.ball_radius)
             single = invert(pack.images[k][None], made.calibration, DRIFTING).height[0]
             once = fit_ball(single, near, contact, who.pitch, who.ball_radius).rmse
-            sigma = errors.sigma_without(ball.fitted(who.ball), ball.inside)
+            sigma = sigma_without(errors, ball.fitted(who.ball), ball.inside)
             measured.append(
                 Measured(
                     pictures.names[pack.number[k]],

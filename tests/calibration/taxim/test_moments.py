@@ -5,8 +5,9 @@ import pytest
 
 from calibration.taxim.moments import OFFSET, SLOPES, Power, colour_terms, graded, place_products
 from harness.basics.arrays import FloatArray
-from harness.sim.optics.lit_calibration import LIGHT_POWERS, light_design, place_terms
+from harness.sim.optics.lit_calibration import LIGHT_POWERS, place_terms
 from harness.sim.optics.shading import design
+from tests.oracles.light_design import light_design
 
 LIGHT: tuple[Power, ...] = tuple((a, b, 1) for a, b in LIGHT_POWERS)
 PIXELS = 700

@@ -161,7 +161,6 @@ def sample() -> ReportData:
         ),
         gels,
         np.array([-0.3, 0.0, 0.28]),
-        1.3,
     )
     last = contacts[-1].posterior
     assert isinstance(last, Posterior)

@@ -103,7 +103,7 @@ def test_pressing_deeper_moves_the_whole_map_by_as_much(seed: int, deeper: float
     poses = np.stack(
         [geometry.transform(rotation, np.array([0, 0, RADIUS - d])) for d in (0.5e-3, 0.5e-3 + deeper)]
     )
-    shallow, deep = height_maps(RasterMesh(_sphere(3)), poses, SENSOR, search_depth=0.1)
+    shallow, deep = height_maps(RasterMesh(_sphere(3)), poses, SENSOR)
     seen = np.isfinite(shallow)
     assert np.array_equal(seen, np.isfinite(deep))
     assert np.allclose(shallow[seen] - deeper, deep[seen], atol=1e-12)

@@ -4,11 +4,17 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad
 
+from harness.basics.arrays import FloatArray
 from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.layer_compliance import disc_stiffness, influence, layer_share
+from harness.sim.gel.layer_compliance import disc_stiffness, influence, taken_back
 from harness.sim.gel.marker_kernel import layer_response
 
 WAVES = np.geomspace(1e-3, 30.0, 200)
+
+
+def layer_share(waves: FloatArray, poisson: float) -> FloatArray:
+    """The share that a layer gives of what a half-space would."""
+    return 1.0 + taken_back(waves, poisson)
 
 
 def test_the_incompressible_layer_is_the_one_that_moves_the_dots() -> None:

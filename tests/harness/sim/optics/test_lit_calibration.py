@@ -10,7 +10,7 @@ import pytest
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, WrongUse
 from harness.sim.gel.gel import R15_SKIRT, deform
-from harness.sim.optics.lit_calibration import LIGHT_POWERS, LitCalibration, light_design, read_calibration
+from harness.sim.optics.lit_calibration import LIGHT_POWERS, LitCalibration, read_calibration
 from harness.sim.optics.optics import Optics, OpticsLevel
 from harness.sim.optics.shading import KNEE, design, scaled_position
 from harness.sim.optics.tactile_calibration import (
@@ -20,6 +20,7 @@ from harness.sim.optics.tactile_calibration import (
     shipped_calibration,
     with_background,
 )
+from tests.oracles.light_design import light_design
 
 PITCH = 0.1245e-3
 LIGHTS = 6 * len(LIGHT_POWERS)
