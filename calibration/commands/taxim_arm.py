@@ -1,17 +1,11 @@
 """The part of ``touchstone calibrate taxim`` that moves the arm: plan, press, say how it goes."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
 from harness.basics.errors import WrongUse
-from harness.commands.output import CONSOLE, emit, resumable
-from harness.recording.step_file import Step
+from harness.commands.output import CONSOLE, resumable, step_progress, stopped
 
 if TYPE_CHECKING:
     from harness.recording.recording import Recording
@@ -61,17 +55,18 @@ def chosen(folder: Path | None, wanted: PressRequest) -> None:
 
 def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
     """The folder of the run that the arm made or went on with; None where Ctrl-C ended it early."""
-    from calibration.taxim.arm.session import perform_on_bench
+    from calibration.taxim.arm.session import procedure
+    from harness.experiment.perform import perform_on_bench, steps_planned
 
-    recording = _recording(wanted)
-    total = len(recording.header.plan["steps"])
+    recording, presses = _recording(wanted), procedure()
+    total = steps_planned(presses, recording)
     if recording.committed < total:
         CONSOLE.print(f"recording to {recording.folder}", markup=False)
         how = f"touchstone calibrate taxim --resume {recording.folder}"
-        with resumable(how), _progress(recording.committed, total) as told:
-            done = perform_on_bench(recording, told, told.say)
+        with resumable(how), step_progress(recording.committed, total, presses.step) as told:
+            done = perform_on_bench(presses, recording, told, say=told.say)
         if not done.complete:
-            _stopped(recording, as_json)
+            stopped(f"{presses.step} {recording.committed}", recording.folder, how, as_json)
             return None
     return recording.folder
 
@@ -90,9 +85,10 @@ def _recording(wanted: PressRequest) -> "Recording":
 
 def _begun(wanted: PressRequest) -> "Recording":
     from calibration.taxim.arm.plan import PressSettings
-    from calibration.taxim.arm.session import ball_scene, begin
+    from calibration.taxim.arm.session import ball_scene, procedure
     from harness.bench.scene import load_scene
     from harness.bench.station_file import load_station, station_path
+    from harness.experiment.begin import begin
     from harness.objects.targets import BALL_RADIUS
 
     scene = None if wanted.scene is None else load_scene(wanted.scene)
@@ -107,49 +103,13 @@ def _begun(wanted: PressRequest) -> "Recording":
         depth=0.4 * radius if wanted.depth is None else wanted.depth,
     )
     station = load_station(station_path(wanted.station or ""))
-    seed = 0 if wanted.seed is None else wanted.seed
     with CONSOLE.status("planning the presses, rehearsing them in the twin"):
-        begun = begin(ball_scene(radius, scene), station, settings, seed, wanted.gap, wanted.run)
+        begun = begin(
+            procedure(settings), ball_scene(radius, scene), station, wanted.seed, wanted.gap, wanted.run
+        )
     rehearsal = begun.plan.rehearsal
     CONSOLE.print(
         f"{settings.presses} presses of {1e3 * settings.depth:.2f} mm; rehearsed in the twin: "
         f"{rehearsal.segments} motions, none refused; {len(rehearsal.warnings)} warnings"
     )
     return begun.recording
-
-
-def _stopped(recording: "Recording", as_json: bool) -> None:
-    said = (
-        f"stopped after step {recording.committed}; go on with "
-        f"`touchstone calibrate taxim --resume {recording.folder}`"
-    )
-    CONSOLE.print(said, markup=False)
-    if as_json:
-        emit({"schema": 1, "error": said, "exit_code": 130, "recording": str(recording.folder)})
-
-
-class _Told:
-    """A bar over the steps, and a line for each."""
-
-    def __init__(self, bar: Progress, done: int, total: int) -> None:
-        self._bar = bar
-        self._total = total
-        self._task = bar.add_task("presses", completed=done, total=total)
-
-    def began(self, step: Step) -> None:
-        self._bar.update(self._task, description=f"step {step.index + 1}: {step.kind}")
-
-    def ended(self, step: Step, seconds: float) -> None:
-        self._bar.advance(self._task)
-        self._bar.console.print(f"  step {step.index + 1} of {self._total} on the disk, {seconds:.1f} s")
-
-    def say(self, sentence: str) -> None:
-        """How the step that is being made went."""
-        self._bar.console.print(f"  {escape(sentence)}")
-
-
-@contextmanager
-def _progress(done: int, total: int) -> Iterator[_Told]:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=CONSOLE, transient=True) as bar:
-        yield _Told(bar, done, total)

@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -49,6 +50,15 @@ def resumable(how: str) -> Iterator[None]:
         raise
 
 
+def stopped(step: str, folder: Path, how: str, as_json: bool) -> int:
+    """Ctrl-C ended a session after a step: say with which command the run goes on; the exit code."""
+    said = f"stopped after {step}; go on with `{how}`"
+    CONSOLE.print(said, markup=False)
+    if as_json:
+        emit({"schema": 1, "error": said, "exit_code": 130, "recording": str(folder)})
+    return 130
+
+
 class StepProgress:
     """A bar over the steps of a run."""
 
@@ -65,6 +75,10 @@ class StepProgress:
         """Count it, and say how long it took."""
         self._bar.console.print(f"  {self._noun} {step.index + 1} recorded in {seconds:.1f} s")
         self._bar.advance(self._task)
+
+    def say(self, sentence: str) -> None:
+        """How the step that is being performed goes."""
+        self._bar.console.print(f"  {escape(sentence)}")
 
 
 @contextmanager

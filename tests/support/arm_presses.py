@@ -5,17 +5,19 @@ from pathlib import Path
 import numpy as np
 
 from calibration.taxim.arm.plan import PressSettings
-from calibration.taxim.arm.session import BALL, ball_scene, begin, perform_on
+from calibration.taxim.arm.session import BALL, ball_scene, procedure
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.bench.device import Health, TactileCamera
 from harness.bench.gap import gap_path, load_gap
 from harness.bench.reading import Reading
 from harness.bench.station import Bench, RunContext
 from harness.bench.station_file import load_station, station_path
-from harness.experiment.begin import Begun
+from harness.experiment import begin, perform
+from harness.experiment.perform import Performed
 from harness.recording.codecs import decode_jpeg
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
+from harness.recording.session import Progress
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.bench import in_process_bench
 from mocks.world.gap_draw import GapDraw
@@ -24,10 +26,12 @@ from tests.support.whole_run import Quiet
 RADIUS = 2e-3
 
 
-def begun(folder: Path, presses: int = 15, seed: int = 1, gap: str | None = None) -> Begun:
+def begun(folder: Path, presses: int = 15, seed: int = 1, gap: str | None = None) -> begin.Begun:
     """Planned and rehearsed on the mocked station; nothing has moved."""
     station = load_station(station_path("mock"))
-    return begin(ball_scene(RADIUS), station, PressSettings(presses=presses), seed, gap, folder)
+    return begin.begin(
+        procedure(PressSettings(presses=presses)), ball_scene(RADIUS), station, seed, gap, folder
+    )
 
 
 def opened(recording: Recording) -> Bench:
@@ -38,6 +42,11 @@ def opened(recording: Recording) -> Bench:
     assert mock is not None
     context = RunContext(recording.truth_path, run.mesh, recording.header.seed, mock["gap"])
     return in_process_bench(run.scene, run.station, context)
+
+
+def perform_on(bench: Bench, recording: Recording, progress: Progress) -> Performed:
+    """What is left of a run, on an open bench."""
+    return perform.perform_on(procedure(), bench, recording, progress)
 
 
 def performed(folder: Path, presses: int = 15, seed: int = 1, gap: str | None = None) -> Recording:

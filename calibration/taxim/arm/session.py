@@ -1,8 +1,6 @@
-"""Begin a calibration by the arm, and perform it on a bench: what the command is made of."""
+"""A calibration by the arm as a procedure of the bench: its scene, its plan and its presses."""
 
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -12,17 +10,10 @@ from calibration.taxim.arm.record import NAME
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile, scene_from_json
-from harness.bench.station import Bench
 from harness.bench.station_file import Station
-from harness.experiment import perform
-from harness.experiment.begin import Begun
-from harness.experiment.begin import begin as begun
 from harness.experiment.experiment import Helpers, Planned, Procedure
-from harness.experiment.perform import Performed
 from harness.objects.targets import BALL_RADIUS
-from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.recording.session import Progress
 from harness.twin.bench_of import twin_of, way_between
 
 GAP = "target"
@@ -55,31 +46,6 @@ def ball_scene(ball_radius: float, scene: SceneFile | None = None) -> SceneFile:
     return scene.model_copy(update={"object": ball})
 
 
-def begin(
-    scene: SceneFile,
-    station: Station,
-    settings: PressSettings,
-    seed: int,
-    gap: str | None = None,
-    folder: Path | None = None,
-) -> Begun:
-    """Plan and rehearse every press, and make the run's folder.
-
-    Args:
-        scene: from ``ball_scene``.
-        station: whose arm and gel.
-        settings: of the presses.
-        seed: of the places, and of a mocked world.
-        gap: reality gap of a mocked bench; ``GAP`` where None.
-        folder: of the run; a dated one under ``runs/`` where None.
-
-    Raises:
-        WrongUse: settings that cannot be; a gap for a real bench; a folder that holds a run.
-        MotionRefused: the rehearsal found a motion that must not be made; nothing was created.
-    """
-    return begun(procedure(settings), scene, station, seed, gap, folder)
-
-
 def procedure(settings: PressSettings | None = None) -> Procedure:
     """What the arm does: presses of the ball, and looks at the untouched gel between them.
 
@@ -93,18 +59,6 @@ def procedure(settings: PressSettings | None = None) -> Procedure:
         performer=_performer,
         gap=GAP,
     )
-
-
-def perform_on_bench(recording: Recording, progress: Progress, say: Callable[[str], None]) -> Performed:
-    """Open the run's bench and make the presses that are left."""
-    return perform.perform_on_bench(procedure(), recording, progress, say=say)
-
-
-def perform_on(
-    bench: Bench, recording: Recording, progress: Progress, say: Callable[[str], None] = lambda _: None
-) -> Performed:
-    """Make what is left of a run on an open bench."""
-    return perform.perform_on(procedure(), bench, recording, progress, say=say)
 
 
 def _planned(settings: PressSettings, scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:

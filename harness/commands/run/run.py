@@ -9,7 +9,7 @@ import typer
 from harness.basics.errors import WrongUse
 from harness.bench.experiments import EXPERIMENTS
 from harness.commands import options
-from harness.commands.output import ANSWERS, CONSOLE, emit, resumable, step_progress, warn
+from harness.commands.output import ANSWERS, CONSOLE, emit, resumable, step_progress, stopped, warn
 
 RUNNABLE = tuple(name for name, row in EXPERIMENTS.items() if row.value is not None)
 
@@ -143,7 +143,8 @@ def run(
 
     done = _perform(kind, recording, accuracy if target is None else None, json, conclude)
     if not done.complete:
-        return _stopped(kind, recording, json)
+        step = f"{kind.step} {recording.committed}"
+        return stopped(step, recording.folder, _resuming(kind, recording), json)
     if told:
         health = done.health or None
         show_report(add_report(kind, told[0], drawing(kind), health, recording.folder), json)
@@ -229,16 +230,9 @@ def _target(budget: str | None, error: str | None, level: list[str] | None) -> A
     return Target(seconds=value) if budget is not None else Target(error=value)
 
 
-def _stopped(kind: Any, recording: Any, as_json: bool) -> int:
-    """Ctrl-C ended the session after a step: how to go on."""
-    said = (
-        f"stopped after {kind.step} {recording.committed}; go on with "
-        f"`touchstone run {kind.name} --resume {recording.folder}`"
-    )
-    CONSOLE.print(said, markup=False)
-    if as_json:
-        emit({"schema": 1, "error": said, "exit_code": 130, "recording": str(recording.folder)})
-    return 130
+def _resuming(kind: Any, recording: Any) -> str:
+    """The command that goes on with a run."""
+    return f"touchstone run {kind.name} --resume {recording.folder}"
 
 
 def _perform(kind: Any, recording: Any, accuracy: Any, as_json: bool, conclude: Any) -> Any:
@@ -249,8 +243,10 @@ def _perform(kind: Any, recording: Any, accuracy: Any, as_json: bool, conclude: 
     if recording.committed == total:
         return Performed(True, {})  # nothing is left to touch: no bench is opened
     CONSOLE.print(f"recording to {recording.folder}", markup=False)
-    how = f"touchstone run {kind.name} --resume {recording.folder}"
-    with resumable(how), step_progress(recording.committed, total, kind.step) as progress:
+    with (
+        resumable(_resuming(kind, recording)),
+        step_progress(recording.committed, total, kind.step) as progress,
+    ):
         ask = None if as_json else _ask
         return perform_on_bench(kind, recording, progress, ask, accuracy, conclude=conclude)
 

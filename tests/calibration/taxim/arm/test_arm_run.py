@@ -15,15 +15,16 @@ import pytest
 
 from calibration.taxim.arm.plan import PressMotion, PressSettings, places
 from calibration.taxim.arm.record import read_arm_run
-from calibration.taxim.arm.session import ball_scene, begin, perform_on
+from calibration.taxim.arm.session import ball_scene, procedure
 from calibration.taxim.arm.settled import look
 from harness.basics.errors import CalibrationRefused, NotTouched, WrongUse
 from harness.bench.gap import load_gap
 from harness.bench.sensor import GELSIGHT_R15
 from harness.bench.station_file import load_station, station_path
+from harness.experiment.begin import begin
 from harness.recording.recording import Recording
 from mocks.world.gap_draw import GapDraw
-from tests.support.arm_presses import RADIUS, Creeping, begun, gap_of_aspect, opened, performed
+from tests.support.arm_presses import RADIUS, Creeping, begun, gap_of_aspect, opened, perform_on, performed
 from tests.support.whole_run import Quiet
 
 
@@ -130,7 +131,7 @@ def test_settings_that_cannot_be_are_refused_before_anything_moves(
 ) -> None:
     station = load_station(station_path("mock"))
     with pytest.raises(WrongUse, match=says):
-        begin(ball_scene(RADIUS), station, settings, 0, None, tmp_path / "run")
+        begin(procedure(settings), ball_scene(RADIUS), station, 0, None, tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
@@ -242,10 +243,9 @@ def test_a_run_stopped_at_any_press_goes_on_there_and_reads_the_same(tmp_path: P
 CHILD = """
 import sys
 from pathlib import Path
-from tests.support.arm_presses import opened
-from tests.support.whole_run import Quiet
-from calibration.taxim.arm.session import perform_on
 from harness.recording.recording import Recording
+from tests.support.arm_presses import opened, perform_on
+from tests.support.whole_run import Quiet
 recording = Recording(Path(sys.argv[1]))
 perform_on(opened(recording), recording, Quiet())
 """
