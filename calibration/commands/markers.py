@@ -55,7 +55,7 @@ def markers(
     Try: touchstone calibrate markers rest.png --spacing 1.5mm --report page/
     """
     from calibration.markers.at_rest import Printed, markers_at_rest
-    from calibration.markers.result import answer_of, file_of, report_of
+    from calibration.markers.result import answer_of, file_of
     from calibration.taxim.pictures import set_digest
     from harness.sim.gel.marker_file import write_markers
 
@@ -69,9 +69,9 @@ def markers(
     write_markers(file, artefact)
     answer = {**answer_of(made, file), "artefact": str(artefact), "report": None}
     if report is not None:
-        from harness.report.marker_page import write_marker_page
+        from calibration.markers.result import write_report
 
-        page = write_marker_page(report_of(made, file, answer, f"{sensor}, {source.name}"), report)
+        page = write_report(made, file, answer, f"{sensor}, {source.name}", report)
         answer["report"] = str(page)
     if json:
         emit(answer)

@@ -197,12 +197,9 @@ def taxim(
     if report is None and arm is not None:
         report = source / "report"
     if report is not None:
-        from calibration.taxim.report import report_of
-        from harness.report.calibration_page import write_calibration_page
+        from calibration.taxim.report import write_report
 
-        page = write_calibration_page(
-            report_of(made, pictures, f"{who.sensor}, {source.name}", scale, arm), report
-        )
+        page = write_report(made, pictures, f"{who.sensor}, {source.name}", report, scale, arm)
     answer = {
         **answer_of(made, artefact, polycalib, page),
         **scale_answer(scale, arm),

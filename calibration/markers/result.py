@@ -1,13 +1,21 @@
 """What a calibration of dots hands on: the file, the answer and the page, of the same numbers."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from calibration.markers.at_rest import Printed, RestingMarkers
+from calibration.markers.dots import Dots
 from harness.basics.arrays import FloatArray
-from harness.report.marker_page import MarkerReport
+from harness.picture.dot_lattice import DotLattice
+from harness.report.figures.dots import found_figure, off_figure
+from harness.report.figures.figures import Album
+from harness.report.template import write_page
 from harness.sim.gel.marker_file import MarkerDot, MarkerFile
+
+PAGE = "markers.html"
+"""Name of the page in its folder."""
 
 
 def file_of(made: RestingMarkers, printed: Printed, made_from: str) -> MarkerFile:
@@ -85,20 +93,41 @@ def answer_of(made: RestingMarkers, file: MarkerFile) -> dict[str, Any]:
     }
 
 
-def report_of(made: RestingMarkers, file: MarkerFile, answer: dict[str, Any], title: str) -> MarkerReport:
-    """What the page shows."""
-    dots = made.dots
-    return MarkerReport(
-        title,
-        _cards(answer),
-        [(name, str(value)) for name, value in file.model_dump(by_alias=True).items() if name != "dots"],
-        _notes(answer),
-        made.picture,
-        dots.places,
-        dots.radius,
-        dots.sigma,
-        made.lattice,
+def write_report(
+    made: RestingMarkers, file: MarkerFile, answer: dict[str, Any], title: str, folder: Path
+) -> Path:
+    """Write the page and its pictures into a folder, which is made if it does not exist; the page's path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    album, dots, lattice = Album(folder), made.dots, made.lattice
+    rows, columns = made.picture.shape[:2]
+    return write_page(
+        folder / PAGE,
+        PAGE,
+        report={
+            "title": title,
+            "cards": _cards(answer),
+            "facts": [pair for pair in file.model_dump(by_alias=True).items() if pair[0] != "dots"],
+            "notes": _notes(answer),
+        },
+        found=album.photograph("found", found_figure(made.picture, dots.places, dots.radius, lattice)),
+        off=album.drawing("off", off_figure(rows, columns, dots.places, lattice)),
+        dots=_lines(dots, lattice),
     )
+
+
+def _lines(dots: Dots, lattice: DotLattice) -> list[tuple[str, ...]]:
+    order = np.lexsort((lattice.index[:, 0], lattice.index[:, 1]))
+    return [
+        (
+            f"{lattice.index[k, 1]}, {lattice.index[k, 0]}" if lattice.on[k] else "none",
+            f"{dots.places[k, 0]:.3f}, {dots.places[k, 1]:.3f}",
+            f"{dots.sigma[k]:.3f}",
+            f"{dots.radius[k]:.2f}",
+            f"{np.hypot(*lattice.affine[k]):.3f}" if lattice.on[k] else "",
+            f"{np.hypot(*lattice.local[k]):.3f}" if lattice.on[k] else "",
+        )
+        for k in order
+    ]
 
 
 def _cards(answer: dict[str, Any]) -> list[tuple[str, str, str]]:

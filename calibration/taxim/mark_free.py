@@ -101,7 +101,7 @@ class MarkFree:
         seconds: from pictures in memory to the artefact.
     """
 
-    calibration: TactileCalibration
+    calibration: LitCalibration
     used: tuple[UsedPress, ...]
     refused: tuple[Refused, ...]
     contact_radius: float

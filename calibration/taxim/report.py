@@ -1,5 +1,9 @@
 """A calibration's report: figures, presses, and live pictures beside what is drawn of them."""
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from calibration.taxim.arm.moves import ArmScale
@@ -11,56 +15,78 @@ from calibration.taxim.pictures import Pictures
 from calibration.taxim.shadow.polar import SAMPLE_STEP
 from calibration.taxim.smooth_fit import distance
 from harness.basics.arrays import ByteArray, FloatArray
-from harness.report.calibration_page import CalibrationReport, Example, MovesFigure, PressLine
-from harness.report.figures.bins import BinsFigure
-from harness.report.figures.shadow import ShadowFigure
+from harness.report.figures.bins import bins_figure
+from harness.report.figures.figures import Album, Picture
+from harness.report.figures.presses import LONGER, maps_figure, moves_figure, scores_figure
+from harness.report.figures.shadow import shadow_figure
+from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, png
+from harness.report.template import write_page
 from harness.sim.gel.gel import deform
 from harness.sim.optics.lit_calibration import LitCalibration
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
-_SHARES = (0.0, 0.5, 1.0)
+PAGE = "calibration.html"
+"""Name of the page in its folder."""
+
+_SHARES = {"worst": 0.0, "median": 0.5, "best": 1.0}
 """Of the presses sorted by their score: which are shown."""
 
 _MARGIN = 2.0
 """Contact radii shown about a press."""
 
 
-def report_of(
+def write_report(
     made: MarkFree,
     pictures: Pictures,
     title: str,
+    folder: Path,
     scale: ArmScale | None = None,
     arm: ArmPresses | None = None,
-) -> CalibrationReport:
-    """What the page of a calibration shows.
+) -> Path:
+    """Write the page of a calibration, which refers to nothing outside itself, and its pictures; its path.
 
     Args:
         made: the calibration.
         pictures: that it was made of.
         title: of the page.
+        folder: made if it does not exist; files of the same names are replaced.
         scale: by the arm's moves; None where none are known.
         arm: the presses that it stands on.
     """
-    header = made.calibration.header
-    return CalibrationReport(
-        title,
-        [*_cards(made), *([] if scale is None else [_pitch_card(scale)])],
-        [(name, str(value)) for name, value in vars(header).items()]
-        + [("sha256", made.calibration.sha256), ("background", made.background_from)],
-        [*_notes(made, scale), *([] if arm is None else [_watched(arm)])],
-        [
-            PressLine(press.name, press.centre, press.radius, press.depth, **vars(press.score))
-            for press in made.used
+    folder.mkdir(parents=True, exist_ok=True)
+    header, album = made.calibration.header, Album(folder)
+    report = {
+        "title": title,
+        "cards": [*_cards(made), *([] if scale is None else [_pitch_card(scale)])],
+        "facts": [
+            *vars(header).items(),
+            ("sha256", made.calibration.sha256),
+            ("background", made.background_from),
         ],
-        [(one.name, one.kind, one.reason) for one in made.refused],
-        made.calibration.background,
-        made.coverage,
-        made.left,
-        _examples(made, pictures),
-        None if scale is None or arm is None else _moves(scale, arm),
-        _shadow_figure(made),
-        bins_of(made.calibration),
+        "notes": [*_notes(made, scale), *([] if arm is None else [_watched(arm)])],
+        "presses": made.used,
+        "refused": made.refused,
+    }
+    circles = [(press.centre, press.radius) for press in made.used]
+    maps = maps_figure(made.calibration.background, circles, made.coverage, made.left)
+    scores = {
+        name: np.array([vars(press.score)[name] for press in made.used]) for name in vars(made.used[0].score)
+    }
+    return write_page(
+        folder / PAGE,
+        PAGE,
+        report=report,
+        maps=album.photograph("maps", maps),
+        scores=album.drawing("scores", scores_figure(scores)),
+        rows=list(_examples(made, pictures, album)),
+        gain=f"{DIFFERENCE_GAIN:g}",
+        moved=None if scale is None or arm is None else _moves(scale, arm, album),
+        numbers=[] if scale is None else _numbers(scale),
+        longer=f"{LONGER:g}",
+        shadowed=_shadow_picture(made, album),
+        shadows=_shadow_lines(made),
+        **_believed(made.calibration, album),
     )
 
 
@@ -79,14 +105,13 @@ def _watched(arm: ArmPresses) -> str:
     )
 
 
-def _moves(scale: ArmScale, arm: ArmPresses) -> MovesFigure:
-    used = np.zeros(len(arm.taken), np.bool_)
-    used[list(scale.used)] = True
+def _numbers(scale: ArmScale) -> list[tuple[str, str, str]]:
+    """Name, value and what it is uncertain by, of everything that the moves tell."""
     pitch, aspect, rotation, skew = scale.pitch, scale.aspect, scale.rotation, scale.skew
     turned, askew = (
         tuple(f"{np.degrees(v):.3f} deg" for v in (one.value, one.within95)) for one in (rotation, skew)
     )
-    numbers = [
+    return [
         ("a pixel shows", f"{1e3 * pitch.value:.5f} mm", f"{1e3 * pitch.within95:.5f} mm"),
         ("from column to column", f"{1e3 * scale.wide.value:.5f} mm", f"{1e3 * scale.wide.within95:.5f} mm"),
         ("from row to row", f"{1e3 * scale.high.value:.5f} mm", f"{1e3 * scale.high.within95:.5f} mm"),
@@ -95,7 +120,13 @@ def _moves(scale: ArmScale, arm: ArmPresses) -> MovesFigure:
         ("rows and columns from square", askew[0], askew[1]),
         ("a press about the map", f"{1e3 * scale.scatter:.3f} mm", ""),
     ]
-    return MovesFigure(numbers, np.array([one.on_gel for one in arm.taken]), scale.residuals, used)
+
+
+def _moves(scale: ArmScale, arm: ArmPresses, album: Album) -> Picture:
+    used = np.zeros(len(arm.taken), np.bool_)
+    used[list(scale.used)] = True
+    on_gel = np.array([one.on_gel for one in arm.taken])
+    return album.drawing("moves", moves_figure(on_gel, scale.residuals, used))
 
 
 def _cards(made: MarkFree) -> list[tuple[str, str, str]]:
@@ -145,9 +176,17 @@ def _shadow_note(made: MarkFree) -> str:
     )
 
 
-def _shadow_figure(made: MarkFree) -> ShadowFigure:
-    pitch, shadow = made.calibration.header.pitch, made.shadow
-    lines = [
+def _shadow_picture(made: MarkFree, album: Album) -> Picture:
+    shadow = made.shadow
+    dark_sides = np.array([one.dark_side for one in shadow.colours])
+    step = made.calibration.header.pitch * SAMPLE_STEP
+    figure = shadow_figure(shadow.directions, step, shadow.typical, shadow.cells, dark_sides)
+    return album.drawing("shadow", figure)
+
+
+def _shadow_lines(made: MarkFree) -> list[tuple[str, ...]]:
+    """Of the table under the figure, one a colour."""
+    return [
         (
             one.colour,
             "" if np.isnan(one.falls) else f"{np.degrees(one.falls):.1f} deg",
@@ -158,42 +197,39 @@ def _shadow_figure(made: MarkFree) -> ShadowFigure:
             f"{one.misfit:.1f}",
             one.missing or "drawn",
         )
-        for one in shadow.colours
+        for one in made.shadow.colours
     ]
-    dark_sides = np.array([one.dark_side for one in shadow.colours])
-    return ShadowFigure(
-        lines, shadow.directions, pitch * SAMPLE_STEP, shadow.typical, shadow.cells, dark_sides
-    )
 
 
-def bins_of(calibration: TactileCalibration) -> BinsFigure | None:
-    """The table's bins and their errors; None of a calibration that does not say these."""
-    if not (isinstance(calibration, LitCalibration) and calibration.uncertainty.size):
-        return None
+def _believed(calibration: LitCalibration, album: Album) -> dict[str, Any]:
+    """The table's bins and their errors, with the median of those that presses reached and of the others."""
     error = np.sqrt((calibration.uncertainty.astype(np.float64) ** 2).mean(axis=2))
     steepest, support = float(np.arcsin(calibration.header.slope_limit)), calibration.support
     inside = np.zeros_like(support)
     inside[: int(np.nonzero(support.any(axis=1))[0].max(initial=0)) + 1] = True
     filled = inside & ~support
-    return BinsFigure(
-        error,
-        support,
-        steepest,
-        float(np.median(error[support])),
-        float(np.median(error[filled])) if filled.any() else np.nan,
-    )
+    return {
+        "believed": album.drawing("bins", bins_figure(error, support, steepest)),
+        "reached": float(np.median(error[support])),
+        "filled": float(np.median(error[filled])) if filled.any() else None,
+    }
 
 
-def _examples(made: MarkFree, pictures: Pictures) -> list[Example]:
+def _examples(
+    made: MarkFree, pictures: Pictures, album: Album
+) -> Iterator[tuple[str, list[tuple[str, Picture]]]]:
+    """From the worst press to the best its title, and it beside what the calibration draws of it."""
     order = sorted(made.used, key=lambda press: press.score.table)
-    chosen = [order[round(share * (len(order) - 1))] for share in _SHARES]
-    return [
-        _example(word, press, made, pictures)
-        for word, press in zip(("worst", "median", "best"), chosen, strict=True)
-    ]
+    for number, (word, share) in enumerate(_SHARES.items(), start=1):
+        press = order[round(share * (len(order) - 1))]
+        live, drawn = _about(press, made, pictures)
+        shown = (("live", live), ("drawn", drawn), ("difference", difference(live, drawn)))
+        tiles = [(name, album.pixels(f"press_{number}_{name}", png(picture))) for name, picture in shown]
+        yield f"{word}: {press.name}, held out {press.score.table:.1f} dB", tiles
 
 
-def _example(word: str, press: UsedPress, made: MarkFree, pictures: Pictures) -> Example:
+def _about(press: UsedPress, made: MarkFree, pictures: Pictures) -> tuple[ByteArray, ByteArray]:
+    """A press as it was seen, its drift taken out, and as it is drawn: RGB about its contact."""
     live = pictures.images[pictures.names.index(press.name)]
     centre = np.array(press.centre)
     change = live.astype(np.float64) - pictures.background
@@ -205,8 +241,7 @@ def _example(word: str, press: UsedPress, made: MarkFree, pictures: Pictures) ->
     x0, y0 = np.maximum(np.floor(centre - reach).astype(int), 0)
     x1, y1 = np.minimum(np.ceil(centre + reach).astype(int), (columns, rows))
     shifted = np.clip(np.round(live - drift), 0.0, 255.0).astype(np.uint8)
-    title = f"{word}: {press.name}, held out {press.score.table:.1f} dB"
-    return Example(title, shifted[y0:y1, x0:x1], drawn[y0:y1, x0:x1])
+    return shifted[y0:y1, x0:x1], drawn[y0:y1, x0:x1]
 
 
 def draw_press(calibration: TactileCalibration, centre: FloatArray, radius: float) -> ByteArray:

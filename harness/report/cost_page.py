@@ -12,7 +12,7 @@ from harness.cost.promise import MET, doubts, promises
 from harness.effects.accuracy import Level
 from harness.report.figures.cost_chart import contacts_chart, cost_chart
 from harness.report.figures.figures import Album, Picture
-from harness.report.template import rendered
+from harness.report.template import write_page
 
 PAGE = "cost.html"
 """Name of the page in its folder."""
@@ -68,7 +68,8 @@ def write_cost_page(
     """
     folder.mkdir(parents=True, exist_ok=True)
     album = Album(folder)
-    page = rendered(
+    return write_page(
+        folder / PAGE,
         PAGE,
         curve=curve,
         reasons=reasons,
@@ -79,8 +80,6 @@ def write_cost_page(
         ],
         by_count=_by_count(curve, count, album),
     )
-    (folder / PAGE).write_text(page, encoding="utf-8")
-    return folder / PAGE
 
 
 def _section(

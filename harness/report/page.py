@@ -23,7 +23,7 @@ from harness.report.figures.pictures import (
 from harness.report.figures.sound import senses_figure, spectrogram_pair
 from harness.report.figures.tiles import DIFFERENCE_GAIN, difference, height_picture, png, root_mean_square
 from harness.report.sound_data import PeakLine, Sound
-from harness.report.template import rendered
+from harness.report.template import write_page
 from harness.report.values import Missing, Posterior
 
 PAGE = "report.html"
@@ -52,9 +52,7 @@ def write_report(data: ReportData, folder: Path) -> Path:
         Path of the page, which refers to nothing outside itself.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    page = rendered(PAGE, **_content(data, Album(folder)))
-    (folder / PAGE).write_text(page, encoding="utf-8")
-    return folder / PAGE
+    return write_page(folder / PAGE, PAGE, **_content(data, Album(folder)))
 
 
 def _content(data: ReportData, album: Album) -> dict[str, Any]:

@@ -31,14 +31,14 @@ def world_rows(scored: Scored, ours: Mapping[str, str]) -> dict[str, str] | Miss
     """What the mocked world did differently, by name, and the estimator's side of it beside."""
     if scored.truth is None:
         return NO_TRUTH
-    return {name: _said(value) for name, value in (*_flat(scored.truth.differences), *ours.items())}
+    return {name: _said(value) for name, value in (*flat(scored.truth.differences), *ours.items())}
 
 
-def _flat(tree: Mapping[str, object], above: str = "") -> Iterator[tuple[str, object]]:
+def flat(tree: Mapping[str, object], above: str = "") -> Iterator[tuple[str, object]]:
     """Names and values of a tree, those of a branch with its name before theirs."""
     for name, value in tree.items():
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{above}{name}.")
+            yield from flat(value, f"{above}{name}.")
         else:
             yield f"{above}{name}", value
 

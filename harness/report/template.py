@@ -1,14 +1,16 @@
 """From a template beside this module to a page that refers to nothing outside itself."""
 
+from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 
-def rendered(template: str, **content: Any) -> str:
-    """The page, with the style of all reports as ``style``.
+def write_page(path: Path, template: str, **content: Any) -> Path:
+    """Write a page, with the style of all reports as ``style``; its path.
 
     Args:
+        path: of the page; a file of that name is replaced.
         template: name of the file.
         content: by the names that the template uses; one that is missing is an error.
     """
@@ -20,4 +22,5 @@ def rendered(template: str, **content: Any) -> str:
         lstrip_blocks=True,
     )
     style = environment.get_template("report.css").render()
-    return environment.get_template(template).render(style=style, **content)
+    path.write_text(environment.get_template(template).render(style=style, **content), encoding="utf-8")
+    return path

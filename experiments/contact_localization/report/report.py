@@ -1,6 +1,5 @@
 """Fill the report of a run from its folder, its answer and, for a mocked run, its truth."""
 
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -31,10 +30,9 @@ from harness.report.data import (
     ReportData,
 )
 from harness.report.figures.props import arm_parts, object_part, sensor_parts, table_and_pedestal
-from harness.report.instruments import artefacts, instruments
-from harness.report.observed import observed_rows
 from harness.report.page import write_report
-from harness.report.simulated import NO_TRUTH, effect_rows, world_rows
+from harness.report.run_page import facts_of
+from harness.report.simulated import NO_TRUTH
 from harness.report.values import Missing
 from harness.report.wording import SENSES
 
@@ -53,31 +51,17 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
         health: of the instruments at the end of the session; None for a replay.
     """
     run, found = scored.run, scored.found
-    header = run.recording.header
     history = scored.answering.history(found.last, found.sense)
     result = result_of(scored)
     return ReportData(
-        title=f"Contact localization: {run.scene.title or run.scene.object.name}",
-        object_name=run.scene.object.name,
-        material=run.scene.object.material,
+        **facts_of("Contact localization", scored, comparison, health, _ours(scored)),
         mesh=run.mesh,
-        mock=header.mock is not None,
-        made=header.created,
-        command=" ".join(["touchstone", *sys.argv[1:]]),
-        recording=str(run.recording.folder),
         answer=_answer(scored, result),
         contacts=_contacts(scored, comparison, history),
         bench=_bench(run, found),
         error_by_contact=_by_contact(scored, history),
         error_by_seconds=_by_seconds(_sweep(scored)),
-        instruments=instruments(run, health),
-        calibrations=artefacts(run),
-        effects=effect_rows(comparison),
-        observed=observed_rows(comparison),
-        world=world_rows(scored, _ours(scored)),
         twin=deviations(run, found),
-        versions={name: text for name, text in header.versions.items() if name != "git"},
-        git=header.versions["git"],
         sound=sound_of(scored),
         symmetry=scored.answering.symmetry.name,
         accuracy={name: str(level) for name, level in scored.accuracy.items()},

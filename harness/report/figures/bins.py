@@ -1,7 +1,5 @@
 """Which slopes presses have taught a table, and how well."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -9,31 +7,18 @@ from harness.basics.arrays import BoolArray, FloatArray
 from harness.report.figures.style import INK, blank, styled
 
 
-@dataclass(frozen=True, eq=False)
-class BinsFigure:
-    """A table, bin by bin.
+def bins_figure(errors: FloatArray, reached: BoolArray, steepest: float) -> Figure:
+    """Errors by slope upwards and direction to the right, and beside them which bins were reached.
 
-    Attributes:
-        error: ``(slopes, directions)`` grey levels, standard error, root mean square over the channels.
-        support: ``(slopes, directions)`` whether presses reached a bin.
+    Args:
+        errors: ``(slopes, directions)`` grey levels, standard error, root mean square over the channels.
+        reached: ``(slopes, directions)`` whether presses reached a bin.
         steepest: rad, where the last supported slope ends.
-        reached: grey levels, the median of the bins that presses reached.
-        filled: the same of those as steep that none reached; NaN where there is none.
     """
-
-    error: FloatArray
-    support: BoolArray
-    steepest: float
-    reached: float
-    filled: float
-
-
-def bins_figure(bins: BinsFigure) -> Figure:
-    """Errors by slope upwards and direction to the right, and beside them which bins were reached."""
-    rows, columns = bins.error.shape
-    shown = max(int(np.ceil(bins.steepest / (0.5 * np.pi) * (rows - 1))), 1)
+    rows, columns = errors.shape
+    shown = max(int(np.ceil(steepest / (0.5 * np.pi) * (rows - 1))), 1)
     extent = (-180.0, 180.0, 0.0, 90.0 * shown / (rows - 1))
-    error, support = bins.error[:shown, : columns - 1], bins.support[:shown, : columns - 1]
+    error, support = errors[:shown, : columns - 1], reached[:shown, : columns - 1]
     with styled():
         figure = blank(12.6, 3.4)
         figure.set_layout_engine("constrained")

@@ -1,8 +1,5 @@
 """What ball presses leave over around their contacts: where shadows lie, if there are any."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -15,37 +12,26 @@ _SHOWN = 15.0
 _COLOURS = ("red", "green", "blue")
 
 
-@dataclass(frozen=True, eq=False)
-class ShadowFigure:
-    """What is left over along rays from the contact's rim.
+def shadow_figure(
+    directions: FloatArray, step: float, left_over: FloatArray, shaded: BoolArray, dark_sides: FloatArray
+) -> Figure:
+    """Three panels, direction to the right and distance upwards.
 
-    Attributes:
-        lines: of the table under the figure, one a colour.
+    Args:
         directions: ``(d,)`` rad, in the picture from the columns' direction towards the rows'.
         step: metres from sample to sample.
-        left: ``(3, d, samples)`` grey levels, red, green, blue.
-        cells: ``(3, d, samples)`` what is taken for a shadow.
+        left_over: ``(3, d, samples)`` grey levels along rays from the rim, red, green, blue.
+        shaded: ``(3, d, samples)`` what is taken for a shadow.
         dark_sides: ``(3,)`` rad, where slopes turn from each light.
     """
-
-    lines: Sequence[tuple[str, ...]]
-    directions: FloatArray
-    step: float
-    left: FloatArray
-    cells: BoolArray
-    dark_sides: FloatArray
-
-
-def shadow_figure(shadow: ShadowFigure) -> Figure:
-    """Three panels, direction to the right and distance upwards."""
-    samples = shadow.left.shape[2]
-    far = 1e3 * shadow.step * samples
+    samples = left_over.shape[2]
+    far = 1e3 * step * samples
     with styled():
         figure = blank(12.6, 3.4)
         figure.set_layout_engine("constrained")
         panels = np.asarray(figure.subplots(1, 3, sharey=True))
         for axes, name, left, cells, dark in zip(
-            panels, _COLOURS, shadow.left, shadow.cells, shadow.dark_sides, strict=True
+            panels, _COLOURS, left_over, shaded, dark_sides, strict=True
         ):
             shown = axes.imshow(
                 left.T,
@@ -57,7 +43,7 @@ def shadow_figure(shadow: ShadowFigure) -> Figure:
                 aspect="auto",
             )
             if cells.any():
-                middles = (np.degrees(shadow.directions), far * (np.arange(samples) + 0.5) / samples)
+                middles = (np.degrees(directions), far * (np.arange(samples) + 0.5) / samples)
                 axes.contour(*middles, cells.T.astype(np.float64), levels=[0.5], colors=INK, linewidths=1.2)
             axes.axvline(np.degrees(dark), color=INK, lw=1.0, ls="--")
             axes.set_title(name, fontsize=10)

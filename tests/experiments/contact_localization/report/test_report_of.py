@@ -4,13 +4,13 @@ import pytest
 
 from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.report import _by
-from harness.report.simulated import _flat, _said
+from harness.report.simulated import _said, flat
 
 
 def test_a_tree_of_values_is_a_row_for_each_leaf() -> None:
     tree = {"gap": "default", "sound": {"modes": 13, "room": {"seconds": 0.4}}, "scale": 1.0}
     rows = [("gap", "default"), ("sound.modes", 13), ("sound.room.seconds", 0.4), ("scale", 1.0)]
-    assert list(_flat(tree)) == rows
+    assert list(flat(tree)) == rows
 
 
 @pytest.mark.parametrize(

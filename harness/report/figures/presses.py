@@ -1,0 +1,136 @@
+"""Presses of a tactile calibration: where they were made, by the arm too, and how well each is predicted."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, IntArray
+from harness.report.figures.style import ANSWER, INK, SOFT, TOOL, blank, styled
+
+LONGER = 20.0
+"""Times as long as they are, arrows of what presses are off the arm's map."""
+
+_WORST_SHOWN = 30.0
+"""Grey levels at which the map of what is left over ends."""
+
+
+def maps_figure(
+    background: ByteArray,
+    circles: Sequence[tuple[tuple[float, float], float]],
+    coverage: IntArray,
+    left_over: FloatArray,
+) -> Figure:
+    """Where the presses were, how often each place was reached, and what is left over there.
+
+    Args:
+        background: ``(rows, columns, 3)`` RGB of the untouched gel.
+        circles: centre (column, row) and radius of each contact line, pixels.
+        coverage: ``(rows, columns)`` how many contacts reached a pixel.
+        left_over: ``(rows, columns)`` grey levels rms on held-out presses; NaN where none was.
+    """
+    rows, columns = coverage.shape
+    with styled():
+        figure = blank(12.6, 12.6 / 3.0 * rows / columns + 0.2)
+        figure.set_layout_engine("constrained")
+        where, often, left = np.asarray(figure.subplots(1, 3))
+        where.imshow(background)
+        where.set_title("presses on the untouched gel", fontsize=10)
+        for centre, radius in circles:
+            where.add_patch(Circle(centre, radius, fill=False, ec="white", lw=0.9))
+            where.plot(*centre, marker="+", ms=4, color=INK, mew=0.8)
+        _map(figure, often, coverage, "contacts that reached a pixel", "Blues", float(coverage.max()))
+        worst = "left over on held-out presses, grey levels rms"
+        _map(figure, left, left_over, worst, "magma", _WORST_SHOWN)
+        for axes in (where, often, left):
+            axes.set_xlim(-0.5, columns - 0.5)
+            axes.set_ylim(rows - 0.5, -0.5)
+            axes.set_axis_off()
+    return figure
+
+
+def moves_figure(on_gel: FloatArray, residuals: FloatArray, used: BoolArray) -> Figure:
+    """Every press on the gel by the arm, with what it is off the map, drawn longer.
+
+    Args:
+        on_gel: ``(presses, 2)`` m, by the arm.
+        residuals: ``(presses, 2)`` m, by which the arm's place is off the pictures'.
+        used: ``(presses,)`` whether a press is among those that the map stands on.
+    """
+    x, y = 1e3 * on_gel.T
+    right, down = 1e3 * LONGER * residuals.T
+    with styled():
+        figure = blank(7.6, 5.6)
+        figure.set_layout_engine("constrained")
+        axes = figure.add_subplot()
+        for which, colour, label in ((used, ANSWER, "used"), (~used, SOFT, "not used")):
+            if which.any():
+                axes.plot(x[which], y[which], ls="none", marker="o", ms=3.5, color=colour, label=label)
+        shown = np.isfinite(right)
+        axes.quiver(
+            x[shown],
+            y[shown],
+            right[shown],
+            down[shown],
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            width=0.003,
+            color=TOOL,
+        )
+        # Arrows do not stretch the axes by themselves: their tips would be cut off.
+        axes.update_datalim(np.column_stack([x + right, y + down])[shown])
+        axes.autoscale_view()
+        axes.set_aspect("equal")
+        axes.invert_yaxis()
+        axes.set_title(f"arrows: off the arm's map, {LONGER:g} times as long", fontsize=9, loc="left")
+        axes.set_xlabel("x of the tool's gel frame, mm")
+        axes.set_ylabel("y, mm")
+        axes.legend(frameon=False, fontsize=9, loc="upper right")
+    return figure
+
+
+def scores_figure(scores: Mapping[str, FloatArray]) -> Figure:
+    """Held-out PSNR of every press, sorted, with and without the centre refitted, and of nothing at all.
+
+    Args:
+        scores: ``(presses,)`` dB, by what predicts: ``table``, ``smooth``, ``unrefitted`` and ``nothing``.
+    """
+    curves: tuple[tuple[str, str, str, str], ...] = (
+        ("table", "table, centre refitted", ANSWER, "o"),
+        ("smooth", "smooth model, centre refitted", TOOL, "s"),
+        ("unrefitted", "table, centre as detected", SOFT, "^"),
+        ("nothing", "untouched gel", "#b9bec6", "x"),
+    )
+    order = np.argsort(scores["table"], kind="stable")
+    with styled():
+        figure = blank(9.0, 3.9)
+        figure.set_layout_engine("constrained")
+        axes = figure.add_subplot()
+        for which, label, colour, marker in curves:
+            axes.plot(
+                np.arange(1, len(order) + 1),
+                scores[which][order],
+                ls="none",
+                marker=marker,
+                ms=4.5,
+                color=colour,
+                label=label,
+            )
+        axes.axhline(float(np.median(scores["table"])), color=ANSWER, lw=1.0, ls="--")
+        axes.set_xlabel("press, from the worst to the best (line: median of the table)")
+        axes.set_ylabel("held-out PSNR within the contact, dB")
+        axes.grid(visible=True, axis="y", color="#e6e8eb", lw=0.8)
+        axes.set_axisbelow(True)
+        axes.legend(frameon=False, fontsize=9, ncols=2, loc="center right")
+    return figure
+
+
+def _map(figure: Figure, axes: Axes, values: AnyArray, title: str, colours: str, highest: float) -> None:
+    bare = np.full((*values.shape, 3), 0.93)
+    axes.imshow(bare)
+    shown = axes.imshow(values, cmap=colours, vmin=0.0, vmax=max(highest, 1.0))
+    axes.set_title(title, fontsize=10)
+    figure.colorbar(shown, ax=axes, shrink=0.8)
