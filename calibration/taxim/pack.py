@@ -3,12 +3,12 @@
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
+from harness.basics.npz_file import read_arrays
 
 _KEYS = {"f0", "imgs", "touch_center", "touch_radius"}
 
@@ -58,16 +58,7 @@ def read_pack(path: Path) -> PressPack:
     Raises:
         CalibrationRefused: missing, incomplete, or shapes that disagree.
     """
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            missing = _KEYS - set(archive.files)
-            if missing:
-                raise CalibrationRefused(
-                    f"{path} has no {sorted(missing)}; a pack of presses holds {sorted(_KEYS)}"
-                )
-            found = {name: archive[name] for name in _KEYS}
-    except (OSError, EOFError, ValueError, BadZipFile) as error:
-        raise CalibrationRefused(f"{path} does not read as a pack of presses: {error}") from error
+    found = read_arrays(path, "a pack of presses", _KEYS)
     images, presses = found["imgs"], len(found["imgs"])
     shapes_agree = (
         images.shape[1:] == found["f0"].shape

@@ -13,26 +13,22 @@ Without it the file is one of ``harness.sim.optics.tactile_calibration``. Presse
 give a ``ShadowedCalibration``: the same with a table of them.
 """
 
-import json
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from zipfile import BadZipFile, is_zipfile
 
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import CalibrationRefused
 from harness.basics.named_file import require_file
-from harness.sim.gel.gel import GelSkirt
 from harness.sim.optics.shading import POSITION_TERMS
 from harness.sim.optics.shadow import ShadowTable
 from harness.sim.optics.tactile_calibration import (
     POSITION_DEGREE,
-    SCHEMA,
-    CalibrationHeader,
     Float32Array,
     TactileCalibration,
-    load_calibration,
+    arrays_of_file,
+    calibration_of_arrays,
     shipped_calibration,
     smooth_terms,
 )
@@ -197,48 +193,11 @@ def read_calibration(path: Path) -> TactileCalibration:
         CalibrationRefused: of another schema, incomplete, or not what was written.
     """
     require_file(path, "calibration", "give the file that touchstone calibrate taxim wrote")
-    if not is_zipfile(path):
-        raise CalibrationRefused(
-            f"{path} does not read as a calibration: it is no .npz archive; give what touchstone calibrate "
-            "taxim wrote"
-        )
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            found = {name: archive[name] for name in archive.files} if LIT in archive.files else {}
-    except (OSError, EOFError, ValueError, BadZipFile) as error:
-        raise CalibrationRefused(f"{path} does not read as a calibration: {error}") from error
-    return _lit(found, path) if found else load_calibration(path)
-
-
-def _lit(found: dict[str, AnyArray], path: Path) -> LitCalibration:
-    wanted = {"header", "background", "table", "support", "smooth", LIT}
-    shadowed = not set(SHADOW).isdisjoint(found)
-    wanted |= set(SHADOW) if shadowed else set()
-    # Files of before it was measured do not say it.
-    wanted |= {UNCERTAINTY} & set(found)
-    if set(found) != wanted:
-        raise CalibrationRefused(f"{path} holds {sorted(found)} where a calibration holds {sorted(wanted)}")
-    header, sha256 = _header(str(found.pop("header")), path)
-    calibration = ShadowedCalibration(header, **found) if shadowed else LitCalibration(header, **found)
-    if calibration.sha256 != sha256:
-        raise CalibrationRefused(
-            f"{path} is not what was written: its contents hash to {calibration.sha256[:12]}"
-        )
-    return calibration
-
-
-def _header(text: str, path: Path) -> tuple[CalibrationHeader, str]:
-    try:
-        outer = json.loads(text)
-        inner = dict(outer["header"])
-        skirt = dict(inner["skirt"])
-        inner["skirt"] = GelSkirt(tuple(skirt["kernels"]), skirt["final"], skirt["core"])
-        sha256 = str(outer["sha256"])
-    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
-        raise CalibrationRefused(f"{path} has no readable header: {error!r}") from error
-    if set(inner) != {item.name for item in fields(CalibrationHeader)} or inner["schema"] != SCHEMA:
-        raise CalibrationRefused(
-            f"{path} has header keys {sorted(inner)} of schema {inner.get('schema')}; this version reads "
-            f"schema {SCHEMA}: fit it again"
-        )
-    return CalibrationHeader(**inner), sha256
+    found = arrays_of_file(path)
+    if LIT not in found:
+        return calibration_of_arrays(found, path, TactileCalibration)
+    # Files of before it was measured do not say their uncertainty.
+    own = {LIT} | {UNCERTAINTY} & set(found)
+    if set(SHADOW).isdisjoint(found):
+        return calibration_of_arrays(found, path, LitCalibration, own)
+    return calibration_of_arrays(found, path, ShadowedCalibration, own | set(SHADOW))

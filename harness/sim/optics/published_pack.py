@@ -8,13 +8,13 @@ are turned to RGB here and nowhere else.
 
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile, is_zipfile
 
 import cv2
 import numpy as np
 
-from harness.basics.arrays import AnyArray, ByteArray, FloatArray, read_only
+from harness.basics.arrays import ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused
+from harness.basics.npz_file import read_arrays
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, GelSkirt, skirt_for
 from harness.sim.optics.shadow import ShadowTable
@@ -101,7 +101,7 @@ def read_table(path: Path) -> FloatArray:
     Raises:
         CalibrationRefused: missing, incomplete, or numbers that are not finite.
     """
-    found = _arrays(path, {"bins", "grad_r", "grad_g", "grad_b"}, "a published colour table")
+    found = read_arrays(path, "a published colour table", ("bins", "grad_r", "grad_g", "grad_b"))
     bins = int(found["bins"])
     parts = [found[f"grad_{named}"].astype(np.float64) for named in "bgr"]
     if any(part.shape != (bins, bins, TABLE_TERMS) for part in parts):
@@ -122,7 +122,7 @@ def _background(folder: Path) -> ByteArray:
             f"{folder} has no {PRESSES}, so nobody knows what the camera sees of the untouched gel; "
             "give such a picture with --background"
         )
-    seen = _arrays(path, {"f0"}, "a pack of presses")["f0"]
+    seen = read_arrays(path, "a pack of presses", ("f0",))["f0"]
     if seen.dtype != np.uint8 or seen.ndim != 3 or seen.shape[2] != 3:
         raise CalibrationRefused(f"{path}: f0 is {seen.dtype} {seen.shape}, not a colour picture of 8 bits")
     return read_only(np.ascontiguousarray(seen[..., ::-1]))
@@ -159,16 +159,3 @@ def _skirt(rows: int, columns: int, pitch: float) -> GelSkirt:
     if rows >= _TAXIM_ROWS:
         return skirt_for(sensor, TAXIM_SKIRT, _TAXIM_PITCH)
     return skirt_for(sensor, R15_SKIRT)
-
-
-def _arrays(path: Path, wanted: set[str], what: str) -> dict[str, AnyArray]:
-    if path.is_file() and not is_zipfile(path):
-        raise CalibrationRefused(f"{path} does not read as {what}: it is no .npz archive")
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            missing = wanted - set(archive.files)
-            if missing:
-                raise CalibrationRefused(f"{path} has no {sorted(missing)}; {what} holds {sorted(wanted)}")
-            return {name: archive[name] for name in wanted}
-    except (OSError, EOFError, ValueError, BadZipFile) as error:
-        raise CalibrationRefused(f"{path} does not read as {what}: {error}") from error

@@ -2,17 +2,18 @@
 
 import hashlib
 import json
+from collections.abc import Set
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile, is_zipfile
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused
+from harness.basics.npz_file import read_arrays
 from harness.sim.gel.gel import GelSkirt
 
 SCHEMA = 1
@@ -128,6 +129,9 @@ class TactileCalibration:
         return digest.hexdigest()
 
 
+C = TypeVar("C", bound=TactileCalibration)
+
+
 def shipped_calibration(name: str) -> TactileCalibration:
     """A calibration that comes with the package.
 
@@ -161,21 +165,34 @@ def load_calibration(path: Path) -> TactileCalibration:
     Raises:
         CalibrationRefused: missing, of another schema, incomplete, or not what was written.
     """
-    if path.is_file() and not is_zipfile(path):
-        raise CalibrationRefused(
-            f"{path} does not read as a calibration: it is no .npz archive; give what touchstone calibrate "
-            "taxim wrote"
-        )
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            found = {name: archive[name] for name in archive.files}
-    except (OSError, EOFError, ValueError, BadZipFile) as error:
-        raise CalibrationRefused(f"{path} does not read as a calibration: {error}") from error
-    wanted = {"header", "background", "table", "support", "smooth"}
+    return calibration_of_arrays(arrays_of_file(path), path, TactileCalibration)
+
+
+def arrays_of_file(path: Path) -> dict[str, AnyArray]:
+    """What a calibration's file holds, by name; ``CalibrationRefused`` where it is none."""
+    return read_arrays(path, "a calibration", advice="; give what touchstone calibrate taxim wrote")
+
+
+def calibration_of_arrays(
+    found: dict[str, AnyArray], path: Path, kind: type[C], own: Set[str] = frozenset()
+) -> C:
+    """A calibration from what its file holds, strictly.
+
+    Args:
+        found: by name, the header among them.
+        path: of the file, for people.
+        kind: of calibration.
+        own: arrays that this kind has beside every calibration's.
+
+    Raises:
+        CalibrationRefused: of another schema, incomplete, or not what was written.
+    """
+    wanted = {"header", "background", "table", "support", "smooth", *own}
     if set(found) != wanted:
         raise CalibrationRefused(f"{path} holds {sorted(found)} where a calibration holds {sorted(wanted)}")
-    header, sha256 = _parse(str(found.pop("header")), path)
-    calibration = TactileCalibration(header, **found)
+    header, sha256 = _parse(str(found["header"]), path)
+    arrays: dict[str, Any] = {name: array for name, array in found.items() if name != "header"}
+    calibration = kind(header, **arrays)
     if calibration.sha256 != sha256:
         raise CalibrationRefused(
             f"{path} is not what was written: its contents hash to {calibration.sha256[:12]}"
@@ -205,7 +222,7 @@ def _parse(text: str, path: Path) -> tuple[CalibrationHeader, str]:
         skirt = inner.pop("skirt")
         inner["skirt"] = GelSkirt(tuple(skirt["kernels"]), skirt["final"], skirt["core"])
         return CalibrationHeader(**inner), str(outer["sha256"])
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
+    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
         raise CalibrationRefused(f"{path} has no readable header: {error!r}") from error
 
 
