@@ -115,23 +115,6 @@ def change_smoothly(z: FloatArray, smooth: FloatArray, limit: float, change: Flo
 
 @compiled
 def draw_smoothly(
-    z: FloatArray, smooth: FloatArray, base: FloatArray, limit: float, image: ByteArray
-) -> tuple[int, int]:
-    """As ``draw_exactly`` with the polynomial."""
-    steepest = limit / np.sqrt(1.0 - limit * limit) if limit < 1.0 else np.inf
-    clipped, beyond = 0, 0
-    row, here, out = np.empty((3, 60)), np.empty(60), np.empty(3)
-    for i in range(z.shape[0]):
-        at_row(smooth, i, z.shape[0], row)
-        for j in range(z.shape[1]):
-            if _smooth_pixel(z, i, j, row, limit, here, out) > steepest:
-                beyond += 1
-            clipped += _to_bytes(base[i, j], out, image[i, j])
-    return clipped, beyond
-
-
-@compiled
-def draw_lit(
     z: FloatArray,
     pressed: FloatArray,
     smooth: FloatArray,
@@ -140,13 +123,13 @@ def draw_lit(
     limit: float,
     image: ByteArray,
 ) -> tuple[int, int]:
-    """As ``draw_smoothly``, and the light of ``harness.sim.optics.lit_calibration``.
+    """As ``draw_exactly`` with the polynomial, and the light of ``harness.sim.optics.lit_calibration``.
 
     Args:
         z: ``(rows, columns)`` heights in pixels.
         pressed: ``(rows, columns)`` pixels, of indentation.
         smooth: ``(120, 3)`` coefficients of the slopes.
-        light: ``(36, 3)`` of the light, grey levels a pixel of indentation.
+        light: ``(36, 3)`` of the light, grey levels a pixel of indentation; ``(0, 3)`` for none.
         base: ``(rows, columns, 3)``.
         limit: sine of the steepest slope supported.
         image: ``(rows, columns, 3)``, overwritten.
@@ -162,7 +145,7 @@ def draw_lit(
         for j in range(columns):
             if _smooth_pixel(z, i, j, row, limit, here, out) > steepest:
                 beyond += 1
-            if pressed[i, j] != 0.0:
+            if len(light) and pressed[i, j] != 0.0:
                 _, nx, ny = _normal(z, i, j, limit)
                 _add_light(light_row, 2.0 * (j + 0.5) / columns - 1.0, nx, ny, pressed[i, j], out)
             clipped += _to_bytes(base[i, j], out, image[i, j])

@@ -22,7 +22,6 @@ from harness.sim.optics.kernels import (
     change_exactly,
     change_smoothly,
     draw_exactly,
-    draw_lit,
     draw_smoothly,
     to_pixels,
 )
@@ -109,12 +108,9 @@ class Optics:
             return draw_exactly(z, self._table, self._base, self._steepest, image)
         if self.level == "fast":
             return draw_fast(z, known.bins, self._padded, self._base_fast, self._steepest, image)
-        if isinstance(known, LitCalibration):
-            light = known.light * known.header.pitch
-            return draw_lit(
-                z, z - self._untouched, known.slopes, light, self._base, known.header.slope_limit, image
-            )
-        return draw_smoothly(z, known.smooth, self._base, known.header.slope_limit, image)
+        light = known.light * known.header.pitch if isinstance(known, LitCalibration) else np.empty((0, 3))
+        limit, pressed = known.header.slope_limit, z - self._untouched
+        return draw_smoothly(z, pressed, self._slopes, light, self._base, limit, image)
 
     @property
     def _steepest(self) -> float:

@@ -48,31 +48,22 @@ def normals_from_colour(
             seen = change[i, j]
             size = np.sqrt(seen[0] ** 2 + seen[1] ** 2 + seen[2] ** 2)
             x, y, left, spread = _descend(here, seen, 0.0, 0.0, limit, ridge, shade, by)
-            if size > _FAINT and left > 2.0 * noise and j > 0:
-                start = normal[i, j - 1]
-                again = _descend(here, seen, start[0], start[1], limit, ridge, shade, by)
+            for k in range(2 + _STARTS):
+                # What is explained well enough stays so; the ring is tried as a whole or not at all.
+                if k <= 2 and not (size > _FAINT and left > 2.0 * noise):
+                    break
+                if (k == 0 and j == 0) or (k == 1 and i == 0):
+                    continue
+                if k == 0:
+                    start_x, start_y = normal[i, j - 1, 0], normal[i, j - 1, 1]
+                elif k == 1:
+                    start_x, start_y = normal[i - 1, j, 0], normal[i - 1, j, 1]
+                else:
+                    turn = 2.0 * np.pi * (k - 2) / _STARTS
+                    start_x, start_y = 0.6 * limit * np.cos(turn), 0.6 * limit * np.sin(turn)
+                again = _descend(here, seen, start_x, start_y, limit, ridge, shade, by)
                 if again[2] < left:
                     x, y, left, spread = again
-            if size > _FAINT and left > 2.0 * noise and i > 0:
-                start = normal[i - 1, j]
-                again = _descend(here, seen, start[0], start[1], limit, ridge, shade, by)
-                if again[2] < left:
-                    x, y, left, spread = again
-            if size > _FAINT and left > 2.0 * noise:
-                for k in range(_STARTS):
-                    turn = 2.0 * np.pi * k / _STARTS
-                    again = _descend(
-                        here,
-                        seen,
-                        0.6 * limit * np.cos(turn),
-                        0.6 * limit * np.sin(turn),
-                        limit,
-                        ridge,
-                        shade,
-                        by,
-                    )
-                    if again[2] < left:
-                        x, y, left, spread = again
             normal[i, j, 0], normal[i, j, 1] = x, y
             fit[i, j, 0], fit[i, j, 1] = left, spread
 
