@@ -57,16 +57,22 @@ def markers(
     from calibration.markers.at_rest import Printed, markers_at_rest
     from calibration.markers.result import answer_of, file_of
     from calibration.taxim.pictures import set_digest
-    from harness.sim.gel.marker_file import write_markers
+    from harness.basics.json_file import write_model
+    from harness.basics.quantities import LENGTH
 
     pictures = _pictures(source)
-    printed = Printed(sensor, serial, _length("--pitch", pitch), _length("--spacing", spacing))
+    printed = Printed(
+        sensor,
+        serial,
+        options.positive("--pitch", pitch, LENGTH),
+        options.positive("--spacing", spacing, LENGTH),
+    )
     made = markers_at_rest(pictures, printed)
     file = file_of(
         made, printed, f"sha256 {set_digest(pictures[0], _rest(pictures))}, {len(pictures)} pictures"
     )
     artefact = out if out is not None else Path(f"{source.resolve().stem}_markers.json")
-    write_markers(file, artefact)
+    write_model(file, artefact)
     answer = {**answer_of(made, file), "artefact": str(artefact), "report": None}
     if report is not None:
         from calibration.markers.result import write_report
@@ -99,18 +105,6 @@ def _rest(pictures: "list[ByteArray]") -> "ByteArray":
     import numpy as np
 
     return np.stack(pictures[1:]) if len(pictures) > 1 else np.zeros((0, 0, 0, 3), np.uint8)
-
-
-def _length(option: str, text: str | None) -> float | None:
-    from harness.basics.errors import WrongUse
-    from harness.basics.quantities import LENGTH
-
-    if text is None:
-        return None
-    length = options.quantity(option, text, LENGTH)
-    if length <= 0.0:
-        raise WrongUse(f"{option} {text}: it must be above zero")
-    return length
 
 
 def _say(answer: dict[str, Any]) -> None:

@@ -167,6 +167,7 @@ def taxim(
     """
     from calibration.taxim.mark_free import calibrate
     from calibration.taxim.pictures import squared
+    from harness.basics.quantities import LENGTH
     from harness.sim.optics.lit_calibration import read_calibration
     from harness.sim.optics.tactile_calibration import save_calibration
 
@@ -176,8 +177,8 @@ def taxim(
         resume,
         run,
         presses,
-        _length("--depth", depth) if depth is not None else None,
-        _length("--ball-radius", ball_radius) if ball_radius is not None else None,
+        options.positive("--depth", depth, LENGTH),
+        options.positive("--ball-radius", ball_radius, LENGTH),
         seed,
         gap,
     )
@@ -249,6 +250,7 @@ def _identity(
     """Who the sensor is, and its pitch: as given, else by the arm, else the paper's sensor's."""
     from calibration.taxim.mark_free import Identity
     from harness.basics.errors import WrongUse
+    from harness.basics.quantities import LENGTH
     from harness.bench.sensor import GELSIGHT_R15
 
     recorded = None if arm is None else arm.ball_radius
@@ -260,24 +262,15 @@ def _identity(
             "mm; leave it out"
         )
     known = GELSIGHT_R15.pitch if scale is None else scale.pitch.value
+    stated = options.positive("--pitch", pitch, LENGTH)
     return Identity(
         sensor=sensor or ("GelSight" if arm is None else arm.sensor),
         serial=serial if arm is None or serial != "unknown" else arm.serial or serial,
         licence=licence,
         date=datetime.now(UTC).date().isoformat(),
-        pitch=known if pitch is None else _length("--pitch", pitch),
+        pitch=known if stated is None else stated,
         ball_radius=recorded if recorded is not None else ball_radius or 0.0,
     )
-
-
-def _length(option: str, text: str) -> float:
-    from harness.basics.errors import WrongUse
-    from harness.basics.quantities import LENGTH
-
-    length = options.quantity(option, text, LENGTH)
-    if length <= 0.0:
-        raise WrongUse(f"{option} {text}: it must be above zero")
-    return length
 
 
 def _channels(text: str | None) -> "Channels | None":

@@ -107,6 +107,16 @@ def quantity(option: str, text: str | None, kind: "Dimension") -> float | None:
         raise WrongUse(f"{option}: {refused}") from None
 
 
+def positive(option: str, text: str | None, kind: "Dimension") -> float | None:
+    """As ``quantity``, of what has to be above zero; ``WrongUse`` where it is not."""
+    from harness.basics.errors import WrongUse
+
+    value = quantity(option, text, kind)
+    if value is not None and value <= 0.0:
+        raise WrongUse(f"{option} {text}: it must be above zero")
+    return value
+
+
 def require_files(*files: tuple[str, Path | None, str]) -> None:
     """Refuse names of files that say another kind, or one name for two of them.
 

@@ -89,7 +89,9 @@ def depth(
     from harness.picture.image_file import read_image
     from harness.sim.optics.depth_reading import read_press
 
-    _checked(out, picture, height_out)
+    options.require_files(
+        ("--out", out, ".npz"), ("--picture", picture, ".png"), ("--height-out", height_out, ".npy")
+    )
     bench = None if station is None else load_station(station_path(station))
     wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, bench)
     known = _calibration(calibration, bench)
@@ -115,15 +117,6 @@ def depth(
     else:
         _say(answer)
     return 0
-
-
-def _checked(out: Path, picture: Path | None, height_out: Path | None) -> None:
-    from harness.basics.errors import WrongUse
-
-    wanted = (("--out", out, ".npz"), ("--picture", picture, ".png"), ("--height-out", height_out, ".npy"))
-    for option, path, suffix in wanted:
-        if path is not None and path.suffix != suffix:
-            raise WrongUse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
 
 
 def _calibration(named: str | None, bench: "Station | None") -> "TactileCalibration":
@@ -178,11 +171,10 @@ def _write(found: "DepthReading", points: "FloatArray", out: Path, height_out: P
 
 
 def _draw(found: "DepthReading", picture: Path) -> None:
-    from harness.report.figures.depth import DepthPictures, depth_figure
+    from harness.report.figures.depth import depth_figure
     from harness.report.figures.figures import Album
 
-    shown = DepthPictures(found.image, found.height, found.sigma, found.contact, found.trusted, found.pitch)
-    Album(picture.parent).photograph(picture.stem, depth_figure(shown))
+    Album(picture.parent).photograph(picture.stem, depth_figure(found))
 
 
 def _answer(

@@ -45,13 +45,11 @@ def asked(
     require_force(force, [], modulus, share, **{"--thickness": thickness, "--gel-poisson": poisson})
     if not force:
         return None
-    found = options.quantity("--thickness", thickness, LENGTH)
+    found = options.positive("--thickness", thickness, LENGTH)
     if found is None:
         if bench is None:
             raise WrongUse("a force needs to know how thick the gel is: --thickness 2.5mm, or a --station")
         found = bench.gel.sensor.gel_thickness
-    if found <= 0.0:
-        raise WrongUse(f"--thickness of {found:g} m cannot be; say a length above zero")
     return ForceAsked(found, stiffness(modulus, share, poisson))
 
 

@@ -211,16 +211,12 @@ def _checked_files(
 ) -> Path:
     if out is None:
         refuse("say where the picture goes: --out FILE.png")
-    for option, path, suffix in (
+    options.require_files(
         ("--out", out, ".png"),
         ("--picture", picture, ".png"),
         ("--height-out", height_out, ".npy"),
         ("--pressure-out", pressure_out, ".npy"),
-    ):
-        if path is not None and path.suffix != suffix:
-            refuse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
-    if out == picture:
-        refuse(f"--out and --picture are both {out}; give them two names")
+    )
     return out
 
 

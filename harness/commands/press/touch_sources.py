@@ -45,8 +45,8 @@ def gel(
     gel = known_gel(
         sensor,
         calibration,
-        pitch=_positive("--pitch", options.quantity("--pitch", pitch, LENGTH)),
-        thickness=_positive("--thickness", options.quantity("--thickness", thickness, LENGTH)),
+        pitch=options.positive("--pitch", pitch, LENGTH),
+        thickness=options.positive("--thickness", thickness, LENGTH),
         background=None if background is None else read_image(background),
         shadow=shadow,
     )
@@ -54,12 +54,6 @@ def gel(
         refuse(f"--noise of {noise} grey levels cannot be drawn; give a finite number")
     gel = replace(gel, noise=noise, seed=seed)
     return gel if markers is None else gel.with_dots(read_markers(markers))
-
-
-def _positive(option: str, value: float | None) -> float | None:
-    if value is not None and value <= 0.0:
-        refuse(f"{option} of {value:g} m cannot be; say a length above zero")
-    return value
 
 
 def of_heights(

@@ -224,9 +224,7 @@ def _target(budget: str | None, error: str | None, level: list[str] | None) -> A
     if level:
         raise WrongUse("--budget and --error choose the levels; leave --level out, or choose all with it")
     option, kind = ("--budget", TIME) if budget is not None else ("--error", LENGTH)
-    value = options.quantity(option, given, kind)
-    if value <= 0.0:
-        raise WrongUse(f"{option} {given}: it must be above zero")
+    value = options.positive(option, given, kind)
     return Target(seconds=value) if budget is not None else Target(error=value)
 
 

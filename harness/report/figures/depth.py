@@ -1,39 +1,19 @@
 """A press read from a live picture: what the camera saw, how deep the gel is, and how sure that is."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.figure import Figure
 
-from harness.basics.arrays import BoolArray, ByteArray, FloatArray
 from harness.report.figures.style import INK, blank, styled
+from harness.sim.optics.depth_reading import DepthReading
 
 _WIDTH, _TITLES = 3.8, 0.7
 
 
-@dataclass(frozen=True, eq=False)
-class DepthPictures:
-    """What is shown.
+def depth_figure(shown: DepthReading) -> Figure:
+    """Live picture, indentation in mm, and one standard deviation of it in micrometres.
 
-    Attributes:
-        image: ``(rows, columns, 3)`` RGB.
-        height: ``(rows, columns)`` metres of indentation.
-        sigma: ``(rows, columns)`` metres, one standard deviation.
-        contact: ``(rows, columns)``; outlined.
-        trusted: ``(rows, columns)``; elsewhere the slope was held or doubtful, which is hatched.
-        pitch: metres a pixel.
+    The contact is outlined; dots are where the slope was held or doubtful.
     """
-
-    image: ByteArray
-    height: FloatArray
-    sigma: FloatArray
-    contact: BoolArray
-    trusted: BoolArray
-    pitch: float
-
-
-def depth_figure(shown: DepthPictures) -> Figure:
-    """Live picture, indentation in mm, and one standard deviation of it in micrometres."""
     rows, columns = shown.height.shape
     half = 0.5e3 * shown.pitch * np.array([columns, rows])
     extent = (-half[0], half[0], half[1], -half[1])

@@ -1,7 +1,5 @@
 """A camera's picture, the simulated one exposed alike, and their difference, side by side."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,26 +15,16 @@ _MARGIN = 0.35
 """Of the object's box, shown on each side of it."""
 
 
-@dataclass(frozen=True, eq=False)
-class LivePictures:
-    """What is shown of a comparison.
+def live_figure(found: LiveComparison, words: tuple[str, str, str]) -> Figure:
+    """Live with both outlines, simulated, and live less simulated: the part of the pictures about the object.
 
-    Attributes:
+    Args:
         found: the comparison.
         words: under each of the three pictures.
-    """
-
-    found: LiveComparison
-    words: tuple[str, str, str]
-
-
-def live_figure(shown: LivePictures) -> Figure:
-    """Live with both outlines, simulated, and live less simulated: the part of the pictures about the object.
 
     Raises:
         ValueError: pictures of other shapes.
     """
-    found = shown.found
     shapes = {found.live.shape, found.simulated.shape}
     if len(shapes) != 1 or {found.silhouette.shape, found.mask.shape} != {found.live.shape[:2]}:
         raise ValueError(f"pictures of {shapes} with masks of {found.silhouette.shape}, {found.mask.shape}")
@@ -47,15 +35,15 @@ def live_figure(shown: LivePictures) -> Figure:
         figure = blank(3 * _WIDTH, _WIDTH * rows / columns + _WORDS)
         figure.set_layout_engine("constrained")
         live, simulated, left = np.asarray(figure.subplots(1, 3)).tolist()
-        titled_picture(live, live_part, "live", shown.words[0])
+        titled_picture(live, live_part, "live", words[0])
         _outline(live, found.silhouette[near], ANSWER)
         _outline(live, found.mask[near], TOOL)
-        titled_picture(simulated, simulated_part, "simulated, as exposed", shown.words[1])
+        titled_picture(simulated, simulated_part, "simulated, as exposed", words[1])
         titled_picture(
             left,
             difference(live_part, simulated_part),
             f"live - simulated, x {DIFFERENCE_GAIN:g}",
-            shown.words[2],
+            words[2],
         )
     return figure
 

@@ -135,7 +135,7 @@ def contacts_figure(sides: Sides, contacts: tuple[ContactRow, ...]) -> Figure:
             if not isinstance(contact.object_from_gel, Missing):
                 _tool_axis(axes, shot, contact.object_from_gel, str(contact.number), 0.14 * sides.size, 9.0)
             if contact.truth is not None:
-                _mark(axes, shot, contact.truth, "*", TRUTH, 130.0)
+                mark(axes, shot, contact.truth, "*", TRUTH, 130.0)
     return figure
 
 
@@ -172,10 +172,10 @@ def _posterior_on(axes: Axes, shot: Shot, contact: ContactRow, heat: Heat, size:
     axes.imshow(shot.picture(0, heat))
     axes.set_axis_off()
     for place in posterior.modes[1:]:
-        _mark(axes, shot, place, "o", INK, 0.45 * size, hollow=True)
-    _mark(axes, shot, posterior.estimate, "P", ANSWER, size)
+        mark(axes, shot, place, "o", INK, 0.45 * size, hollow=True)
+    mark(axes, shot, posterior.estimate, "P", ANSWER, size)
     if contact.truth is not None:
-        _mark(axes, shot, contact.truth, "*", TRUTH, 1.3 * size)
+        mark(axes, shot, contact.truth, "*", TRUTH, 1.3 * size)
 
 
 def _tool_axis(
@@ -220,7 +220,7 @@ def _tool_axis(
     )
 
 
-def _mark(
+def mark(
     axes: Axes, shot: Shot, place: FloatArray, marker: str, colour: str, size: float, hollow: bool = False
 ) -> None:
     """A marker on the object; pale where it lies on the far side."""

@@ -8,7 +8,7 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from harness.basics.arrays import FloatArray
-from harness.report.figures.pictures import Heat
+from harness.report.figures.pictures import Heat, mark
 from harness.report.figures.shading import Shot
 from harness.report.figures.style import ANSWER, INK, SOFT, TRUTH, blank, styled
 from harness.report.values import Missing, Posterior
@@ -17,7 +17,7 @@ FLOOR = -70.0
 """dB against a spectrogram's own loudest, below which nothing is told apart."""
 
 _SPREAD = 30.0
-_LIFT = 3e-3
+_MARK = 70.0
 _SENSE_WIDTH = 3.1
 _TITLES = 0.5
 
@@ -123,16 +123,6 @@ def _believed(axes: Axes, shot: Shot, found: Posterior | Missing, truth: FloatAr
         axes.imshow(shot.picture())
     else:
         axes.imshow(shot.picture(0, Heat(found)))
-        _mark(axes, shot, found.estimate, "P", ANSWER)
+        mark(axes, shot, found.estimate, "P", ANSWER, _MARK)
     if truth is not None:
-        _mark(axes, shot, truth, "*", TRUTH)
-
-
-def _mark(axes: Axes, shot: Shot, place: FloatArray, marker: str, colour: str) -> None:
-    """A marker on the object; pale where it lies on the far side."""
-    pixel = shot.camera.project(place[None])[0][0]
-    strength = 0.25 if bool(shot.hidden(place[None], _LIFT)[0]) else 1.0
-    axes.scatter(
-        float(pixel[0]), float(pixel[1]), s=70.0, marker=marker, c=colour,
-        edgecolors="white", linewidths=1.1, alpha=strength, zorder=5,
-    )  # fmt: skip
+        mark(axes, shot, truth, "*", TRUTH, _MARK)

@@ -5,19 +5,18 @@ volume it took of the gel. A table by depth holds for that very object; one by v
 same for objects of like breadth.
 """
 
-import json
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 from scipy.interpolate import PchipInterpolator
 
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import CalibrationRefused, OutOfDomain
-from harness.basics.named_file import require_file
-from harness.basics.whole_file import write_text_whole
+from harness.basics.errors import OutOfDomain
+from harness.basics.json_file import read_model
+from harness.basics.toml_file import StrictModel
 
 Above = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Said = Annotated[str, Field(min_length=1)]
@@ -25,11 +24,7 @@ Said = Annotated[str, Field(min_length=1)]
 _UNITS = {"depth_m": (1e3, "mm deep"), "volume_m3": (1e9, "mm^3 of the gel taken")}
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class ForceRow(_Strict):
+class ForceRow(StrictModel):
     """What was measured at one depth.
 
     Attributes:
@@ -44,7 +39,7 @@ class ForceRow(_Strict):
     sigma_n: Above
 
 
-class ForceTable(_Strict):
+class ForceTable(StrictModel):
     """Forces of one gel and one kind of object, least first.
 
     Attributes:
@@ -101,27 +96,6 @@ class ForceTable(_Strict):
         return float(depth.max() if self.of == "depth_m" else depth.sum() * pitch**2)
 
 
-def write_force_table(table: ForceTable, path: Path) -> None:
-    """Write the file, whole or not at all."""
-    write_text_whole(path, json.dumps(table.model_dump(by_alias=True), indent=1, allow_nan=False) + "\n")
-
-
 def read_force_table(path: Path) -> ForceTable:
-    """Read the file, strictly.
-
-    Raises:
-        WrongUse: there is no such file.
-        CalibrationRefused: not what ``write_force_table`` writes.
-    """
-    require_file(path, "table of forces")
-    try:
-        return ForceTable.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise CalibrationRefused(f"{path} does not read as a table of forces: {error}") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "all of it"
-        said = first["msg"].removeprefix("Value error, ")
-        raise CalibrationRefused(
-            f"{path} is no table of forces: {where}: {said}; docs/touch_force.md shows one"
-        ) from error
+    """A table of forces, ``docs/touch_force.md``; raises as ``read_model``."""
+    return read_model(path, ForceTable, "table of forces", "docs/touch_force.md shows one")

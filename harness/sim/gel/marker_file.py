@@ -5,16 +5,16 @@ print is off by a pixel, turned by a degree, and a dot is missing here and there
 the very gel.
 """
 
-import json
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from harness.basics.arrays import FloatArray, read_only
-from harness.basics.errors import CalibrationRefused, OutOfDomain, WrongUse
-from harness.basics.whole_file import write_text_whole
+from harness.basics.errors import OutOfDomain
+from harness.basics.json_file import read_model
+from harness.basics.toml_file import StrictModel
 from harness.bench.sensor import MarkerGrid
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -22,11 +22,7 @@ Above = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(gt=0)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class MarkerDot(_Strict):
+class MarkerDot(StrictModel):
     """One dot of a resting gel.
 
     Attributes:
@@ -46,7 +42,7 @@ class MarkerDot(_Strict):
     radius_px: Above
 
 
-class MarkerFile(_Strict):
+class MarkerFile(StrictModel):
     """Every dot of a gel.
 
     Attributes:
@@ -117,26 +113,6 @@ class MarkerFile(_Strict):
         return scale
 
 
-def write_markers(markers: MarkerFile, path: Path) -> None:
-    """Write the file, whole or not at all."""
-    write_text_whole(path, json.dumps(markers.model_dump(by_alias=True), indent=1, allow_nan=False) + "\n")
-
-
 def read_markers(path: Path) -> MarkerFile:
-    """Read the file, strictly.
-
-    Raises:
-        WrongUse: missing, or none that may be read.
-        CalibrationRefused: not what ``write_markers`` writes.
-    """
-    try:
-        return MarkerFile.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise CalibrationRefused(
-            f"{path} is no file of markers: {where or 'all of it'}: {first['msg']}; give what `touchstone "
-            "calibrate markers` wrote"
-        ) from error
+    """The file that ``touchstone calibrate markers`` wrote; raises as ``read_model``."""
+    return read_model(path, MarkerFile, "file of markers", "give what `touchstone calibrate markers` wrote")

@@ -101,7 +101,7 @@ def test_a_table_of_measured_forces_is_read_where_it_is_given(
         (["--force", "--level", "touch.force=hertz"], "touch.force has no level 'hertz'"),
         (["--force", "--level", "touch.force=table"], "--force-table"),
         (["--force", "--thickness", "0.4mm"], "press less, or ask for no force"),
-        (["--force", "--force-table", "none.json"], "no table of forces none.json"),
+        (["--force", "--force-table", "none.json"], "none.json cannot be read: no such file"),
     ],
 )
 def test_what_cannot_be_answered_is_refused_with_what_to_do(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.picture.live_picture import compare_live
-from harness.report.figures.live import LivePictures, live_figure
+from harness.report.figures.live import live_figure
 from tests.samples.exposed_pictures import bench_alone, pictured, taken
 
 IMAGE = pictured(radius=12.0)
@@ -20,11 +20,12 @@ FOUND = replace(
     mask=np.roll(MASK, 3, axis=1),
 )
 """Of an object too small for an exposure to be fitted, as one that was."""
-SHOWN = LivePictures(FOUND, ("a", "b", "c"))
+
+WORDS = ("a", "b", "c")
 
 
 def test_the_sheet_shows_the_object_three_times_and_what_is_around_it() -> None:
-    panels = live_figure(SHOWN).axes
+    panels = live_figure(FOUND, WORDS).axes
     assert [axes.get_title() for axes in panels] == ["live", "simulated, as exposed", "live - simulated, x 3"]
     shapes = [np.asarray(axes.images[0].get_array()).shape for axes in panels]
     # 24 pixels and 3 more to the right, and a third of that on each side.
@@ -37,11 +38,10 @@ def test_an_object_at_the_edge_or_not_there_is_shown_all_the_same() -> None:
     whole = replace(FOUND, silhouette=~MASK, mask=MASK)
     none = replace(FOUND, silhouette=MASK & ~MASK, mask=MASK & ~MASK)
     for found in (whole, none):
-        shown = replace(SHOWN, found=found)
-        assert np.asarray(live_figure(shown).axes[0].images[0].get_array()).shape == (96, 96, 3)
+        assert np.asarray(live_figure(found, WORDS).axes[0].images[0].get_array()).shape == (96, 96, 3)
 
 
 def test_pictures_of_two_sizes_are_refused() -> None:
     for wrong in (replace(FOUND, live=FOUND.live[1:]), replace(FOUND, mask=MASK[1:])):
         with pytest.raises(ValueError, match="pictures of"):
-            live_figure(replace(SHOWN, found=wrong))
+            live_figure(wrong, WORDS)

@@ -9,13 +9,14 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, OutOfDomain, WrongUse
+from harness.basics.json_file import write_model
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.force_effects import pressed_of_gel, table_force
 from harness.effects.touch_press import press_heights
 from harness.sim.gel import contact_force as forces
 from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.force_table import ForceTable, read_force_table, write_force_table
+from harness.sim.gel.force_table import ForceTable, read_force_table
 from harness.sim.optics.pressed_gel import Gel
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples.pressed_shapes import paraboloid
@@ -141,7 +142,7 @@ def test_a_press_takes_measured_forces_where_they_are_chosen() -> None:
 
 def test_a_table_reads_back_as_it_was_written(tmp_path: Path) -> None:
     table = ForceTable.model_validate(TABLE)
-    write_force_table(table, tmp_path / "f.json")
+    write_model(table, tmp_path / "f.json")
     assert read_force_table(tmp_path / "f.json") == table
 
 

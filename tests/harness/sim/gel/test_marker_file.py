@@ -11,11 +11,12 @@ from scipy.spatial import cKDTree
 from calibration.markers.dots import find_dots
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, DataRefused, OutOfDomain, WrongUse
+from harness.basics.json_file import write_model
 from harness.basics.toml_file import validate
 from harness.bench.scene import SceneFile
 from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.touch_press import press_heights
-from harness.sim.gel.marker_file import MarkerDot, MarkerFile, read_markers, write_markers
+from harness.sim.gel.marker_file import MarkerDot, MarkerFile, read_markers
 from harness.sim.gel.markers import marker_displacements, rest_markers
 from harness.sim.optics.known_gel import known_gel
 
@@ -65,10 +66,10 @@ def ball(depth: float) -> FloatArray:
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
     path = tmp_path / "dots.json"
-    write_markers(measured(), path)
+    write_model(measured(), path)
     assert read_markers(path) == measured()
     first = path.read_bytes()
-    write_markers(measured(), path)
+    write_model(measured(), path)
     assert path.read_bytes() == first
 
 

@@ -1,0 +1,41 @@
+"""Files that programs write for programs: strict JSON of one model, whole or not at all."""
+
+import json
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from harness.basics.errors import CalibrationRefused, WrongUse
+from harness.basics.whole_file import write_text_whole
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def write_model(model: BaseModel, path: Path) -> None:
+    """Write the file, whole or not at all."""
+    write_text_whole(path, json.dumps(model.model_dump(by_alias=True), indent=1, allow_nan=False) + "\n")
+
+
+def read_model(path: Path, kind: type[M], what: str, advice: str) -> M:
+    """Read the file, strictly.
+
+    Args:
+        path: of the file.
+        kind: of model.
+        what: such a file is called.
+        advice: what to give instead of one that is none.
+
+    Raises:
+        WrongUse: missing, or none that may be read.
+        CalibrationRefused: not what ``write_model`` writes.
+    """
+    try:
+        return kind.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "all of it"
+        said = first["msg"].removeprefix("Value error, ")
+        raise CalibrationRefused(f"{path} is no {what}: {where}: {said}; {advice}") from error
