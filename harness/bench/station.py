@@ -4,7 +4,6 @@ The table of kinds is literal and names its drivers by import strings, loaded on
 in the core imports what lies above it.
 """
 
-import importlib
 import logging
 import os
 import time
@@ -13,11 +12,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Protocol
 
 from harness.basics.errors import BenchFault, CalibrationRefused, SafetyStop, TouchstoneError, WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.device import Arm, ImpactHammer, Microphone, TactileCamera
+from harness.bench.experiments import loaded
 from harness.bench.gap import gap_path
 from harness.bench.mock_lab import LabAddresses, MockLab
 from harness.bench.scene import SceneFile
@@ -167,10 +167,10 @@ def _surround(stack: ExitStack, environment: Mapping[str, str]) -> None:
 def make_arm(station: Station) -> Arm:
     """The arm's driver, not yet open; its limits hold for the flange, the gel's housing and the hammer."""
     section = station.arm
-    made: Arm = _load(INSTRUMENTS[section.kind])(
+    made: Arm = loaded(INSTRUMENTS[section.kind])(
         address=section.address,
         model=section.model,
-        limits=_load(LIMITS[section.kind])(**section.safety.model_dump()),
+        limits=loaded(LIMITS[section.kind])(**section.safety.model_dump()),
         rate=section.rate,
         tool_points=station.tool_points.tolist(),
     )
@@ -180,7 +180,7 @@ def make_arm(station: Station) -> Arm:
 def make_gel(station: Station) -> TactileCamera:
     """The gel's driver, not yet open."""
     section = station.gel
-    made: TactileCamera = _load(INSTRUMENTS[section.kind])(
+    made: TactileCamera = loaded(INSTRUMENTS[section.kind])(
         url=section.url, sensor=section.sensor, serial=section.serial, nominal_rate=section.rate
     )
     return made
@@ -191,7 +191,7 @@ def make_camera(station: Station) -> TactileCamera | None:
     section = station.camera
     if section is None:
         return None
-    made: TactileCamera = _load(INSTRUMENTS[section.kind])(
+    made: TactileCamera = loaded(INSTRUMENTS[section.kind])(
         url=section.url, rows=section.rows, columns=section.columns, serial=section.serial
     )
     return made
@@ -211,7 +211,7 @@ def make_hammer(station: Station) -> ImpactHammer:
             "sensors.sound = false in the scene"
         )
     calibration = section.acquisition
-    made: ImpactHammer = _load(INSTRUMENTS[section.kind])(
+    made: ImpactHammer = loaded(INSTRUMENTS[section.kind])(
         calibration=calibration if station.own_microphone is None else calibration.without_microphone,
         port=section.port or "",
         serial=section.serial,
@@ -243,7 +243,7 @@ def make_microphone(station: Station) -> Microphone | None:
             f"scale {calibrated}, the station's [microphone] has {section.full_scale}: set its bits, or "
             "calibrate it"
         )
-    made: Microphone = _load(INSTRUMENTS[section.kind])(
+    made: Microphone = loaded(INSTRUMENTS[section.kind])(
         device=section.device,
         rate=round(section.rate or 0.0),
         channels=section.channels or 1,
@@ -302,8 +302,3 @@ class _Closing:
                 raise
             _LOG.warning("%s: %s", self.what, failure)
         return False
-
-
-def _load(target: str) -> Any:
-    module, _, name = target.partition(":")
-    return vars(importlib.import_module(module))[name]

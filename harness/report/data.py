@@ -132,7 +132,6 @@ class InstrumentRow:
     readings: int
     drops: int | None
     latency_median: float | None
-    latency_99: float | None
     remark: str = ""
 
 

@@ -47,7 +47,6 @@ def instruments(run: RunFiles, health: Mapping[str, Health] | None) -> tuple[Ins
             readings=sum(counts.get(one, 0) for one in names),
             drops=said.drops,
             latency_median=said.latency,
-            latency_99=None,
             remark=said.detail,
         )
         for name, said in health.items()

@@ -1,6 +1,5 @@
 """Ball presses as an arm recorded them, read back from the run's folder alone."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -178,7 +177,8 @@ def _on_gel(poses: Reading, recording: Recording) -> FloatArray:
 
 
 def _pictures(rest: FloatArray, taken: tuple[Taken, ...], name: str) -> Pictures:
-    bad = tuple(_refused(taken))
+    each = (why_not(one.name, one.touched, one.settled, one.unrest, one.seconds) for one in taken)
+    bad = tuple(reason for reason in each if reason is not None)
     kept = [one for one in taken if one.touched and one.settled]
     if not kept:
         raise CalibrationRefused(f"{name}: no press met the ball and came to rest; {bad[0].reason}")
@@ -196,20 +196,16 @@ def _pictures(rest: FloatArray, taken: tuple[Taken, ...], name: str) -> Pictures
     )
 
 
-def _refused(taken: tuple[Taken, ...]) -> Iterator[Refused]:
-    for one in taken:
-        reason = why_not(one)
-        if reason is not None:
-            yield reason
+def why_not(name: str, touched: bool, settled: bool, unrest: float, seconds: float) -> Refused | None:
+    """Why a press is no picture of a ball at rest; None where it is.
 
-
-def why_not(one: Taken) -> Refused | None:
-    """Why a press is no picture of a ball at rest; None where it is."""
-    return why_not_of(one.name, one.touched, one.settled, one.unrest, one.seconds)
-
-
-def why_not_of(name: str, touched: bool, settled: bool, unrest: float, seconds: float) -> Refused | None:
-    """The same of a press's own words: ``unrest`` in grey levels, ``seconds`` that it was waited for."""
+    Args:
+        name: of the press.
+        touched: whether the ball was met.
+        settled: whether the picture came to rest.
+        unrest: grey levels between the last two looks.
+        seconds: that it was waited for.
+    """
     if not touched:
         return Refused(
             name,

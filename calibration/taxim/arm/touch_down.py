@@ -91,22 +91,16 @@ def middles_at_depth(descents: list[FloatArray], ball: float) -> FloatArray:
     Returns:
         ``(presses, 2)`` pixels (column, row), NaN where nothing was seen.
     """
-    seen = [_contact(change, ball).strength for change in descents]
+    seen = [_contact(change, ball) for change in descents]
     deepest = [_middle(_weight(one[-1], WAYS[0])) if len(one) else np.full(2, np.nan) for one in seen]
     return np.array(deepest).reshape(-1, 2)
 
 
-@dataclass(frozen=True, eq=False)
-class _Contact:
+def _contact(change: FloatArray, ball: float) -> FloatArray:
     """The strength of change within reach of one contact: ``(pictures, rows, columns)`` grey levels."""
-
-    strength: FloatArray
-
-
-def _contact(change: FloatArray, ball: float) -> _Contact:
     strength = np.stack([_strength(picture) for picture in change]) if len(change) else np.zeros((0, 1, 1))
     if not len(strength):
-        return _Contact(strength)
+        return strength
     centre = _found(strength[min(2, len(strength) - 1)])
     y, x = (axis.astype(np.float64) for axis in np.mgrid[: strength.shape[1], : strength.shape[2]])
     for _ in range(_TURNS):
@@ -114,7 +108,7 @@ def _contact(change: FloatArray, ball: float) -> _Contact:
         strongest = strength[-1] * near
         weight = np.maximum(strongest - 0.15 * strongest.max(), 0.0)
         centre = _middle(weight)
-    return _Contact(strength * near)
+    return np.asarray(strength * near)
 
 
 def _strength(change: FloatArray) -> FloatArray:
@@ -129,8 +123,8 @@ def _found(strength: FloatArray) -> FloatArray:
     return np.array([float(column), float(row)])
 
 
-def _began(contact: _Contact, way: Descent) -> FloatArray:
-    strength = contact.strength[: way.pictures]
+def _began(contact: FloatArray, way: Descent) -> FloatArray:
+    strength = contact[: way.pictures]
     if len(strength) < way.degree + 2 or strength[-1].max() < 2.0 * _FAINT:
         return np.full(2, np.nan)
     middles = np.array([_middle(_weight(one, way)) for one in strength])

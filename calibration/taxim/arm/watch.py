@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from calibration.taxim.arm.channels import IMAGE, STATE, UNREST, UNTOUCHED, WAY
 from calibration.taxim.arm.plan import PressMotion
-from calibration.taxim.arm.record import changed, press_name, why_not_of
+from calibration.taxim.arm.record import changed, press_name, why_not
 from calibration.taxim.arm.settled import look
 from calibration.taxim.gates import MOST_DRIFT, refusals, sightings
 from calibration.taxim.pictures import Pictures, Refused
@@ -119,7 +119,7 @@ class PressWatch:
         name = press_name(step.index)
         touched, settled, seconds = (float(value) for value in readings[STATE].values[-1])
         unrest = float(readings[UNREST].values[-1]) if UNREST in readings else 0.0
-        refused = why_not_of(name, bool(touched), bool(settled), unrest, seconds)
+        refused = why_not(name, bool(touched), bool(settled), unrest, seconds)
         if refused is not None:
             return refused, ""
         pictures = _one(name, look(readings[UNTOUCHED]), readings[IMAGE])

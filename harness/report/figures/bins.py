@@ -20,8 +20,7 @@ def bins_figure(errors: FloatArray, reached: BoolArray, steepest: float) -> Figu
     extent = (-180.0, 180.0, 0.0, 90.0 * shown / (rows - 1))
     error, support = errors[:shown, : columns - 1], reached[:shown, : columns - 1]
     with styled():
-        figure = blank(12.6, 3.4)
-        figure.set_layout_engine("constrained")
+        figure = blank(12.6, 3.4, "constrained")
         left, right = np.asarray(figure.subplots(1, 2, sharey=True))
         drawn = left.imshow(
             error,

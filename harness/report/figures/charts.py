@@ -4,11 +4,10 @@ from types import MappingProxyType
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from harness.report.data import ErrorCurve
 from harness.report.figures.marks import key, number_marks
-from harness.report.figures.style import blank, styled
+from harness.report.figures.style import blank, plain_logarithm, styled
 
 _COLOURS = ("#c2410c", "#5b616b", "#0f766e", "#1b3fae", "#9d6b00", "#8a2d79")
 _OF = MappingProxyType(
@@ -29,8 +28,7 @@ def error_chart(curves: tuple[ErrorCurve, ...], x_label: str, logarithmic_x: boo
     """
     with styled():
         labels = [label for curve in curves for label in curve.labels]
-        figure = blank(8.2 if labels else 6.4, 3.9)
-        figure.set_layout_engine("constrained")
+        figure = blank(8.2 if labels else 6.4, 3.9, "constrained")
         axes = figure.add_subplot()
         floor = (
             max(1e-2, 0.5 * min(e for c in curves for e in c.error if e > 0.0) * 1e3) if _any(curves) else 0.1
@@ -48,16 +46,12 @@ def error_chart(curves: tuple[ErrorCurve, ...], x_label: str, logarithmic_x: boo
                 zorder=3 if strong else 2,
             )
         axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.yaxis.set_minor_formatter(NullFormatter())
+        plain_logarithm(axes.yaxis, (1.0, 2.0, 5.0))
         axes.set_ylabel("error in mm")
         axes.set_xlabel(x_label)
         if logarithmic_x:
             axes.set_xscale("log")
-            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            axes.xaxis.set_minor_formatter(NullFormatter())
+            plain_logarithm(axes.xaxis, (1.0, 2.0, 3.0, 5.0))
         else:
             axes.set_xticks(sorted({x for curve in curves for x in curve.x}))
         axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from harness.cost.curve import Point, front
 from harness.report.figures.marks import key, number_marks
-from harness.report.figures.style import SOFT, blank, styled
+from harness.report.figures.style import SOFT, blank, plain_logarithm, styled
 
 _COLOURS = ("#1b3fae", "#c2410c", "#0f766e", "#8a2d79", "#9d6b00")
 _DASHES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
@@ -30,8 +29,7 @@ def cost_chart(points: Sequence[Point], families: Sequence[str], title: str, sta
     """
     best = front(points)
     with styled():
-        figure = blank(10.4, 4.9)
-        figure.set_layout_engine("constrained")
+        figure = blank(10.4, 4.9, "constrained")
         axes = figure.add_subplot()
         for number, name in enumerate(dict.fromkeys(family_of(p, families) for p in points)):
             mine = [point for point in points if family_of(point, families) == name]
@@ -67,8 +65,7 @@ def contacts_chart(curves: Sequence[tuple[str, Sequence[tuple[int, Point]]]]) ->
         curves: by name of the setting: the number of contacts and the point measured with them.
     """
     with styled():
-        figure = blank(8.2, 3.6)
-        figure.set_layout_engine("constrained")
+        figure = blank(8.2, 3.6, "constrained")
         left, right = figure.subplots(1, 2)
         for number, (name, points) in enumerate(curves):
             around, own = divmod(number, len(_COLOURS))
@@ -93,9 +90,7 @@ def contacts_chart(curves: Sequence[tuple[str, Sequence[tuple[int, Point]]]]) ->
                 )
         for axes, said in ((left, "error in mm"), (right, "seconds of CPU time")):
             axes.set_yscale("log")
-            axes.yaxis.set_major_locator(LogLocator(subs=_TICKS))
-            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            axes.yaxis.set_minor_formatter(NullFormatter())
+            plain_logarithm(axes.yaxis, _TICKS)
             axes.set_xticks(sorted({count for _, points in curves for count, _ in points}))
             axes.set_xlabel("contacts")
             axes.set_ylabel(said)
@@ -136,8 +131,6 @@ def _logarithmic(axes: Axes) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=_TICKS))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter(NullFormatter())
+        plain_logarithm(axis, _TICKS)
     axes.grid(visible=True, which="major", color="#e6e8eb", lw=0.8)
     axes.set_axisbelow(True)

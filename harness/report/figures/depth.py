@@ -18,8 +18,7 @@ def depth_figure(shown: DepthReading) -> Figure:
     half = 0.5e3 * shown.pitch * np.array([columns, rows])
     extent = (-half[0], half[0], half[1], -half[1])
     with styled():
-        figure = blank(3 * _WIDTH + 1.2, _WIDTH * rows / columns + _TITLES)
-        figure.set_layout_engine("constrained")
+        figure = blank(3 * _WIDTH + 1.2, _WIDTH * rows / columns + _TITLES, "constrained")
         live, height, sigma = np.asarray(figure.subplots(1, 3))
         live.imshow(shown.image, extent=extent)
         live.set_title("live", fontsize=10)

@@ -27,8 +27,7 @@ def found_figure(picture: ByteArray, places: FloatArray, radii: FloatArray, latt
     """
     rows, columns = picture.shape[:2]
     with styled():
-        figure = blank(12.6, 12.6 / 2.0 * rows / columns + 0.3)
-        figure.set_layout_engine("constrained")
+        figure = blank(12.6, 12.6 / 2.0 * rows / columns + 0.3, "constrained")
         whole, part = figure.subplots(1, 2)
         for axes, thick in ((whole, 0.7), (part, 1.4)):
             _dots(axes, picture, places, radii, lattice, thick)
@@ -57,8 +56,7 @@ def off_figure(rows: int, columns: int, places: FloatArray, lattice: DotLattice)
         ("off the smoothly bent grid", lattice.local),
     )
     with styled():
-        figure = blank(12.0, 6.0 * rows / columns + 0.6)
-        figure.set_layout_engine("constrained")
+        figure = blank(12.0, 6.0 * rows / columns + 0.6, "constrained")
         for axes, (words, off) in zip(np.asarray(figure.subplots(1, 2)), panels, strict=True):
             x, y = places[lattice.on].T
             right, down = off[lattice.on].T

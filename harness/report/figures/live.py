@@ -32,8 +32,7 @@ def live_figure(found: LiveComparison, words: tuple[str, str, str]) -> Figure:
     live_part, simulated_part = found.live[near], found.simulated[near]
     rows, columns = live_part.shape[:2]
     with styled():
-        figure = blank(3 * _WIDTH, _WIDTH * rows / columns + _WORDS)
-        figure.set_layout_engine("constrained")
+        figure = blank(3 * _WIDTH, _WIDTH * rows / columns + _WORDS, "constrained")
         live, simulated, left = np.asarray(figure.subplots(1, 3)).tolist()
         titled_picture(live, live_part, "live", words[0])
         _outline(live, found.silhouette[near], ANSWER)

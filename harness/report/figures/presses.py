@@ -33,8 +33,7 @@ def maps_figure(
     """
     rows, columns = coverage.shape
     with styled():
-        figure = blank(12.6, 12.6 / 3.0 * rows / columns + 0.2)
-        figure.set_layout_engine("constrained")
+        figure = blank(12.6, 12.6 / 3.0 * rows / columns + 0.2, "constrained")
         where, often, left = np.asarray(figure.subplots(1, 3))
         where.imshow(background)
         where.set_title("presses on the untouched gel", fontsize=10)
@@ -62,8 +61,7 @@ def moves_figure(on_gel: FloatArray, residuals: FloatArray, used: BoolArray) -> 
     x, y = 1e3 * on_gel.T
     right, down = 1e3 * LONGER * residuals.T
     with styled():
-        figure = blank(7.6, 5.6)
-        figure.set_layout_engine("constrained")
+        figure = blank(7.6, 5.6, "constrained")
         axes = figure.add_subplot()
         for which, colour, label in ((used, ANSWER, "used"), (~used, SOFT, "not used")):
             if which.any():
@@ -106,8 +104,7 @@ def scores_figure(scores: Mapping[str, FloatArray]) -> Figure:
     )
     order = np.argsort(scores["table"], kind="stable")
     with styled():
-        figure = blank(9.0, 3.9)
-        figure.set_layout_engine("constrained")
+        figure = blank(9.0, 3.9, "constrained")
         axes = figure.add_subplot()
         for which, label, colour, marker in curves:
             axes.plot(

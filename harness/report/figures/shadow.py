@@ -27,8 +27,7 @@ def shadow_figure(
     samples = left_over.shape[2]
     far = 1e3 * step * samples
     with styled():
-        figure = blank(12.6, 3.4)
-        figure.set_layout_engine("constrained")
+        figure = blank(12.6, 3.4, "constrained")
         panels = np.asarray(figure.subplots(1, 3, sharey=True))
         for axes, name, left, cells, dark in zip(
             panels, _COLOURS, left_over, shaded, dark_sides, strict=True

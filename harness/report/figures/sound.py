@@ -47,8 +47,7 @@ def spectrogram_pair(
             )
     heard, rung = (np.maximum(levels - levels.max(), FLOOR) for levels in (recorded, simulated))
     with styled():
-        figure = blank(10.2, 3.5)
-        figure.set_layout_engine("constrained")
+        figure = blank(10.2, 3.5, "constrained")
         row = list(np.asarray(figure.subplots(1, 3, sharex=True, sharey=True)))
         _levels(row[0], times, frequencies, heard, "recorded", "magma", (FLOOR, 0.0))
         last = _levels(row[1], times, frequencies, rung, "simulated", "magma", (FLOOR, 0.0))

@@ -1,13 +1,15 @@
 """Type and colours that all drawings of a report share."""
 
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from harness.basics.arrays import AnyArray
 
@@ -35,9 +37,9 @@ def styled() -> AbstractContextManager[None]:
     return mpl.rc_context(_STYLE)
 
 
-def blank(width: float, height: float) -> Figure:
+def blank(width: float, height: float, layout: Literal["constrained"] | None = None) -> Figure:
     """An empty white figure of ``width`` times ``height`` inches that needs no display."""
-    figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
+    figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white", layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -56,3 +58,10 @@ def titled_picture(axes: Axes, picture: AnyArray, title: str, words: str) -> Non
     axes.set_xlabel(words, fontsize=8)
     axes.set_xticks([])
     axes.set_yticks([])
+
+
+def plain_logarithm(axis: Axis, ticks: tuple[float, ...]) -> None:
+    """Ticks of a logarithmic axis at these multiples of the powers of ten, written as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=ticks))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -45,8 +45,7 @@ def touch_figure(shown: TouchPictures) -> Figure:
     rows, columns = shown.heights.shape
     down = 1 if shown.live is None else 2
     with styled():
-        figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES))
-        figure.set_layout_engine("constrained")
+        figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES), "constrained")
         grid = np.asarray(figure.subplots(down, 3, squeeze=False))
         _heights(figure, grid[0, 0], shown)
         titled_picture(grid[0, 1], shown.image, "simulated", shown.words[1])
@@ -91,8 +90,7 @@ def levels_figure(shown: LevelPictures) -> Figure:
     rows, columns = shown.heights.shape
     down = 1 if shown.reference is None else 2
     with styled():
-        figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES))
-        figure.set_layout_engine("constrained")
+        figure = blank(3 * _WIDTH + 0.9, down * (_WIDTH * rows / columns + _TITLES), "constrained")
         grid = np.asarray(figure.subplots(down, 3, squeeze=False))
         low, high = min(0.0, float(shown.heights.min())), max(1e-6, float(shown.heights.max()))
         _map(figure, grid[0, 0], 1e3 * shown.heights, shown.pitch, (1e3 * low, 1e3 * high), "mm")

@@ -51,7 +51,7 @@ class Instrument:
 def instruments(monkeypatch: pytest.MonkeyPatch) -> type[Instrument]:
     Instrument.log, Instrument.fails = [], {}
     monkeypatch.setattr(
-        station_module, "_load", lambda target: Instrument if target in INSTRUMENTS.values() else dict
+        station_module, "loaded", lambda target: Instrument if target in INSTRUMENTS.values() else dict
     )
     return Instrument
 

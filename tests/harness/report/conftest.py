@@ -203,13 +203,11 @@ def sample() -> ReportData:
             ErrorCurve("particle filter", (0.03, 0.09, 0.29, 0.84), (0.019, 0.0045, 0.0025, 0.0017)),
         ),
         instruments=(
-            InstrumentRow("arm", "127.0.0.1:30004", 124.98, 125.0, 4812, 0, 0.0021, 0.0068),
+            InstrumentRow("arm", "127.0.0.1:30004", 124.98, 125.0, 4812, 0, 0.0021),
             InstrumentRow(
-                "gelsight", "http://127.0.0.1:8090/stream", 29.7, 30.0, 1120, 3, 0.019, 0.041, "reopened once"
+                "gelsight", "http://127.0.0.1:8090/stream", 29.7, 30.0, 1120, 3, 0.019, "reopened once"
             ),
-            InstrumentRow(
-                "camera", "http://127.0.0.1:8091/stream", None, 10.0, 0, None, None, None, "not used"
-            ),
+            InstrumentRow("camera", "http://127.0.0.1:8091/stream", None, 10.0, 0, None, None, "not used"),
         ),
         calibrations=(
             Artefact("taxim-r15", "mock-0001", "2026-02-20", 10.0, "1.9 grey levels rms", "3f" * 32),
