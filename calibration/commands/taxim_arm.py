@@ -25,19 +25,14 @@ class PressRequest:
     seed: int | None
     gap: str | None
 
-    def require_none(self, why: str) -> None:
+    def require_none(self) -> None:
         """Refuse options that only a new run of the arm can follow."""
-        given = {
-            "--scene": self.scene,
-            "--run": self.run,
-            "--presses": self.presses,
-            "--depth": self.depth,
-            "--seed": self.seed,
-            "--gap": self.gap,
-        }
-        named = [name for name, value in given.items() if value is not None]
+        names = ("scene", "run", "presses", "depth", "seed", "gap")
+        named = [f"--{name}" for name in names if vars(self)[name] is not None]
         if named:
-            raise WrongUse(f"{', '.join(named)}: {why}")
+            raise WrongUse(
+                f"{', '.join(named)}: they plan a new run of the arm; give --station, or leave them out"
+            )
 
 
 def chosen(folder: Path | None, wanted: PressRequest) -> None:
@@ -50,7 +45,7 @@ def chosen(folder: Path | None, wanted: PressRequest) -> None:
             "or --station NAME to press a ball with that bench's arm, or --resume RUN to go on with one"
         )
     if wanted.station is None:
-        wanted.require_none("they plan a new run of the arm; give --station, or leave them out")
+        wanted.require_none()
 
 
 def pressed(wanted: PressRequest, as_json: bool) -> Path | None:

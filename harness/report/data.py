@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
-from harness.report.observed import Observed
 from harness.report.sound_data import Sound
 from harness.report.values import Missing, Posterior
 
@@ -166,6 +165,25 @@ class EffectRun:
     calls: int | None = None
     seconds: float | None = None
     stored: bool = False
+
+
+@dataclass(frozen=True)
+class Observed:
+    """A simulated quantity that the scene asked for.
+
+    Attributes:
+        name: of the effect that provides it, and of a part of it.
+        shape: of the array; what it is where it is none.
+        least: of its numbers; None where it has none.
+        mean: likewise.
+        most: likewise.
+    """
+
+    name: str
+    shape: str
+    least: float | None = None
+    mean: float | None = None
+    most: float | None = None
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Experiment, Scored
 from harness.report import wording
 from harness.report.instruments import artefacts, instruments
-from harness.report.observed import observed_rows
-from harness.report.simulated import effect_rows, flat, world_rows
+from harness.report.simulated import effect_rows, flat, observed_rows, world_rows
 from harness.report.template import write_page
 from harness.report.values import Missing
 

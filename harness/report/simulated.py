@@ -1,10 +1,11 @@
 """What was simulated for a report, and what the mocked world did differently."""
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
-from harness.report.data import EffectRun
+from harness.report.data import EffectRun, Observed
 from harness.report.values import Missing
 
 NO_TRUTH = Missing("the truth is not known: this is not a mocked run, or its truth was taken away")
@@ -25,6 +26,22 @@ def effect_rows(comparison: Comparison) -> tuple[EffectRun, ...]:
         for step in plan.ran
     ]
     return (*ran, *(EffectRun(step.effect.provides, False, step.reason) for step in plan.skipped))
+
+
+def observed_rows(comparison: Comparison) -> tuple[Observed, ...]:
+    """A row for every quantity that the scene observes, and for every part of one."""
+    return tuple(row for name, said in comparison.observed().items() for row in _observed(name, said))
+
+
+def _observed(name: str, said: Mapping[str, Any]) -> Iterator[Observed]:
+    if "parts" in said:
+        for part, inner in said["parts"].items():
+            yield from _observed(f"{name}: {part}", inner)
+    elif "shape" in said:
+        shape = " x ".join(str(length) for length in said["shape"]) or "one number"
+        yield Observed(name, shape, said.get("least"), said.get("mean"), said.get("most"))
+    else:
+        yield Observed(name, said["kind"])
 
 
 def world_rows(scored: Scored, ours: Mapping[str, str]) -> dict[str, str] | Missing:

@@ -10,10 +10,10 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import OutOfDomain
-from harness.basics.faces.face_clusters import FaceClusters, cluster_faces
+from harness.basics.faces.face_clusters import cluster_faces
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import TactileSensor
-from harness.sim.gel.raster_kernels import rasterise
+from harness.sim.gel.raster_kernels import Clusters, rasterise
 
 STAND_OFF = 50e-3
 """Metres behind the gel plane where its rays start: farther back is behind the sensor."""
@@ -29,15 +29,16 @@ class RasterMesh:
 
     Attributes:
         mesh: in metres, in the object's frame.
-        clusters: its faces by neighbourhood.
+        clusters: its faces by neighbourhood, as the z-buffer takes them.
     """
 
     mesh: Mesh
-    clusters: FaceClusters
+    clusters: Clusters
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
-        self.clusters = cluster_faces(mesh)
+        of = cluster_faces(mesh)
+        self.clusters = of.corners, of.faces, of.boxes, of.groups
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,8 @@ def height_maps(raster: RasterMesh, gel_from_object: FloatArray, sensor: Tactile
     gap = np.empty((len(poses), sensor.rows, sensor.columns))
     no_faces = np.empty((0, 0, 0), np.int64)
     corner = -0.5 * np.array(sensor.window)
-    _run(raster, poses, corner, sensor.pitch, (-STAND_OFF, SEARCH_DEPTH), gap, no_faces)
+    span = np.array([-STAND_OFF, SEARCH_DEPTH])
+    rasterise(raster.clusters, poses, corner, sensor.pitch, span, gap, no_faces)
     return read_only(gap)
 
 
@@ -175,29 +177,8 @@ def _picture(
     poses = _rigid(np.asarray(view_from_object)[None])
     depth = np.empty((1, *shape))
     corner = -0.5 * pitch * np.array(shape[::-1], np.float64)
-    _run(raster, poses, corner, pitch, span, depth, face)
+    rasterise(raster.clusters, poses, corner, pitch, np.array(span), depth, face)
     return read_only(depth[0])
-
-
-def _run(
-    raster: RasterMesh,
-    poses: FloatArray,
-    corner: FloatArray,
-    pitch: float,
-    span: tuple[float, float],
-    depth: FloatArray,
-    face: IntArray,
-) -> None:
-    of = raster.clusters
-    rasterise(
-        (of.corners, of.faces, of.boxes, of.groups),
-        poses,
-        corner,
-        pitch,
-        np.array(span),
-        depth,
-        face,
-    )
 
 
 def _rigid(poses: FloatArray) -> FloatArray:
