@@ -8,7 +8,7 @@ DEV := $(VENV)/.installed-dev
 # A microphone on a sound card, and a sound card to test it with; all else works without.
 SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 
-.PHONY: help install demo test slow hunt lint types contracts bench tables sound clean
+.PHONY: help install demo test slow hunt lint types contracts reference bench tables sound clean
 
 help: ## what can be asked for
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -58,6 +58,9 @@ types: $(DEV)
 
 contracts: $(DEV)
 	@$(BIN)/lint-imports
+
+reference: $(DEV) ## docs/reference, from the models and the tables
+	@$(BIN)/python -m tests.docs.reference
 
 bench: $(DEV) ## timings with their spread, beside the peers
 	@$(BIN)/python -m pytest -m benchmark -s

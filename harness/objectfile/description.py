@@ -28,7 +28,20 @@ _MOST_BYTES = 16 * 2**20
 
 
 class Description(Entry):
-    """All of ``object.json``."""
+    """All of ``object.json``.
+
+    Attributes:
+        schema_number: ``schema`` in the file.
+        name: of the object.
+        units: of every length in the folder.
+        frame: of every point in the folder.
+        material: of the object.
+        mesh: its surface.
+        provenance: of the mesh.
+        audio: the sound; null until it is built.
+        touch: the touch; null until it is built.
+        vision: the look; null until it is built.
+    """
 
     schema_number: Literal[1] = Field(alias="schema")
     name: Annotated[str, Field(min_length=1, max_length=200)]

@@ -28,7 +28,13 @@ class Entry(StrictModel):
 
 
 class FileEntry(Entry):
-    """A file of the folder, and what its bytes must be."""
+    """A file of the folder, and what its bytes must be.
+
+    Attributes:
+        file: its name, beside ``object.json``.
+        sha256: of its bytes, hexadecimal.
+        bytes: its size.
+    """
 
     file: Annotated[str, AfterValidator(_plain_name)]
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -46,7 +52,18 @@ class Source(Entry):
 
 
 class Provenance(Entry):
-    """How a part came to be, so that it can be made again; ``seconds`` by stage, where they were taken."""
+    """How a part came to be, so that it can be made again.
+
+    Attributes:
+        code: versions and hashes of the programs.
+        seeds: of everything random, by name.
+        settings: that it was built with, by name.
+        sources: that it was made from.
+        licence: of the part.
+        made: date, if whoever built it wants one.
+        seconds: on the clock, by stage.
+        cpu_seconds: of the processor, by stage.
+    """
 
     code: dict[str, str] = Field(default_factory=dict)
     seeds: dict[str, int] = Field(default_factory=dict)
@@ -93,7 +110,15 @@ class MaterialEntry(Entry):
 
 
 class MeshEntry(FileEntry):
-    """The object's surface: what every point of a query is near to."""
+    """The object's surface: what every point of a query is near to.
+
+    Attributes:
+        metres_per_unit: of the numbers in the file.
+        vertices: their number.
+        faces: their number.
+        low_m: m, least corner of the bounding box.
+        high_m: m, greatest corner of the bounding box.
+    """
 
     metres_per_unit: Annotated[float, Field(gt=0.0)]
     vertices: Annotated[int, Field(ge=3)]
@@ -172,8 +197,11 @@ class Sampled(Entry):
 class SelfTest(Entry):
     """What a graph gave when it was made.
 
-    ``rows`` is the number of queries, ``n``. A number of the outputs may differ by ``tolerance``
-    times the greatest one of that output that is kept here.
+    Attributes:
+        rows: the number of queries, ``n``.
+        inputs: the queries.
+        outputs: some of the answers.
+        tolerance: that a number may differ by, in the greatest one of that output that is kept here.
     """
 
     rows: Annotated[int, Field(ge=1)]
@@ -183,7 +211,14 @@ class SelfTest(Entry):
 
 
 class NetworkEntry(FileEntry):
-    """A graph in ONNX: what goes in, what comes out, and how to see that it still does."""
+    """A graph in ONNX: what goes in, what comes out, and how to see that it still does.
+
+    Attributes:
+        inputs: of the graph.
+        outputs: of the graph.
+        self_test: queries with their answers.
+        measured: errors, by names with their unit.
+    """
 
     inputs: Annotated[tuple[Input, ...], Field(min_length=1)]
     outputs: Annotated[tuple[Tensor, ...], Field(min_length=1)]
@@ -208,7 +243,22 @@ class TableEntry(FileEntry):
 
 
 class AudioEntry(Entry):
-    """The object's sound: its modes, and one or two ways to their shapes near the surface."""
+    """The object's sound: its modes, and one or two ways to their shapes near the surface.
+
+    Attributes:
+        frequencies_hz: Hz, undamped, ascending.
+        dampings_per_s: 1/s: a mode decays as ``exp(-d t)``.
+        complete_up_to_hz: Hz below which no mode is missing.
+        mass_kg: kg.
+        rigid_modes: left out.
+        nodes: of the finite-element mesh.
+        elements: of the finite-element mesh.
+        residual: the greatest relative residual of a mode.
+        near_surface_m: m, how far from the surface a query may be.
+        network: of the shapes.
+        table: of the shapes.
+        provenance: of the sound.
+    """
 
     frequencies_hz: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...], Field(min_length=1)]
     dampings_per_s: tuple[Annotated[float, Field(ge=0.0)], ...]

@@ -13,7 +13,18 @@ Size = Annotated[int, Field(ge=1)]
 
 
 class GelEntry(Entry):
-    """The flat gel that the maps are of, and its skirt in its own pixels."""
+    """The flat gel that the maps are of, and its skirt in its own pixels.
+
+    Attributes:
+        name: of the sensor's make.
+        rows: pixels.
+        columns: pixels.
+        pitch_m: m, of a pixel.
+        thickness_m: m, of the gel.
+        skirt_kernels: pixels, widths of the pyramid of blurs.
+        skirt_final: pixels, width of the last blur.
+        skirt_core: share of the greatest depth from which the object shapes the gel.
+    """
 
     name: str
     rows: Size
@@ -50,7 +61,13 @@ class GelEntry(Entry):
 
 
 class CodesEntry(Entry):
-    """Codes of the surface: their graph, the places they belong to, how far a press may be from one."""
+    """Codes of the surface.
+
+    Attributes:
+        network: graph from a node and the gel's pose to a map.
+        nodes: places and outward normals.
+        most_off_m: m, how far a press may be from a node.
+    """
 
     network: NetworkEntry
     nodes: FileEntry
@@ -58,7 +75,17 @@ class CodesEntry(Entry):
 
 
 class TouchEntry(Entry):
-    """The object's touch: what may be asked, and one or two ways to the answer."""
+    """The object's touch: what may be queried, and one or two networks that answer.
+
+    Attributes:
+        gel: that the maps are of.
+        depth_m: m, least and greatest depth of a press.
+        most_tilt_rad: rad, the greatest tilt.
+        near_surface_m: m, how far from the surface a contact may be.
+        codes: network of the level ``codes``.
+        perceptron: network of the level ``perceptron``.
+        provenance: of the touch.
+    """
 
     gel: GelEntry
     depth_m: tuple[Positive, Positive]

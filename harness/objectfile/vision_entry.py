@@ -12,7 +12,14 @@ Cells = Annotated[int, Field(ge=1, le=MOST_CELLS)]
 
 
 class VisionGridEntry(Entry):
-    """Where the networks answer: cubes of a lattice in the object's frame; which ones, the graph says."""
+    """Where the networks answer: cubes of a lattice in the object's frame; which ones, the graph says.
+
+    Attributes:
+        low_m: m, least corner of the lattice.
+        cell_m: m, side of a cell.
+        cells: along x, y and z.
+        networks: cells that have one.
+    """
 
     low_m: Corner
     cell_m: Positive
@@ -27,7 +34,7 @@ class VisionGridEntry(Entry):
 
 
 class VisionSizeEntry(Entry):
-    """How large each network is, as ``vision_network.NetworkSize``, and the samples of a block."""
+    """How large each network is, as ``NetworkSize``, and the samples of a block."""
 
     width: Annotated[int, Field(ge=8, le=256, multiple_of=8)]
     octaves: Annotated[int, Field(ge=0, le=10)]
@@ -36,7 +43,12 @@ class VisionSizeEntry(Entry):
 
 
 class VisionShellEntry(Entry):
-    """How finely the surface is marched, and how far behind it the networks were made to answer."""
+    """How finely the surface is marched, and how far behind it the networks were made to answer.
+
+    Attributes:
+        voxels_per_cell: along a side.
+        deep_voxels: behind the surface.
+    """
 
     voxels_per_cell: Annotated[int, Field(ge=4, le=64, multiple_of=4)]
     deep_voxels: Annotated[float, Field(ge=0.0, le=64.0)]
@@ -45,9 +57,22 @@ class VisionShellEntry(Entry):
 class VisionEntry(Entry):
     """The object's look: the networks, where they answer, and how their numbers are meant.
 
-    ``level`` is what a network is told: ``osf`` place, view and light, as the paper's; ``osf-v`` also the
-    light's visibility and the surface's normal. ``surface`` is what pictures are drawn along where that is
-    not the object's mesh.
+    Attributes:
+        level: inputs of a network: ``osf`` place, view and light, as the paper's; ``osf-v`` also the
+            light's visibility and the surface's normal.
+        metres_per_unit: of the graph's points.
+        camera: its frame.
+        pixel: where its centre is.
+        views: the direction of a ray.
+        light: the direction of a light.
+        colour: of the answers.
+        density_per_m: 1/m that a density of 1 stands for.
+        grid: of cells.
+        size: of each network.
+        shell: of voxels along the surface.
+        network: the graph; errors on held-out pictures under ``measured``.
+        surface: that pictures are drawn along; null where it is the mesh.
+        provenance: of the look.
     """
 
     level: Kind
