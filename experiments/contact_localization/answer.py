@@ -7,13 +7,12 @@ from functools import cached_property
 import numpy as np
 from numba.core.event import install_recorder
 
-from experiments.contact_localization.accuracy.dials import levels_of
 from experiments.contact_localization.accuracy.solving import Readings, located, prepare, timed_height_map
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.posterior.dials import SENSES, Senses
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.levels import Levels, Senses
 from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, RecordingDamaged, WrongUse
@@ -30,9 +29,6 @@ from harness.recording.synchronise import synchronised
 
 AROUND_IMAGES = 0.1
 """s before the first frame from which the arm, at rest, is averaged too."""
-
-
-_SENSES: tuple[Senses, ...] = ("touch", "audio", "both")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +60,7 @@ class Answer:
     def by_sense(self) -> dict[Senses, Estimate | FitRefused]:
         """The answer by every sense that was recorded: touch, audio, both."""
         found: dict[Senses, Estimate | FitRefused] = {**self.others, self.sense: self.last}
-        return {sense: found[sense] for sense in _SENSES if sense in found}
+        return {sense: found[sense] for sense in SENSES.levels if sense in found}
 
 
 class ContactAnswering:
@@ -77,7 +73,7 @@ class ContactAnswering:
 
     def __init__(self, run: RunFiles, accuracy: Accuracy) -> None:
         self.model, self.prior = model_of_run(run, accuracy), prior_of(run)
-        self._levels, self._run = levels_of(accuracy), run
+        self._accuracy, self._run = accuracy, run
         self._seen: list[Observation] = []
         self._heights: list[FloatArray] = []
         self._taken = (0.0, 0.0)
@@ -123,10 +119,11 @@ class ContactAnswering:
             FitRefused: no place on this object explains the readings.
         """
         readings = self.readings
-        senses = _SENSES if readings.heard else ("touch",)
-        sense = self._levels.senses if self._levels.senses in senses else "touch"
-        if self._levels.senses == "audio" and sense == "touch":
+        wanted = self._accuracy.of(SENSES)
+        if wanted == "audio" and not readings.heard:
             raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
+        senses: tuple[Senses, ...] = SENSES.levels if readings.heard else ("touch",)
+        sense = wanted if readings.heard else "touch"
         with install_recorder("numba:compiler_lock") as loads:
             last = self._by(sense, readings)
             others = {other: self._tried(other, readings) for other in senses if other != sense}
@@ -143,10 +140,10 @@ class ContactAnswering:
         count = len(readings.observations)
         if count == 1:
             return (last,)
-        return (*self._located(replace(self._levels, senses=sense), readings.first(count - 1), 1), last)
+        return (*self._located(sense, readings.first(count - 1), 1), last)
 
     def _by(self, sense: Senses, readings: Readings) -> Estimate:
-        return self._located(replace(self._levels, senses=sense), readings, None)[-1]
+        return self._located(sense, readings, None)[-1]
 
     def _tried(self, sense: Senses, readings: Readings) -> Estimate | FitRefused:
         try:
@@ -154,8 +151,8 @@ class ContactAnswering:
         except FitRefused as refusal:
             return refusal
 
-    def _located(self, levels: Levels, readings: Readings, first: int | None) -> tuple[Estimate, ...]:
-        return located(readings, levels, first)
+    def _located(self, sense: Senses, readings: Readings, first: int | None) -> tuple[Estimate, ...]:
+        return located(readings, self._accuracy.with_({SENSES.name: sense}), first)
 
 
 def _timed_anew(again: Estimate | FitRefused, found: Estimate | FitRefused) -> Estimate | FitRefused:
@@ -163,14 +160,6 @@ def _timed_anew(again: Estimate | FitRefused, found: Estimate | FitRefused) -> E
     if isinstance(found, FitRefused) or isinstance(again, FitRefused):
         return found
     return replace(found, seconds=again.seconds)
-
-
-def answer(run: RunFiles, accuracy: Accuracy) -> Answer:
-    """What a whole recording says; as ``ContactAnswering.answer``."""
-    answering = ContactAnswering(run, accuracy)
-    for record in run.recording.steps():
-        answering.read(record)
-    return answering.answer()
 
 
 def prior_of(run: RunFiles) -> Prior:

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from experiments.contact_localization.accuracy.benchmark_runs import performed, preparations
+from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, performed, preparations
 from experiments.contact_localization.accuracy.budget_text import BUDGETS
 from experiments.contact_localization.accuracy.dials import KNOBS, setting_name, settings, settings_by_count
 from experiments.contact_localization.accuracy.paper import PAPER_CM
-from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Setting
-from experiments.contact_localization.accuracy.table_cell import HEARD, METHODS, Cell, cells, run_cell
+from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
+from experiments.contact_localization.accuracy.table_cell import HEARD, METHODS, run_cell
 from experiments.contact_localization.answer import ContactAnswering
 from experiments.contact_localization.lines import answer_lines
 from experiments.contact_localization.plan import plan
@@ -17,7 +17,7 @@ from experiments.contact_localization.report.report import write
 from experiments.contact_localization.report.result import result_of
 from experiments.contact_localization.section import Localization
 from harness.bench.scene import SceneFile
-from harness.experiment.experiment import Experiment, Helpers, MeasuredCondition, Measurement
+from harness.experiment.experiment import Experiment, Helpers, MeasuredCondition, Measurement, Setting
 from harness.recording.run_folder import RunFiles
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between

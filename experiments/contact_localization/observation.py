@@ -1,7 +1,5 @@
 """From what was recorded at each contact to what the estimator compares."""
 
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +8,6 @@ from experiments.contact_localization.model import Model
 from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise, touch_map
 from harness.basics.arrays import ByteArray, FloatArray, read_only
-from harness.basics.cores import own_cores
 from harness.basics.errors import DataRefused
 from harness.bench.acquisition import Strike
 from harness.sim.optics.inverse import invert
@@ -45,26 +42,6 @@ class Observation:
             )
         object.__setattr__(self, "base_from_gel", read_only(pose.copy()))
         object.__setattr__(self, "images", images)
-
-
-def read_contacts(
-    observations: Sequence[Observation], model: Model, block: int, noise: TouchNoise
-) -> tuple[Contact, ...]:
-    """Recover each contact's height map, on all cores, and average it into the map that is compared.
-
-    Args:
-        observations: the contacts.
-        model: gives the sensor and its calibration.
-        block: tactile pixels a side of one compared pixel.
-        noise: gives the gel's blurs.
-    """
-
-    def read(observation: Observation) -> Contact:
-        heights = height_map(observation, model)
-        return contact_of(observation.base_from_gel, heights, model.sensor.pitch, block, noise)
-
-    with ThreadPoolExecutor(own_cores(), "images") as pool:
-        return tuple(pool.map(read, observations))
 
 
 def contact_of(

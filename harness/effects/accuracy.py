@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
+from typing import Generic, Literal, TypeVar, cast
 
 from harness.basics.errors import WrongUse
 from harness.basics.toml_file import nearest
@@ -11,9 +11,11 @@ from harness.basics.toml_file import nearest
 Level = str | int | float
 """One position of a dial: the name of a method, or a number."""
 
+LevelT = TypeVar("LevelT", bound=Level, covariant=True)
+
 
 @dataclass(frozen=True)
-class Knob:
+class Knob(Generic[LevelT]):
     """One dial.
 
     Attributes:
@@ -27,10 +29,10 @@ class Knob:
     """
 
     name: str
-    levels: tuple[Level, ...]
+    levels: tuple[LevelT, ...]
     unit: str
     kind: Literal["number", "method"]
-    default: Level
+    default: LevelT
     meaning: str = ""
 
     def __post_init__(self) -> None:
@@ -40,7 +42,7 @@ class Knob:
             raise ValueError(f"{self.name} is a {self.kind} and has the levels {self.levels}")
         self.checked(self.default)
 
-    def checked(self, level: Level) -> Level:
+    def checked(self, level: Level) -> LevelT:
         """``level``, if the dial has it.
 
         Raises:
@@ -52,7 +54,7 @@ class Knob:
         hint = nearest(level, map(str, self.levels)) if isinstance(level, str) else f"it has {self._listed()}"
         raise WrongUse(f"{self.name} has no level {level!r}; {hint}")
 
-    def read(self, text: str) -> Level:
+    def read(self, text: str) -> LevelT:
         """The level that an operator wrote; ``WrongUse`` where there is none."""
         try:
             return self.checked(text.strip() if self.kind == "method" else float(text))
@@ -67,7 +69,7 @@ class Knob:
 class Accuracy(Mapping[str, Level]):
     """A level for each of some knobs; cannot be changed."""
 
-    knobs: tuple[Knob, ...]
+    knobs: tuple[Knob[Level], ...]
     levels: Mapping[str, Level]
 
     def __post_init__(self) -> None:
@@ -80,21 +82,15 @@ class Accuracy(Mapping[str, Level]):
         object.__setattr__(self, "levels", MappingProxyType(whole))
 
     @classmethod
-    def default(cls, knobs: Iterable[Knob]) -> "Accuracy":
+    def default(cls, knobs: Iterable[Knob[Level]]) -> "Accuracy":
         """Every knob where nobody chooses."""
         return cls(tuple(knobs), {})
 
     @classmethod
-    def finest(cls, knobs: Iterable[Knob]) -> "Accuracy":
+    def finest(cls, knobs: Iterable[Knob[Level]]) -> "Accuracy":
         """Every knob at its most exact level."""
         knobs = tuple(knobs)
         return cls(knobs, {knob.name: knob.levels[-1] for knob in knobs})
-
-    @classmethod
-    def coarsest(cls, knobs: Iterable[Knob]) -> "Accuracy":
-        """Every knob at its cheapest level."""
-        knobs = tuple(knobs)
-        return cls(knobs, {knob.name: knob.levels[0] for knob in knobs})
 
     def with_(self, changes: Mapping[str, Level]) -> "Accuracy":
         """The same choice but for ``changes``; ``WrongUse`` for an unknown knob or level."""
@@ -116,6 +112,10 @@ class Accuracy(Mapping[str, Level]):
                 raise WrongUse(f"no knob {name.strip()!r}; {nearest(name.strip(), by_name)}")
             changes[name.strip()] = by_name[name.strip()].read(level)
         return self.with_(changes)
+
+    def of(self, knob: Knob[LevelT]) -> LevelT:
+        """The level of one knob, as that has it."""
+        return cast(LevelT, self[knob.name])
 
     def __getitem__(self, name: str) -> Level:
         if name not in self.levels:

@@ -59,7 +59,7 @@ class Implementation:
     needs: tuple[str, ...]
     compute: Compute
     when: Condition | None = None
-    knobs: tuple[Knob, ...] = ()
+    knobs: tuple[Knob[Level], ...] = ()
     version: int = 1
     stored: bool = False
 
@@ -88,11 +88,11 @@ class Effect:
     compute: Compute
     when: Condition | None = None
     bypass: str | None = None
-    knobs: tuple[Knob, ...] = ()
+    knobs: tuple[Knob[Level], ...] = ()
     version: int = 1
     stored: bool = False
     omission: Omission | None = None
-    choice: Knob | None = None
+    choice: Knob[Level] | None = None
     ways: Mapping[Level, Implementation] = field(default_factory=dict, hash=False)
 
     def way(self, accuracy: Accuracy) -> Implementation | None:
@@ -135,12 +135,12 @@ def by_name(effects: Iterable[Effect]) -> dict[str, Effect]:
     return known
 
 
-def knobs_of(effects: Iterable[Effect]) -> tuple[Knob, ...]:
+def knobs_of(effects: Iterable[Effect]) -> tuple[Knob[Level], ...]:
     """Every knob of the effects, once, in order."""
     found = {knob.name: knob for effect in effects for knob in _knobs(effect)}
     return tuple(found.values())
 
 
-def _knobs(effect: Effect) -> tuple[Knob, ...]:
+def _knobs(effect: Effect) -> tuple[Knob[Level], ...]:
     chosen = () if effect.choice is None else (effect.choice,)
     return (*chosen, *effect.knobs, *(knob for way in effect.ways.values() for knob in way.knobs))

@@ -164,7 +164,7 @@ def _planned(effect: Effect, search: _Search) -> PlannedEffect:
     return PlannedEffect(effect, "; ".join(reasons), levels)
 
 
-def _why_this_way(effect: Effect, choice: Knob, accuracy: Accuracy) -> str:
+def _why_this_way(effect: Effect, choice: Knob[Level], accuracy: Accuracy) -> str:
     way, level = effect.way(accuracy), accuracy[choice.name]
     said = f"{choice.name} is {level}"
     if way is not None and way.when is not None:

@@ -307,7 +307,7 @@ class Experiment(Procedure):
     """
 
     title: str
-    knobs: tuple[Knob, ...]
+    knobs: tuple[Knob[Level], ...]
     answering: Callable[[RunFiles, Accuracy], Answering]
     result: Callable[[Scored], dict[str, Any]]
     lines: Callable[[Mapping[str, Any]], list[str]]
@@ -318,7 +318,7 @@ class Experiment(Procedure):
     measurement: Measurement | None = None
 
     @property
-    def own_knobs(self) -> tuple[Knob, ...]:
+    def own_knobs(self) -> tuple[Knob[Level], ...]:
         """Those dials that are not the simulation's."""
         simulated = {knob.name for knob in knobs_of(EFFECTS)}
         return tuple(knob for knob in self.knobs if knob.name not in simulated)

@@ -8,7 +8,7 @@ from harness.effects.touch_file_effects import SHAPES as DRAWN
 
 
 def chosen_levels(
-    knobs: Sequence[Knob], texts: Sequence[str], start: Mapping[str, Level] | None = None
+    knobs: Sequence[Knob[Level]], texts: Sequence[str], start: Mapping[str, Level] | None = None
 ) -> Accuracy:
     """The default accuracy but for what an operator wrote, for example ``["localization.rounds=1"]``.
 

@@ -15,7 +15,7 @@ from harness.bench.scene import SceneFile
 from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
-from harness.effects.accuracy import Accuracy, Knob
+from harness.effects.accuracy import Accuracy, Knob, Level
 from harness.experiment.begin import begin
 from harness.experiment.experiment import Experiment, Measurement, Say, Scored, Setting
 from harness.experiment.lookup import named
@@ -106,7 +106,7 @@ class PlainCase:
         return Sample(self.cell.name, self.cell.object, found["error_m"], None, 0.0, cpu, wall, float(steps))
 
 
-def plain_measurement(name: str, *knobs: Knob) -> Measurement:
+def plain_measurement(name: str, *knobs: Knob[Level]) -> Measurement:
     """How an experiment is measured by its dials alone.
 
     Args:

@@ -23,11 +23,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, performed
+from experiments.contact_localization.accuracy.benchmark_runs import Case, Cell, cells, performed
 from experiments.contact_localization.accuracy.budget import ask
 from experiments.contact_localization.accuracy.front import Front, front_of
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Models
-from experiments.contact_localization.accuracy.table_cell import Cell, cells
 from harness.basics.whole_file import write_text_whole
 from harness.bench.station_file import load_station, station_path
 from harness.cost.choice import for_budget

@@ -13,8 +13,8 @@ from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.plan import plan_contacts
-from experiments.contact_localization.posterior.estimate import Estimate, estimate
-from experiments.contact_localization.posterior.levels import Levels, Senses
+from experiments.contact_localization.posterior.dials import Senses
+from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.sound.consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused
@@ -30,6 +30,7 @@ from harness.skills.planning import RunPlan
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
+from tests.support.localization import dials, estimate
 
 pytestmark = pytest.mark.timeout(300, func_only=True)  # on a cold machine the modes are computed first
 
@@ -123,7 +124,7 @@ def whole(run: Run) -> dict[Senses, Estimate]:
 
 
 def by(senses: Senses, observations: Sequence[Observation], run: Run, model: Model | None = None) -> Estimate:
-    return estimate(observations, model or run.model, run.prior, Levels(senses=senses), seed=SEED)
+    return estimate(observations, model or run.model, run.prior, dials(senses=senses), seed=SEED)
 
 
 def with_strikes(run: Run, change: Callable[[int, Strike], Strike | None]) -> tuple[Observation, ...]:

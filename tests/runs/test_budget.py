@@ -7,21 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case
+from experiments.contact_localization.accuracy.benchmark_runs import Case, cells
 from experiments.contact_localization.accuracy.budget import answer_within
 from experiments.contact_localization.accuracy.budget_text import as_json, doubts, sentences, staleness
 from experiments.contact_localization.accuracy.dials import (
     FINEST,
     KNOBS,
-    METHOD,
-    SPACING,
     setting_name,
     settings,
 )
 from experiments.contact_localization.accuracy.front import Front, foresee, front_for, shipped_curve
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, object_key
-from experiments.contact_localization.accuracy.table_cell import cells
 from experiments.contact_localization.experiment import EXPERIMENT
+from experiments.contact_localization.posterior.dials import METHOD, SPACING
 from harness.basics.errors import WrongUse
 from harness.bench.station_file import load_station, station_path
 from harness.cli import invoke

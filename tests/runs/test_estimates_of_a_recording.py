@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.dials import chosen
-from experiments.contact_localization.answer import Answer, answer
+from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import true_points
 from harness.basics.arrays import FloatArray
@@ -17,6 +16,7 @@ from harness.basics.errors import FitRefused
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
+from tests.support.localization import answer, chosen
 from tests.support.sessions import score
 from tests.support.whole_run import copied, edited, rewritten, with_reading
 

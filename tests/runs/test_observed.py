@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.dials import chosen
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.basics.errors import WrongUse
 from harness.bench.scene import SceneFile, scene_from_json
@@ -17,6 +16,7 @@ from harness.experiment.compare import compare, require_sources
 from harness.experiment.experiment import Scored
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles, station_calibration
+from tests.support.localization import chosen
 from tests.support.sessions import score, start
 from tests.support.whole_run import copied, edited
 

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization import answer as answer_module
-from experiments.contact_localization.accuracy.dials import chosen
 from experiments.contact_localization.accuracy.solving import located
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import result_of
@@ -25,6 +24,7 @@ from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.optics import Optics
 from tests.support import sessions as session_of
+from tests.support.localization import answer, chosen
 from tests.support.whole_run import copied
 
 KERNELS = (
@@ -255,8 +255,8 @@ def test_an_answers_seconds_are_those_with_every_kernel_loaded(
         asked.append(located(*arguments, **named)[-1])
         return (replace(asked[-1], seconds={"images": 1e6} if len(asked) == 1 else {"images": 1.0}),)
 
-    answer_module.answer(run, quick)  # loads what it needs
+    answer(run, quick)  # loads what it needs
     monkeypatch.setattr(answer_module, "located", first)
-    found = answer_module.answer(run, quick)
+    found = answer(run, quick)
     assert found.seconds == (1.0 if compiles else 1e6)
     assert np.array_equal(found.last.contacts, asked[0].contacts)

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from experiments.contact_localization.accuracy.dials import chosen
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.experiment import perform
 from harness.experiment.answer import RESULT, finish
 from harness.recording.recording import Recording
 from mocks.in_process.bench import in_process_bench
+from tests.support.localization import chosen
 from tests.support.whole_run import Quiet, copied
 
 

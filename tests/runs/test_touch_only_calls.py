@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.dials import chosen
 from experiments.contact_localization.sound import analysis as sound_analysis
 from harness.bench.acquisition import Strike
 from harness.effects import sound_effects
 from harness.recording.recording import Recording
 from tests.support import sessions as session_of
+from tests.support.localization import chosen
 from tests.support.whole_run import in_process_run, touch_scene
 
 OF_SOUND = (

@@ -19,12 +19,10 @@ import cv2
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.dials import chosen
-from experiments.contact_localization.accuracy.table_cell import Cell, scene_of
-from experiments.contact_localization.answer import Answer, answer
+from experiments.contact_localization.accuracy.benchmark_runs import Cell, scene_of
+from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.observation import Observation
-from experiments.contact_localization.posterior.estimate import Estimate, estimate
-from experiments.contact_localization.posterior.levels import Levels
+from experiments.contact_localization.posterior.estimate import Estimate
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.geometry import inverse
 from harness.bench.gap import load_gap
@@ -40,6 +38,7 @@ from mocks.in_process.bench import in_process_bench
 from mocks.lab_scene import nominal_bench
 from mocks.world.world import World
 from tests.support import sessions as session_of
+from tests.support.localization import answer, dials, estimate
 from tests.support.real_data import find_shared_data
 from tests.support.whole_run import Quiet, copied, touch_scene
 
@@ -87,7 +86,7 @@ class Side:
 def side(recording: Recording) -> Side:
     run = RunFiles(recording)
     truth = json.loads(recording.truth_path.read_text(encoding="utf-8"))
-    return Side(run, truth, answer(run, chosen([])))
+    return Side(run, truth, answer(run, dials()))
 
 
 def both(scene: SceneFile, folder: Path) -> tuple[Side, Side]:
@@ -122,7 +121,7 @@ def answered_where_the_wired_arm_was(wired: Side, world: World) -> Estimate:
         Observation(observed.base_from_gel, shown(world, pose, step)[None])
         for step, (observed, pose) in enumerate(zip(wired.found.observations, wired.poses, strict=True))
     )
-    return estimate(seen, wired.found.model, wired.found.prior, Levels(), seed=SEED)
+    return estimate(seen, wired.found.model, wired.found.prior, dials(), seed=SEED)
 
 
 def distance(one: FloatArray, other: FloatArray) -> float:

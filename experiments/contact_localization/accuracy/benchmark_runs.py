@@ -1,10 +1,14 @@
 """Runs on the mocked bench, performed in process and kept in memory, to be answered at any setting."""
 
 import gc
+import json
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -14,31 +18,66 @@ from experiments.contact_localization.accuracy.dials import SIMULATED, needs_ima
 from experiments.contact_localization.accuracy.solving import (
     Models,
     Readings,
-    Setting,
     Solved,
     object_key,
     prepare,
     solve_loaded,
 )
-from experiments.contact_localization.accuracy.table_cell import (
-    Cell,
-    PerformedRun,
-    believed,
-    perform_cell,
-    scene_of,
-)
+from experiments.contact_localization.answer import in_time, observe_step
 from experiments.contact_localization.build_model import model_of_scene
+from experiments.contact_localization.model import Prior
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.baselines import mean_random_error
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError
+from harness.basics.geometry import rotation_about
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
 from harness.effects.scene_object import known_object
-from harness.experiment.experiment import Say
-from harness.recording.run_folder import station_calibration
+from harness.experiment.experiment import Say, Setting
+from harness.picture.square_pixels import aspect_stated
+from harness.recording.run_folder import station_acquisition, station_calibration
+from harness.recording.step_file import Step, StepRecord
+from harness.skills.press import PressPerformer
+from harness.twin.bench_of import way_between
+from mocks.in_process.bench import in_process_bench
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Which run.
+
+    Attributes:
+        object: its name in the table.
+        spacing: ``"close"`` or ``"spread"``.
+        gap: ``"default"`` or ``"none"``.
+        yaw: ``"known"`` to the estimator or ``"unknown"``.
+        seed: of the sites, the world and the draws.
+        sound: whether every place is struck too.
+    """
+
+    object: str
+    spacing: str
+    gap: str
+    yaw: str
+    seed: int
+    sound: bool = False
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """What was varied."""
+        return {"spacing": self.spacing, "gap": self.gap, "yaw": self.yaw}
+
+    @property
+    def name(self) -> str:
+        """Of the cell's file; a gap may be a path."""
+        gap = self.gap.replace("/", "_")
+        plain = f"{self.object}-{self.spacing}-{gap}-{self.yaw}-{self.seed}"
+        return f"{plain}-sound" if self.sound else plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +157,16 @@ def _uncollected() -> Iterator[None]:
             gc.enable()
 
 
+def scene_of(cell: Cell, scene: SceneFile) -> SceneFile:
+    """The scene of a run: the object turned by an angle of the run's own."""
+    turned = np.random.default_rng((cell.seed, 7)).uniform(0.0, 360.0)
+    tree = scene.model_dump(mode="json", by_alias=True)
+    tree.setdefault("localization", {})["spacing"] = cell.spacing
+    tree["object"]["pose"]["yaw"] = f"{turned:.3f} deg"
+    tree["sensors"]["sound"] = cell.sound
+    return scene_from_json(tree, "the table")
+
+
 def perform(cell: Cell, scene: SceneFile, station: Station, models: MutableMapping[str, Models]) -> Case:
     """Plan and perform a run on the mocked bench in process.
 
@@ -127,21 +176,35 @@ def perform(cell: Cell, scene: SceneFile, station: Station, models: MutableMappi
         station: a mocked one.
         models: by object, taken from and added to: an object's samples are made once for all its runs.
     """
-    return _case(cell, _performed(cell, scene, station), scene, station, models)
+    return _case(cell, _recorded(cell, scene, station), scene, station, models)
 
 
-_Recorded = tuple[tuple[Observation, ...], FloatArray, FloatArray]
-"""The observations, ``base_from_object`` and the true points of a performed run."""
+_Recorded = tuple[tuple[Observation, ...], FloatArray]
+"""The observations and the true points of a performed run."""
 
 
-def _performed(cell: Cell, scene: SceneFile, station: Station) -> _Recorded:
-    turned = scene_of(cell, scene)
-    run = perform_cell(cell, turned, station, known_object(turned).mesh)
-    return run.observations, run.base_from_object, run.true_points
+def _recorded(cell: Cell, scene: SceneFile, station: Station) -> _Recorded:
+    """In memory alone: a recording keeps times to the nanosecond, and these are whole."""
+    scene = scene_of(cell, scene)
+    mesh = known_object(scene).mesh
+    plan, acquisition = plan_contacts(scene, station, mesh, cell.seed), station_acquisition(scene, station)
+    aspect = aspect_stated(station_calibration(station).header.made_from)
+    performer = PressPerformer(partial(way_between, plan.bench))
+    with TemporaryDirectory(prefix="touchstone-table-") as folder:
+        context = RunContext(Path(folder) / "truth.json", mesh, cell.seed, cell.gap)
+        bench = in_process_bench(scene, station, context)
+        observations = []
+        for index, parameters in enumerate(plan.parameters()):
+            step = Step(index, "press", parameters)
+            readings = {r.channel.name: r for r in performer.perform(step, bench)}
+            record = StepRecord(step, readings, 0.0)
+            observations.append(observe_step(record, station.flange_from_gel, acquisition, aspect))
+        contacts = json.loads(context.truth.read_text(encoding="utf-8"))["contacts"]
+    return in_time(observations), np.array([contact["point_in_object_m"] for contact in contacts])
 
 
 def _elsewhere(cell: Cell, scene: dict[str, Any], station: Station) -> _Recorded:
-    return _performed(cell, scene_from_json(scene, "the cost of accuracy"), station)
+    return _recorded(cell, scene_from_json(scene, "the cost of accuracy"), station)
 
 
 def _case(
@@ -158,10 +221,31 @@ def _case(
     own = models.setdefault(
         name, Models(lambda accuracy: model_of_scene(turned, station, mesh, calibration, accuracy))
     )
-    observations, base_from_object, true_points = recorded
-    performed = PerformedRun(observations, own.at({}), base_from_object, true_points, cell.seed)
-    asked = Run(observations, own, believed(performed, cell.yaw), cell.seed, name)
-    return Case(cell, asked, true_points, mesh)
+    observations, true_points = recorded
+    prior = believed(turned.base_from_object(mesh)[:3, :3], cell)
+    return Case(cell, Run(observations, own, prior, cell.seed, name), true_points, mesh)
+
+
+def believed(base_from_object: FloatArray, cell: Cell) -> Prior:
+    """What an estimator is told of the object's orientation ``(3, 3)``: its yaw is known or unknown to it."""
+    if cell.yaw == "known":
+        return Prior(base_from_object, "known")
+    # Turned by chance, so that the unknown yaw falls between the grid's yaws, not on one of them.
+    angle = float(np.random.default_rng((cell.seed, 11)).uniform(0.0, 2.0 * np.pi))
+    return Prior(rotation_about(np.array([0.0, 0.0, 1.0]), angle) @ base_from_object, "unknown")
+
+
+def cells(
+    objects: Sequence[str],
+    seeds: Sequence[int],
+    spacings: Sequence[str],
+    gaps: Sequence[str],
+    yaws: Sequence[str],
+    sound: bool = False,
+) -> list[Cell]:
+    """Every run of a table, one seed of every object before the next: a table that is stopped is even."""
+    first = [Cell(o, s, g, y, 0, sound) for y in yaws for g in gaps for s in spacings for o in objects]
+    return [replace(cell, seed=seed) for seed in seeds for cell in first]
 
 
 def performed(

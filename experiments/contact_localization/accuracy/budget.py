@@ -6,20 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import (
-    FINEST,
-    METHOD,
-    SENSES,
-    SIMULATED,
-    SPACING,
-    needs_images,
-    needs_sound,
-)
+from experiments.contact_localization.accuracy.dials import FINEST, SIMULATED, needs_images, needs_sound
 from experiments.contact_localization.accuracy.front import Front
 from experiments.contact_localization.accuracy.solving import (
     Models,
     Readings,
-    Setting,
     Solved,
     object_key,
     prepare,
@@ -30,13 +21,14 @@ from experiments.contact_localization.answer import observe, prior_of
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Prior
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.posterior.dials import METHOD, SENSES, SPACING
 from experiments.contact_localization.posterior.problem_size import places_left
 from harness.basics.errors import WrongUse
 from harness.cost.bounds import most_seconds
 from harness.cost.choice import for_budget, for_error
 from harness.cost.curve import Point
 from harness.cost.promise import promise
-from harness.experiment.experiment import Target
+from harness.experiment.experiment import Setting, Target
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 

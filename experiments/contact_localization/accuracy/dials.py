@@ -2,41 +2,25 @@
 
 from collections.abc import Iterator, Mapping
 
-from experiments.contact_localization.posterior.levels import Levels, Senses
+from experiments.contact_localization.posterior.dials import (
+    BLOCK,
+    DIALS,
+    METHOD,
+    PARTICLES,
+    ROUNDS,
+    SAMPLES,
+    SENSES,
+    SPACING,
+)
 from harness.effects.accuracy import Accuracy, Knob, Level
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 from harness.effects.sound_effects import EDGE, MODES, SHAPES
-from harness.experiment.levels import chosen_levels
+from harness.experiment.experiment import Setting
 
-METHOD = Knob(
-    "localization.method", ("particle", "grid"), "", "method", "grid", "the paper's filter, or ours"
-)
-SENSES = Knob(
-    "localization.senses",
-    ("touch", "audio", "both"),
-    "",
-    "method",
-    "both",
-    "what is used of what was recorded",
-)
-SPACING = Knob(
-    "localization.spacing", (4e-3, 3e-3, 2e-3, 1.5e-3), "m", "number", 2e-3, "between surface samples"
-)
-ROUNDS = Knob(
-    "localization.rounds", (0, 1, 2, 3, 5), "rounds", "number", 5, "most refinements after the grid"
-)
-SAMPLES = Knob(
-    "localization.samples", (600, 1500, 3000, 6000), "", "number", 3000, "hypotheses a refinement draws"
-)
-PARTICLES = Knob(
-    "localization.particles", (300, 1000, 3000, 10_000), "", "number", 1000, "of the paper's filter"
-)
-BLOCK = Knob("localization.block", (16, 8), "pixels", "number", 8, "tactile pixels averaged, each way")
+KNOBS = (*DIALS, *knobs_of(EFFECTS))
 
-KNOBS = (SENSES, METHOD, SPACING, ROUNDS, SAMPLES, PARTICLES, BLOCK, *knobs_of(EFFECTS))
-
-SIMULATED = (MODES, EDGE, SHAPES)
+SIMULATED: tuple[Knob[Level], ...] = (MODES, EDGE, SHAPES)
 """Dials of the simulation that an estimate depends on: the modes that its sounds are compared with.
 Its other terms are its own, and only the comparison of a report draws simulated readings."""
 
@@ -74,31 +58,9 @@ FINEST = _grid("both", 1.5e-3, 5, 6000, 8)
 """What is asked after an answer, to say what more time would have given."""
 
 
-def chosen(texts: list[str], start: Mapping[str, Level] | None = None) -> Accuracy:
-    """The default accuracy but for what an operator wrote, for example ``["localization.rounds=1"]``.
-
-    Args:
-        texts: what was written.
-        start: levels to turn from instead of the default ones.
-
-    Raises:
-        WrongUse: an unknown dial or level, and the nearest is named; a touch that no run carries.
-    """
-    return chosen_levels(KNOBS, texts, start)
-
-
-def levels_of(accuracy: Accuracy) -> Levels:
-    """What the estimator takes."""
-    senses: dict[Level, Senses] = {"touch": "touch", "audio": "audio", "both": "both"}
-    return Levels(
-        senses=senses[accuracy[SENSES.name]],
-        method="particle" if accuracy[METHOD.name] == "particle" else "grid",
-        spacing=float(accuracy[SPACING.name]),
-        particles=int(accuracy[PARTICLES.name]),
-        block=int(accuracy[BLOCK.name]),
-        rounds=int(accuracy[ROUNDS.name]),
-        samples=int(accuracy[SAMPLES.name]),
-    )
+def accuracy_at(setting: Setting) -> Accuracy:
+    """Every dial at a setting; what that leaves open is at its default."""
+    return Accuracy.default(KNOBS).with_(setting)
 
 
 def settings(thorough: bool = False, sound: bool = True, objectfile: bool = False) -> list[dict[str, Level]]:

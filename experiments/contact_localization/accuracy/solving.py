@@ -6,29 +6,22 @@ from dataclasses import dataclass, field, replace
 
 from numba.core.event import install_recorder
 
-from experiments.contact_localization.accuracy.dials import (
-    KNOBS,
-    SENSES,
-    SIMULATED,
-    levels_of,
-    needs_sound,
-)
+from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_at, needs_images, needs_sound
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation, contact_of, height_map
+from experiments.contact_localization.posterior.dials import BLOCK, SENSES, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
-from experiments.contact_localization.posterior.levels import Levels
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.mesh import Mesh
 from harness.basics.store import digest
 from harness.effects.accuracy import Accuracy, Level
+from harness.experiment.experiment import Setting
 
 PROGRAM = "contact-localization"
 ESTIMATOR = "experiments.contact_localization.posterior.estimate"
 """The module whose sources, with all they import, decide whether a curve still holds."""
-
-Setting = Mapping[str, Level]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +97,7 @@ class Models:
         plain = setting if needs_sound(setting) else {}
         chosen = tuple(plain.get(knob.name, knob.default) for knob in SIMULATED)
         if chosen not in self._made:
-            self._made[chosen] = self.make(_accuracy(plain))
+            self._made[chosen] = self.make(accuracy_at(plain))
         return self._made[chosen]
 
     def all(self) -> Mapping[tuple[Level, ...], Model]:
@@ -139,7 +132,7 @@ def timed_height_map(observation: Observation, model: Model) -> tuple[FloatArray
 
 def prepare(model: Model, setting: Setting) -> None:
     """Make what depends on the object alone, before any reading is needed: its samples and gains."""
-    spacing = levels_at(setting).spacing
+    spacing = accuracy_at(setting).of(SPACING)
     _ = model.surface(spacing).tree
     if model.modes is not None and needs_sound({SENSES.name: SENSES.default, **setting}):
         model.gains(spacing)
@@ -147,31 +140,28 @@ def prepare(model: Model, setting: Setting) -> None:
 
 def solve(readings: Readings, setting: Setting) -> Solved:
     """Answer at one setting, timed; call ``prepare`` before."""
-    levels, noise = levels_at(setting), Noise()
+    accuracy = accuracy_at(setting)
     cpu, wall = time.process_time(), time.perf_counter()
     estimate, refusal = None, None
     try:
-        estimate = located(readings, levels, noise=noise)[-1]
+        estimate = located(readings, accuracy)[-1]
     except FitRefused as error:
         refusal = str(error)
     return Solved(estimate, time.process_time() - cpu, time.perf_counter() - wall, refusal)
 
 
-def located(
-    readings: Readings, levels: Levels, first: int | None = None, noise: Noise | None = None
-) -> tuple[Estimate, ...]:
+def located(readings: Readings, accuracy: Accuracy, first: int | None = None) -> tuple[Estimate, ...]:
     """The estimates after each contact from the ``first`` on; after the last alone where None.
 
     Raises:
         FitRefused: no place on this object explains the readings.
     """
-    noise = noise or Noise()
-    images = levels.senses != "audio"
-    contacts = _contacts(readings, levels, noise, images)
+    noise, images = Noise(), needs_images(accuracy)
+    contacts = _contacts(readings, accuracy.of(BLOCK), noise, images)
     strikes = [observation.strike for observation in readings.observations]
     seconds = readings.shared[1] if images else 0.0
     model, prior, seed = readings.model, readings.prior, readings.seed
-    return locate(contacts, model, prior, levels, noise, seed, first, seconds, strikes)
+    return locate(contacts, model, prior, accuracy, noise, seed, first, seconds, strikes)
 
 
 def solve_loaded(readings: Readings, setting: Setting) -> Solved:
@@ -181,21 +171,12 @@ def solve_loaded(readings: Readings, setting: Setting) -> Solved:
     return solve(readings, setting) if loads.buffer else solved
 
 
-def levels_at(setting: Setting) -> Levels:
-    """What the estimator takes at a setting; what it leaves open is at its default."""
-    return levels_of(_accuracy(setting))
-
-
-def _accuracy(setting: Setting) -> Accuracy:
-    return Accuracy.default(KNOBS).with_(setting)
-
-
-def _contacts(readings: Readings, levels: Levels, noise: Noise, images: bool) -> list[Contact]:
+def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> list[Contact]:
     if not images:
         return [Contact(observation.base_from_gel) for observation in readings.observations]
     pitch = readings.model.sensor.pitch
     return [
-        contact_of(observation.base_from_gel, heights, pitch, levels.block, noise.touch)
+        contact_of(observation.base_from_gel, heights, pitch, block, noise.touch)
         for observation, heights in zip(readings.observations, readings.heights, strict=True)
     ]
 

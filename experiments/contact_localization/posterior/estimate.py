@@ -7,15 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation, read_contacts
 from experiments.contact_localization.posterior.consistency import (
     Gate,
     gates,
     refuse_bad_fit,
     refuse_inside_out,
 )
+from experiments.contact_localization.posterior.dials import METHOD, SENSES, SPACING, Senses
 from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise
-from experiments.contact_localization.posterior.levels import Levels, Senses
 from experiments.contact_localization.posterior.methods import PosteriorSolution, lap, solve_run
 from experiments.contact_localization.posterior.posterior import (
     Mode,
@@ -37,6 +36,7 @@ from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import WrongUse
 from harness.basics.faces.nearest import nearest_point
 from harness.bench.acquisition import Strike
+from harness.effects.accuracy import Accuracy
 
 FLOORS: Mapping[Senses, float] = {"touch": 0.4e-3, "audio": 0.75e-3, "both": 0.3e-3}
 """Metres, one sigma of the errors that hypotheses by these senses do not show, fitted to calibration runs. By
@@ -85,86 +85,55 @@ class Estimate:
     doubts: tuple[str, ...] = ()
 
 
-def estimate(
-    observations: Sequence[Observation],
-    model: Model,
-    prior: Prior,
-    accuracy: Levels | None = None,
-    noise: Noise | None = None,
-    seed: int = 0,
-) -> Estimate:
-    """Localize the last contact.
-
-    Args:
-        observations: the contacts, in the order they were made.
-        model: object and sensor.
-        prior: of the object's orientation.
-        accuracy: the method and its levels; the default is the grid at 2 mm.
-        noise: of the terms; the default is what calibration runs gave.
-        seed: of the draws inside the method.
-
-    Raises:
-        FitRefused: no place on this object explains the contacts.
-        WrongUse: there are no observations.
-    """
-    return each_estimate(observations, model, prior, accuracy, noise, seed, first=len(observations))[-1]
-
-
-def each_estimate(
-    observations: Sequence[Observation],
-    model: Model,
-    prior: Prior,
-    accuracy: Levels | None = None,
-    noise: Noise | None = None,
-    seed: int = 0,
-    first: int = 1,
-) -> tuple[Estimate, ...]:
-    """The estimate after each contact from the ``first`` on; readings are prepared once.
-
-    Estimates of fewer than all contacts are not refused: they are pictures of the way to the
-    answer. The last one is as ``estimate`` gives it, and is refused as it is.
-    """
-    if len(observations) == 0:
-        raise WrongUse("no contacts were given; a run needs at least one")
-    levels, noise = accuracy or Levels(), noise or Noise()
-    started = time.perf_counter()
-    if levels.senses == "audio":
-        contacts = tuple(Contact(observation.base_from_gel) for observation in observations)
-    else:
-        contacts = read_contacts(observations, model, levels.block, noise.touch)
-    images = time.perf_counter() - started
-    strikes = [observation.strike for observation in observations]
-    return locate(contacts, model, prior, levels, noise, seed, first, images, strikes)
-
-
 def locate(
     contacts: Sequence[Contact],
     model: Model,
     prior: Prior,
-    levels: Levels,
+    accuracy: Accuracy,
     noise: Noise,
     seed: int = 0,
     first: int | None = None,
     image_seconds: float = 0.0,
     strikes: Sequence[Strike | None] = (),
 ) -> tuple[Estimate, ...]:
-    """As ``each_estimate``, from height maps already recovered and strikes as they were captured."""
-    search = Search(contacts, model, prior, levels.spacing, noise)
+    """The estimate after each contact from the ``first`` on; of the last contact alone where None.
+
+    Estimates of fewer than all contacts are not refused: they are pictures of the way to the answer.
+
+    Args:
+        contacts: what each image shows, in the order they were made.
+        model: object and sensor.
+        prior: of the object's orientation.
+        accuracy: the method and its levels.
+        noise: of the terms.
+        seed: of the draws inside the method.
+        first: contacts of the first estimate.
+        image_seconds: s that reading all images took.
+        strikes: of the contacts, as they were captured.
+
+    Raises:
+        FitRefused: no place on this object explains the contacts.
+        WrongUse: there are no contacts, or none was struck and sound alone is asked for.
+    """
+    if len(contacts) == 0:
+        raise WrongUse("no contacts were given; a run needs at least one")
+    senses, spacing = accuracy.of(SENSES), accuracy.of(SPACING)
+    search = Search(contacts, model, prior, spacing, noise)
     strikes = distinct_strikes([contact.base_from_gel for contact in contacts[: len(strikes)]], strikes)
     count = len(contacts)
     answers = []
     for k in range(count if first is None else first, count + 1):
         seconds = {"images": image_seconds * k / count}
         start = time.perf_counter()
-        alone = levels.senses == "audio"
-        heard = None if levels.senses == "touch" else hear(strikes[:k], model, levels.spacing, alone)
+        alone = senses == "audio"
+        heard = None if senses == "touch" else hear(strikes[:k], model, spacing, alone)
         if alone and heard is None:
             raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
         if heard is not None:
             lap(seconds, "sounds", start)
-        found = solve_run(search, k, levels, seed, seconds, heard)
-        doubts = _judged(search, found, levels, heard, k, seconds) if k == count else ()
-        floor = FLOORS[levels.senses if heard else "touch"]
+        found = solve_run(search, k, accuracy, seed, seconds, heard)
+        doubts = _judged(search, found, accuracy, heard, k, seconds) if k == count else ()
+        floor = FLOORS[senses if heard else "touch"]
         answers.append(_answer(search, k, found, seconds, floor, doubts))
     return tuple(answers)
 
@@ -172,7 +141,7 @@ def locate(
 def _judged(
     search: Search,
     found: PosteriorSolution,
-    levels: Levels,
+    accuracy: Accuracy,
     heard: StrikeEvidence | None,
     count: int,
     seconds: dict[str, float],
@@ -181,10 +150,10 @@ def _judged(
     start = time.perf_counter()
     doubts: tuple[str, ...] = ()
     if heard is not None:
-        judge = refuse_strange_sound if levels.senses == "audio" else doubts_of_sound_at
+        judge = refuse_strange_sound if accuracy.of(SENSES) == "audio" else doubts_of_sound_at
         doubts = judge(search, found.hypotheses, heard, count)
     # The paper's filter has no measure of fit to be refused by.
-    if levels.method == "grid" and found.pictured:
+    if accuracy.of(METHOD) == "grid" and found.pictured:
         refuse_bad_fit(search, found.members, found.fits)
         refuse_inside_out(search, found.hypotheses.top, found.members)
     lap(seconds, "judge", start)

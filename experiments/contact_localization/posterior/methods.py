@@ -6,14 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.posterior.consistency import likeness_of, refuse_bad_fit
+from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, ROUNDS, SAMPLES, SENSES
 from experiments.contact_localization.posterior.grid import on_samples, refine
 from experiments.contact_localization.posterior.hypotheses import Hypotheses, anchors
-from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.posterior.particle import particle_filter
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.evidence import StrikeEvidence
 from experiments.contact_localization.sound.places import by_sound
 from harness.basics.arrays import FloatArray, IntArray
+from harness.effects.accuracy import Accuracy
 
 _UNKNOWN_YAW_FACTOR = 4
 _ANCHORS = 3
@@ -41,7 +42,7 @@ class PosteriorSolution:
 def solve_run(
     search: Search,
     count: int,
-    levels: Levels,
+    accuracy: Accuracy,
     seed: int,
     seconds: dict[str, float],
     heard: StrikeEvidence | None,
@@ -51,7 +52,7 @@ def solve_run(
     Args:
         search: the run.
         count: contacts that are used.
-        levels: the method and its dials.
+        accuracy: the method and its dials.
         seed: of the draws inside the method.
         seconds: by stage; what is spent here is added.
         heard: what their strikes said; None without.
@@ -59,18 +60,18 @@ def solve_run(
     Raises:
         FitRefused: no image shows a contact, and no sound is asked for alone.
     """
-    if levels.senses == "audio":
+    if accuracy.of(SENSES) == "audio":
         assert heard is not None
         return _by_sound(search, count, heard, seconds)
     members = search.members(count)
     if len(members) == 0:
         refuse_bad_fit(search, members, np.empty(0))
-    if levels.method == "particle":
-        return _by_particles(search, count, members, levels, seed, seconds)
+    if accuracy.of(METHOD) == "particle":
+        return _by_particles(search, count, members, accuracy, seed, seconds)
     best: PosteriorSolution | None = None
     clear = -np.inf
     for anchor in anchors(members, _ANCHORS):
-        found = _by_grid(search, members, int(anchor), levels, seed, seconds, heard)
+        found = _by_grid(search, members, int(anchor), accuracy, seed, seconds, heard)
         likeness = likeness_of(search, members, found.fits)
         if best is None or likeness.margin > clear:
             best, clear = found, likeness.margin
@@ -85,7 +86,7 @@ def _by_grid(
     search: Search,
     members: IntArray,
     anchor: int,
-    levels: Levels,
+    accuracy: Accuracy,
     seed: int,
     seconds: dict[str, float],
     heard: StrikeEvidence | None,
@@ -94,8 +95,8 @@ def _by_grid(
     coarse = on_samples(search, members, anchor, heard)
     lap(seconds, "grid", start)
     start = time.perf_counter()
-    samples = levels.samples * (1 if search.prior.yaw == "known" else _UNKNOWN_YAW_FACTOR)
-    refined = refine(search, coarse, members, samples, levels.rounds, seed, heard)
+    samples = accuracy.of(SAMPLES) * (1 if search.prior.yaw == "known" else _UNKNOWN_YAW_FACTOR)
+    refined = refine(search, coarse, members, samples, accuracy.of(ROUNDS), seed, heard)
     fits = search.gates(refined.top, members)
     lap(seconds, "refine", start)
     return PosteriorSolution(refined, members, fits)
@@ -112,10 +113,10 @@ def _by_sound(
 
 
 def _by_particles(
-    search: Search, count: int, members: IntArray, levels: Levels, seed: int, seconds: dict[str, float]
+    search: Search, count: int, members: IntArray, accuracy: Accuracy, seed: int, seconds: dict[str, float]
 ) -> PosteriorSolution:
     start = time.perf_counter()
-    particles = particle_filter(search, count, levels.particles, seed)
+    particles = particle_filter(search, count, accuracy.of(PARTICLES), seed)
     rotations = search.prior.object_from_base(particles.yaws)
     last = count - 1
     inward = rotations @ search.axes[last]

@@ -8,8 +8,9 @@ import numpy as np
 
 from experiments.contact_localization.answer import Answer as Found
 from experiments.contact_localization.posterior.consistency import Gate
+from experiments.contact_localization.posterior.dials import METHOD
+from experiments.contact_localization.posterior.dials import SENSES as BY
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.comparison import object_from_gels
 from experiments.contact_localization.report.result import flags_of, result_of, true_points, without_images
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
@@ -19,6 +20,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, WrongUse
 from harness.basics.geometry import inverse
 from harness.bench.device import Health
+from harness.effects.accuracy import Accuracy
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.recording.run_folder import RunFiles
@@ -187,32 +189,32 @@ def _by_seconds(trade: tuple[SweepPoint, ...]) -> tuple[ErrorCurve, ...] | Missi
     if not trade:
         return NO_TRUTH
     methods: dict[str, list[SweepPoint]] = {}
-    heard = any(point.levels.senses == "audio" for point in trade)
+    heard = any(point.accuracy.of(BY) == "audio" for point in trade)
     for point in trade:
-        methods.setdefault(_method(point.levels, heard), []).append(point)
+        methods.setdefault(_method(point.accuracy, heard), []).append(point)
     return tuple(
         ErrorCurve(
             name,
             tuple(point.seconds_a_contact for point in points),
             tuple(point.error for point in points),
             tuple(point.name for point in points),
-            by=_by(points[0].levels, heard),
+            by=_by(points[0].accuracy, heard),
         )
         for name, points in methods.items()
     )
 
 
-def _by(levels: Levels, heard: bool) -> str:
+def _by(accuracy: Accuracy, heard: bool) -> str:
     """What answers: the paper's filter, or a sense; of a run without sound all are touch."""
-    if levels.method == "particle":
-        return levels.method
-    return levels.senses if heard else "touch"
+    if accuracy.of(METHOD) == "particle":
+        return "particle"
+    return accuracy.of(BY) if heard else "touch"
 
 
-def _method(levels: Levels, heard: bool) -> str:
-    if levels.method == "particle":
+def _method(accuracy: Accuracy, heard: bool) -> str:
+    if accuracy.of(METHOD) == "particle":
         return "the paper's particle filter"
-    return f"grid, {SENSES[levels.senses]}" if heard else "grid"
+    return f"grid, {SENSES[accuracy.of(BY)]}" if heard else "grid"
 
 
 def _ours(scored: Scored) -> dict[str, str]:

@@ -7,8 +7,8 @@ import numpy as np
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.posterior.baselines import geometry_only, mean_random_error
 from experiments.contact_localization.posterior.consistency import Gate
+from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.posterior.posterior import Mode
 from experiments.contact_localization.sound.consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
@@ -47,7 +47,7 @@ def result_of(scored: Scored) -> dict[str, Any]:
 def without_images(found: Answer, count: int) -> FloatArray:
     """``(3,)`` metres: the last of the first ``count`` contacts, from the arm's translations alone."""
     poses = [observation.base_from_gel for observation in found.observations[:count]]
-    return geometry_only(poses, found.model, found.prior, Levels().spacing).position_in_object
+    return geometry_only(poses, found.model, found.prior, SPACING.default).position_in_object
 
 
 def _doubts(found: Answer) -> tuple[str, ...]:

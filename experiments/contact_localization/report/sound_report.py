@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import SPACING
 from experiments.contact_localization.answer import Answer
+from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import true_points
 from experiments.contact_localization.report.sound_pictures import sound_pair

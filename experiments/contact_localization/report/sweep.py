@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import (
+from experiments.contact_localization.accuracy.dials import accuracy_at
+from experiments.contact_localization.accuracy.solving import Readings, prepare, solve_loaded
+from experiments.contact_localization.posterior.dials import (
     BLOCK,
     METHOD,
     PARTICLES,
@@ -13,15 +15,9 @@ from experiments.contact_localization.accuracy.dials import (
     SENSES,
     SPACING,
 )
-from experiments.contact_localization.accuracy.solving import (
-    Readings,
-    Setting,
-    levels_at,
-    prepare,
-    solve_loaded,
-)
-from experiments.contact_localization.posterior.levels import Levels
 from harness.basics.arrays import FloatArray
+from harness.effects.accuracy import Accuracy
+from harness.experiment.experiment import Setting
 
 
 def _grid(spacing: float, rounds: int, samples: int) -> Setting:
@@ -66,13 +62,13 @@ class SweepPoint:
 
     Attributes:
         name: of the level.
-        levels: the dials.
+        accuracy: the dials.
         seconds_a_contact: of the estimate, samples of the surface prepared.
         error: m, of the last contact.
     """
 
     name: str
-    levels: Levels
+    accuracy: Accuracy
     seconds_a_contact: float
     error: float
 
@@ -92,5 +88,5 @@ def trade(readings: Readings, true: FloatArray) -> tuple[SweepPoint, ...]:
             continue
         seconds = (readings.shared[1] + solved.wall) / len(readings.observations)
         error = float(np.linalg.norm(solved.estimate.position_in_object - true))
-        points.append(SweepPoint(name, levels_at(setting), seconds, error))
+        points.append(SweepPoint(name, accuracy_at(setting), seconds, error))
     return tuple(points)

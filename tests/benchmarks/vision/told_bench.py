@@ -17,12 +17,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from experiments.contact_localization.accuracy.benchmark_runs import Case, performed
+from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, performed
 from experiments.contact_localization.accuracy.solving import Models
-from experiments.contact_localization.accuracy.table_cell import cells
 from experiments.contact_localization.posterior.baselines import geometry_and_axis
-from experiments.contact_localization.posterior.estimate import estimate
-from experiments.contact_localization.posterior.levels import Levels, Senses
+from experiments.contact_localization.posterior.dials import SPACING, Senses
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_about
 from harness.basics.symmetry import find_symmetries
@@ -31,6 +29,7 @@ from harness.bench.station_file import load_station, station_path
 from harness.experiment.costing import workers_of
 from harness.experiment.subjects import objects
 from mocks.world.gap_draw import GapDraw
+from tests.support.localization import dials, estimate
 
 TOLD: Mapping[str, frozenset[str]] = {
     "nothing": frozenset(),
@@ -84,7 +83,7 @@ def _scored(case: Case, senses: Senses) -> dict[str, tuple[float, float]]:
     def off(point: FloatArray) -> tuple[float, float]:
         return float(np.linalg.norm(point - true)), float(symmetry.distance(point, true))
 
-    levels, found = Levels(senses=senses), {}
+    levels, found = dials(senses=senses), {}
     for name, what in TOLD.items():
         observations = [
             replace(one, base_from_gel=_corrected(one.base_from_gel, draw, k, what))
@@ -93,7 +92,7 @@ def _scored(case: Case, senses: Senses) -> dict[str, tuple[float, float]]:
         answer = estimate(observations, model, case.run.prior, levels, seed=case.cell.seed)
         found[name] = off(answer.position_in_object)
     poses = [one.base_from_gel for one in case.run.observations]
-    alone = geometry_and_axis(poses, model, case.run.prior, levels.spacing).position_in_object
+    alone = geometry_and_axis(poses, model, case.run.prior, levels.of(SPACING)).position_in_object
     return {**found, "geometry + axis, told nothing": off(alone)}
 
 

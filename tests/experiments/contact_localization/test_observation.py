@@ -7,7 +7,8 @@ import pytest
 
 from experiments.contact_localization.answer import AROUND_IMAGES, observe_step
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation, height_map, read_contacts
+from experiments.contact_localization.observation import Observation, contact_of, height_map
+from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import DataRefused, RecordingDamaged, WrongUse
@@ -91,6 +92,11 @@ def test_an_untouched_gel_reads_zero(model: Model) -> None:
     assert not height_map(Observation(np.eye(4), background[None]), model).any()
 
 
+def read(observation: Observation, model: Model) -> Contact:
+    heights = height_map(observation, model)
+    return contact_of(observation.base_from_gel, heights, model.sensor.pitch, BLOCK, TouchNoise())
+
+
 def test_contacts_keep_their_poses_and_order_and_show_whether_they_touched(
     model: Model, picture: ByteArray
 ) -> None:
@@ -98,7 +104,7 @@ def test_contacts_keep_their_poses_and_order_and_show_whether_they_touched(
     poses = [transform(np.eye(3), np.array([0.1 * k, 0.0, 0.0])) for k in range(3)]
     images = [picture[None], background[None], picture[None]]
     observations = [Observation(p, i) for p, i in zip(poses, images, strict=True)]
-    contacts = read_contacts(observations, model, BLOCK, TouchNoise())
+    contacts = [read(observation, model) for observation in observations]
     assert [c.shows_contact for c in contacts] == [True, False, True]
     for contact, pose in zip(contacts, poses, strict=True):
         np.testing.assert_array_equal(contact.base_from_gel, pose)
@@ -106,7 +112,7 @@ def test_contacts_keep_their_poses_and_order_and_show_whether_they_touched(
 
 
 def test_the_coarse_map_is_of_the_same_press_at_half_the_resolution(model: Model, picture: ByteArray) -> None:
-    (contact,) = read_contacts([Observation(np.eye(4), picture[None])], model, BLOCK, TouchNoise())
+    contact = read(Observation(np.eye(4), picture[None]), model)
     fine, coarse = contact.touch, contact.coarse
     assert fine is not None
     assert coarse is not None

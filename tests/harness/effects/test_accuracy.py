@@ -11,8 +11,7 @@ ZERO = Knob("rounds", (0, 1, 3), "", "number", 3)
 KNOBS = (GRID, OPTICS, ZERO)
 
 
-def test_finest_coarsest_and_default_choose_a_level_for_every_knob() -> None:
-    assert dict(Accuracy.coarsest(KNOBS)) == {"touch.grid": 30, "touch.optics": "smooth", "rounds": 0}
+def test_finest_and_default_choose_a_level_for_every_knob() -> None:
     assert dict(Accuracy.finest(KNOBS)) == {"touch.grid": 120, "touch.optics": "exact", "rounds": 3}
     assert dict(Accuracy.default(KNOBS)) == {"touch.grid": 60, "touch.optics": "fast", "rounds": 3}
 

@@ -5,23 +5,22 @@ import pytest
 
 from experiments.contact_localization.accuracy.budget import Run, ask
 from experiments.contact_localization.accuracy.dials import (
-    SENSES,
-    SPACING,
     needs_images,
     needs_sound,
     setting_name,
 )
 from experiments.contact_localization.accuracy.front import Front
-from experiments.contact_localization.accuracy.solving import Models, Setting, read, solve
+from experiments.contact_localization.accuracy.solving import Models, read, solve
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.posterior.dials import SENSES, SPACING
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import frame_facing, transform
 from harness.basics.materials import Material
 from harness.bench.sensor import GELSIGHT_R15
 from harness.cost.curve import Point, Sample
 from harness.effects.accuracy import Accuracy
-from harness.experiment.experiment import Target
+from harness.experiment.experiment import Setting, Target
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples import sounding_plate as plate
 

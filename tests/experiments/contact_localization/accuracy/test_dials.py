@@ -1,55 +1,45 @@
 """The estimator's dials: what an operator may choose, and that the choice is what is run."""
 
-from dataclasses import fields
-
 import pytest
 
 from experiments.contact_localization.accuracy.dials import (
     FINEST,
     KNOBS,
-    SENSES,
-    chosen,
-    levels_of,
     needs_sound,
     saves_no_answer_time,
     settings,
     settings_by_count,
 )
 from experiments.contact_localization.accuracy.front import front_of, shipped_curve
-from experiments.contact_localization.posterior.levels import Levels
+from experiments.contact_localization.posterior.dials import (
+    BLOCK,
+    DIALS,
+    PARTICLES,
+    ROUNDS,
+    SAMPLES,
+    SENSES,
+    SPACING,
+)
 from harness.basics.errors import WrongUse
-from harness.effects.accuracy import Accuracy, Knob
-
-OURS = [knob for knob in KNOBS if knob.name.startswith("localization.")]
-
-
-def test_choosing_nothing_is_the_estimators_own_default() -> None:
-    assert levels_of(chosen([])) == Levels()
+from harness.effects.accuracy import Accuracy, Knob, Level
+from tests.support.localization import chosen, dials
 
 
-def test_every_field_of_the_levels_has_its_dial() -> None:
-    assert {knob.name.removeprefix("localization.") for knob in OURS} == {f.name for f in fields(Levels)}
-
-
-@pytest.mark.parametrize("knob", OURS, ids=lambda knob: knob.name)
-def test_turning_one_dial_changes_that_level_and_no_other(knob: Knob) -> None:
-    name = knob.name.removeprefix("localization.")
+@pytest.mark.parametrize("knob", DIALS, ids=lambda knob: knob.name)
+def test_turning_one_dial_changes_that_level_and_no_other(knob: Knob[Level]) -> None:
     for level in knob.levels:
-        found = levels_of(chosen([f"{knob.name}={level}"]))
-        before = Levels()
-        for field in fields(Levels):
-            value = vars(found)[field.name]
-            assert value == (level if field.name == name else vars(before)[field.name])
-            assert type(value) is type(vars(before)[field.name])
+        found = chosen([f"{knob.name}={level}"])
+        assert found == dials().with_({knob.name: level})
+        for other in DIALS:
+            assert found.of(other) == (level if other is knob else other.default)
+            assert type(found.of(other)) is type(other.default)
 
 
 def test_dials_go_from_cheap_to_exact() -> None:
-    coarse, fine = levels_of(Accuracy.coarsest(KNOBS)), levels_of(Accuracy.finest(KNOBS))
-    assert coarse.spacing > fine.spacing
-    assert coarse.particles < fine.particles
-    assert coarse.samples < fine.samples
-    assert coarse.rounds < fine.rounds
-    assert coarse.block > fine.block
+    for falls in (SPACING, BLOCK):
+        assert list(falls.levels) == sorted(falls.levels, reverse=True)
+    for rises in (PARTICLES, SAMPLES, ROUNDS):
+        assert list(rises.levels) == sorted(rises.levels)
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,12 @@ import pytest
 
 from experiments.contact_localization import build_model as model_of
 from experiments.contact_localization.accuracy.benchmark_runs import preparations
-from experiments.contact_localization.accuracy.dials import KNOBS, SENSES, needs_objectfile, settings
+from experiments.contact_localization.accuracy.dials import KNOBS, needs_objectfile, settings
 from experiments.contact_localization.accuracy.front import Front
 from experiments.contact_localization.accuracy.solving import Models
 from experiments.contact_localization.build_model import model_of_run, model_of_scene
 from experiments.contact_localization.model import Model
+from experiments.contact_localization.posterior.dials import SENSES
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.accuracy import table_cell
-from experiments.contact_localization.accuracy.table_cell import METHODS, Cell, cells, scene_of
+from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, scene_of
+from experiments.contact_localization.accuracy.solving import read
+from experiments.contact_localization.accuracy.table_cell import METHODS
 from experiments.contact_localization.experiment import EXPERIMENT, MEASUREMENT
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.baselines import mean_random_error
-from experiments.contact_localization.posterior.levels import Levels
-from harness.basics.clock import now
+from experiments.contact_localization.posterior.dials import SPACING
 from harness.basics.errors import WrongUse
 from harness.basics.symmetry import find_symmetries
 from harness.bench.scene import scene_from_options
@@ -136,9 +137,10 @@ def test_a_refused_fit_of_the_right_object_is_a_failure_at_the_value_of_a_guess(
     poses = [np.eye(4), np.eye(4)]
     observations = tuple(Observation(pose, blank) for pose in poses)
     true = np.array([0.02, -0.0075, 0.025])
-    run = table_cell.PerformedRun(observations, block, np.eye(4), true[None], seed=0)
     symmetry = find_symmetries(block.mesh)
-    answered = table_cell._estimated(run, prior, Levels(spacing=3e-3), symmetry, now())
+    answered = table_cell._estimated(
+        read(observations, block, prior, seed=0), {SPACING.name: 3e-3}, true, symmetry
+    )
     assert answered["error_m"] == answered["error_symmetric_m"] == mean_random_error(block.mesh, true)
     assert answered["in_region90"] is False
     assert "no tactile image" in answered["refused"]

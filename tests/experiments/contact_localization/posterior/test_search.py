@@ -9,15 +9,15 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import geometry_and_axis, geometry_only
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise
-from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.posterior.shared_errors import SharedNoise
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest import nearest_point
 from harness.basics.geometry import rotation_about, rotation_from_vector, translation
 from tests.samples.synthetic_press import BASE_FROM_OBJECT, PRESSES
+from tests.support.localization import dials
 
-QUICK = Levels(spacing=3e-3, samples=1000)
+QUICK = dials(spacing=3e-3, samples=1000)
 UP = np.array([0.0, 0.0, 1.0])
 TRUE = np.array([press.point for press in PRESSES])
 ALL = np.arange(len(PRESSES))

@@ -2,9 +2,9 @@
 
 import pytest
 
-from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.report import _by
 from harness.report.simulated import _said, flat
+from tests.support.localization import dials
 
 
 def test_a_tree_of_values_is_a_row_for_each_leaf() -> None:
@@ -24,6 +24,6 @@ def test_a_value_is_said_in_four_digits_and_nothing_is_not_less_than_nothing(
 
 
 def test_a_run_without_sound_answers_by_touch_whatever_its_levels_say() -> None:
-    assert _by(Levels(senses="both"), heard=False) == "touch"
-    assert _by(Levels(senses="both"), heard=True) == "both"
-    assert _by(Levels(senses="touch", method="particle"), heard=True) == "particle"
+    assert _by(dials(senses="both"), heard=False) == "touch"
+    assert _by(dials(senses="both"), heard=True) == "both"
+    assert _by(dials(senses="touch", method="particle"), heard=True) == "particle"

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.dials import KNOBS, chosen
+from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
@@ -17,7 +17,6 @@ from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
-from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.result import estimate_of, flags_of
 from harness.basics.errors import RecordingDamaged
 from harness.basics.geometry import translation
@@ -28,8 +27,9 @@ from harness.experiment.experiment import Scored
 from harness.experiment.truth import Truth, read_truth
 from harness.recording.recording import Recording
 from tests.samples.synthetic_press import PRESSES
+from tests.support.localization import chosen, dials
 
-QUICK = Levels(spacing=3e-3, rounds=1, samples=300)
+QUICK = dials(spacing=3e-3, rounds=1, samples=300)
 TRUE = {k: np.array(press.point) for k, press in enumerate(PRESSES)}
 
 

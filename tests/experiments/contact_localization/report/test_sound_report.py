@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.contact_localization.accuracy.dials import KNOBS, SPACING
+from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
-from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.sound_report import contact_time, sound_of, strike_line
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import frame_facing, transform
@@ -30,6 +30,7 @@ from harness.report.values import Missing
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples import sounding_plate as plate
 from tests.samples.blows import half_sine
+from tests.support.localization import dials
 
 K = 5
 SCALE = 1.03
@@ -59,7 +60,7 @@ def scored(model: Model, strikes: tuple[Strike | None, ...], asked: bool = True)
         [Contact(pose) for pose in poses],
         model,
         prior,
-        Levels(spacing=COARSE, senses="audio"),
+        dials(spacing=COARSE, senses="audio"),
         Noise(),
         strikes=STRIKES,
     )[-1]

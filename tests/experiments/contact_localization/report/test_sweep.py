@@ -1,34 +1,36 @@
 """Error against seconds, and live beside simulated: what the report draws from one recording."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.solving import levels_at, read
+from experiments.contact_localization.accuracy.dials import accuracy_at
+from experiments.contact_localization.accuracy.solving import read
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
+from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, ROUNDS, SPACING
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
-from experiments.contact_localization.posterior.levels import Levels
 from experiments.contact_localization.report.comparison import object_from_gels
 from experiments.contact_localization.report.sweep import LEVELS, trade
 from harness.basics.arrays import FloatArray
 from harness.sim.optics.optics import Optics
 from tests.samples.synthetic_press import PRESSES, felt
+from tests.support.localization import dials
 
-ALL = {name: levels_at(setting) for name, setting in LEVELS.items()}
+ALL = {name: accuracy_at(setting) for name, setting in LEVELS.items()}
 
 
 def test_the_levels_tried_go_from_cheap_to_exact_for_each_method() -> None:
-    grids = [levels for levels in ALL.values() if levels.method == "grid"]
-    filters = [levels for levels in ALL.values() if levels.method == "particle"]
-    assert [g.spacing for g in grids] == sorted((g.spacing for g in grids), reverse=True)
-    assert [g.rounds for g in grids] == sorted(g.rounds for g in grids)
-    assert [f.particles for f in filters] == sorted(f.particles for f in filters)
-    assert Levels() in grids
-    assert len(set(ALL.values())) == len(ALL)
+    grids = [levels for levels in ALL.values() if levels.of(METHOD) == "grid"]
+    filters = [levels for levels in ALL.values() if levels.of(METHOD) == "particle"]
+    assert [g.of(SPACING) for g in grids] == sorted((g.of(SPACING) for g in grids), reverse=True)
+    assert [g.of(ROUNDS) for g in grids] == sorted(g.of(ROUNDS) for g in grids)
+    assert [f.of(PARTICLES) for f in filters] == sorted(f.of(PARTICLES) for f in filters)
+    assert dials() in grids
+    assert len({tuple(levels.items()) for levels in ALL.values()}) == len(ALL)
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +41,7 @@ def answered(contacts: tuple[Contact, ...], block: Model, prior: Prior) -> Answe
     observations = tuple(
         Observation(c.base_from_gel, image[None]) for c, image in zip(contacts, images, strict=True)
     )
-    quick = Levels(spacing=3e-3, rounds=1, samples=300)
+    quick = dials(spacing=3e-3, rounds=1, samples=300)
     last = locate(contacts, block, prior, quick, Noise())[-1]
     return Answer(observations, tuple(heights), block, prior, last, 0.1)
 
@@ -50,11 +52,11 @@ def test_every_level_is_tried_on_the_same_readings_and_scored(answered: Answer) 
     points = trade(readings, true)
     assert [point.name for point in points] == list(LEVELS)
     for point in points:
-        assert point.levels == ALL[point.name]
+        assert point.accuracy == ALL[point.name]
         assert point.seconds_a_contact > 0.0
         assert 0.0 <= point.error < answered.model.mesh.diagonal
     # Exact readings of a small object: every level of ours is near, whatever it cost.
-    assert max(point.error for point in points if point.levels.method == "grid") < 4e-3
+    assert max(point.error for point in points if point.accuracy.of(METHOD) == "grid") < 4e-3
 
 
 def test_a_gel_is_put_as_deep_behind_its_contact_as_its_image_says(answered: Answer) -> None:
@@ -66,9 +68,3 @@ def test_a_gel_is_put_as_deep_behind_its_contact_as_its_image_says(answered: Ans
         turned = answered.prior.object_from_base(np.array([answered.last.yaw]))[0]
         expected = turned @ answered.observations[k].base_from_gel[:3, :3]
         assert pose[:3, :3] == pytest.approx(expected, abs=1e-12)
-
-
-def test_a_setting_names_no_dial_that_levels_do_not_have() -> None:
-    known = {f"localization.{field.name}" for field in fields(Levels)}
-    for setting in LEVELS.values():
-        assert set(setting) <= known
