@@ -115,4 +115,4 @@ def answer(run: str | Path, levels: Sequence[str] = ()) -> dict[str, Any]:
     recording = Recording(Path(run))
     experiment = experiment_of(recording)
     scored = score(experiment, recording, chosen_levels(experiment.knobs, levels))
-    return {**common(experiment, scored), **experiment.result(scored)}
+    return {**common(experiment, scored), **scored.result}

@@ -5,9 +5,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numba.core.event import install_recorder
 
-from experiments.contact_localization.accuracy.solving import Readings, located, prepare, timed_height_map
+from experiments.contact_localization.accuracy.solving import (
+    Readings,
+    loaded,
+    located,
+    prepare,
+    timed_height_map,
+)
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
@@ -103,10 +108,7 @@ class ContactAnswering:
         station = self._run.station
         aspect = aspect_stated(self._run.calibration.header.made_from)
         seen = observe_step(record, station.flange_from_gel, self._run.acquisition, aspect)
-        with install_recorder("numba:compiler_lock") as loads:
-            heights, cpu, wall = timed_height_map(seen, self.model)
-        if loads.buffer:  # a kernel was compiled or loaded meanwhile: no reading costs that
-            heights, cpu, wall = timed_height_map(seen, self.model)
+        heights, cpu, wall = loaded(lambda: timed_height_map(seen, self.model))
         self._seen.append(seen)
         self._heights.append(heights)
         self._taken = (self._taken[0] + cpu, self._taken[1] + wall)
@@ -124,12 +126,8 @@ class ContactAnswering:
             raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
         senses: tuple[Senses, ...] = SENSES.levels if readings.heard else ("touch",)
         sense = wanted if readings.heard else "touch"
-        with install_recorder("numba:compiler_lock") as loads:
-            last = self._by(sense, readings)
-            others = {other: self._tried(other, readings) for other in senses if other != sense}
-        if loads.buffer:
-            last = replace(last, seconds=self._by(sense, readings).seconds)
-            others = {other: _timed_anew(self._tried(other, readings), one) for other, one in others.items()}
+        last = loaded(lambda: self._by(sense, readings))
+        others = {other: self._tried(other, readings) for other in senses if other != sense}
         seconds = sum(last.seconds.values())
         seen, heights = readings.observations, readings.heights
         return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others)
@@ -147,19 +145,12 @@ class ContactAnswering:
 
     def _tried(self, sense: Senses, readings: Readings) -> Estimate | FitRefused:
         try:
-            return self._by(sense, readings)
+            return loaded(lambda: self._by(sense, readings))
         except FitRefused as refusal:
             return refusal
 
     def _located(self, sense: Senses, readings: Readings, first: int | None) -> tuple[Estimate, ...]:
         return located(readings, self._accuracy.with_({SENSES.name: sense}), first)
-
-
-def _timed_anew(again: Estimate | FitRefused, found: Estimate | FitRefused) -> Estimate | FitRefused:
-    """An answer with the seconds that the same one took when it was asked for again."""
-    if isinstance(found, FitRefused) or isinstance(again, FitRefused):
-        return found
-    return replace(found, seconds=again.seconds)
 
 
 def prior_of(run: RunFiles) -> Prior:

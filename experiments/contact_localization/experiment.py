@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, performed, preparations
-from experiments.contact_localization.accuracy.budget_text import BUDGETS
+from experiments.contact_localization.accuracy.budget import BUDGETS
 from experiments.contact_localization.accuracy.dials import KNOBS, setting_name, settings, settings_by_count
 from experiments.contact_localization.accuracy.paper import PAPER_CM
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
@@ -17,7 +17,8 @@ from experiments.contact_localization.report.report import write
 from experiments.contact_localization.report.result import result_of
 from experiments.contact_localization.section import Localization
 from harness.bench.scene import SceneFile
-from harness.experiment.experiment import Experiment, Helpers, MeasuredCondition, Measurement, Setting
+from harness.effects.accuracy import Setting
+from harness.experiment.experiment import Experiment, Helpers, MeasuredCondition, Measurement
 from harness.recording.run_folder import RunFiles
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between

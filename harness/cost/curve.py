@@ -177,29 +177,9 @@ def best_within(
         prices: s by name of a point, instead of its measured mean.
         errors: m by name of a point, instead of its measured mean: of one object, where one is touched.
     """
-    _refuse_odd(seconds, "a budget", "s")
+    if not (np.isfinite(seconds) and seconds > 0.0):
+        raise WrongUse(f"a budget of {seconds:g} s cannot be kept; give a number above zero")
     price = {p.name: p.seconds.value for p in points} if prices is None else prices
     loss = {p.name: p.error.value for p in points} if errors is None else errors
     within = [point for point in points if price[point.name] <= seconds]
     return min(within, key=lambda p: (loss[p.name], price[p.name]), default=None)
-
-
-def cheapest_within(
-    points: Sequence[Point], error: float, errors: Mapping[str, float] | None = None
-) -> Point | None:
-    """The cheapest setting whose error is at most ``error``; None where none is.
-
-    Args:
-        points: of one condition.
-        error: m, above zero.
-        errors: m by name of a point, instead of its measured mean: a bound, where one is wanted.
-    """
-    _refuse_odd(error, "an error", "m")
-    loss = {p.name: p.error.value for p in points} if errors is None else errors
-    within = [point for point in points if loss[point.name] <= error]
-    return min(within, key=lambda p: (p.seconds.value, loss[p.name]), default=None)
-
-
-def _refuse_odd(value: float, what: str, unit: str) -> None:
-    if not (np.isfinite(value) and value > 0.0):
-        raise WrongUse(f"{what} of {value:g} {unit} cannot be kept; give a number above zero")

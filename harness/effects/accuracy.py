@@ -11,6 +11,9 @@ from harness.basics.toml_file import nearest
 Level = str | int | float
 """One position of a dial: the name of a method, or a number."""
 
+Setting = Mapping[str, Level]
+"""Levels of some dials; what it leaves open is at its default."""
+
 LevelT = TypeVar("LevelT", bound=Level, covariant=True)
 
 

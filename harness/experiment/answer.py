@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -48,17 +48,23 @@ def score(
         FitRefused: nothing explains the readings.
     """
     run = RunFiles(recording)
-    if recording.committed == 0:
-        raise WrongUse(
-            f"{recording.folder} holds no {experiment.step} yet; go on with `touchstone run --resume`"
-        )
+    require_steps(experiment, recording)
     if answering is None:
         answering = experiment.answering(run, accuracy)
         for record in recording.steps():
             answering.read(record)
     found = answering.answer()
     warnings = tuple(recording.header.plan.get("warnings", ()))
-    return Scored(run, answering, found, read_truth(recording), accuracy, warnings)
+    scored = Scored(run, answering, found, read_truth(recording), accuracy, warnings)
+    return replace(scored, result=experiment.result(scored))
+
+
+def require_steps(experiment: Experiment, recording: Recording) -> None:
+    """Refuse a run of which nothing was performed: ``WrongUse``."""
+    if recording.committed == 0:
+        raise WrongUse(
+            f"{recording.folder} holds no {experiment.step} yet; go on with `touchstone run --resume`"
+        )
 
 
 def finish(
@@ -117,7 +123,7 @@ def tell_answer(
 ) -> Told:
     """Answer, write ``result.json``, tell; the arguments are ``finish``'s."""
     scored = score(experiment, recording, accuracy, answering)
-    result = {**common(experiment, scored), **experiment.result(scored), **(more or {})}
+    result = {**common(experiment, scored), **scored.result, **(more or {})}
     result["warnings"] = [*scored.warnings, *result.get("warnings", ())]
     result["answered_after_s"] = None if since is None else now() - since
     _write(folder / RESULT, result)

@@ -18,7 +18,8 @@ from harness.bench.station_file import Station
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import sample_from, sample_json
 from harness.cost.provenance import code, machine
-from harness.experiment.experiment import Experiment, RunCase, RunCell, Say, Setting
+from harness.effects.accuracy import Setting
+from harness.experiment.experiment import Experiment, RunCase, RunCell, Say
 from harness.experiment.tables import measurement_of
 
 _SCHEMA = 2

@@ -4,34 +4,30 @@ Everything else that a run needs is done for every experiment alike by the modul
 rehearse, perform and resume, replay, compare, write the result and the report, tables, cost.
 """
 
-from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.device import Health
-from harness.bench.reading import Reading
 from harness.bench.scene import SceneFile, Section
 from harness.bench.station import Bench
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
-from harness.effects.accuracy import Accuracy, Knob, Level
+from harness.effects.accuracy import Accuracy, Knob, Level, Setting
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
+from harness.experiment.solving import Budgets
 from harness.experiment.truth import Truth
-from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.recording.step_file import Step, StepRecord
+from harness.recording.session import StepPerformer
+from harness.recording.step_file import StepRecord
 
 if TYPE_CHECKING:  # a report knows experiments and needs no simulator of the arm
     from harness.twin.bench import TwinBench
     from harness.twin.rehearsal import RehearsalReport
-
-Setting = Mapping[str, Level]
-"""Levels of some dials; what it leaves open is at its default."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,16 +62,6 @@ class Helpers:
     say: Callable[[str], None] = lambda _: None
 
 
-class Performer(Protocol):
-    """Moves the arm and reads the instruments, a step at a time."""
-
-    def steps(self, recording: Recording) -> Iterator[Step]:
-        """The steps still to perform; may look at what has been recorded so far."""
-
-    def perform(self, step: Step, bench: Bench) -> Sequence[Reading]:
-        """Touch the hardware; everything read is returned, nothing else is kept."""
-
-
 class Answering(Protocol):
     """Readings to answer: each step is read once, and all that needs the readings has them from here."""
 
@@ -102,6 +88,7 @@ class Scored:
         truth: of a mocked run.
         accuracy: the chosen level of every dial.
         warnings: what the operator should know.
+        result: the answer as JSON values.
     """
 
     run: RunFiles
@@ -110,6 +97,7 @@ class Scored:
     truth: Truth | None
     accuracy: Accuracy
     warnings: tuple[str, ...]
+    result: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -224,43 +212,6 @@ class Measurement:
     published: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Target:
-    """What is asked of an answer: one of the two.
-
-    Attributes:
-        seconds: s on the clock for the estimate.
-        error: m.
-    """
-
-    seconds: float | None = None
-    error: float | None = None
-
-    def __post_init__(self) -> None:
-        if (self.seconds is None) == (self.error is None):
-            raise WrongUse("give either a budget of seconds or an error to be met")
-
-
-class Budgets(Protocol):
-    """Answers as asked: within so many seconds, or to an error."""
-
-    def foresee(self, scene: SceneFile, target: Target) -> str:
-        """What will be tried, in a sentence, before anything moves.
-
-        Raises:
-            WrongUse: a budget that cannot be kept.
-        """
-
-    def doubts(self, recording: Recording, target: Target) -> tuple[str, ...]:
-        """What the operator should know of the curve that the answer goes by."""
-
-    def answer(self, recording: Recording, target: Target) -> dict[str, Any]:
-        """What was asked, what it took and at which ``levels``, as JSON values."""
-
-    def sentences(self, cost: Mapping[str, Any]) -> tuple[str, ...]:
-        """The same for people."""
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Procedure:
     """What an arm is to do at a bench, whatever is made of the readings: an experiment's or a calibration's.
@@ -279,7 +230,7 @@ class Procedure:
     step: str
     section: type[Section] | None = None
     plan: Callable[[SceneFile, Station, Mesh, int], Planned]
-    performer: Callable[[RunFiles, Helpers], Performer]
+    performer: Callable[[RunFiles, Helpers], StepPerformer[Bench]]
     plan_key: str = "steps"
     gap: str | None = None
 

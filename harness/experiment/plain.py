@@ -1,29 +1,31 @@
 """Tables and cost curves of an experiment that has no way of its own: runs in process, all dials turned."""
 
 import time
-from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from harness.basics.errors import TouchstoneError
+from harness.basics.errors import FitRefused, TouchstoneError
 from harness.bench.experiments import EXPERIMENTS, loaded
 from harness.bench.scene import SceneFile
 from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
-from harness.effects.accuracy import Accuracy, Knob, Level
+from harness.effects.accuracy import Accuracy, Knob, Level, Setting
 from harness.experiment.begin import begin
-from harness.experiment.experiment import Experiment, Measurement, Say, Scored, Setting
+from harness.experiment.experiment import Experiment, Measurement, Say, Scored
 from harness.experiment.lookup import named
 from harness.experiment.perform import perform_on
+from harness.experiment.solving import Budgets, Solved
+from harness.experiment.subjects import object_key
 from harness.experiment.truth import read_truth
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.recording.step_file import Step
+from harness.recording.session import Quiet
 
 IN_PROCESS = "mocks.in_process.bench:in_process_bench"
 """The mocked bench without sockets, in simulated time."""
@@ -65,45 +67,117 @@ class PlainCell:
 
 
 @dataclass(frozen=True, eq=False)
+class PlainRun:
+    """A recorded run, to be answered at any setting of the dials; settings share nothing.
+
+    Attributes:
+        experiment: that it is of.
+        recording: of it.
+        steps: from how many of its first steps.
+    """
+
+    experiment: Experiment
+    recording: Recording
+    steps: int
+    shared: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def object(self) -> str:
+        """The name that its seconds are measured under."""
+        run = RunFiles(self.recording)
+        return object_key(run.scene.object.name, run.mesh)
+
+    def unfit(self, _setting: Setting) -> None:
+        """It can be answered at every setting."""
+
+    def load(self, settings: Sequence[Setting]) -> None:
+        """Answer once at each setting."""
+        for setting in settings:
+            self.solve(self, setting)
+
+    def prepare(self, _setting: Setting) -> None:
+        """Nothing is known to depend on the object alone."""
+
+    def prepared_alike(self, _one: Setting, _other: Setting) -> bool:
+        """Always."""
+        return True
+
+    def work(self, _setting: Setting) -> float:
+        """As many steps as there are."""
+        return float(self.steps)
+
+    def read(self, _setting: Setting) -> "PlainRun":
+        """Itself: each answer reads its steps."""
+        return self
+
+    def result(self, setting: Setting) -> dict[str, Any]:
+        """The answer as JSON values.
+
+        Raises:
+            FitRefused: nothing explains the readings.
+        """
+        solved = self.solve(self, setting)
+        if solved.refusal is not None:
+            raise FitRefused(solved.refusal)
+        found: dict[str, Any] = solved.found
+        return found
+
+    def solve(self, _readings: "PlainRun", setting: Setting) -> Solved:
+        """The answer as JSON values, timed from the first reading on."""
+        run = RunFiles(self.recording)
+        accuracy = Accuracy.default(self.experiment.knobs).with_(setting)
+        answering = self.experiment.answering(run, accuracy)
+        records = [record for record in self.recording.steps() if record.step.index < self.steps]
+        answer, refusal = None, None
+        cpu, wall = time.process_time(), time.perf_counter()
+        try:
+            for record in records:
+                answering.read(record)
+            answer = answering.answer()
+        except FitRefused as error:
+            refusal = str(error)
+        cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+        if refusal is not None:
+            return Solved(None, None, cpu, wall, refusal)
+        truth = read_truth(self.recording)
+        if truth is not None:
+            truth = replace(truth, points={k: v for k, v in truth.points.items() if k < self.steps})
+        result = self.experiment.result(Scored(run, answering, answer, truth, accuracy, ()))
+        return Solved(result, result.get("credible90_m"), cpu, wall)
+
+    def described(self, solved: Solved) -> dict[str, Any]:
+        """Where its answer is a place, that; its error."""
+        found = solved.found or {}
+        return {
+            "position_m": found.get("position_m"),
+            "error_m": found.get("error_m"),
+            "refused": solved.refusal,
+        }
+
+
+@dataclass(frozen=True, eq=False)
 class PlainCase:
     """A performed run, to be answered at any setting of the dials."""
 
     cell: PlainCell
-    experiment: Experiment
-    recording: Recording
+    run: PlainRun
     kept: TemporaryDirectory[str] = field(repr=False)
 
     @property
     def steps(self) -> int:
         """How many were performed."""
-        return self.recording.committed
+        return self.run.steps
 
     def close(self) -> None:
         """Remove the run's folder."""
         self.kept.cleanup()
 
-    def result(self, setting: Setting, steps: int) -> tuple[dict[str, Any], float, float]:
-        """The answer from the first steps as JSON values, its s of CPU time and on the clock."""
-        run = RunFiles(self.recording)
-        accuracy = Accuracy.default(self.experiment.knobs).with_(setting)
-        answering = self.experiment.answering(run, accuracy)
-        records = [record for record in self.recording.steps() if record.step.index < steps]
-        cpu, wall = time.process_time(), time.perf_counter()
-        for record in records:
-            answering.read(record)
-        found = answering.answer()
-        taken = time.process_time() - cpu, time.perf_counter() - wall
-        truth = read_truth(self.recording)
-        if truth is not None:
-            truth = replace(truth, points={k: v for k, v in truth.points.items() if k < steps})
-        scored = Scored(run, answering, found, truth, accuracy, ())
-        return self.experiment.result(scored), *taken
-
     def sample(self, setting: Setting, steps: int) -> Sample:
         """The error and the seconds of an answer from the first steps."""
-        self.result(setting, steps)  # what is compiled for it is loaded
-        found, cpu, wall = self.result(setting, steps)
-        return Sample(self.cell.name, self.cell.object, found["error_m"], None, 0.0, cpu, wall, float(steps))
+        run = replace(self.run, steps=steps)
+        error = run.result(setting)["error_m"]  # and what is compiled for it is loaded
+        solved, work = run.solve(run, setting), run.work(setting)
+        return Sample(self.cell.name, run.object, error, solved.radius, 0.0, solved.cpu, solved.wall, work)
 
 
 def plain_measurement(name: str, *knobs: Knob[Level]) -> Measurement:
@@ -126,8 +200,25 @@ def plain_measurement(name: str, *knobs: Knob[Level]) -> Measurement:
         methods=tuple(settings),
         performed=_Performs(name),
         settings=lambda _thorough, _chosen, _scenes: tuple(settings.values()),
-        setting_name=lambda setting: next(n for n, levels in settings.items() if levels == setting),
+        setting_name=lambda setting: next(
+            (name for name, levels in settings.items() if levels == setting), "every dial at its finest"
+        ),
     )
+
+
+def plain_budgets(name: str, steps: Callable[[SceneFile], int], *knobs: Knob[Level]) -> Budgets:
+    """How an experiment keeps a budget by its dials alone; errors are promised where it has ``credible90_m``.
+
+    Args:
+        name: of the experiment, as in the table of experiments.
+        steps: that a run of a scene has.
+        knobs: all at their finest for what more time would have given.
+    """
+
+    def solver(run: RunFiles) -> PlainRun:
+        return PlainRun(named(name), run.recording, run.recording.committed)
+
+    return Budgets(solver, {knob.name: knob.levels[-1] for knob in knobs}, steps)
 
 
 def _cells(
@@ -144,9 +235,10 @@ class _Answers:
     settings: Mapping[str, Setting]
 
     def __call__(self, cell: PlainCell, scene: SceneFile, station: Station) -> dict[str, Any]:
-        with _performed(named(self.name), cell, scene, station) as case:
-            found = {name: case.result(levels, case.steps)[0] for name, levels in self.settings.items()}
-            return {"schema": 1, "cell": vars(cell), case.experiment.plural: case.steps, "rows": found}
+        with closing(perform_in_process(named(self.name), cell, scene, station)) as case:
+            run = case.run
+            found = {name: run.result(levels) for name, levels in self.settings.items()}
+            return {"schema": 1, "cell": vars(cell), run.experiment.plural: run.steps, "rows": found}
 
 
 @dataclass(frozen=True)
@@ -182,26 +274,5 @@ def perform_in_process(
     recording = begin(experiment, scene, station, cell.seed, cell.gap, Path(kept.name) / "run").recording
     run = RunFiles(recording)
     context = RunContext(recording.truth_path, run.mesh, cell.seed, cell.gap)
-    perform_on(experiment, loaded(IN_PROCESS)(run.scene, run.station, context), recording, _Quiet())
-    return PlainCase(cell, experiment, recording, kept)
-
-
-@contextmanager
-def _performed(
-    experiment: Experiment, cell: PlainCell, scene: SceneFile, station: Station
-) -> Iterator[PlainCase]:
-    case = perform_in_process(experiment, cell, scene, station)
-    try:
-        yield case
-    finally:
-        case.close()
-
-
-class _Quiet:
-    """A progress that says nothing."""
-
-    def began(self, step: Step) -> None:
-        """Nothing."""
-
-    def ended(self, step: Step, seconds: float) -> None:
-        """Nothing."""
+    perform_on(experiment, loaded(IN_PROCESS)(run.scene, run.station, context), recording, Quiet())
+    return PlainCase(cell, PlainRun(experiment, recording, recording.committed), kept)

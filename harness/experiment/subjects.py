@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from harness.basics.mesh import Mesh
+from harness.basics.store import digest
 from harness.bench.scene import SceneFile, scene_from_options
 from harness.objects.household import MATERIALS
 
@@ -23,3 +25,8 @@ def objects(data: Path | None, builtin_only: bool = False) -> dict[str, SceneFil
         for name, (file, units, material) in REAL.items()
     }
     return {**scenes, **real}
+
+
+def object_key(name: str, mesh: Mesh) -> str:
+    """A name that two different objects do not share: the seconds of an object's runs are kept under it."""
+    return f"{name}-{digest([mesh.vertices, mesh.faces])[:8]}"

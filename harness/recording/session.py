@@ -35,6 +35,16 @@ class Progress(Protocol):
         """A step is on the disk."""
 
 
+class Quiet:
+    """A progress that says nothing."""
+
+    def began(self, step: Step) -> None:
+        """Nothing."""
+
+    def ended(self, step: Step, seconds: float) -> None:
+        """Nothing."""
+
+
 class Interrupt:
     """Ctrl-C once: end after the step. Twice: stop the arm now."""
 

@@ -35,7 +35,7 @@ def write_run_page(
         folder: made if it does not exist.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    run, result = scored.run, experiment.result(scored)
+    run, result = scored.run, scored.result
     named = {"object": run.scene.object.name, "mock": run.recording.header.mock is not None}
     data = {
         **facts_of(experiment.title, scored, comparison, health),

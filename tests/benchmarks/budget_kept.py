@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, Cell, cells, performed
-from experiments.contact_localization.accuracy.budget import ask
-from experiments.contact_localization.accuracy.front import Front, front_of
+from experiments.contact_localization.accuracy.dials import needs_sound
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, Models
+from experiments.contact_localization.experiment import EXPERIMENT
 from harness.basics.whole_file import write_text_whole
 from harness.bench.station_file import load_station, station_path
 from harness.cost.choice import for_budget
@@ -34,8 +34,10 @@ from harness.cost.curve import GROSS, Curve
 from harness.cost.file import curve_path, load, sample_json
 from harness.cost.provenance import code, machine, stale
 from harness.effects.accuracy import Level
+from harness.experiment.budget import ask
 from harness.experiment.costing import workers_of
-from harness.experiment.experiment import Target
+from harness.experiment.front import Front, front_of
+from harness.experiment.solving import Target
 from harness.experiment.subjects import objects
 
 SHARE = 0.95
@@ -108,8 +110,8 @@ def _front(curve: Curve, cell: Cell, reasons: Sequence[str]) -> Front:
         "yaw": cell.yaw,
         "contacts": CONTACTS,
     }
-    found = front_of(curve, wanted, reasons, shipped=False)
-    return found if cell.sound else found.unheard()
+    found = front_of(EXPERIMENT, curve, wanted, reasons, shipped=False)
+    return found if cell.sound else found.fitting(lambda setting: "unheard" if needs_sound(setting) else None)
 
 
 def _record(case: Case, front: Front) -> dict[str, Any]:
@@ -122,7 +124,7 @@ def _record(case: Case, front: Front) -> dict[str, Any]:
 
 def _asked(case: Case, front: Front, target: Target) -> dict[str, Any]:
     refused = target.seconds is not None and not _foreseen(case, front, target.seconds)
-    found = ask(case.run, front, target, loaded=True)
+    found = ask(case.run, front, target)
     return {
         "asked": target.seconds if target.seconds is not None else target.error,
         "refused_before": refused,

@@ -16,11 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.front import front_of
+from experiments.contact_localization.experiment import EXPERIMENT
 from harness.cost.choice import for_error
 from harness.cost.curve import Point, Sample
 from harness.cost.file import load
 from harness.cost.promise import promise
+from harness.experiment.front import front_of
 
 SHIPPED = Path(__file__).parents[2] / "experiments" / "contact_localization" / "data" / "cost.json"
 ERRORS = (2e-3, 3e-3, 5e-3, 8e-3, 12e-3, 20e-3)
@@ -44,7 +45,7 @@ def main() -> None:
     promised = met = 0
     for spacing in ("close", "spread"):
         condition = {"spacing": spacing, "gap": "default", "yaw": "known", "contacts": 6}
-        points = front_of(curve, condition, (), shipped=False).points
+        points = front_of(EXPERIMENT, curve, condition, (), shipped=False).points
         for error in ERRORS:
             answers = list(left_out(points, error))
             promised += sum(answer.promised for answer in answers)

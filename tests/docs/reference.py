@@ -147,7 +147,7 @@ def _effects() -> list[str]:
     return lines
 
 
-def _dials(knobs: Iterable[Knob]) -> list[str]:
+def _dials(knobs: Iterable[Knob[Any]]) -> list[str]:
     rows = [
         (f"`{k.name}`", _listed(k.levels), f"`{k.default}`", k.unit or "", markdown(k.meaning)) for k in knobs
     ]

@@ -3,21 +3,19 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pytest
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells
-from experiments.contact_localization.accuracy.budget import answer_within
-from experiments.contact_localization.accuracy.budget_text import as_json, doubts, sentences, staleness
+from experiments.contact_localization.accuracy.budget import shipped_curve
 from experiments.contact_localization.accuracy.dials import (
     FINEST,
     KNOBS,
     setting_name,
     settings,
 )
-from experiments.contact_localization.accuracy.front import Front, foresee, front_for, shipped_curve
-from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM, object_key
+from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.dials import METHOD, SPACING
 from harness.basics.errors import WrongUse
@@ -28,9 +26,11 @@ from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import curve_path, load, save
 from harness.cost.provenance import code, machine
 from harness.effects.accuracy import Accuracy, Level
+from harness.experiment.budget import answer_as_asked, sentences
 from harness.experiment.costing import Work, gathered, joined, measure
-from harness.experiment.experiment import Target
-from harness.experiment.subjects import objects
+from harness.experiment.front import Front, doubts, foresee, front_for, staleness
+from harness.experiment.solving import Target
+from harness.experiment.subjects import object_key, objects
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from tests.support import sessions as session_of
@@ -78,30 +78,33 @@ def curve_of(recording: Recording, coarse_cpu: float = 0.2, fine_cpu: float = 3.
     return Curve(PROGRAM, points, machine(), code(ESTIMATOR), "2026-01-01T00:00:00+00:00", "T")
 
 
+def front_of_run(recording: Recording) -> Front:
+    return front_for(EXPERIMENT, RunFiles(recording).scene, recording.committed)
+
+
+def answered(recording: Recording, target: Target) -> dict[str, Any]:
+    return answer_as_asked(EXPERIMENT, recording, front_of_run(recording), target)
+
+
 def test_a_budget_takes_what_keeps_it_and_says_what_it_took(done: Recording, cache: Path) -> None:
     save(curve_of(done), curve_path(PROGRAM))
-    front = front_for(RunFiles(done).scene, done.committed)
-    assert front.trusted
-    target = Target(seconds=30.0)
-    found = answer_within(done, front, target)
-    assert found.asked.point.levels == DEFAULT
-    assert found.asked.kept
-    assert found.asked.cpu < 30.0
-    said = as_json(found, front, target, done)
+    assert front_of_run(done).trusted
+    said = answered(done, Target(seconds=30.0))
+    assert said["levels"] == DEFAULT
+    assert said["cpu_s"] < 30.0
     assert said["kept"] is True
     assert said["error_m"] < 20e-3
     assert said["finest"]["error_m"] is not None
-    assert "kept" in sentences(said)[0]
-    assert "not counted" in sentences(said)[1]
+    assert "kept" in sentences(EXPERIMENT, said)[0]
+    assert "not counted" in sentences(EXPERIMENT, said)[1]
     json.dumps(said, allow_nan=False)
 
 
 def test_a_budget_too_small_for_the_finer_setting_takes_the_coarser(done: Recording, cache: Path) -> None:
     save(curve_of(done, 0.01, 1e4), curve_path(PROGRAM))
-    front = front_for(RunFiles(done).scene, done.committed)
-    found = answer_within(done, front, Target(seconds=20.0)).asked
-    assert found.point.levels == COARSE
-    assert found.tried == (setting_name(COARSE),)
+    found = answered(done, Target(seconds=20.0))
+    assert found["levels"] == COARSE
+    assert found["tried"] == [setting_name(COARSE)]
 
 
 def test_the_answer_within_a_budget_is_the_run_s_answer_at_those_levels(
@@ -109,71 +112,63 @@ def test_the_answer_within_a_budget_is_the_run_s_answer_at_those_levels(
 ) -> None:
     save(curve_of(done), curve_path(PROGRAM))
     recording = copied(done, tmp_path / "copy")
-    front = front_for(RunFiles(recording).scene, recording.committed)
-    found = answer_within(recording, front, Target(seconds=30.0)).asked
-    assert found.solved.estimate is not None
-    scored = session_of.score(recording, Accuracy.default(KNOBS).with_(found.point.levels))
-    np.testing.assert_array_equal(
-        scored.found.last.position_in_object, found.solved.estimate.position_in_object
-    )
+    found = answered(recording, Target(seconds=30.0))
+    scored = session_of.score(recording, Accuracy.default(KNOBS).with_(found["levels"]))
+    assert scored.found.last.position_in_object.tolist() == found["position_m"]
 
 
 def test_an_error_is_promised_from_the_answer_s_own_radius_or_not_at_all(
     done: Recording, cache: Path
 ) -> None:
     save(curve_of(done), curve_path(PROGRAM))
-    front = front_for(RunFiles(done).scene, done.committed)
-    generous = answer_within(done, front, Target(error=0.1)).asked
-    assert generous.tried == (setting_name(COARSE),)
-    assert generous.kept
-    assert generous.promise <= 0.1
-    strict = answer_within(done, front, Target(error=1e-6))
-    assert not strict.asked.kept
-    said = as_json(strict, front, Target(error=1e-6), done)
-    assert "cannot be promised" in sentences(said)[0]
+    generous = answered(done, Target(error=0.1))
+    assert generous["tried"] == [setting_name(COARSE)]
+    assert generous["kept"]
+    assert generous["promised_error_m"] <= 0.1
+    strict = answered(done, Target(error=1e-6))
+    assert not strict["kept"]
+    assert "cannot be promised" in sentences(EXPERIMENT, strict)[0]
 
 
 def test_nothing_is_promised_from_more_contacts_than_the_run_has(done: Recording, cache: Path) -> None:
     measured = curve_of(done)
     more = tuple(replace(point, condition={**point.condition, "contacts": 6}) for point in measured.points)
     save(replace(measured, points=more), curve_path(PROGRAM))
-    front, target = front_for(RunFiles(done).scene, done.committed), Target(error=0.1)
+    front, target = front_of_run(done), Target(error=0.1)
     assert front.scale == 0.5
-    assert any("measured with 6 contacts" in said for said in doubts(front, target))
-    found = answer_within(done, front, target)
-    assert not found.asked.kept
-    assert as_json(found, front, target, done)["promised_error_m"] is None
+    assert any("measured with 6 contacts" in said for said in doubts(EXPERIMENT, front, target))
+    found = answered(done, target)
+    assert not found["kept"]
+    assert found["promised_error_m"] is None
 
 
 def test_a_budget_that_cannot_be_kept_is_refused_before_anything_moves(done: Recording, cache: Path) -> None:
     save(curve_of(done), curve_path(PROGRAM))
-    run = RunFiles(done)
-    front = front_for(run.scene, done.committed)
-    name = object_key(run.scene.object.name, run.mesh)
+    scene = RunFiles(done).scene
     with pytest.raises(WrongUse, match="the cheapest setting may take"):
-        foresee(front, Target(seconds=1e-3), name)
-    assert "at most" in foresee(front, Target(seconds=30.0), name)
+        foresee(EXPERIMENT, scene, Target(seconds=1e-3))
+    assert "at most" in foresee(EXPERIMENT, scene, Target(seconds=30.0))
 
 
 def test_without_a_curve_of_this_machine_the_one_that_came_along_is_gone_by_and_said_to_be_stale(
     done: Recording, cache: Path
 ) -> None:
-    front = front_for(RunFiles(done).scene, done.committed)
+    front = front_of_run(done)
     assert front.shipped
     for point in shipped_curve().points:
         Accuracy.default(KNOBS).with_(point.levels)  # levels that today's dials have
     if not front.trusted:
-        assert "touchstone cost" in staleness(front)
+        assert "touchstone cost" in staleness(EXPERIMENT, front)
     assert not curve_path(PROGRAM).exists()
 
 
 def test_a_curve_of_other_code_is_used_but_not_trusted(done: Recording, cache: Path) -> None:
     old = curve_of(done)
     save(Curve(PROGRAM, old.points, old.machine, {**old.code, "sha256": "0"}, old.made), curve_path(PROGRAM))
-    front = front_for(RunFiles(done).scene, done.committed)
+    front = front_of_run(done)
     assert not front.trusted
     assert not front.shipped
-    assert "code has changed" in staleness(front)
+    assert "code has changed" in staleness(EXPERIMENT, front)
 
 
 @pytest.mark.parametrize(

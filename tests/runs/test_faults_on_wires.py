@@ -22,11 +22,11 @@ from harness.experiment.experiment import Experiment
 from harness.experiment.perform import Performed
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.recording.session import Progress
+from harness.recording.session import Progress, Quiet
 from harness.recording.step_file import Step
 from mocks.in_process.bench import in_process_bench
 from tests.support import sessions as session_of
-from tests.support.whole_run import Quiet, copied, edited
+from tests.support.whole_run import copied, edited
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),

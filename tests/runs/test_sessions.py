@@ -19,10 +19,11 @@ from harness.cli import invoke
 from harness.commands.output import warn
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
+from harness.recording.session import Quiet
 from harness.recording.step_file import Step
 from mocks.in_process.bench import in_process_bench
 from tests.support import sessions as session_of
-from tests.support.whole_run import Quiet, copied, edited, in_process_run, touch_scene
+from tests.support.whole_run import copied, edited, in_process_run, touch_scene
 
 PACKETS_APART = 0.1e-3
 """m: simulated packets are 0.4 mm of the search apart, and the touch is interpolated between two."""

@@ -10,9 +10,10 @@ from experiments.contact_localization.experiment import EXPERIMENT
 from harness.experiment import perform
 from harness.experiment.answer import RESULT, finish
 from harness.recording.recording import Recording
+from harness.recording.session import Quiet
 from mocks.in_process.bench import in_process_bench
 from tests.support.localization import chosen
-from tests.support.whole_run import Quiet, copied
+from tests.support.whole_run import copied
 
 
 def test_the_result_is_written_and_told_before_anything_is_drawn(

@@ -33,6 +33,7 @@ from harness.experiment.subjects import REAL, objects
 from harness.objects.household import MATERIALS
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
+from harness.recording.session import Quiet
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.bench import in_process_bench
 from mocks.lab_scene import nominal_bench
@@ -40,7 +41,7 @@ from mocks.world.world import World
 from tests.support import sessions as session_of
 from tests.support.localization import answer, dials, estimate
 from tests.support.real_data import find_shared_data
-from tests.support.whole_run import Quiet, copied, touch_scene
+from tests.support.whole_run import copied, touch_scene
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux"),

@@ -17,11 +17,10 @@ from harness.experiment.perform import Performed
 from harness.recording.codecs import decode_jpeg
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.recording.session import Progress
+from harness.recording.session import Progress, Quiet
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.bench import in_process_bench
 from mocks.world.gap_draw import GapDraw
-from tests.support.whole_run import Quiet
 
 RADIUS = 2e-3
 

@@ -12,19 +12,10 @@ from harness.bench.station import RunContext
 from harness.bench.station_file import load_station, station_path
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.recording.step_file import Step, StepRecord, write_step
+from harness.recording.session import Quiet
+from harness.recording.step_file import StepRecord, write_step
 from mocks.in_process.bench import in_process_bench
 from tests.support import sessions as session_of
-
-
-class Quiet:
-    """A progress that says nothing."""
-
-    def began(self, step: Step) -> None:
-        """Nothing."""
-
-    def ended(self, step: Step, seconds: float) -> None:
-        """Nothing."""
 
 
 def touch_scene(mesh: str = "builtin:mug", contacts: int = 3, spacing: str = "spread") -> SceneFile:

@@ -18,10 +18,9 @@ from experiments.contact_localization.accuracy.dials import SIMULATED, needs_ima
 from experiments.contact_localization.accuracy.solving import (
     Models,
     Readings,
-    Solved,
-    object_key,
+    loaded,
     prepare,
-    solve_loaded,
+    solve,
 )
 from experiments.contact_localization.answer import in_time, observe_step
 from experiments.contact_localization.build_model import model_of_scene
@@ -37,8 +36,11 @@ from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
+from harness.effects.accuracy import Setting
 from harness.effects.scene_object import known_object
-from harness.experiment.experiment import Say, Setting
+from harness.experiment.experiment import Say
+from harness.experiment.solving import Solved
+from harness.experiment.subjects import object_key
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.run_folder import station_acquisition, station_calibration
 from harness.recording.step_file import Step, StepRecord
@@ -112,34 +114,33 @@ class Case:
         readings = self.readings(setting).first(contacts)
         prepare(readings.model, setting)
         with _uncollected():
-            solved = solve_loaded(readings, setting)
-        radius = None if solved.estimate is None else solved.estimate.credible90
+            solved = loaded(lambda: solve(readings, setting))
         shared = readings.shared[0] if needs_images(setting) else 0.0
         error = self.error_of(solved, contacts)
         return Sample(
             self.cell.name,
             self.run.object,
             error,
-            radius,
+            solved.radius,
             shared,
             solved.cpu,
             solved.wall,
-            self.places_left(contacts),
+            self.work(contacts),
         )
 
-    def places_left(self, contacts: int) -> float:
+    def work(self, contacts: int) -> float:
         """By the first contacts: how much there is to do."""
         if contacts not in self._left:
             run = replace(self.run, observations=self.run.observations[:contacts])
-            self._left[contacts] = run.places_left({})
+            self._left[contacts] = run.work({})
         return self._left[contacts]
 
     def error_of(self, solved: Solved, contacts: int) -> float:
         """m, of the last of the first contacts; a refused answer counts as a random one."""
         true = self.true_points[contacts - 1]
-        if solved.estimate is None:
+        if solved.found is None:
             return mean_random_error(self.mesh, true)
-        return float(np.linalg.norm(solved.estimate.position_in_object - true))
+        return float(np.linalg.norm(solved.found.position_in_object - true))
 
 
 @contextmanager

@@ -12,11 +12,10 @@ from experiments.contact_localization.posterior.dials import (
     SENSES,
     SPACING,
 )
-from harness.effects.accuracy import Accuracy, Knob, Level
+from harness.effects.accuracy import Accuracy, Knob, Level, Setting
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
 from harness.effects.sound_effects import EDGE, MODES, SHAPES
-from harness.experiment.experiment import Setting
 
 KNOBS = (*DIALS, *knobs_of(EFFECTS))
 
@@ -25,17 +24,20 @@ SIMULATED: tuple[Knob[Level], ...] = (MODES, EDGE, SHAPES)
 Its other terms are its own, and only the comparison of a report draws simulated readings."""
 
 
-def _grid(senses: str, spacing: float, rounds: int, samples: int, block: int) -> dict[str, Level]:
+def grid(senses: str, spacing: float, rounds: int, samples: int, block: int) -> dict[str, Level]:
+    """The posterior over a grid, refined: by senses, spacing in m, most rounds, draws, pixels averaged."""
     dials = {SPACING.name: spacing, ROUNDS.name: rounds, SAMPLES.name: samples, BLOCK.name: block}
     return {SENSES.name: senses, METHOD.name: "grid", **dials}
 
 
-def _particles(number: int, spacing: float, block: int) -> dict[str, Level]:
+def particles(number: int, spacing: float, block: int) -> dict[str, Level]:
+    """The paper's filter, by touch."""
     dials = {SPACING.name: spacing, PARTICLES.name: number, BLOCK.name: block}
     return {SENSES.name: "touch", METHOD.name: "particle", **dials}
 
 
-def _by_sound(spacing: float) -> dict[str, Level]:
+def by_sound(spacing: float) -> dict[str, Level]:
+    """The grid by sound alone, which no other dial of it changes."""
     return {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: spacing}
 
 
@@ -54,7 +56,7 @@ _GRIDS = (
 )
 """Spacing, rounds, samples and block: from the cheapest to the finest, where the front is likely to lie."""
 
-FINEST = _grid("both", 1.5e-3, 5, 6000, 8)
+FINEST = grid("both", 1.5e-3, 5, 6000, 8)
 """What is asked after an answer, to say what more time would have given."""
 
 
@@ -72,12 +74,12 @@ def settings(thorough: bool = False, sound: bool = True, objectfile: bool = Fals
         objectfile: whether every scene names one, from which modes can come too.
     """
     found = [
-        *(_grid("touch", *dials) for dials in _GRIDS),
-        *(_particles(*dials) for dials in ((300, 4e-3, 16), (1000, 2e-3, 8), (3000, 2e-3, 8))),
+        *(grid("touch", *dials) for dials in _GRIDS),
+        *(particles(*dials) for dials in ((300, 4e-3, 16), (1000, 2e-3, 8), (3000, 2e-3, 8))),
     ]
     if sound:
-        found += [_grid("both", *dials) for dials in _GRIDS]
-        found += [_by_sound(float(spacing)) for spacing in SPACING.levels]
+        found += [grid("both", *dials) for dials in _GRIDS]
+        found += [by_sound(float(spacing)) for spacing in SPACING.levels]
         found += _other_modes()
         found += _other_shapes() if objectfile else []
     for turned in _turned(sound) if thorough else ():
@@ -88,18 +90,18 @@ def settings(thorough: bool = False, sound: bool = True, objectfile: bool = Fals
 
 def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
     """The few settings that are measured with fewer contacts too."""
-    cheapest = _grid("touch", *_COARSEST)
+    cheapest = grid("touch", *_COARSEST)
     dials = ((2e-3, 0, 3000, 16), _DEFAULT)
-    touch = [cheapest, *(_grid("touch", *each) for each in dials)]
-    both = [_grid("both", *each) for each in dials]
-    return [*touch, *both, _by_sound(4e-3), _by_sound(2e-3)] if sound else touch
+    touch = [cheapest, *(grid("touch", *each) for each in dials)]
+    both = [grid("both", *each) for each in dials]
+    return [*touch, *both, by_sound(4e-3), by_sound(2e-3)] if sound else touch
 
 
 def _other_modes() -> list[dict[str, Level]]:
     """Fewer modes, and modes of coarser elements, than the default ones."""
     few: tuple[dict[str, Level], ...] = ({MODES.name: 16}, {MODES.name: 32}, {EDGE.name: 0.7})
-    full, quick = _grid("both", *_DEFAULT), _grid("both", *_COARSEST)
-    return [*({**full, **level} for level in few), {**quick, **few[0]}, {**_by_sound(2e-3), **few[1]}]
+    full, quick = grid("both", *_DEFAULT), grid("both", *_COARSEST)
+    return [*({**full, **level} for level in few), {**quick, **few[0]}, {**by_sound(2e-3), **few[1]}]
 
 
 def _other_shapes() -> list[dict[str, Level]]:
@@ -107,14 +109,14 @@ def _other_shapes() -> list[dict[str, Level]]:
     others: list[dict[str, Level]] = [
         {SHAPES.name: level} for level in SHAPES.levels if level != SHAPES.default
     ]
-    quick = (_grid("both", *_COARSEST), _grid("both", *_DEFAULT), _by_sound(2e-3))
+    quick = (grid("both", *_COARSEST), grid("both", *_DEFAULT), by_sound(2e-3))
     return [{**setting, **shapes} for shapes in others for setting in quick]
 
 
 def _turned(sound: bool) -> Iterator[dict[str, Level]]:
     """Every dial of the grid turned from its default, one at a time."""
     for senses in ("touch", "both") if sound else ("touch",):
-        default = _grid(senses, *_DEFAULT)
+        default = grid(senses, *_DEFAULT)
         for knob in (SPACING, ROUNDS, SAMPLES, BLOCK, *((MODES, EDGE) if senses == "both" else ())):
             for level in knob.levels:
                 if level == knob.default:

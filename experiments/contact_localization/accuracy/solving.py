@@ -3,21 +3,22 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from numba.core.event import install_recorder
 
 from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_at, needs_images, needs_sound
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation, contact_of, height_map
-from experiments.contact_localization.posterior.dials import BLOCK, SENSES, SPACING
+from experiments.contact_localization.posterior.dials import BLOCK, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
-from harness.basics.mesh import Mesh
-from harness.basics.store import digest
-from harness.effects.accuracy import Accuracy, Level
-from harness.experiment.experiment import Setting
+from harness.effects.accuracy import Accuracy, Level, Setting
+from harness.experiment.solving import Solved
+
+T = TypeVar("T")
 
 PROGRAM = "contact-localization"
 ESTIMATOR = "experiments.contact_localization.posterior.estimate"
@@ -62,23 +63,6 @@ class Readings:
             heights=self.heights[:count],
             shared=(share * self.shared[0], share * self.shared[1]),
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """An answer and what it took beyond what is shared.
-
-    Attributes:
-        estimate: None where the fit was refused.
-        cpu: s of CPU time.
-        wall: s on the clock.
-        refusal: why, where it was refused.
-    """
-
-    estimate: Estimate | None
-    cpu: float
-    wall: float
-    refusal: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,11 +114,18 @@ def timed_height_map(observation: Observation, model: Model) -> tuple[FloatArray
     return heights, time.process_time() - cpu, time.perf_counter() - wall
 
 
+def loaded(timed: Callable[[], T]) -> T:
+    """What times itself, once more where a kernel was compiled or loaded meanwhile: nothing counts that."""
+    with install_recorder("numba:compiler_lock") as loads:
+        found = timed()
+    return timed() if loads.buffer else found
+
+
 def prepare(model: Model, setting: Setting) -> None:
     """Make what depends on the object alone, before any reading is needed: its samples and gains."""
     spacing = accuracy_at(setting).of(SPACING)
     _ = model.surface(spacing).tree
-    if model.modes is not None and needs_sound({SENSES.name: SENSES.default, **setting}):
+    if model.modes is not None and needs_sound(setting):
         model.gains(spacing)
 
 
@@ -147,7 +138,8 @@ def solve(readings: Readings, setting: Setting) -> Solved:
         estimate = located(readings, accuracy)[-1]
     except FitRefused as error:
         refusal = str(error)
-    return Solved(estimate, time.process_time() - cpu, time.perf_counter() - wall, refusal)
+    taken = time.process_time() - cpu, time.perf_counter() - wall
+    return Solved(estimate, None if estimate is None else estimate.credible90, *taken, refusal)
 
 
 def located(readings: Readings, accuracy: Accuracy, first: int | None = None) -> tuple[Estimate, ...]:
@@ -164,13 +156,6 @@ def located(readings: Readings, accuracy: Accuracy, first: int | None = None) ->
     return locate(contacts, model, prior, accuracy, noise, seed, first, seconds, strikes)
 
 
-def solve_loaded(readings: Readings, setting: Setting) -> Solved:
-    """As ``solve``, once more where a kernel was compiled or loaded meanwhile: no answer costs that."""
-    with install_recorder("numba:compiler_lock") as loads:
-        solved = solve(readings, setting)
-    return solve(readings, setting) if loads.buffer else solved
-
-
 def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> list[Contact]:
     if not images:
         return [Contact(observation.base_from_gel) for observation in readings.observations]
@@ -179,8 +164,3 @@ def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> lis
         contact_of(observation.base_from_gel, heights, pitch, block, noise.touch)
         for observation, heights in zip(readings.observations, readings.heights, strict=True)
     ]
-
-
-def object_key(name: str, mesh: Mesh) -> str:
-    """A name that two different objects do not share."""
-    return f"{name}-{digest([mesh.vertices, mesh.faces])[:8]}"

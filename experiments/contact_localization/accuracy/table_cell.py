@@ -8,11 +8,7 @@ import numpy as np
 from experiments.contact_localization.accuracy.benchmark_runs import Cell, perform
 from experiments.contact_localization.accuracy.dials import accuracy_at, needs_images
 from experiments.contact_localization.accuracy.solving import Readings, solve
-from experiments.contact_localization.posterior.baselines import (
-    geometry_and_axis,
-    geometry_only,
-    mean_random_error,
-)
+from experiments.contact_localization.posterior.baselines import mean_random_error, without_images
 from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, SENSES, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
@@ -24,7 +20,7 @@ from harness.basics.clock import now
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
-from harness.experiment.experiment import Setting
+from harness.effects.accuracy import Setting
 
 METHODS = ("random", "geometry", "geometry + axis", "paper's touch filter", "touch")
 HEARD = ("paper's MFCC filter", "audio", "both")
@@ -53,9 +49,9 @@ def _scored(method: str, readings: Readings, true: FloatArray, symmetry: Symmetr
         error = mean_random_error(readings.model.mesh, true)
         return {"error_m": error, "error_symmetric_m": None, "seconds": 0.0}
     if method.startswith("geometry"):
-        method_of = geometry_and_axis if method.endswith("axis") else geometry_only
         poses = [observation.base_from_gel for observation in readings.observations]
-        point = method_of(poses, readings.model, readings.prior, SPACING.default).position_in_object
+        axis = method.endswith("axis")
+        point = without_images(poses, readings.model, readings.prior, SPACING.default, axis)
         return _errors(point, true, symmetry, now() - start)
     if method == "paper's MFCC filter":
         return _errors(_by_mfcc(readings), true, symmetry, now() - start)
@@ -80,7 +76,7 @@ def _estimated(
 ) -> dict[str, Any]:
     solved = solve(readings, setting)
     seconds = solved.wall + (readings.shared[1] if needs_images(setting) else 0.0)
-    if solved.estimate is None:
+    if solved.found is None:
         # A refused fit of the right object is a failure, counted at the value of a random answer.
         error = mean_random_error(readings.model.mesh, true)
         return {
@@ -90,8 +86,8 @@ def _estimated(
             "refused": solved.refusal,
             "in_region90": False,
         }
-    scored = _errors(solved.estimate.position_in_object, true, symmetry, seconds)
-    return {**scored, **_sureness(solved.estimate, true)}
+    scored = _errors(solved.found.position_in_object, true, symmetry, seconds)
+    return {**scored, **_sureness(solved.found, true)}
 
 
 def _sureness(found: Estimate, true: FloatArray) -> dict[str, Any]:

@@ -5,7 +5,6 @@ made; a method that reads tactile images must be seen beside them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,73 +24,27 @@ estimate's own noise of places unread (179 runs: 14.5 against 15.7 mm in the mea
 against 3.5 mm with spread ones)."""
 
 
-@dataclass(frozen=True, eq=False)
-class BaselineAnswer:
-    """An answer without images.
-
-    Attributes:
-        position_in_object: ``(3,)`` metres, on the surface.
-        candidates: ``(10, 3)`` metres, the most probable samples.
-    """
-
-    position_in_object: FloatArray
-    candidates: FloatArray
-
-
-def random_point(mesh: Mesh, seed: int) -> FloatArray:
-    """``(3,)`` metres: a point drawn evenly from the surface, the paper's baseline."""
-    return np.asarray(random_points(mesh, 1, np.random.default_rng(seed))[0][0])
-
-
 def mean_random_error(mesh: Mesh, truth_in_object: FloatArray, count: int = 4000) -> float:
     """Metres: the mean distance from a point drawn evenly from the surface to a ``(3,)`` truth."""
     points = random_points(mesh, count, np.random.default_rng(0))[0]
     return float(np.linalg.norm(points - truth_in_object, axis=1).mean())
 
 
-def geometry_only(
-    base_from_gels: Sequence[FloatArray],
-    model: Model,
-    prior: Prior,
-    spacing: float,
-    noise: Noise | None = None,
-) -> BaselineAnswer:
-    """Where the last contact was, from the arm's translations alone: all contacts lie on the surface.
+def without_images(
+    base_from_gels: Sequence[FloatArray], model: Model, prior: Prior, spacing: float, use_axis: bool = False
+) -> FloatArray:
+    """``(3,)`` metres, on the surface: the last contact, by this alone that all contacts lie on the object.
 
     Args:
-        base_from_gels: ``(4, 4)`` each, in order.
+        base_from_gels: ``(4, 4)`` each, in order; only the translations between them are used.
         model: of the object.
         prior: of its orientation.
         spacing: metres between surface samples.
-        noise: of places.
+        use_axis: whether the tool is taken to have stood near the surface's normal at every contact.
     """
-    return _without_images(base_from_gels, model, prior, spacing, noise or _BY_PLACES, use_axis=False)
-
-
-def geometry_and_axis(
-    base_from_gels: Sequence[FloatArray],
-    model: Model,
-    prior: Prior,
-    spacing: float,
-    noise: Noise | None = None,
-) -> BaselineAnswer:
-    """As ``geometry_only``, and the tool stood near the surface's normal at every contact."""
-    return _without_images(base_from_gels, model, prior, spacing, noise or _BY_PLACES, use_axis=True)
-
-
-def _without_images(
-    base_from_gels: Sequence[FloatArray],
-    model: Model,
-    prior: Prior,
-    spacing: float,
-    noise: Noise,
-    use_axis: bool,
-) -> BaselineAnswer:
     contacts = [Contact(np.asarray(pose)) for pose in base_from_gels]
-    search = Search(contacts, model, prior, spacing, noise)
+    search = Search(contacts, model, prior, spacing, _BY_PLACES)
     last = len(contacts) - 1
     hypotheses = search.grid(np.arange(len(contacts)), last, use_axis)
     points = search.contact_places(last, hypotheses)
-    ranked = np.argsort(-hypotheses.log_weights, kind="stable")[:10]
-    position = nearest_point(model.mesh, best_point(points, hypotheses.weights))
-    return BaselineAnswer(position, points[ranked])
+    return nearest_point(model.mesh, best_point(points, hypotheses.weights))

@@ -52,9 +52,7 @@ class Particles:
         return np.asarray(self.points[np.argsort(-self.log_weights, kind="stable")[:CANDIDATES]])
 
 
-def particle_filter(
-    search: Search, count: int, particles: int, seed: int, temperature: float = TEMPERATURE
-) -> Particles:
+def particle_filter(search: Search, count: int, particles: int, seed: int) -> Particles:
     """Run the filter by touch over the first ``count`` contacts.
 
     Args:
@@ -62,13 +60,12 @@ def particle_filter(
         count: contacts.
         particles: how many.
         seed: of the start and of the resampling.
-        temperature: of the weights.
     """
 
     def felt(k: int, at: IntArray, yaws: FloatArray) -> FloatArray | None:
         return _similarity(search, k, at, yaws) if search.contacts[k].shows_contact else None
 
-    return filtered(search, count, felt, particles, seed, temperature)
+    return filtered(search, count, felt, particles, seed)
 
 
 def filtered(
@@ -77,7 +74,6 @@ def filtered(
     similarity: Similarity,
     particles: int,
     seed: int,
-    temperature: float = TEMPERATURE,
 ) -> Particles:
     """Run the filter by any sense over the first ``count`` contacts.
 
@@ -87,7 +83,6 @@ def filtered(
         similarity: of each contact's reading.
         particles: how many.
         seed: of the start and of the resampling.
-        temperature: of the weight ``exp(similarity / temperature)``.
     """
     rng = np.random.default_rng(seed)
     surface = search.surface
@@ -101,7 +96,7 @@ def filtered(
             at = _nearest(search, surface.points[at] + moved)
         alike = similarity(k, at, yaws)
         if alike is not None:
-            log_weights = log_weights + alike / temperature
+            log_weights = log_weights + alike / TEMPERATURE
             log_weights -= log_weights.max()
     return Particles(surface.points[at], yaws, log_weights)
 

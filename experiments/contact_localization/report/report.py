@@ -12,7 +12,7 @@ from experiments.contact_localization.posterior.dials import METHOD
 from experiments.contact_localization.posterior.dials import SENSES as BY
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.comparison import object_from_gels
-from experiments.contact_localization.report.result import flags_of, result_of, true_points, without_images
+from experiments.contact_localization.report.result import by_translations, flags_of, true_points
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
 from experiments.contact_localization.report.sweep import SweepPoint, trade
 from experiments.contact_localization.report.twin_check import deviations
@@ -54,11 +54,10 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
     """
     run, found = scored.run, scored.found
     history = scored.answering.history(found.last, found.sense)
-    result = result_of(scored)
     return ReportData(
         **facts_of("Contact localization", scored, comparison, health, _ours(scored)),
         mesh=run.mesh,
-        answer=_answer(scored, result),
+        answer=_answer(scored),
         contacts=_contacts(scored, comparison, history),
         bench=_bench(run, found),
         error_by_contact=_by_contact(scored, history),
@@ -67,11 +66,12 @@ def report_of(scored: Scored, comparison: Comparison, health: Mapping[str, Healt
         sound=sound_of(scored),
         symmetry=scored.answering.symmetry.name,
         accuracy={name: str(level) for name, level in scored.accuracy.items()},
-        warnings=(*scored.warnings, *result["warnings"]),
+        warnings=(*scored.warnings, *scored.result["warnings"]),
     )
 
 
-def _answer(scored: Scored, result: Mapping[str, Any]) -> AnswerRow:
+def _answer(scored: Scored) -> AnswerRow:
+    result = scored.result
     touch = result["estimates"][result["answer"]]
     return AnswerRow(
         position=scored.found.last.position_in_object,
@@ -153,7 +153,7 @@ def _by_contact(scored: Scored, history: tuple[Estimate, ...]) -> tuple[ErrorCur
         return NO_TRUTH
     counts = tuple(float(k + 1) for k in range(len(true)))
     ours = _errors([estimate.position_in_object for estimate in history], true)
-    alone = _errors([without_images(found, k + 1) for k in range(len(true))], true)
+    alone = _errors([by_translations(found, k + 1) for k in range(len(true))], true)
     return (
         ErrorCurve(SENSES[found.sense], counts, ours, by=found.sense),
         *_by_other_senses(scored, true),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.answer import Answer
-from experiments.contact_localization.posterior.baselines import geometry_only, mean_random_error
+from experiments.contact_localization.posterior.baselines import mean_random_error, without_images
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
@@ -37,17 +37,17 @@ def result_of(scored: Scored) -> dict[str, Any]:
         },
         "answer": found.sense,
         "random_baseline_m": None if last_true is None else mean_random_error(scored.run.mesh, last_true),
-        "geometry_baseline_m": _distance(without_images(found, len(found.observations)), last_true),
+        "geometry_baseline_m": _distance(by_translations(found, len(found.observations)), last_true),
         "symmetry": scored.answering.symmetry.name,
         "seconds": found.seconds,
         "warnings": list(_doubts(found)),
     }
 
 
-def without_images(found: Answer, count: int) -> FloatArray:
+def by_translations(found: Answer, count: int) -> FloatArray:
     """``(3,)`` metres: the last of the first ``count`` contacts, from the arm's translations alone."""
     poses = [observation.base_from_gel for observation in found.observations[:count]]
-    return geometry_only(poses, found.model, found.prior, SPACING.default).position_in_object
+    return without_images(poses, found.model, found.prior, SPACING.default)
 
 
 def _doubts(found: Answer) -> tuple[str, ...]:

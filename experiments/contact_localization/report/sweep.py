@@ -1,57 +1,34 @@
 """Error against seconds: one recording, estimated at several levels of accuracy."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.dials import accuracy_at
-from experiments.contact_localization.accuracy.solving import Readings, prepare, solve_loaded
-from experiments.contact_localization.posterior.dials import (
-    BLOCK,
-    METHOD,
-    PARTICLES,
-    ROUNDS,
-    SAMPLES,
-    SENSES,
-    SPACING,
-)
+from experiments.contact_localization.accuracy.dials import accuracy_at, by_sound, grid, particles
+from experiments.contact_localization.accuracy.solving import Readings, loaded, prepare, solve
 from harness.basics.arrays import FloatArray
-from harness.effects.accuracy import Accuracy
-from harness.experiment.experiment import Setting
-
-
-def _grid(spacing: float, rounds: int, samples: int) -> Setting:
-    return {METHOD.name: "grid", SPACING.name: spacing, ROUNDS.name: rounds, SAMPLES.name: samples}
-
-
-def _particles(number: int) -> Setting:
-    return {
-        SENSES.name: "touch",
-        METHOD.name: "particle",
-        PARTICLES.name: number,
-        BLOCK.name: BLOCK.default,
-    }
-
+from harness.effects.accuracy import Accuracy, Setting
 
 LEVELS: dict[str, Setting] = {
-    "4 mm, no refinement": _grid(4.0e-3, 0, 3000),
-    "3 mm, no refinement": _grid(3.0e-3, 0, 3000),
-    "2 mm, no refinement": _grid(2.0e-3, 0, 3000),
-    "2 mm, refined once": _grid(2.0e-3, 1, 3000),
-    "2 mm, refined": _grid(2.0e-3, 5, 3000),
-    "1.5 mm, refined": _grid(1.5e-3, 5, 6000),
-    "300 particles": _particles(300),
-    "1,000 particles": _particles(1000),
-    "3,000 particles": _particles(3000),
+    "4 mm, no refinement": grid("both", 4e-3, 0, 3000, 8),
+    "3 mm, no refinement": grid("both", 3e-3, 0, 3000, 8),
+    "2 mm, no refinement": grid("both", 2e-3, 0, 3000, 8),
+    "2 mm, refined once": grid("both", 2e-3, 1, 3000, 8),
+    "2 mm, refined": grid("both", 2e-3, 5, 3000, 8),
+    "1.5 mm, refined": grid("both", 1.5e-3, 5, 6000, 8),
+    "300 particles": particles(300, 2e-3, 8),
+    "1,000 particles": particles(1000, 2e-3, 8),
+    "3,000 particles": particles(3000, 2e-3, 8),
 }
 """What the report tries, by name, from cheap to exact for each method; `touchstone cost` tries more."""
 
 BY_SENSE: dict[str, Setting] = {
-    "touch: 4 mm, no refinement": {SENSES.name: "touch", **_grid(4.0e-3, 0, 3000)},
-    "touch: 2 mm, no refinement": {SENSES.name: "touch", **_grid(2.0e-3, 0, 3000)},
-    "touch: 2 mm, refined": {SENSES.name: "touch", **_grid(2.0e-3, 5, 3000)},
-    "sound: 4 mm": {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: 4.0e-3},
-    "sound: 2 mm": {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: 2.0e-3},
+    "touch: 4 mm, no refinement": grid("touch", 4e-3, 0, 3000, 8),
+    "touch: 2 mm, no refinement": grid("touch", 2e-3, 0, 3000, 8),
+    "touch: 2 mm, refined": grid("touch", 2e-3, 5, 3000, 8),
+    "sound: 4 mm": by_sound(4e-3),
+    "sound: 2 mm": by_sound(2e-3),
 }
 """What is tried beside where contacts were struck, so that each sense is seen alone."""
 
@@ -83,10 +60,10 @@ def trade(readings: Readings, true: FloatArray) -> tuple[SweepPoint, ...]:
     points = []
     for name, setting in (LEVELS | BY_SENSE if readings.heard else LEVELS).items():
         prepare(readings.model, setting)
-        solved = solve_loaded(readings, setting)
-        if solved.estimate is None:
+        solved = loaded(partial(solve, readings, setting))
+        if solved.found is None:
             continue
         seconds = (readings.shared[1] + solved.wall) / len(readings.observations)
-        error = float(np.linalg.norm(solved.estimate.position_in_object - true))
+        error = float(np.linalg.norm(solved.found.position_in_object - true))
         points.append(SweepPoint(name, accuracy_at(setting), seconds, error))
     return tuple(points)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import dct, rfft, rfftfreq
 
-from experiments.contact_localization.posterior.particle import TEMPERATURE, Particles, filtered
+from experiments.contact_localization.posterior.particle import Particles, filtered
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.sound.gains import GainTable
 from harness.basics.arrays import AnyArray, FloatArray, IntArray, read_only
@@ -141,7 +141,6 @@ def mfcc_filter(
     strikes: Sequence[Strike | None],
     particles: int,
     seed: int,
-    temperature: float = TEMPERATURE,
 ) -> Particles:
     """The paper's filter over all contacts, by sound alone.
 
@@ -151,14 +150,13 @@ def mfcc_filter(
         strikes: one a contact, None where there is none.
         particles: how many.
         seed: of the start and of the resampling.
-        temperature: of the weight ``exp(cosine / temperature)``.
     """
 
     def heard(k: int, at: IntArray, _yaws: FloatArray) -> FloatArray | None:
         strike = strikes[k]
         return None if strike is None else table.similarities(strike)[at]
 
-    return filtered(search, len(strikes), heard, particles, seed, temperature)
+    return filtered(search, len(strikes), heard, particles, seed)
 
 
 def _mode_powers(modes: Modes, material: Material, rate: float, settings: Mfcc) -> FloatArray:

@@ -90,9 +90,12 @@ def run(
     from harness.commands.scenes import resolve
     from harness.experiment.answer import add_report, finish, tell_answer
     from harness.experiment.begin import begin
+    from harness.experiment.budget import answer_as_asked, sentences
+    from harness.experiment.front import doubts, foresee, front_for
     from harness.experiment.levels import chosen_levels
     from harness.experiment.lookup import experiment_of, named, require_of
     from harness.recording.recording import Recording
+    from harness.recording.run_folder import RunFiles
 
     target = _target(budget, error, level)
     if resume is not None:
@@ -119,8 +122,6 @@ def run(
             require_of(recording, named(experiment).name, "--resume")
         accuracy = chosen_levels(kind.knobs, level or [])
     else:
-        from harness.bench.station_file import load_station, station_path
-
         kind = named(experiment or DEFAULT)
         accuracy = chosen_levels(kind.knobs, level or [])
         keys = {"contacts": contacts, "spacing": spacing, "yaw": yaw}
@@ -129,7 +130,7 @@ def run(
         )
         bench = load_station(station_path(station or "mock"))
         if target is not None:
-            CONSOLE.print(_budgets(kind).foresee(wanted, target), markup=False)
+            CONSOLE.print(foresee(kind, wanted, target), markup=False)
         begun = begin(kind, wanted, bench, seed, gap, out)
         recording = begun.recording
         _describe(kind, begun, accuracy)
@@ -151,12 +152,13 @@ def run(
         return 0
     more: dict[str, Any] = {}
     if target is not None:
-        for doubt in _budgets(kind).doubts(recording, target):
+        front = front_for(kind, RunFiles(recording).scene, recording.committed)
+        for doubt in doubts(kind, front, target):
             warn(doubt)
         with CONSOLE.status("estimating as asked, then at the finest levels"):
-            more["cost"] = _budgets(kind).answer(recording, target)
+            more["cost"] = answer_as_asked(kind, recording, front, target)
         accuracy = accuracy.with_(more["cost"]["levels"])
-        for sentence in _budgets(kind).sentences(more["cost"]):
+        for sentence in sentences(kind, more["cost"]):
             CONSOLE.print(sentence, markup=False)
     result = finish(
         kind,
@@ -205,19 +207,13 @@ def show_report(result: dict[str, Any], as_json: bool) -> None:
         ANSWERS.print(f"report: {result['report']}", markup=False)
 
 
-def _budgets(kind: Any) -> Any:
-    if kind.budgets is None:
-        raise WrongUse(f"{kind.name} has no --budget and no --error yet; choose levels with --level")
-    return kind.budgets
-
-
 def _target(budget: str | None, error: str | None, level: list[str] | None) -> Any:
     """What was asked of the estimate; None where nothing was."""
     given = error if budget is None else budget
     if given is None:
         return None
     from harness.basics.quantities import LENGTH, TIME
-    from harness.experiment.experiment import Target
+    from harness.experiment.solving import Target
 
     if budget is not None and error is not None:
         raise WrongUse("--budget and --error each choose the levels; give one of them")

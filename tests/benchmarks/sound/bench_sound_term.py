@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.baselines import geometry_and_axis, geometry_only
+from experiments.contact_localization.posterior.baselines import without_images
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import Search
@@ -196,8 +196,8 @@ def score_of(thing: Thing, run: Run, settings: Analysis, noise: SoundNoise, seed
     particles = mfcc_filter(search, thing.mfcc, run.strikes, 1000, seed)
     poses = list(run.poses)
     return Score(
-        off(geometry_only(poses, thing.model, run.prior, SPACING).position_in_object),
-        off(geometry_and_axis(poses, thing.model, run.prior, SPACING).position_in_object),
+        off(without_images(poses, thing.model, run.prior, SPACING)),
+        off(without_images(poses, thing.model, run.prior, SPACING, use_axis=True)),
         answers[False],
         answers[True],
         off(particles.candidates().mean(axis=0)),

@@ -19,7 +19,7 @@ from rich.table import Table
 
 from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, performed
 from experiments.contact_localization.accuracy.solving import Models
-from experiments.contact_localization.posterior.baselines import geometry_and_axis
+from experiments.contact_localization.posterior.baselines import without_images
 from experiments.contact_localization.posterior.dials import SPACING, Senses
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_about
@@ -92,7 +92,7 @@ def _scored(case: Case, senses: Senses) -> dict[str, tuple[float, float]]:
         answer = estimate(observations, model, case.run.prior, levels, seed=case.cell.seed)
         found[name] = off(answer.position_in_object)
     poses = [one.base_from_gel for one in case.run.observations]
-    alone = geometry_and_axis(poses, model, case.run.prior, levels.of(SPACING)).position_in_object
+    alone = without_images(poses, model, case.run.prior, levels.of(SPACING), use_axis=True)
     return {**found, "geometry + axis, told nothing": off(alone)}
 
 

@@ -7,7 +7,16 @@ from typing import Any
 import pytest
 
 from harness.bench.experiments import EXPERIMENTS, ExperimentRow
+from harness.bench.scene import scene_from_options
 from harness.cli import invoke
+from harness.cost.curve import Curve, Point, Sample
+from harness.cost.file import curve_path, save
+from harness.cost.provenance import code, machine
+from harness.effects.scene_object import known_object
+from harness.experiment.lookup import named
+from harness.experiment.subjects import object_key
+from harness.experiment.tables import measurement_of
+from tests.experiments.toy.experiment import CLAIMED, STRIDE
 from tests.support.whole_run import in_process_run, touch_scene
 
 ROW = ExperimentRow(
@@ -64,6 +73,50 @@ def test_it_has_a_table_and_a_cost_curve(tmp_path: Path, capsys: pytest.CaptureF
     ((condition),) = cost["conditions"]
     assert condition["condition"] == {"gap": "none", "presses": 2}
     assert len(condition["settings"]) == 2
+
+
+def save_a_curve() -> None:
+    """Measured, it says, on this machine with this code: every pose is worth its seconds."""
+    name = object_key("mug", known_object(scene_from_options("builtin:mug")).mesh)
+
+    def point(stride: int, cpu: float, error: float) -> Point:
+        samples = tuple(
+            Sample(f"r{k}", name, error, CLAIMED, 0.0, cpu * (1.0 + 1e-3 * k), cpu) for k in range(40)
+        )
+        return Point(f"stride {stride}", {STRIDE.name: stride}, {"gap": "default", "presses": 1}, samples)
+
+    points = (point(8, 0.5, 4e-3), point(1, 2.0, 1e-3))
+    here = code(measurement_of(named("toy")).estimator)
+    save(Curve("toy", points, machine(), here, "2026-01-01T00:00:00+00:00", "T"), curve_path("toy"))
+
+
+def test_it_keeps_a_budget_and_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    save_a_curve()
+    wanted = ["run", "toy", "--object", "builtin:mug", "--set", "presses=1"]
+    assert invoke([*wanted, "--budget", "1 ms"]) == 2
+    assert "the cheapest setting may take 0.5" in capsys.readouterr().err
+    run = str(tmp_path / "run")
+    plenty = said(capsys, *wanted, "--budget", "30 s", "--out", run)
+    assert plenty["cost"]["kept"]
+    assert plenty["cost"]["levels"] == {STRIDE.name: 1} == {STRIDE.name: plenty["accuracy"][STRIDE.name]}
+    assert plenty["cost"]["error_m"] == plenty["error_m"]
+    assert plenty["cost"]["finest"]["error_m"] == plenty["error_m"]
+    little = said(capsys, "run", "--resume", run, "--budget", "1 s")
+    assert little["cost"]["levels"] == {STRIDE.name: 8}
+    for error, tried, kept in (
+        ("5 mm", ["stride 8"], True),
+        ("2 mm", ["stride 1"], True),
+        ("1 um", [], False),
+    ):
+        met = said(capsys, "run", "--resume", run, "--error", error)["cost"]
+        assert met["kept"] is kept
+        assert not kept or met["tried"] == tried
+        assert (met["promised_error_m"] <= met["asked"]["error_m"]) is kept
+
+
+def test_a_budget_without_a_curve_says_how_to_measure_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert invoke(["run", "toy", "--object", "builtin:mug", "--budget", "1 s"]) == 2
+    assert "measure it with `touchstone cost toy`" in capsys.readouterr().err
 
 
 def test_another_experiments_run_is_one_clear_sentence(

@@ -15,7 +15,7 @@ from harness.basics.code_version import closure, content_hash
 from harness.basics.errors import DataRefused, WrongUse
 from harness.cost.bounds import KEPT, likely_error, most_seconds, predicted_at_most
 from harness.cost.choice import for_budget, for_error, nearest_condition
-from harness.cost.curve import Curve, Point, Sample, best_within, cheapest_within, front
+from harness.cost.curve import Curve, Point, Sample, best_within, front
 from harness.cost.file import curve_path, from_json, load, save, to_json
 from harness.cost.promise import doubt, doubts, promise, promise_share
 from harness.cost.provenance import machine, stale
@@ -91,16 +91,6 @@ def test_a_larger_budget_never_buys_a_larger_error(cloud: list[Point], a: float,
 
 
 @settings(deadline=None)
-@given(clouds, errors, errors)
-def test_a_larger_error_never_costs_more(cloud: list[Point], a: float, b: float) -> None:
-    strict, loose = cheapest_within(cloud, min(a, b)), cheapest_within(cloud, max(a, b))
-    if strict is not None:
-        assert loose is not None
-        assert loose.seconds.value <= strict.seconds.value
-        assert strict.error.value <= min(a, b)
-
-
-@settings(deadline=None)
 @given(clouds, costs)
 def test_what_a_budget_buys_lies_on_the_front(cloud: list[Point], budget: float) -> None:
     bought = best_within(cloud, budget)
@@ -127,8 +117,6 @@ def test_an_answer_in_no_time_was_not_measured() -> None:
 def test_a_budget_or_error_that_cannot_be_kept_is_refused(odd: float) -> None:
     with pytest.raises(WrongUse, match="above zero"):
         best_within([point("p", 1.0, 1e-3)], odd)
-    with pytest.raises(WrongUse, match="above zero"):
-        cheapest_within([point("p", 1.0, 1e-3)], odd)
 
 
 def test_a_run_is_counted_once_at_each_setting() -> None:

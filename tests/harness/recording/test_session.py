@@ -11,7 +11,7 @@ import pytest
 from harness.basics.errors import BenchFault
 from harness.bench.reading import Channel, Reading
 from harness.recording.recording import Recording, RunHeader
-from harness.recording.session import perform
+from harness.recording.session import Quiet, perform
 from harness.recording.step_file import Step
 
 CHANNEL = Channel("arm.joints", "rad", (6,), "float64")
@@ -32,14 +32,6 @@ class Counting:
         self.performed.append(step.index)
         self.during(step.index)
         return [Reading(CHANNEL, np.array([1.0]), np.full((1, 6), float(step.index)))]
-
-
-class Quiet:
-    def began(self, step: Step) -> None:
-        """Say nothing."""
-
-    def ended(self, step: Step, seconds: float) -> None:
-        """Say nothing."""
 
 
 @pytest.fixture

@@ -23,9 +23,9 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.bench.station_file import load_station, station_path
 from harness.experiment.begin import begin
 from harness.recording.recording import Recording
+from harness.recording.session import Quiet
 from mocks.world.gap_draw import GapDraw
 from tests.support.arm_presses import RADIUS, Creeping, begun, gap_of_aspect, opened, perform_on, performed
-from tests.support.whole_run import Quiet
 
 
 @pytest.fixture(scope="module")
@@ -245,7 +245,7 @@ import sys
 from pathlib import Path
 from harness.recording.recording import Recording
 from tests.support.arm_presses import opened, perform_on
-from tests.support.whole_run import Quiet
+from harness.recording.session import Quiet
 recording = Recording(Path(sys.argv[1]))
 perform_on(opened(recording), recording, Quiet())
 """

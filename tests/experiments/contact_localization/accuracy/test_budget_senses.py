@@ -1,15 +1,16 @@
 """Answers in time or to an error where senses cost differently: images are read only where looked at."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from experiments.contact_localization.accuracy.budget import Run, ask
+from experiments.contact_localization.accuracy.budget import Run
 from experiments.contact_localization.accuracy.dials import (
     needs_images,
     needs_sound,
     setting_name,
 )
-from experiments.contact_localization.accuracy.front import Front
 from experiments.contact_localization.accuracy.solving import Models, read, solve
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import Observation
@@ -19,8 +20,10 @@ from harness.basics.geometry import frame_facing, transform
 from harness.basics.materials import Material
 from harness.bench.sensor import GELSIGHT_R15
 from harness.cost.curve import Point, Sample
-from harness.effects.accuracy import Accuracy
-from harness.experiment.experiment import Setting, Target
+from harness.effects.accuracy import Accuracy, Setting
+from harness.experiment.budget import ask
+from harness.experiment.front import Front
+from harness.experiment.solving import Target
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples import sounding_plate as plate
 
@@ -80,15 +83,15 @@ def front(audio_seconds: float, touch_seconds: float, audio_error: float = 2e-3)
 
 def test_a_budget_that_only_sound_keeps_reads_no_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.contact_localization.accuracy.solving.height_map", never)
-    found = ask(run, front(0.01, 1e4), Target(seconds=60.0), loaded=True)
+    found = ask(run, front(0.01, 1e4), Target(seconds=60.0))
     assert found.point.levels == AUDIO
     assert found.kept
-    assert found.solved.estimate is not None
+    assert found.solved.found is not None
 
 
 def test_an_error_that_sound_promises_first_reads_no_image(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.contact_localization.accuracy.solving.height_map", never)
-    found = ask(run, front(0.01, 1e4), Target(error=5e-3), loaded=True)
+    found = ask(run, front(0.01, 1e4), Target(error=5e-3))
     assert found.tried == (setting_name(AUDIO),)
     assert found.kept
     assert found.promise == 2e-3
@@ -101,21 +104,21 @@ def test_where_sound_promises_too_little_touch_is_tried_and_reads_the_images(run
     assert found.solved.refusal is not None
 
 
-def test_settings_that_need_sound_are_left_out_where_nothing_was_heard() -> None:
-    assert [point.levels for point in front(0.01, 1.0).unheard().points] == [TOUCH]
-    only = front(0.01, 1.0)
+def test_settings_that_need_sound_are_left_out_where_nothing_was_heard(run: Run) -> None:
+    unheard = replace(run, observations=tuple(replace(one, strike=None) for one in run.observations))
+    both = front(0.01, 1.0)
+    assert [point.levels for point in both.fitting(unheard.unfit).points] == [TOUCH]
+    assert both.fitting(run.unfit).points == both.points
     with pytest.raises(WrongUse, match="by sound alone"):
-        Front(only.points[1:], 1.0, K, (), "", shipped=False).unheard()
+        replace(both, points=both.points[1:]).fitting(unheard.unfit)
 
 
 def test_sound_is_answered_the_same_whether_images_were_read_or_not(run: Run) -> None:
     given = run.observations, MODEL, run.prior, 0
     with_images, without = solve(read(*given), AUDIO), solve(read(*given, images=False), AUDIO)
-    assert with_images.estimate is not None
-    assert without.estimate is not None
-    np.testing.assert_array_equal(
-        with_images.estimate.position_in_object, without.estimate.position_in_object
-    )
+    assert with_images.found is not None
+    assert without.found is not None
+    np.testing.assert_array_equal(with_images.found.position_in_object, without.found.position_in_object)
 
 
 def test_each_choice_of_the_modes_is_made_once_and_touch_takes_the_default() -> None:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from experiments.contact_localization.accuracy.budget import shipped_curve
 from experiments.contact_localization.accuracy.dials import (
     FINEST,
     KNOBS,
@@ -10,7 +11,7 @@ from experiments.contact_localization.accuracy.dials import (
     settings,
     settings_by_count,
 )
-from experiments.contact_localization.accuracy.front import front_of, shipped_curve
+from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.dials import (
     BLOCK,
     DIALS,
@@ -22,6 +23,7 @@ from experiments.contact_localization.posterior.dials import (
 )
 from harness.basics.errors import WrongUse
 from harness.effects.accuracy import Accuracy, Knob, Level
+from harness.experiment.front import front_of
 from tests.support.localization import chosen, dials
 
 
@@ -94,6 +96,6 @@ def test_a_shipped_budget_never_buys_coarser_elements() -> None:
     measured = [point for point in curve.points if saves_no_answer_time(point.levels)]
     assert measured, "the curve no longer says what coarser elements cost"
     for condition in curve.conditions():
-        offered = front_of(curve, condition, (), shipped=True).points
+        offered = front_of(EXPERIMENT, curve, condition, (), shipped=True).points
         assert offered
         assert not [point.name for point in offered if saves_no_answer_time(point.levels)]

@@ -1,6 +1,7 @@
 """The modes that sounds are compared with may come from the object's ObjectFile: nothing is solved then."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,8 @@ import pytest
 
 from experiments.contact_localization import build_model as model_of
 from experiments.contact_localization.accuracy.benchmark_runs import preparations
+from experiments.contact_localization.accuracy.budget import BUDGETS
 from experiments.contact_localization.accuracy.dials import KNOBS, needs_objectfile, settings
-from experiments.contact_localization.accuracy.front import Front
 from experiments.contact_localization.accuracy.solving import Models
 from experiments.contact_localization.build_model import model_of_run, model_of_scene
 from experiments.contact_localization.model import Model
@@ -25,6 +26,7 @@ from harness.cost.curve import Point, Sample
 from harness.effects import sound_effects
 from harness.effects.accuracy import Accuracy, Level
 from harness.effects.scene_object import known_object
+from harness.experiment.front import Front
 from harness.objectfile.audio.part import with_audio
 from harness.objectfile.entries import Provenance
 from harness.objectfile.file import ObjectFile, create_object
@@ -129,9 +131,10 @@ def test_a_budget_chooses_no_objectfile_where_the_scene_names_none() -> None:
         for name, levels in named.items()
     ]
     front = Front(tuple(points), 1.0, 6, (), "today", shipped=False)
-    assert [point.name for point in front.solved().points] == ["solved"]
+    unfit = partial(BUDGETS.unfit, scene_of(None))
+    assert [point.name for point in front.fitting(unfit).points] == ["solved"]
     with pytest.raises(WrongUse, match="this scene names none"):
-        Front((points[1],), 1.0, 6, (), "today", shipped=False).solved()
+        replace(front, points=(points[1],)).fitting(unfit)
 
 
 def test_an_option_names_it_beside_an_object_and_not_beside_a_scene(of: ObjectFile) -> None:

@@ -1,0 +1,168 @@
+"""The measured settings that a run goes by, and what may be asked of its answer."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from harness.basics.errors import WrongUse
+from harness.bench.scene import SceneFile
+from harness.cost.choice import for_budget, for_error, nearest_condition
+from harness.cost.curve import Curve, Point
+from harness.cost.file import curve_path, load
+from harness.cost.provenance import code, machine, stale
+from harness.effects.accuracy import Level, Setting
+from harness.effects.scene_object import known_object
+from harness.experiment.experiment import Experiment
+from harness.experiment.solving import Budgets, Target
+from harness.experiment.subjects import object_key
+from harness.experiment.tables import measurement_of
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """The measured settings that a run goes by.
+
+    Attributes:
+        points: of the condition nearest to the run's.
+        scale: how many times their seconds are to be expected, for its number of steps.
+        steps: how many the points were measured with.
+        reasons: why the curve is stale; empty where it is not.
+        made: when it was measured.
+        shipped: whether it came with the program.
+    """
+
+    points: tuple[Point, ...]
+    scale: float
+    steps: int
+    reasons: tuple[str, ...]
+    made: str
+    shipped: bool
+
+    @property
+    def vouches(self) -> bool:
+        """Whether errors may be promised: the points were measured with no more steps than the run has."""
+        return self.scale >= 1.0
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it was measured on this machine with this code."""
+        return not self.reasons
+
+    def fitting(self, unfit: Callable[[Setting], str | None]) -> "Front":
+        """Those settings that a run can be answered at.
+
+        Args:
+            unfit: why it cannot be at a setting; None where it can.
+
+        Raises:
+            WrongUse: there are none.
+        """
+        reasons = [unfit(point.levels) for point in self.points]
+        points = tuple(point for point, why in zip(self.points, reasons, strict=True) if why is None)
+        if not points:
+            raise WrongUse(f"{reasons[0]}")
+        return replace(self, points=points)
+
+
+def budgets_of(experiment: Experiment) -> Budgets:
+    """How an experiment keeps a budget.
+
+    Raises:
+        WrongUse: it does not.
+    """
+    if experiment.budgets is None:
+        raise WrongUse(f"{experiment.name} has no --budget and no --error yet; choose levels with --level")
+    return experiment.budgets
+
+
+def front_for(experiment: Experiment, scene: SceneFile, steps: int) -> Front:
+    """The curve of this machine, or the one that came with the program, for runs like this one.
+
+    Raises:
+        WrongUse: nothing like this run was measured.
+        DataRefused: this machine's curve is damaged.
+    """
+    budgets = budgets_of(experiment)
+    like = budgets.condition(scene)
+    path = curve_path(experiment.name)
+    own = load(path) if path.exists() else None
+    if own is not None and (own.where(like) or budgets.shipped is None):
+        curve, shipped = own, False
+    elif budgets.shipped is not None:
+        curve, shipped = budgets.shipped(), True
+    else:
+        raise WrongUse(
+            f"what accuracy costs was not measured on this machine; measure it with `touchstone cost "
+            f"{experiment.name}`, or choose levels with --level"
+        )
+    reasons = stale(curve, machine(), code(measurement_of(experiment).estimator))
+    front = front_of(experiment, curve, {**like, experiment.plural: steps}, reasons, shipped)
+    return front.fitting(lambda setting: budgets.unfit(scene, setting))
+
+
+def front_of(
+    experiment: Experiment, curve: Curve, wanted: Mapping[str, Level], reasons: Sequence[str], shipped: bool
+) -> Front:
+    """The settings of a curve for a condition, but for those that are not offered while there are others.
+
+    Args:
+        experiment: that the curve is of.
+        curve: measured.
+        wanted: the run's condition.
+        reasons: why the curve is stale; empty where it is not.
+        shipped: whether it came with the program.
+
+    Raises:
+        WrongUse: nothing like the condition was measured.
+    """
+    count, offered = experiment.plural, budgets_of(experiment).offered
+    condition, scale = nearest_condition(curve.conditions(), wanted, count)
+    measured = curve.where(condition)
+    points = tuple(point for point in measured if offered(point.levels)) or measured
+    return Front(points, scale, int(condition[count]), tuple(reasons), curve.made, shipped)
+
+
+def foresee(experiment: Experiment, scene: SceneFile, target: Target) -> str:
+    """What will be tried, in a sentence, before anything moves.
+
+    Args:
+        experiment: to be run.
+        scene: on the table.
+        target: what is asked.
+
+    Raises:
+        WrongUse: the cheapest setting measured on this machine takes longer than the budget; nothing like
+            this run was measured, or the experiment keeps no budgets.
+    """
+    front = front_for(experiment, scene, budgets_of(experiment).steps(scene))
+    name = object_key(scene.object.name, known_object(scene).mesh)
+    if target.seconds is None:
+        assert target.error is not None
+        tried = for_error(front.points, target.error, name)
+        return f"for an error of {1e3 * target.error:g} mm: {', then '.join(point.name for point in tried)}"
+    found = for_budget(front.points, target.seconds, name, front.scale)
+    if not found.fits and front.trusted:
+        raise WrongUse(
+            f"a budget of {target.seconds:g} s cannot be kept: the cheapest setting may take "
+            f"{found.seconds:.2g} s here ({found.point.name}); allow more, or take fewer {experiment.plural}"
+        )
+    return f"for {target.seconds:g} s: {found.point.name}, at most {found.seconds:.2g} s"
+
+
+def doubts(experiment: Experiment, front: Front, target: Target) -> tuple[str, ...]:
+    """What the operator should know of the front before an answer goes by it."""
+    said = [] if front.trusted else [staleness(experiment, front)]
+    if target.error is not None and not front.vouches:
+        said.append(
+            f"settings were measured with {front.steps} {experiment.plural} and this run has fewer, so no "
+            f"error is promised; measure fewer with `touchstone cost {experiment.name} --contacts N`"
+        )
+    return tuple(said)
+
+
+def staleness(experiment: Experiment, front: Front) -> str:
+    """Why the front is not of this machine and code, what is done about it, and how to be rid of it."""
+    kind = "the curve that came with the program" if front.shipped else "this machine's curve"
+    return (
+        f"{kind} is stale ({'; '.join(front.reasons)}): its seconds are scaled by what reading the "
+        f"{experiment.plural} takes now; measure here with `touchstone cost {experiment.name}`"
+    )

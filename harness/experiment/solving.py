@@ -1,0 +1,110 @@
+"""What is asked of an answer beside its levels, and what an experiment gives to be answered so."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from harness.basics.errors import WrongUse
+from harness.bench.scene import SceneFile
+from harness.cost.curve import Curve
+from harness.effects.accuracy import Level, Setting
+from harness.recording.run_folder import RunFiles
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is asked of an answer: one of the two.
+
+    Attributes:
+        seconds: s on the clock for the estimate.
+        error: m.
+    """
+
+    seconds: float | None = None
+    error: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.seconds is None) == (self.error is None):
+            raise WrongUse("give either a budget of seconds or an error to be met")
+
+
+class Shared(Protocol):
+    """Readings in memory, brought as far as settings share."""
+
+    @property
+    def shared(self) -> tuple[float, float]:
+        """S of CPU time and on the clock that this took."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """An answer at one setting, and what it took beyond what settings share.
+
+    Attributes:
+        found: the answer, as the experiment has it; None where it was refused.
+        radius: m, within which the answer itself claims 90 %; None where it claims nothing.
+        cpu: s of CPU time.
+        wall: s on the clock.
+        refusal: why, where it was refused.
+    """
+
+    found: Any
+    radius: float | None
+    cpu: float
+    wall: float
+    refusal: str | None = None
+
+
+class Solver(Protocol):
+    """A run's readings in memory, to be answered at any setting."""
+
+    @property
+    def object(self) -> str:
+        """The name that its seconds were measured under."""
+
+    def unfit(self, setting: Setting) -> str | None:
+        """Why these readings cannot be answered at a setting; None where they can."""
+
+    def load(self, settings: Sequence[Setting]) -> None:
+        """Load what is compiled for answers at these settings, dearest last; no budget counts it."""
+
+    def prepare(self, setting: Setting) -> None:
+        """Make what a setting needs of the object alone; no budget counts it."""
+
+    def prepared_alike(self, one: Setting, other: Setting) -> bool:
+        """Whether ``one`` needs nothing prepared that ``other`` does not."""
+
+    def work(self, setting: Setting) -> float | None:
+        """How much there is to do, see ``harness.cost.curve.Sample``; None where it is not counted."""
+
+    def read(self, setting: Setting) -> Any:
+        """The readings as a setting takes them, ``Shared``."""
+
+    def solve(self, readings: Any, setting: Setting) -> Solved:
+        """Answer at one setting, timed, from what ``read`` gave for this or another one."""
+
+    def described(self, solved: Solved) -> dict[str, Any]:
+        """As JSON values: ``position_m``, ``error_m`` and ``refused``, each None where there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Budgets:
+    """How an experiment answers as asked: within so many seconds, or to an error.
+
+    Attributes:
+        solver: of a run's readings.
+        finest: the setting asked after an answer, to say what more time would have given.
+        steps: that a run of a scene has.
+        condition: of a scene's runs, as the points of a curve have it, but for the number of steps.
+        unfit: why a scene's runs cannot be answered at a setting; None where they can.
+        offered: whether a setting is chosen while there are others.
+        shipped: the curve that came with the program; None where none did.
+    """
+
+    solver: Callable[[RunFiles], Solver]
+    finest: Setting
+    steps: Callable[[SceneFile], int]
+    condition: Callable[[SceneFile], Mapping[str, Level]] = lambda _: {"gap": "default"}
+    unfit: Callable[[SceneFile, Setting], str | None] = lambda _scene, _setting: None
+    offered: Callable[[Setting], bool] = lambda _: True
+    shipped: Callable[[], Curve] | None = None
