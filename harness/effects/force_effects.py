@@ -64,7 +64,7 @@ def pressed_of_gel(surface: FloatArray, share: float = OF_GEL) -> FloatArray:
     """How deep a gel is pressed where only its surface is known: what is deeper than a share of its deepest.
 
     The surface of a gel that is pressed lies where the object is, and what hangs beside it asks for no force;
-    a drawn skirt would (``docs/touch_force.md`` has what the tenth costs).
+    a drawn skirt would (``docs/explanation/touch_force.md`` has what the tenth costs).
 
     Args:
         surface: ``(rows, columns)`` metres of indentation.

@@ -97,5 +97,5 @@ class ForceTable(StrictModel):
 
 
 def read_force_table(path: Path) -> ForceTable:
-    """A table of forces, ``docs/touch_force.md``; raises as ``read_model``."""
-    return read_model(path, ForceTable, "table of forces", "docs/touch_force.md shows one")
+    """A table of forces, ``docs/explanation/touch_force.md``; raises as ``read_model``."""
+    return read_model(path, ForceTable, "table of forces", "docs/explanation/touch_force.md shows one")

@@ -18,7 +18,7 @@ def pixel_places(samples: int) -> list[tuple[Place, int]]:
 
     A lattice of one generator (Korobov), of all such the one whose two nearest places are farthest apart.
     Each of ``samples**2`` columns and rows has one place in its middle. For edges of any slope the error
-    goes with the number of places to the power of -0.77 (measured: docs/vision.md).
+    goes with the number of places to the power of -0.77 (measured: docs/explanation/vision.md).
 
     Args:
         samples: a side of a pixel, 1 to 64.
