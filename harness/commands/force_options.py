@@ -18,7 +18,7 @@ Force = Annotated[
     bool,
     typer.Option(
         "--force",
-        help="How hard the gel is pressed as well, in newtons, with its uncertainty: docs/explanation/touch_force.md.",
+        help="How hard the gel is pressed as well, in N, with its error: docs/explanation/touch_force.md.",
     ),
 ]
 Modulus = Annotated[

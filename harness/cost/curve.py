@@ -23,13 +23,33 @@ GROSS = 20.0e-3
 
 
 @dataclass(frozen=True)
+class ErrorUnit:
+    """What a program's errors are.
+
+    Attributes:
+        key: of the unit, where a name has to say it.
+        label: of an error that is drawn.
+        scale: what an error is multiplied by to be shown.
+        gross: errors beyond this are failures, and count alike.
+    """
+
+    key: str
+    label: str
+    scale: float = 1.0
+    gross: float = float("inf")
+
+
+METRES = ErrorUnit("m", "error in mm (mean, each at most 20 mm; 90 % interval)", 1e3, GROSS)
+
+
+@dataclass(frozen=True)
 class Sample:
     """One run, answered at one setting.
 
     Attributes:
         run: its name; the same readings at every setting.
         object: what was touched, by a name that two different objects do not share.
-        error: m; a refused answer counts as a random one.
+        error: in the point's unit; a refused answer counts as a random one.
         radius: m, within which the answer itself claims 90 %; None where it claims nothing.
         shared: s of CPU time for what is done alike at every setting that needs it: reading images.
         cpu: s of CPU time for the rest.
@@ -68,12 +88,14 @@ class Point:
         levels: of the dials that are turned.
         condition: what was given and not chosen: how many contacts, whether the yaw was known.
         samples: at least one, each of another run.
+        unit: of the samples' errors.
     """
 
     name: str
     levels: Mapping[str, Level]
     condition: Mapping[str, Level]
     samples: tuple[Sample, ...]
+    unit: ErrorUnit = METRES
 
     def __post_init__(self) -> None:
         runs = [sample.run for sample in self.samples]
@@ -84,7 +106,7 @@ class Point:
 
     @cached_property
     def errors(self) -> FloatArray:
-        """``(runs,)`` m."""
+        """``(runs,)`` in the unit."""
         return np.array([sample.error for sample in self.samples])
 
     @cached_property
@@ -99,12 +121,12 @@ class Point:
 
     @cached_property
     def error(self) -> Interval:
-        """In m: mean over the runs, none counted beyond ``GROSS``, with its 90 % bootstrap interval."""
-        return bootstrap(np.minimum(self.errors, GROSS), mean)
+        """Mean over the runs, none counted beyond the unit's ``gross``, with its 90 % bootstrap interval."""
+        return bootstrap(np.minimum(self.errors, self.unit.gross), mean)
 
     @cached_property
     def median_error(self) -> Interval:
-        """In m, with its 90 % bootstrap interval."""
+        """Of the runs, with its 90 % bootstrap interval."""
         return bootstrap(self.errors, median)
 
     @cached_property

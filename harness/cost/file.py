@@ -80,6 +80,23 @@ def from_json(tree: Mapping[str, Any]) -> Curve:
     )
 
 
+def summary(point: Point, on_front: bool) -> dict[str, Any]:
+    """A setting in numbers, as commands answer it."""
+    unit = point.unit.key
+    return {
+        "levels": dict(point.levels),
+        "front": on_front,
+        f"error_{unit}": point.error.value,
+        f"error_low_{unit}": point.error.low,
+        f"error_high_{unit}": point.error.high,
+        f"median_error_{unit}": point.median_error.value,
+        f"mean_error_{unit}": float(point.errors.mean()),
+        "seconds": point.seconds.value,
+        "seconds_low": point.seconds.low,
+        "seconds_high": point.seconds.high,
+    }
+
+
 _KEYS = {
     "run": "run",
     "object": "object",

@@ -1,4 +1,4 @@
-"""What pictures cost and err: every knob of ``vision_trades`` turned, on cameras and lights kept back.
+"""What pictures cost and err: every knob turned from its default, on cameras and lights kept back.
 
 Each way is asked for the same pictures in turns, so that what else the machine does falls on all alike.
 Errors are against exact pictures, and against many samples of the same networks, which tells what the
@@ -6,37 +6,95 @@ renderer leaves out from what the networks do not know.
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
 from harness.authoring.training import Report
+from harness.authoring.vision.cells import VERSION
 from harness.authoring.vision.data import HeldOutViews
-from harness.authoring.vision.metrics import network_pictures, picture_errors, reference_pictures
-from harness.authoring.vision.trades import Networks, Trade, Variation, every_sample, in_bits, kept_bytes
+from harness.authoring.vision.metrics import BEHIND, network_pictures, picture_errors, reference_pictures
+from harness.authoring.vision.profiles import CellsSpec
+from harness.authoring.vision.vision import networks_alone
+from harness.basics.arrays import FloatArray
+from harness.basics.store import digest
+from harness.cost.curve import ErrorUnit, Point, Sample
 from harness.objectfile.vision.network.graph import vision_graph
-from harness.objectfile.vision.network.network import VisionModel
 from harness.objectfile.vision.render import VisionRenderer
-from harness.objectfile.vision.settings import Rendered, RenderSettings
+from harness.objectfile.vision.settings import COVERS, LEVELS, RenderSettings
+from harness.picture.image_metrics import mean_square
 from harness.picture.linear_image import LinearImage
 from harness.sim.light.direct_image import LitObject
 
+DEFAULT = "default"
+"""The knob that is turned nowhere."""
+
+GREY = ErrorUnit("grey", "error in grey levels of 255 (root mean square; mean of views, 90 % interval)")
+
+_SAMPLES = 4
+"""A side of a pixel of the exact pictures."""
+
 
 @dataclass(frozen=True)
-class Spread:
-    """Quartiles over repetitions of the seconds that a picture takes in the mean of all views.
+class Way:
+    """One way to a picture: a knob at one of its levels, all others at their default.
 
     Attributes:
-        low: s, first quartile.
-        middle: s, median.
-        high: s, third quartile.
+        knob: its name, with a unit where it has one.
+        level: for people.
+        networks: that are asked, by how they are trained.
+        side: pixels.
+        settings: of the renderer.
     """
 
-    low: float
-    middle: float
-    high: float
+    knob: str
+    level: str
+    networks: CellsSpec
+    side: int
+    settings: RenderSettings = field(default_factory=RenderSettings)
+
+
+def ways(spec: CellsSpec, side: int) -> tuple[Way, ...]:
+    """The default, then every knob at every other level.
+
+    Args:
+        spec: of the networks that all but the knobs of networks ask.
+        side: pixels of all pictures but those of the knob of that name.
+    """
+    plain = Way(DEFAULT, DEFAULT, spec, side)
+    drawn: list[tuple[str, str, RenderSettings]] = [
+        *(("level", level, RenderSettings(level=level)) for level in LEVELS),
+        *(("step, voxels", f"{step:g}", RenderSettings(step=step)) for step in (4.0, 2.0, 1.0, 0.5, 0.25)),
+        *(
+            ("termination", f"{end:g}", RenderSettings(termination=end))
+            for end in (0.3, 0.1, 0.03, 0.01, 0.0)
+        ),
+        *(("coverage, sub-pixels", str(of), RenderSettings(coverage=of)) for of in COVERS),
+        *(("rays, along a pixel", str(rays), RenderSettings(rays=rays)) for rays in (1, 2, 3)),
+        *(("lead, voxels", f"{lead:g}", RenderSettings(lead=lead)) for lead in (0.5, 1.0, 2.0, np.inf)),
+    ]
+    made: list[tuple[str, str, CellsSpec]] = [
+        *(("grid, cells", str(cells), replace(spec, cells=cells)) for cells in (8, 12, 16, 24)),
+        *(("width", str(wide), replace(spec, size=replace(spec.size, width=wide))) for wide in (16, 32, 64)),
+        *(("told", kind, replace(spec, size=replace(spec.size, kind=kind))) for kind in ("osf-v", "osf")),
+    ]
+    turned = (
+        *(replace(plain, knob=knob, level=level, settings=settings) for knob, level, settings in drawn),
+        *(replace(plain, knob="side, pixels", level=str(of), side=of) for of in (64, 128, 256, 400)),
+        *(replace(plain, knob=knob, level=level, networks=networks) for knob, level, networks in made),
+    )
+    return (plain, *(way for way in turned if replace(way, knob=DEFAULT, level=DEFAULT) != plain))
+
+
+def every_sample(settings: RenderSettings) -> RenderSettings:
+    """Many samples of the whole shell, no ray ended: what skipping, ending and thinning out leave out.
+
+    Pixels are cut up as they were, which is no networks' matter: it tells in the errors against exact
+    pictures.
+    """
+    return RenderSettings(step=0.125, termination=0.0, coverage=settings.coverage, rays=settings.rays)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +105,8 @@ class Worth:
         samples: a picture, in the mean.
         rays: a picture, in the mean.
         networks: in all.
-        weight_bytes: of the weights as they are kept.
+        file_bytes: of the file of its networks.
+        errors: grey levels from the exact picture of each view, root mean square.
         exact: errors against exact pictures, by ``picture_errors``'s names.
         many: the same against many samples of the same networks.
     """
@@ -55,163 +114,147 @@ class Worth:
     samples: float
     rays: float
     networks: int
-    weight_bytes: int
+    file_bytes: int
+    errors: tuple[float, ...]
     exact: Mapping[str, float]
     many: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Cost:
-    """What one way costs and is worth.
+class PictureCost:
+    """What one way is worth and costs.
 
     Attributes:
+        way: to the picture.
         worth: of its pictures.
-        wall: s on the clock a picture.
-        cpu: s of CPU time a picture, all threads together.
+        point: errors and seconds, a sample for each view.
     """
 
+    way: Way
     worth: Worth
-    wall: Spread
-    cpu: Spread
+    point: Point
 
 
 @dataclass(frozen=True, eq=False)
-class Views:
-    """What every way is asked for.
+class Studio:
+    """An object, what it is seen by, and its networks; each is made once.
 
     Attributes:
         lit: the object.
-        held_out: cameras and lights that no network was shown.
-        samples: a side of a pixel of the exact pictures.
+        held_out: cameras and lights that no network is shown.
+        threads: that share the work; None for as many as the process has cores.
+        renderers: by how their networks were trained.
+        file_bytes: of the file of networks, likewise.
     """
 
     lit: LitObject
     held_out: HeldOutViews
-    samples: int = 4
-
-    def of_side(self, side: int) -> HeldOutViews:
-        """The same cameras with so many pixels a side."""
-        kept = self.held_out
-        return HeldOutViews(tuple(each.resized(side, side) for each in kept.cameras), kept.lights, kept.apart)
-
-    def exact(self, side: int) -> list[LinearImage]:
-        """Exact pictures of so many pixels a side."""
-        return reference_pictures(self.lit, self.of_side(side), self.samples)
-
-
-@dataclass(frozen=True, eq=False)
-class CostRequest:
-    """Renderers by their networks, each opened once.
-
-    Attributes:
-        models: the trained networks, in float16, for every training that is asked for.
-        lit: the object.
-        threads: None for as many as the process has cores.
-    """
-
-    models: Mapping[Networks, VisionModel]
-    lit: LitObject
     threads: int | None = None
-    _opened: dict[Networks, VisionRenderer] = field(default_factory=dict)
+    renderers: dict[CellsSpec, VisionRenderer] = field(default_factory=dict)
+    file_bytes: dict[CellsSpec, int] = field(default_factory=dict)
+    _exact: dict[int, list[LinearImage]] = field(default_factory=dict)
+    _many: dict[Way, list[LinearImage]] = field(default_factory=dict)
 
-    def model(self, networks: Networks) -> VisionModel:
-        """The networks in their bits."""
-        return in_bits(self.models[Networks(networks.spec)], networks.bits)
+    def train(self, spec: CellsSpec, seed: int, folder: Path, report: Report) -> None:
+        """Take networks from the folder where they are there; a training that was killed goes on.
 
-    def renderer(self, networks: Networks) -> VisionRenderer:
-        """That draws them."""
-        if networks not in self._opened:
-            data = vision_graph(self.model(networks)).SerializeToString()
-            self._opened[networks] = VisionRenderer(data, self.lit.appearance.mesh, self.threads)
-        return self._opened[networks]
+        Args:
+            spec: of their training.
+            seed: of all that is drawn.
+            folder: exists.
+            report: told of progress.
 
-    def picture(self, way: Variation, view: int, held_out: HeldOutViews) -> Rendered:
-        """One picture, in the pixels of ``held_out``."""
-        renderer = self.renderer(way.networks)
-        return renderer.render(held_out.cameras[view], held_out.lights[view], way.settings)
+        Raises:
+            DataRefused: a file of that name that is of something else.
+        """
+        name = self._key(spec, seed)
+        kept, checkpoint = folder / f"{name}.onnx", folder / f".{name}.npz"
+        if not kept.is_file():
+            model = networks_alone(self.lit, self.held_out, spec, seed, checkpoint, report, self.threads)
+            part = kept.with_name(f".{kept.name}.part")
+            part.write_bytes(vision_graph(model).SerializeToString())
+            part.replace(kept)
+            checkpoint.unlink(missing_ok=True)
+        data, mesh = kept.read_bytes(), self.lit.appearance.mesh
+        self.renderers[spec] = VisionRenderer(data, mesh, self.threads, name=kept.name)
+        self.file_bytes[spec] = len(data)
+
+    def views(self, way: Way) -> HeldOutViews:
+        """The cameras with its pixels."""
+        cameras = tuple(each.resized(way.side, way.side) for each in self.held_out.cameras)
+        return replace(self.held_out, cameras=cameras)
+
+    def worth(self, way: Way) -> Worth:
+        """What it is worth."""
+        renderer, views = self.renderers[way.networks], self.views(way)
+        drawn = [
+            renderer.render(camera, light, way.settings)
+            for camera, light in zip(views.cameras, views.lights, strict=True)
+        ]
+        if way.side not in self._exact:
+            self._exact[way.side] = reference_pictures(self.lit, views, _SAMPLES)
+        exact, found = self._exact[way.side], [each.image for each in drawn]
+        whole = replace(way, knob="", level="", settings=every_sample(way.settings))
+        if whole not in self._many:
+            self._many[whole] = network_pictures(renderer, views, whole.settings)
+        return Worth(
+            samples=float(np.mean([each.samples for each in drawn])),
+            rays=float(np.mean([each.rays for each in drawn])),
+            networks=len(renderer.model.grid),
+            file_bytes=self.file_bytes[way.networks],
+            errors=tuple(
+                mean_square(got.display(BEHIND), wanted.display(BEHIND)) ** 0.5
+                for got, wanted in zip(found, exact, strict=True)
+            ),
+            exact=picture_errors(exact, found),
+            many=picture_errors(self._many[whole], found),
+        )
+
+    def _key(self, spec: CellsSpec, seed: int) -> str:
+        look, mesh, kept = self.lit.appearance, self.lit.appearance.mesh, self.held_out
+        size, *others = astuple(spec)
+        surface = [mesh.vertices, mesh.faces, look.normals, look.tints, look.places, look.texture_of]
+        eyes = [camera.eye for camera in kept.cameras] + [light.direction for light in kept.lights]
+        told = ["vision networks", VERSION, list(size), others, seed, surface, list(look.textures), eyes]
+        return digest([*told, kept.apart])[:16]
 
 
-def networks_of(asked: Iterable[Trade]) -> tuple[Networks, ...]:
-    """What must be trained for them, each once, in their order."""
-    return tuple(dict.fromkeys(Networks(each.way.networks.spec) for each in asked))
-
-
-def measured(
-    ways: Sequence[Variation], asked: CostRequest, views: Views, repeat: int, report: Report
-) -> dict[Variation, Cost]:
-    """Errors and seconds of each way, each measured once however often it is named.
+def measured(asked: Sequence[Way], studio: Studio, repeat: int, report: Report) -> tuple[PictureCost, ...]:
+    """Errors and seconds of each way.
 
     Args:
-        ways: to a picture.
-        asked: renderers of their networks.
-        views: that are drawn.
+        asked: ways to a picture.
+        studio: with their networks.
         repeat: times that every picture is drawn for its seconds, one or more.
         report: told of progress.
     """
-    each = tuple(dict.fromkeys(ways))
-    sight = {side: _Sight(views, side) for side in dict.fromkeys(way.side for way in each)}
-    errors: dict[Variation, Worth] = {}
-    for number, way in enumerate(each):
-        report("comparing pictures", 0.5 * number / len(each))
-        errors[way] = _worth(way, asked, sight[way.side])
-    taken: dict[Variation, list[tuple[float, float]]] = {way: [] for way in each}
+    worth = []
+    for number, way in enumerate(asked):
+        report("comparing pictures", 0.5 * number / len(asked))
+        worth.append(studio.worth(way))
+    taken = []
     for turn in range(repeat):
         report("timing", 0.5 + 0.5 * turn / repeat)
-        for way in each:
-            taken[way].append(_seconds(way, asked, sight[way.side].held_out))
-    return {way: Cost(errors[way], *_spreads(taken[way])) for way in each}
+        taken.append([_seconds(studio, way) for way in asked])
+    return tuple(map(_cost, asked, worth, np.median(taken, axis=0)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Sight:
-    """Views of one size, with their exact pictures."""
-
-    views: Views
-    side: int
-    _many: dict[tuple[Networks, RenderSettings], list[LinearImage]] = field(default_factory=dict)
-
-    @cached_property
-    def held_out(self) -> HeldOutViews:
-        return self.views.of_side(self.side)
-
-    @cached_property
-    def exact(self) -> list[LinearImage]:
-        return self.views.exact(self.side)
-
-    def many(self, way: Variation, asked: CostRequest) -> list[LinearImage]:
-        key = way.networks, every_sample(way.settings)
-        if key not in self._many:
-            self._many[key] = network_pictures(asked.renderer(way.networks), self.held_out, key[1])
-        return self._many[key]
+def _seconds(studio: Studio, way: Way) -> list[tuple[float, float]]:
+    """Of CPU time, all threads together, and on the clock, of each view."""
+    views, renderer = studio.views(way), studio.renderers[way.networks]
+    found = []
+    for camera, light in zip(views.cameras, views.lights, strict=True):
+        cpu, wall = time.process_time(), time.perf_counter()
+        renderer.render(camera, light, way.settings)
+        found.append((time.process_time() - cpu, time.perf_counter() - wall))
+    return found
 
 
-def _worth(way: Variation, asked: CostRequest, sight: _Sight) -> Worth:
-    count = len(sight.held_out.cameras)
-    drawn = [asked.picture(way, view, sight.held_out) for view in range(count)]
-    found, model = [each.image for each in drawn], asked.model(way.networks)
-    return Worth(
-        samples=float(np.mean([each.samples for each in drawn])),
-        rays=float(np.mean([each.rays for each in drawn])),
-        networks=len(model.grid),
-        weight_bytes=kept_bytes(model, way.networks.bits),
-        exact=picture_errors(sight.exact, found),
-        many=picture_errors(sight.many(way, asked), found),
+def _cost(way: Way, worth: Worth, seconds: FloatArray) -> PictureCost:
+    samples = tuple(
+        Sample(f"view {view + 1}", "", error, None, 0.0, *seconds[view].tolist())
+        for view, error in enumerate(worth.errors)
     )
-
-
-def _seconds(way: Variation, asked: CostRequest, held_out: HeldOutViews) -> tuple[float, float]:
-    """On the clock and of CPU time, of one picture in the mean of all views."""
-    clocks: tuple[Callable[[], float], ...] = (time.perf_counter, time.process_time)
-    begun = [clock() for clock in clocks]
-    for view in range(len(held_out.cameras)):
-        asked.picture(way, view, held_out)
-    wall, cpu = (
-        (clock() - before) / len(held_out.cameras) for clock, before in zip(clocks, begun, strict=True)
-    )
-    return wall, cpu
-
-
-def _spreads(taken: Sequence[tuple[float, float]]) -> tuple[Spread, Spread]:
-    """On the clock, and of CPU time."""
-    quartiles = np.quantile(np.array(taken), (0.25, 0.5, 0.75), axis=0)
-    return Spread(*quartiles[:, 0].tolist()), Spread(*quartiles[:, 1].tolist())
+    name = way.knob if way.knob == DEFAULT else f"{way.knob}: {way.level}"
+    levels, condition = {"knob": way.knob, "level": way.level}, {"side, pixels": way.side}
+    return PictureCost(way, worth, Point(name, levels, condition, samples, GREY))

@@ -1,30 +1,30 @@
 """``touchstone cost vision``: what pictures by networks cost and err, knob by knob."""
 
-import time
-from dataclasses import dataclass
+import math
+import os
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.table import Table
 
+from harness.basics.cores import own_cores
 from harness.basics.whole_file import write_text_whole
 from harness.commands import options
 from harness.commands.object import vision_options
-from harness.commands.object.cost_vision_answer import (
-    MeasuredCurves,
-    as_json,
-    draw,
-    load_of_others,
-    print_answer,
-)
-from harness.commands.output import emit, share_progress, warn
+from harness.commands.output import ANSWERS, emit, share_progress, warn
 
 if TYPE_CHECKING:
     from harness.authoring.training import Report
-    from harness.authoring.vision.cost import Views
+    from harness.authoring.vision.cost import PictureCost, Way
     from harness.authoring.vision.profiles import CellsSpec
-    from harness.authoring.vision.trades import Trade
+    from harness.cost.curve import Point
+
+CODE = "harness.authoring.vision.cost"
+"""The module whose sources, with all that it imports, networks and pictures depend on."""
 
 
 def vision(
@@ -56,74 +56,128 @@ def vision(
 
     Try: touchstone cost vision builtin:wrench --threads 1
     """
-    from harness.authoring.vision.cost import Views
+    from harness.authoring.vision.cost import Studio, measured
     from harness.authoring.vision.data import held_out_pictures
     from harness.authoring.vision.profiles import vision_profile
+    from harness.cost.curve import front
+    from harness.cost.provenance import code, machine
     from harness.sim.light.appearance_source import appearance_of
     from harness.sim.light.direct_image import LitObject
     from harness.sim.solid.surface_source import surface_of
 
-    spec = vision_profile(profile).networks
-    chosen = _chosen(spec, size, knob)
+    chosen = _chosen(vision_profile(profile).networks, size, knob)
     look = appearance_of(mesh, surface_of(mesh, units, None).units)
-    sight = Views(LitObject(look), held_out_pictures(look.mesh, views, size, size, seed))
+    studio = Studio(LitObject(look), held_out_pictures(look.mesh, views, size, size, seed), threads)
     out.mkdir(parents=True, exist_ok=True)
     with share_progress() as report:
-        found = _measured(chosen, sight, _Asking(seed, repeat, out, threads), report)
-    picture = draw(found, mesh, out)
-    answer = as_json(found, mesh, profile, seed, picture)
-    write_text_whole(picture.with_suffix(".json"), dumps(answer, allow_nan=False, indent=1) + "\n")
-    for sentence in found.notes:
-        warn(sentence)
+        wanted = tuple(dict.fromkeys(way.networks for way in chosen))
+        for number, networks in enumerate(wanted, start=1):
+            studio.train(networks, seed, out, _after(f"networks {number} of {len(wanted)}", report))
+        load, cores = _load_of_others(), threads or own_cores()
+        costs = measured(chosen, studio, repeat, report)
+    of_size = [each.point for each in costs if each.way.side == size]
+    best = front(of_size)
+    answer = {
+        "schema": 2,
+        "program": "vision",
+        "mesh": mesh,
+        "profile": profile,
+        "seed": seed,
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": machine(),
+        "code": code(CODE),
+        "threads": cores,
+        "repeat": repeat,
+        "load": load,
+        "points": [_point(each, each.point in best) for each in costs],
+        "picture": str(_drawn(of_size, f"{Path(mesh).name}, {size} x {size} pixels, {cores} threads", out)),
+        "curve": str(out / "curve.json"),
+    }
+    write_text_whole(out / "curve.json", dumps(answer, allow_nan=False, indent=1) + "\n")
+    if load is not None and load + cores > (os.cpu_count() or 1) + 0.5:
+        warn(
+            f"the machine was busy (load {load:.1f} before the pictures): seconds on the clock say "
+            "nothing; compare CPU time, or measure again when it is quiet"
+        )
     if json:
         emit(answer)
     else:
-        print_answer(found, picture)
+        _print(costs, best)
+        ANSWERS.print(answer["picture"], markup=False)
     return 0
 
 
-@dataclass(frozen=True)
-class _Asking:
-    """How networks are made and pictures timed."""
-
-    seed: int
-    repeat: int
-    out: Path
-    threads: int | None
-
-
-def _measured(
-    chosen: "tuple[Trade, ...]", sight: "Views", asking: _Asking, report: "Report"
-) -> MeasuredCurves:
-    from harness.authoring.vision.cost import CostRequest, measured, networks_of
-    from harness.authoring.vision.cost_networks import trained
-
-    begun, models = time.perf_counter(), {}
-    for number, networks in enumerate(wanted := networks_of(chosen)):
-        named = _numbered(report, f"networks {number + 1} of {len(wanted)}")
-        models[networks] = trained(networks, sight, asking.seed, asking.out, named, asking.threads)
-    seconds = {"networks": time.perf_counter() - begun}
-    before = load_of_others()
-    begun = time.perf_counter()
-    asked, ways = CostRequest(models, sight.lit, asking.threads), [each.way for each in chosen]
-    costs = measured(ways, asked, sight, asking.repeat, report)
-    seconds["pictures"] = time.perf_counter() - begun
-    return MeasuredCurves(chosen, costs, asked.threads, asking.repeat, before, seconds)
-
-
-def _chosen(spec: "CellsSpec", size: int, knobs: list[str] | None) -> "tuple[Trade, ...]":
-    from harness.authoring.vision.trades import trades
+def _chosen(spec: "CellsSpec", size: int, knobs: list[str] | None) -> "tuple[Way, ...]":
+    from harness.authoring.vision.cost import DEFAULT, ways
     from harness.basics.errors import WrongUse
     from harness.basics.toml_file import nearest
 
-    every = trades(spec, size)
-    known = {each.knob.partition(",")[0]: each.knob for each in every}
+    every = ways(spec, size)
+    known = [way.knob.partition(",")[0] for way in every]
     for name in knobs or []:
         if name not in known:
             raise WrongUse(f"no knob {name!r}; {nearest(name, known)}")
-    kept = {known[name] for name in knobs or known}
-    return tuple(each for each in every if each.knob in kept)
+    kept = {DEFAULT, *(knobs or known)}
+    return tuple(way for way, name in zip(every, known, strict=True) if name in kept)
 
 
-def _numbered(report: "Report", before: str) -> "Report":
+def _after(before: str, report: "Report") -> "Report":
     return lambda doing, share: report(f"{before}: {doing}", share)
+
+
+def _load_of_others() -> float | None:
+    """Programs that ran or waited over the last minute, this one's single thread left out."""
+    return max(os.getloadavg()[0] - 1.0, 0.0) if hasattr(os, "getloadavg") else None
+
+
+def _drawn(points: "Sequence[Point]", title: str, out: Path) -> Path:
+    from harness.report.figures.cost_chart import cost_chart
+    from harness.report.figures.figures import Album
+
+    return out / Album(out).drawing("curve", cost_chart(points, ("knob",), title, stale=False)).file
+
+
+def _point(cost: "PictureCost", on_front: bool) -> dict[str, Any]:
+    from harness.cost.file import summary
+
+    worth = cost.worth
+    return {
+        **summary(cost.point, on_front),
+        "wall_s": float(cost.point.wall_seconds.mean()),
+        "side_px": cost.way.side,
+        "samples": worth.samples,
+        "rays": worth.rays,
+        "networks": worth.networks,
+        "file_bytes": worth.file_bytes,
+        "from_exact": _finite(worth.exact),
+        "from_many_samples": _finite(worth.many),
+    }
+
+
+def _finite(errors: Mapping[str, float]) -> dict[str, float | None]:
+    """The decibels of equal pictures are null."""
+    return {name: value if math.isfinite(value) else None for name, value in errors.items()}
+
+
+def _print(costs: "Sequence[PictureCost]", best: "Sequence[Point]") -> None:
+    drawn = Table()
+    for heading in ("knob", "level"):
+        drawn.add_column(heading, no_wrap=True)
+    for heading in (
+        *("front", "samples", "exact, dB", "SSIM", "object, dB", "many, dB", "CPU, ms", "clock, ms", "MB"),
+    ):
+        drawn.add_column(heading, justify="right", no_wrap=True)
+    last = ""
+    for cost in costs:
+        way, worth, exact = cost.way, cost.worth, cost.worth.exact
+        if last and way.knob != last:
+            drawn.add_section()
+        drawn.add_row(
+            *("" if way.knob == last else way.knob, way.level, "*" if cost.point in best else ""),
+            *(f"{worth.samples:.0f}", f"{exact['psnr_db']:.2f}", f"{exact['ssim']:.4f}"),
+            *(f"{exact['psnr_db_object']:.2f}", f"{worth.many['psnr_db']:.2f}"),
+            *(f"{1e3 * cost.point.seconds.value:.1f}", f"{1e3 * cost.point.wall_seconds.mean():.1f}"),
+            f"{worth.file_bytes / 1e6:.2f}",
+        )
+        last = way.knob
+    ANSWERS.print(drawn)

@@ -139,6 +139,7 @@ def _scenes(only: list[str] | None, scene: Path | None) -> dict[str, Any]:
 
 def _result(curve: Any, path: Path, page: Path) -> dict[str, Any]:
     from harness.cost.curve import front
+    from harness.cost.file import summary
 
     conditions = []
     for condition in curve.conditions():
@@ -148,7 +149,7 @@ def _result(curve: Any, path: Path, page: Path) -> dict[str, Any]:
             {
                 "condition": condition,
                 "runs": max(len(point.samples) for point in points),
-                "settings": [_setting(point, point.name in best) for point in points],
+                "settings": [summary(point, point.name in best) for point in points],
             }
         )
     return {
@@ -161,21 +162,6 @@ def _result(curve: Any, path: Path, page: Path) -> dict[str, Any]:
         "conditions": conditions,
         "curve": str(path),
         "report": str(page),
-    }
-
-
-def _setting(point: Any, on_front: bool) -> dict[str, Any]:
-    return {
-        "levels": dict(point.levels),
-        "front": on_front,
-        "error_m": point.error.value,
-        "error_low_m": point.error.low,
-        "error_high_m": point.error.high,
-        "median_error_m": point.median_error.value,
-        "mean_error_m": float(point.errors.mean()),
-        "seconds": point.seconds.value,
-        "seconds_low": point.seconds.low,
-        "seconds_high": point.seconds.high,
     }
 
 

@@ -8,7 +8,7 @@ from harness.basics.errors import WrongUse
 from harness.picture.linear_image import LinearImage
 
 VisionLevel = Literal["fused", "onnx", "one_sample"]
-LEVELS = ("fused", "onnx", "one_sample")
+LEVELS: tuple[VisionLevel, ...] = ("fused", "onnx", "one_sample")
 
 COVERS = (1, 3, 5, 7)
 """Sub-pixels along a pixel: odd, so that one is its centre."""

@@ -27,16 +27,17 @@ def cost_chart(points: Sequence[Point], families: Sequence[str], title: str, sta
         title: over the drawing.
         stale: whether the curve no longer holds; written across it.
     """
-    best = front(points)
+    best, unit = front(points), points[0].unit
     with styled():
         figure = blank(10.4, 4.9, "constrained")
         axes = figure.add_subplot()
         for number, name in enumerate(dict.fromkeys(family_of(p, families) for p in points)):
             mine = [point for point in points if family_of(point, families) == name]
-            colour = _COLOURS[number % len(_COLOURS)]
-            _marks(axes, [p for p in mine if p not in best], colour, f"{name}, dominated", pale=True)
-            _marks(axes, [p for p in mine if p in best], colour, f"{name}, on the front", pale=False)
-        at = np.array([(p.seconds.value, 1e3 * p.error.value) for p in best])
+            around, own = divmod(number, len(_COLOURS))
+            look = _COLOURS[own], _DASHES[around % len(_DASHES)][1]
+            _marks(axes, [p for p in mine if p not in best], *look, f"{name}, dominated", pale=True)
+            _marks(axes, [p for p in mine if p in best], *look, f"{name}, on the front", pale=False)
+        at = np.array([(p.seconds.value, unit.scale * p.error.value) for p in best])
         axes.plot(*at.T, color=SOFT, lw=1.0, zorder=1)
         if stale:
             axes.text(
@@ -44,8 +45,8 @@ def cost_chart(points: Sequence[Point], families: Sequence[str], title: str, sta
                 ha="center", va="center", rotation=18, fontweight="bold",
             )  # fmt: skip
         axes.set_title(title, fontsize=11)
-        axes.set_xlabel("seconds of CPU time, from readings to answer (geometric mean, 90 % interval)")
-        axes.set_ylabel("error in mm (mean, each at most 20 mm; 90 % interval)")
+        axes.set_xlabel("seconds of CPU time (geometric mean, 90 % interval)")
+        axes.set_ylabel(unit.label)
         _logarithmic(axes)
         axes.legend(loc="best", frameon=False, fontsize=8)  # named: see charts.py
         key(axes, [f"{number}  {point.name}" for number, point in enumerate(best, start=1)])
@@ -101,10 +102,11 @@ def contacts_chart(curves: Sequence[tuple[str, Sequence[tuple[int, Point]]]]) ->
     return figure
 
 
-def _marks(axes: Axes, points: Sequence[Point], colour: str, label: str, pale: bool) -> None:
+def _marks(axes: Axes, points: Sequence[Point], colour: str, mark: str, label: str, pale: bool) -> None:
     if not points:
         return
-    x, y = [p.seconds.value for p in points], [1e3 * p.error.value for p in points]
+    scale = points[0].unit.scale
+    x, y = [p.seconds.value for p in points], [scale * p.error.value for p in points]
     axes.errorbar(
         x,
         y,
@@ -113,10 +115,10 @@ def _marks(axes: Axes, points: Sequence[Point], colour: str, label: str, pale: b
             [p.seconds.high - p.seconds.value for p in points],
         ),
         yerr=(
-            [1e3 * (p.error.value - p.error.low) for p in points],
-            [1e3 * (p.error.high - p.error.value) for p in points],
+            [scale * (p.error.value - p.error.low) for p in points],
+            [scale * (p.error.high - p.error.value) for p in points],
         ),
-        fmt="o",
+        fmt=mark,
         ms=4 if pale else 8,
         mfc="white" if pale else colour,
         color=colour,

@@ -35,26 +35,26 @@ def cost(block: Path, *more: str) -> int:
 
 
 def test_a_knob_is_turned_and_its_curve_kept(block: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    knobs = ("--knob", "termination", "--knob", "weights")
+    knobs = ("--knob", "termination", "--knob", "grid")
     assert cost(block, *knobs, "--json") == 0
     answer = json.loads(capsys.readouterr().out)
     out = block.parent / "cost"
     assert json.loads((out / "curve.json").read_text()) == answer
     assert Path(answer["picture"]).read_bytes().startswith(b"\x89PNG")
     points = answer["points"]
-    assert [point["level"] for point in points if point["knob"] == "termination"][-1] == "0"
-    sizes = [point["weight_bytes"] for point in points if point["knob"] == "weights, bits"]
-    assert sizes == sorted(sizes, reverse=True)
-    assert len(set(sizes)) == 4
+    turned = [point["levels"]["level"] for point in points if point["levels"]["knob"] == "termination"]
+    assert turned == ["0.3", "0.1", "0.01", "0"]
+    assert any(point["front"] for point in points)
     for point in points:
-        assert point["cpu_s"]["middle"] > 0.0
+        assert point["seconds"] > 0.0
+        assert 0.0 < point["error_grey"] < 150.0
         assert point["from_exact"]["psnr_db"] > 5.0
     before = {path: path.stat().st_mtime_ns for path in out.glob("*.onnx")}
-    assert len(before) == 1
+    assert len(before) == 5
     assert cost(block, *knobs) == 0
     said = capsys.readouterr().out
     assert {path: path.stat().st_mtime_ns for path in out.glob("*.onnx")} == before
-    for words in ("termination", "weights, bits", "CPU, ms", "curve.png"):
+    for words in ("termination", "grid, cells", "CPU, ms", "curve.png"):
         assert words in said
 
 
