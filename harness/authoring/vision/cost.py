@@ -31,7 +31,7 @@ from harness.sim.light.direct_image import LitObject
 DEFAULT = "default"
 """The knob that is turned nowhere."""
 
-GREY = ErrorUnit("grey", "error in grey levels of 255 (root mean square; mean of views, 90 % interval)")
+GREY = ErrorUnit("grey", "error, grey levels of 255 (rms; mean of views, 90 %)")
 
 _SAMPLES = 4
 """A side of a pixel of the exact pictures."""
