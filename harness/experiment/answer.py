@@ -1,4 +1,4 @@
-"""From a recording to its result: answer, write ``result.json``, tell; only then compare and draw."""
+"""From a recording to its result: answer, write ``result.json``, publish; only then compare and draw."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -27,7 +27,7 @@ RESULT = "result.json"
 OBSERVED = "observed.npz"
 """Beside it: what the scene observes, simulated at the answer."""
 
-Tell = Callable[[Mapping[str, Any]], None]
+Publish = Callable[[Mapping[str, Any]], None]
 Draw = Callable[[Scored, Comparison, Mapping[str, Health] | None, Path], Path]
 """Draws the report of an experiment that has no page of its own."""
 
@@ -75,11 +75,11 @@ def finish(
     health: Mapping[str, Health] | None = None,
     folder: Path | None = None,
     answering: Answering | None = None,
-    tell: Tell = lambda _: None,
+    publish: Publish = lambda _: None,
     more: Mapping[str, Any] | None = None,
     since: float | None = None,
 ) -> dict[str, Any]:
-    """The result of a run: written and told as soon as it is known, then again with what the report adds.
+    """The result of a run: written and published once it is known, then again with what the report adds.
 
     Args:
         experiment: that the run is of.
@@ -89,18 +89,18 @@ def finish(
         health: of the instruments; None for a replay.
         folder: for result and report; the run's own where None.
         answering: that has the readings already.
-        tell: is given the result before the report is drawn.
+        publish: is given the result before the report is drawn.
         more: further keys of the result.
         since: s on the bench clock, when the last step was on the disk; the result says how long after.
     """
     folder = folder or recording.folder
-    told = tell_answer(experiment, recording, accuracy, folder, answering, tell, more, since)
-    return add_report(experiment, told, draw, health, folder)
+    written = write_answer(experiment, recording, accuracy, folder, answering, publish, more, since)
+    return add_report(experiment, written, draw, health, folder)
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """An answer that is written and told, and not yet compared.
+class WrittenAnswer:
+    """An answer that is written and published, and not yet compared.
 
     Attributes:
         scored: the answer.
@@ -111,40 +111,40 @@ class Told:
     result: dict[str, Any]
 
 
-def tell_answer(
+def write_answer(
     experiment: Experiment,
     recording: Recording,
     accuracy: Accuracy,
     folder: Path,
     answering: Answering | None = None,
-    tell: Tell = lambda _: None,
+    publish: Publish = lambda _: None,
     more: Mapping[str, Any] | None = None,
     since: float | None = None,
-) -> Told:
-    """Answer, write ``result.json``, tell; the arguments are ``finish``'s."""
+) -> WrittenAnswer:
+    """Answer, write ``result.json``, publish; the arguments are ``finish``'s."""
     scored = score(experiment, recording, accuracy, answering)
     result = {**common(experiment, scored), **scored.result, **(more or {})}
     result["warnings"] = [*scored.warnings, *result.get("warnings", ())]
     result["answered_after_s"] = None if since is None else now() - since
     _write(folder / RESULT, result)
-    tell(result)
-    return Told(scored, result)
+    publish(result)
+    return WrittenAnswer(scored, result)
 
 
 def add_report(
     experiment: Experiment,
-    told: Told,
+    written: WrittenAnswer,
     draw: Draw,
     health: Mapping[str, Health] | None,
     folder: Path,
 ) -> dict[str, Any]:
     """Compare, draw the report, and write the result again with both; the arguments are ``finish``'s."""
-    scored = told.scored
+    scored = written.scored
     comparison = compare(scored, experiment.sources(scored))
     page = (experiment.report or draw)(scored, comparison, health, folder / "report")
     np.savez_compressed(folder / OBSERVED, **comparison.arrays())  # type: ignore[arg-type]
     result = {
-        **told.result,
+        **written.result,
         "plan": plan_json(comparison),
         "observed": comparison.observed(),
         "report": str(page),

@@ -22,5 +22,5 @@ def told_of(
     lit = extras.under(eye, light)
     assert lit is not None, "these networks are told nothing"
     found = np.empty((len(ways), extras.count), np.float32)
-    lit.tell(ways, depth, likely, found, Workspace())
+    lit.surface_inputs(ways, depth, likely, found, Workspace())
     return found

@@ -7,7 +7,7 @@ import typer
 
 from harness.commands import options
 from harness.commands.output import warn
-from harness.commands.run.run import drawing, show_report, teller
+from harness.commands.run.run import drawing, show_report, publisher
 
 
 def replay(
@@ -50,6 +50,6 @@ def replay(
         warn(f"{error}; the default levels are taken")
     accuracy = chosen_levels(kind.knobs, level or [], own)
     folder = out or run.with_name(f"{run.name}-replay")
-    result = finish(kind, recording, accuracy, drawing(kind), None, folder, None, teller(kind, json))
+    result = finish(kind, recording, accuracy, drawing(kind), None, folder, None, publisher(kind, json))
     show_report(result, json)
     return 0

@@ -32,7 +32,7 @@ class Sense(StrEnum):
 
 
 class Yaw(StrEnum):
-    """Whether the estimator is told the object's yaw."""
+    """Whether the estimator knows the object's yaw."""
 
     KNOWN = "known"
     UNKNOWN = "unknown"
@@ -64,7 +64,7 @@ def run(
     spacing: Annotated[
         Spacing | None, typer.Option(help="close: within 25 mm of the last; spread: over the object.")
     ] = None,
-    yaw: Annotated[Yaw | None, typer.Option(help="Whether the estimator is told the object's yaw.")] = None,
+    yaw: Annotated[Yaw | None, typer.Option(help="Whether the estimator knows the object's yaw.")] = None,
     sense: Annotated[
         Sense | None, typer.Option(help="touch: press only; both: strike each place too, and listen.")
     ] = None,
@@ -88,7 +88,7 @@ def run(
     """
     from harness.bench.station_file import load_station, station_path
     from harness.commands.scenes import resolve
-    from harness.experiment.answer import add_report, finish, tell_answer
+    from harness.experiment.answer import add_report, finish, write_answer
     from harness.experiment.begin import begin
     from harness.experiment.budget import answer_as_asked, sentences
     from harness.experiment.front import doubts, foresee, front_for
@@ -134,21 +134,23 @@ def run(
         begun = begin(kind, wanted, bench, seed, gap, out)
         recording = begun.recording
         _describe(kind, begun, accuracy)
-    told: list[Any] = []
+    written: list[Any] = []
 
     def conclude(done: Any) -> None:
         if target is None:
-            tell = teller(kind, json)
+            publish = publisher(kind, json)
             folder, since = recording.folder, done.ended
-            told.append(tell_answer(kind, recording, accuracy, folder, done.answering, tell, None, since))
+            written.append(
+                write_answer(kind, recording, accuracy, folder, done.answering, publish, None, since)
+            )
 
     done = _perform(kind, recording, accuracy if target is None else None, json, conclude)
     if not done.complete:
         step = f"{kind.step} {recording.committed}"
         return stopped(step, recording.folder, _resuming(kind, recording), json)
-    if told:
+    if written:
         health = done.health or None
-        show_report(add_report(kind, told[0], drawing(kind), health, recording.folder), json)
+        show_report(add_report(kind, written[0], drawing(kind), health, recording.folder), json)
         return 0
     more: dict[str, Any] = {}
     if target is not None:
@@ -168,7 +170,7 @@ def run(
         done.health or None,
         None,
         done.answering,
-        teller(kind, json),
+        publisher(kind, json),
         more,
         done.ended,
     )
@@ -176,10 +178,10 @@ def run(
     return 0
 
 
-def teller(kind: Any, as_json: bool) -> Any:
+def publisher(kind: Any, as_json: bool) -> Any:
     """Says the answer as soon as it is known, before the report is drawn."""
 
-    def tell(result: Any) -> None:
+    def publish(result: Any) -> None:
         for warning in result["warnings"]:
             warn(warning)
         if not as_json:
@@ -187,7 +189,7 @@ def teller(kind: Any, as_json: bool) -> Any:
                 ANSWERS.print(line, markup=False)
             CONSOLE.print("comparing with the simulation, drawing the report", markup=False)
 
-    return tell
+    return publish
 
 
 def drawing(kind: Any) -> Any:

@@ -124,7 +124,7 @@ class VisionRenderer:
                 if np.isfinite(chosen.lead):
                     begin[at] = np.maximum(surface[at] - chosen.lead * self.shell.voxel, 0.0)
             if lit is not None:
-                lit.tell(ways[at], surface[at], outline.faces[at], extras[at], room)
+                lit.surface_inputs(ways[at], surface[at], outline.faces[at], extras[at], room)
 
         rays = Rays.begun(camera.eye, ways, surface, Scene(views, extras, light.direction), begin)
         return rays, slant, aimed

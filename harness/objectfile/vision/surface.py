@@ -1,4 +1,4 @@
-"""What ``osf-v`` networks are told too: whether the light reaches a ray's surface, and its normal."""
+"""Further inputs of ``osf-v`` networks: whether the light reaches a ray's surface, and its normal."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from harness.basics.faces.ray_mesh import LEAST
 from harness.basics.mesh import Mesh
 from harness.objectfile.vision.coverage.faces import FaceCubes
 from harness.objectfile.vision.light import LampGrid
-from harness.objectfile.vision.surface_inputs import Surface, tell
+from harness.objectfile.vision.surface_inputs import Surface, surface_inputs
 from harness.objectfile.vision.threads import Workspace
 from harness.sim.light.appearance import plain
 
@@ -37,10 +37,10 @@ class LitSurface:
     surface: Surface
     grid: LampGrid
 
-    def tell(
+    def surface_inputs(
         self, ways: FloatArray, depth: FloatArray, likely: AnyArray, told: AnyArray, room: Workspace
     ) -> None:
-        """Fill in what is told of some rays: 1 where the light is seen, else 0; the unit normal that is seen.
+        """Fill in the inputs of some rays: 1 where the light is seen, else 0; the unit normal that is seen.
 
         All four are 0 for a ray that meets nothing.
 
@@ -57,7 +57,7 @@ class LitSurface:
             room.take(f"told {kind}", (count,), kind) for kind in ("int64", "float64", "bool")
         )
         lifted = room.take("lifted", (count, 3), np.float64)
-        tell(
+        surface_inputs(
             *(self.eye, ways, begin, likely, self.cubes.lists, self.surface, self.lamp, self.size),
             *(faces, lifted, faced, told),
         )
@@ -70,7 +70,7 @@ class SurfaceExtras:
 
     Args:
         mesh: in metres.
-        count: of further inputs: 4, or 0 for networks that are told nothing more.
+        count: of further inputs: 4, or 0 for networks with no further inputs.
         closed: of ``is_closed``.
     """
 
@@ -83,7 +83,7 @@ class SurfaceExtras:
             self._surface = (mesh.corners, mesh.face_normals, plain(mesh, (1.0, 1.0, 1.0)).normals)
 
     def under(self, eye: FloatArray, light: FloatArray) -> LitSurface | None:
-        """The mesh under a lamp; None for networks that are told nothing.
+        """The mesh under a lamp; None for networks without such inputs.
 
         Args:
             eye: ``(3,)`` m, where rays will begin.

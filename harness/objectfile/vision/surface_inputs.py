@@ -1,4 +1,4 @@
-"""What networks are told of the place that a ray meets, ray by ray: its normal, and where a lamp is asked."""
+"""Per-ray inputs at the hit point: surface normal, and the shadow ray's origin."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ Surface = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @compiled
-def tell(
+def surface_inputs(
     eye: FloatArray,
     ways: FloatArray,
     begin: FloatArray,
