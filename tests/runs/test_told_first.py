@@ -35,7 +35,7 @@ def test_the_result_is_written_and_told_before_anything_is_drawn(
             chosen([]),
             lambda *_: tmp_path,
             folder=tmp_path,
-            tell=lambda _: happened.append("told"),
+            publish=lambda _: happened.append("told"),
         )
     assert happened == ["told", "compared"]
     assert written["estimates"]["touch"]["position_m"]

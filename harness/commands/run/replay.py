@@ -7,7 +7,7 @@ import typer
 
 from harness.commands import options
 from harness.commands.output import warn
-from harness.commands.run.run import drawing, show_report, publisher
+from harness.commands.run.run import drawing, publisher, show_report
 
 
 def replay(
