@@ -123,6 +123,10 @@ class Link:
         """Whether the uploaded script is alive."""
         return bool(self._control.isProgramRunning())
 
+    def state_is_older(self) -> bool:
+        """Whether the newest state is of before the program ended: it does not say yet what ended it."""
+        return self._newest is None or int(self._newest[pipe.FIELDS["runtime_state"]][0]) == ur_words.PLAYING
+
     def zero_force(self) -> None:
         """Take the present reading of the force sensor as zero."""
         self._check(self._control.zeroFtSensor(), "zero the force sensor")

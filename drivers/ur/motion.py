@@ -22,6 +22,7 @@ START_WITHIN: Final = 0.5  # s for the script to begin a motion it accepted
 SETTLE_WITHIN: Final = 0.5  # s from the end of the script's motion to rest at the target
 BRAKE_WITHIN: Final = 0.05  # s for ur_rtde to pass on a brake, before the program is ended without it
 STOP_WITHIN: Final = 1.0  # s from braking to rest
+CAUSE_WITHIN: Final = 0.2  # s for the controller to send the state that says why its program ended
 RISE: Final = 0.5  # N; a motion that starts beyond the press limit may go on while the force falls
 JOINT_TOLERANCE: Final = 1e-3  # rad
 POSITION_TOLERANCE: Final = 0.5e-3  # m
@@ -72,6 +73,7 @@ class Motion:
     _began: bool = False
     _since: float = field(default_factory=now)
     _ended: float | None = None
+    _cut: float | None = None
 
     @classmethod
     def from_message(cls, message: pipe.Message, force: float) -> "Motion":
@@ -123,6 +125,9 @@ class Motion:
         if self._outcome is not None:
             return self._stopped(link, stream)
         if not link.program_running():
+            self._cut = now() if self._cut is None else self._cut
+            if link.state_is_older() and now() - self._cut < CAUSE_WITHIN:
+                return None
             cause = link.why()
             return Outcome(error=type(cause)(f"{self.what} was cut short: {cause}"))
         if now() > self.deadline:

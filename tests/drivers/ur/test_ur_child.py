@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +17,7 @@ from drivers.ur import motion as ur_motion
 from drivers.ur import pipe
 from drivers.ur import words as ur_words
 from drivers.ur.child import Child
-from drivers.ur.motion import Motion, Outcome
+from drivers.ur.motion import CAUSE_WITHIN, Motion, Outcome
 from drivers.ur.stream import Guard, Stream
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
@@ -124,6 +125,7 @@ class ScriptedLink:
     address: str = "127.99.99.98"
     accepts: bool = True
     alive: bool = True
+    older: bool = False
     count: int = 7
     running: bool = False
     done: list[str] = field(default_factory=list)
@@ -147,6 +149,9 @@ class ScriptedLink:
 
     def program_running(self) -> bool:
         return self.alive
+
+    def state_is_older(self) -> bool:
+        return self.older
 
     def why(self) -> TouchstoneError:
         return BenchFault("the controller says: program stopped")
@@ -228,6 +233,22 @@ def test_a_motion_that_never_begins_is_a_fault(monkeypatch: pytest.MonkeyPatch) 
     outcome = rig.look()
     assert outcome is not None
     assert "did not begin" in str(outcome.error)
+
+
+def test_a_dead_script_s_cause_is_waited_for_but_not_for_long() -> None:
+    rig = Rig()
+    rig.begin()
+    rig.link.alive, rig.link.older = False, True
+    assert rig.look() is None
+    rig.link.older = False
+    outcome = rig.look()
+    assert outcome is not None
+    assert "was cut short" in str(outcome.error)
+    silent = Rig()
+    silent.link.alive, silent.link.older = False, True
+    assert silent.look() is None
+    time.sleep(1.1 * CAUSE_WITHIN)
+    assert silent.look() is not None
 
 
 def test_a_dead_script_is_told_with_its_cause() -> None:
