@@ -34,6 +34,7 @@ from harness.basics.errors import TouchstoneError, WrongUse
 from harness.basics.geometry import frame_facing, inverse, transform
 from harness.bench.gap import load_gap
 from harness.bench.kinematics import forward
+from harness.bench.station import BARE, LOOK, PRESS, STRIKE
 from harness.bench.station_sections import ArmSection
 from mocks.camera.lab_cameras import CameraView, stream
 from mocks.faults import parse
@@ -42,6 +43,7 @@ from mocks.lab_scene import read_lab_scene
 from mocks.shared_pose import SharedPose, StepMark
 from mocks.ur.hooks import LEFT_ABOVE, ControllerConfig
 from mocks.ur.serve import serve
+from mocks.world.gap_draw import GapDraw
 from mocks.world.sound_of_run import strikes_of
 from mocks.world.truth import TruthFile
 from mocks.world.world import NominalBench, World
@@ -97,7 +99,7 @@ class Lab:
         gel = CameraView(shared, _GEL, world.tactile_image)
         self._children["gel"] = LabChild("gel", lambda line: stream(address, GEL_PORT, gel, GEL_RATE, line))
         if camera:
-            seen = CameraView(shared, _CAMERA, lambda pose, _step, _sample: world.scene_image(pose))
+            seen = CameraView(shared, _CAMERA, world.scene_image)
             self._children["camera"] = LabChild(
                 "camera", lambda line: stream(address, CAMERA_PORT, seen, CAMERA_RATE, line)
             )
@@ -163,10 +165,13 @@ class Lab:
         """Set the step and sample, and wait until the gel has shown them."""
         mark = StepMark(self._shared.mark.number + 1, step, sample)
         self._shared.set_mark(mark)
-        if sample >= 0:
+        if sample in (PRESS, STRIKE):
             self._truth.append(self._shared.base_from_flange, step, sample)
+        elif sample == LOOK:
+            self._truth.looked()
         end = now() + SHOWN_TIMEOUT
-        while self._shared.shown(_GEL) < mark.number and now() < end:
+        viewer = _CAMERA if sample in (LOOK, BARE) and self._has_camera else _GEL
+        while self._shared.shown(viewer) < mark.number and now() < end:
             time.sleep(2e-3)
         return {"step": step, "sample": sample}
 
@@ -251,7 +256,8 @@ def _controller(
 def _begin(arguments: argparse.Namespace) -> Lab:
     """Build the world, and begin a process for each instrument."""
     cv2.setNumThreads(0)  # threads of the parent are lost in a fork
-    told, gap = read_lab_scene(arguments.scene), load_gap(arguments.gap)
+    gap = load_gap(arguments.gap)
+    told = read_lab_scene(arguments.scene, GapDraw(gap, arguments.seed))
     world = World(told.bench, gap, arguments.seed)
     strikes = strikes_of(world, told.scene, told.station, gap, arguments.seed)
     card = None

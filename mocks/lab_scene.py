@@ -18,6 +18,7 @@ from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import Station, station_from_json
 from harness.objects.builtin import build
+from mocks.world.gap_draw import GapDraw
 from mocks.world.world import Camera, Furniture, NominalBench
 
 SCHEMA = 1
@@ -44,8 +45,8 @@ class LabScene:
 _KEYS = {"schema", "scene", "station", "mesh", "base_from_object"}
 
 
-def read_lab_scene(path: Path) -> LabScene:
-    """The bench of a file.
+def read_lab_scene(path: Path, draw: GapDraw) -> LabScene:
+    """The bench of a file, its object as large as the run's draws say where nobody is told.
 
     Raises:
         WrongUse: it cannot be read, or is not what a lab is told.
@@ -61,11 +62,12 @@ def read_lab_scene(path: Path) -> LabScene:
     scene = scene_from_json(told["scene"], str(path))
     station = station_from_json(told["station"], str(path))
     mesh = None if told["mesh"] is None else _read_mesh(Path(told["mesh"]))
-    return LabScene(nominal_bench(scene, station, mesh, np.array(told["base_from_object"])), scene, station)
+    bench = nominal_bench(scene, station, mesh, np.array(told["base_from_object"]), draw)
+    return LabScene(bench, scene, station)
 
 
 def nominal_bench(
-    scene: SceneFile, station: Station, mesh: Mesh | None, base_from_object: FloatArray
+    scene: SceneFile, station: Station, mesh: Mesh | None, base_from_object: FloatArray, draw: GapDraw
 ) -> NominalBench:
     """The bench as scene and station state it.
 
@@ -74,21 +76,37 @@ def nominal_bench(
         station: the instruments.
         mesh: of the object in metres, scaled; None for a built-in object, which the world
             tessellates anew.
-        base_from_object: ``(4, 4)``, nominal.
+        base_from_object: ``(4, 4)``, nominal, of the object as it is drawn.
+        draw: of the run: how large the object is where the scene hides it.
 
     Raises:
         WrongUse: no mesh for an object that is not built in.
     """
+    drawn = _own_tessellation(scene) if mesh is None else mesh
+    made = _made_scale(scene, drawn, draw)
+    placed, factor = base_from_object.copy(), 1.0 if made is None else made
+    # Grown about its anchor, it stands where it stood.
+    anchor = np.array(scene.object.pose.position)
+    placed[:3, 3] = anchor + factor * (placed[:3, 3] - anchor)
     return NominalBench(
-        mesh=_own_tessellation(scene) if mesh is None else mesh,
-        base_from_object=base_from_object,
+        mesh=drawn if made is None else Mesh(made * drawn.vertices, drawn.faces),
+        base_from_object=base_from_object if made is None else placed,
         flange_from_gel=station.flange_from_gel,
         sensor=station.gel.sensor,
         calibration=station.gel.calibration,
         other_calibration=station.gel.described.world_calibration,
         camera=_camera(scene, station),
         furniture=Furniture(scene.table.height, scene.table.size, scene.support.width),
+        made_scale=made,
     )
+
+
+def _made_scale(scene: SceneFile, drawn: Mesh, draw: GapDraw) -> float | None:
+    """How much larger the object is than its drawing; None where the scene states its size."""
+    if not scene.object.is_hidden:
+        return None
+    nominal = float(np.ptp(drawn.bounds, axis=0).max())
+    return draw.hidden_size(*scene.object.sizes_of(nominal)) / nominal
 
 
 def _own_tessellation(scene: SceneFile) -> Mesh:
@@ -96,7 +114,7 @@ def _own_tessellation(scene: SceneFile) -> Mesh:
     if name is None:
         raise WrongUse(f"the world needs the mesh of {scene.object.name}: it is not built in")
     mesh = build(name, edge=EDGE)
-    return Mesh(mesh.vertices * scene.object.scale, mesh.faces)
+    return Mesh(mesh.vertices * scene.object.drawn_scale, mesh.faces)
 
 
 def _camera(scene: SceneFile, station: Station) -> Camera | None:

@@ -1,10 +1,8 @@
 """From a run folder to its answer; the bench is not needed, and the truth is not looked at."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-
-import numpy as np
 
 from experiments.contact_localization.accuracy.solving import (
     Readings,
@@ -15,25 +13,17 @@ from experiments.contact_localization.accuracy.solving import (
 )
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.dials import SENSES, Senses
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import FitRefused, RecordingDamaged, WrongUse
-from harness.basics.geometry import rotation_from_quaternion, transform
+from harness.basics.errors import FitRefused, WrongUse
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
-from harness.bench.acquisition import AcquisitionCalibration, of_one_stream, strike_from_readings
-from harness.bench.acquisition_channels import FORCE
-from harness.bench.reading import Reading
 from harness.effects.accuracy import Accuracy
-from harness.picture.square_pixels import aspect_stated, made_square
+from harness.picture.square_pixels import aspect_stated
+from harness.recording.observation import Observation, in_time, observe_step
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
-from harness.recording.synchronise import synchronised
-
-AROUND_IMAGES = 0.1
-"""s before the first frame from which the arm, at rest, is averaged too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,59 +156,3 @@ def observe(run: RunFiles) -> tuple[Observation, ...]:
     return in_time(
         [observe_step(record, flange_from_gel, acquisition, aspect) for record in run.recording.steps()]
     )
-
-
-def in_time(seen: Sequence[Observation]) -> tuple[Observation, ...]:
-    """The contacts of one run, the sounds of a microphone on a clock of its own in time with each other."""
-    if all(observation.strike is None for observation in seen):
-        return tuple(seen)
-    strikes = synchronised(of_one_stream([observation.strike for observation in seen]))
-    return tuple(
-        replace(observation, strike=strike) for observation, strike in zip(seen, strikes, strict=True)
-    )
-
-
-def observe_step(
-    record: StepRecord,
-    flange_from_gel: FloatArray,
-    acquisition: AcquisitionCalibration | None = None,
-    aspect: float = 1.0,
-) -> Observation:
-    """One contact: its images, where the arm was at rest while they were taken, and its strike.
-
-    Args:
-        record: of the step.
-        flange_from_gel: ``(4, 4)`` of the station.
-        acquisition: what the hammer's counts mean; None for a run without sound.
-        aspect: a pixel's height over its width, as the gel's calibration says; images are made square by it.
-
-    Raises:
-        RecordingDamaged: the step has no images, or no pose of the arm with them.
-    """
-    images = _needed(record, "gel.image")
-    poses = _needed(record, "arm.base_from_flange")
-    first, last = images.times[0] - AROUND_IMAGES, images.times[-1]
-    during = (poses.times >= first) & (poses.times <= last)
-    if not during.any():
-        raise RecordingDamaged(
-            f"step {record.step.index}: no pose of the arm was recorded within {AROUND_IMAGES} s "
-            "of its images"
-        )
-    struck = acquisition is not None and FORCE in record.readings
-    strike = strike_from_readings(record.readings, acquisition) if struck and acquisition else None
-    return Observation(
-        _middle(poses.values[during]) @ flange_from_gel, made_square(images.values, aspect), strike
-    )
-
-
-def _middle(poses: FloatArray) -> FloatArray:
-    """``(4, 4)``: the median place and the mean attitude of ``(n, 7)`` poses at rest."""
-    quaternions = poses[:, 3:]
-    aligned = quaternions * np.sign(quaternions @ quaternions[0])[:, None]
-    return transform(rotation_from_quaternion(aligned.mean(axis=0)), np.median(poses[:, :3], axis=0))
-
-
-def _needed(record: StepRecord, name: str) -> Reading:
-    if name not in record.readings:
-        raise RecordingDamaged(f"step {record.step.index} has no {name!r}; it cannot be estimated from")
-    return record.readings[name]

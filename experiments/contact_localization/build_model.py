@@ -1,29 +1,17 @@
 """The model of a scene's object: with its modes where the scene is to be heard."""
 
-from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from experiments.contact_localization.model import Model
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
-from harness.basics.store import Store, default_folder
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
-from harness.effects.catalogue import EFFECTS
-from harness.effects.effect import Facts
-from harness.effects.evaluate import evaluate
-from harness.effects.plan import default_accuracy, plan
-from harness.effects.scene_object import known_file
+from harness.experiment.object_modes import ReadFile, object_modes
 from harness.objectfile.file import ObjectFile
 from harness.recording.run_folder import RunFiles
-from harness.sim.modal.modal import from_arrays
-from harness.sim.modal.modes import Modes
 from harness.sim.optics.tactile_calibration import TactileCalibration
-
-ReadFile = Callable[[], ObjectFile | None]
-"""Reads the object's ObjectFile, asked only where the modes come from it."""
 
 
 def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
@@ -67,32 +55,3 @@ def model_of_scene(
 
 def _carried(run: RunFiles) -> ObjectFile:
     return run.objectfile
-
-
-def object_modes(
-    scene: SceneFile,
-    station: Station,
-    mesh: Mesh,
-    accuracy: Accuracy | None = None,
-    objectfile: ReadFile | None = None,
-) -> Modes:
-    """The object's modes: from the store where they were found before, or from its ObjectFile.
-
-    Args:
-        scene: says the material and the wall.
-        station: gives the sensor.
-        mesh: of the object, in metres.
-        accuracy: levels of the modes' dials; None for the default ones.
-        objectfile: reads the object's; None for the one that the scene names.
-    """
-    chosen = plan(
-        EFFECTS, Facts(scene, station.gel.sensor), ("object.modes",), accuracy or default_accuracy(EFFECTS)
-    )
-    sources: dict[str, Any] = {
-        "object.mesh": mesh,
-        "object.wall": scene.object.wall,
-        "object.material": MATERIALS[scene.object.material],
-    }
-    if "object.file" in chosen.sources:
-        sources["object.file"] = (objectfile or partial(known_file, scene, mesh))()
-    return from_arrays(evaluate(chosen, sources, Store(default_folder()))["object.modes"])

@@ -35,6 +35,12 @@ EXPERIMENTS: dict[str, ExperimentRow] = {
         section="localization",
         model="experiments.contact_localization.section:Localization",
     ),
+    "scale-estimation": ExperimentRow(
+        about="How big is an object of known shape?",
+        value="experiments.scale_estimation.experiment:EXPERIMENT",
+        section="scale",
+        model="experiments.scale_estimation.section:Scale",
+    ),
     "calibrate-taxim": ExperimentRow(
         about="How does a tactile camera's gel turn slope into colour?", command="calibrate taxim"
     ),

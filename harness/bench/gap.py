@@ -33,6 +33,7 @@ class ObjectGap(StrictModel):
 
     Attributes:
         position: m, per axis of the base and run; no estimator is told the position.
+        height: m, of the support under it, per run; None for what ``position`` says.
         yaw: rad, about the vertical, per run.
         tilt: rad, about base x and y each, per run.
     """
@@ -40,6 +41,7 @@ class ObjectGap(StrictModel):
     position: Annotated[Length, Nonnegative]
     yaw: Annotated[Angle, Nonnegative]
     tilt: Annotated[Angle, Nonnegative]
+    height: Annotated[Length, Nonnegative] | None = None
 
 
 class SensorGap(StrictModel):
@@ -149,6 +151,22 @@ class SoundGap(StrictModel):
     double_strikes: tuple[int, ...] = ()
 
 
+class CameraGap(StrictModel):
+    """Where the scene camera is and what it adds, against the station's description of it.
+
+    Attributes:
+        position: m, per axis of the base, per run.
+        rotation: rad, per axis of the camera, per run.
+        focal_length: relative, per run.
+        noise: grey levels of 255, per pixel, channel and picture.
+    """
+
+    position: Annotated[Length, Nonnegative] = 0.0
+    rotation: Annotated[Angle, Nonnegative] = 0.0
+    focal_length: Annotated[Ratio, Nonnegative] = 0.0
+    noise: float = Field(default=0.0, ge=0.0, allow_inf_nan=False)
+
+
 class Gap(StrictModel):
     """Everything that may differ between the bench and what is believed of it."""
 
@@ -160,6 +178,7 @@ class Gap(StrictModel):
     gel: GelGap
     shape: ShapeGap
     sound: SoundGap
+    camera: CameraGap = CameraGap()
 
 
 def gap_path(name: str) -> Path:

@@ -1,5 +1,6 @@
 """What is on the table: ``scene.toml``, or the options of the command line, as one model."""
 
+import math
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
@@ -16,6 +17,7 @@ from harness.basics.quantities import (
     Angle,
     Length,
     Nonnegative,
+    Ordered,
     Positive,
     Ratio,
     Time,
@@ -26,6 +28,9 @@ from harness.objects.builtin import DESCRIPTION
 
 BUILTIN = "builtin:"
 UNITS = ("m", "cm", "mm", "in")
+
+_REACHED = (0.05, 0.45)
+"""M: objects that an arm at this bench can reach around."""
 
 _Z = np.array([0.0, 0.0, 1.0])
 _UPRIGHT = {
@@ -63,7 +68,10 @@ class SceneObject(StrictModel):
             absolute once it is read.
         units: of the mesh file's numbers; None to go by the file and its size.
         material: a key of ``harness.basics.materials.MATERIALS``; a built-in object has one of its own.
-        scale: applied to the mesh after its units.
+        scale: applied to the mesh after its units; ``"hidden"`` where nobody is told how large the object was
+            made: models keep the drawing's size, and a mocked world draws another from the run's seed.
+        sizes: m, from and to: the longest side that a hidden size may have; None for half to twice the
+            drawing's, within 5 to 45 cm, what this bench's arm can reach around.
         wall: m, of an object whose mesh is only its outside; None for what the mesh says.
         objectfile: folder of its ObjectFile, found as ``mesh`` is; None where it has none.
         pose: nominal.
@@ -72,7 +80,8 @@ class SceneObject(StrictModel):
     mesh: str = Field(min_length=1)
     units: Literal["m", "cm", "mm", "in"] | None = None
     material: str
-    scale: float = Field(default=1.0, gt=0.0, allow_inf_nan=False)
+    scale: float | Literal["hidden"] = 1.0
+    sizes: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] | None = None
     wall: Annotated[Length, Positive] | None = None
     objectfile: str | None = Field(default=None, min_length=1)
     pose: Pose = Pose()
@@ -81,6 +90,23 @@ class SceneObject(StrictModel):
     def builtin(self) -> str | None:
         """The name of the built-in object, None for a mesh file."""
         return self.mesh.removeprefix(BUILTIN) if self.mesh.startswith(BUILTIN) else None
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether nobody is told how large the object was made."""
+        return self.scale == "hidden"
+
+    @property
+    def drawn_scale(self) -> float:
+        """That its models have."""
+        return 1.0 if self.scale == "hidden" else self.scale
+
+    def sizes_of(self, nominal: float) -> tuple[float, float]:
+        """M, from and to: what the longest side may be, of an object whose drawing's is ``nominal`` m."""
+        if self.sizes is not None:
+            return self.sizes
+        low, high = max(0.5 * nominal, _REACHED[0]), min(2.0 * nominal, _REACHED[1])
+        return (low, high) if low < high else (0.5 * nominal, 2.0 * nominal)
 
     @property
     def name(self) -> str:
@@ -99,6 +125,22 @@ class SceneObject(StrictModel):
         if name not in OWN:
             raise ValueError(f"no built-in object {name!r}; {nearest(name, OWN)}")
         return data if data.get("material") is not None else {**data, "material": OWN[name]}
+
+    @model_validator(mode="after")
+    def _sizes_are_of_a_hidden_one(self) -> "SceneObject":
+        if self.sizes is not None and not self.is_hidden:
+            raise ValueError(
+                'sizes are those a hidden size may have; leave them out, or say scale = "hidden"'
+            )
+        return self
+
+    @field_validator("scale", mode="before")
+    @classmethod
+    def _a_factor_or_hidden(cls, given: Any) -> Any:
+        number = isinstance(given, (int, float)) and not isinstance(given, bool)
+        if given != "hidden" and not (number and 0.0 < given < math.inf):
+            raise ValueError('it should be a number above 0, or "hidden" where nobody is told the size')
+        return given
 
     @field_validator("material")
     @classmethod

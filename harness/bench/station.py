@@ -38,8 +38,9 @@ LIMITS = {"ur": "drivers.ur.safety:SafetyLimits"}
 _LOG = logging.getLogger(__name__)
 
 
-PRESS, STRIKE = 0, 1
-"""The samples of a contact: the gel pressed on the object, the hammer fired before it."""
+PRESS, STRIKE, LOOK, BARE = range(4)
+"""The samples of a step: the gel pressed on the object, the hammer fired before it, the scene camera's
+picture, the same without the object."""
 
 
 class Mark(Protocol):

@@ -59,6 +59,6 @@ def known_object(scene: SceneFile) -> KnownObject:
     wanted = scene.object
     if wanted.builtin is not None:
         mesh = build(wanted.builtin)
-        return KnownObject(Mesh(mesh.vertices * wanted.scale, mesh.faces), None)
-    taken = take_in(Path(wanted.mesh), wanted.units, wanted.scale, wanted.wall)
+        return KnownObject(Mesh(mesh.vertices * wanted.drawn_scale, mesh.faces), None)
+    taken = take_in(Path(wanted.mesh), wanted.units, wanted.drawn_scale, wanted.wall)
     return KnownObject(taken.mesh, taken.report)

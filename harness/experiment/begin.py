@@ -55,6 +55,8 @@ def begin(
     mock = None
     if station.mock is not None:
         mock = {"gap": lasting_name(gap or procedure.gap or station.mock.gap)}
+    if procedure.observe is not None and scene.observe == SceneFile.model_fields["observe"].default:
+        scene = scene.model_copy(update={"observe": procedure.observe})
     known = known_object(scene)
     calibration, acquisition = station_calibration(station), station_acquisition(scene, station)
     if isinstance(procedure, Experiment):

@@ -224,6 +224,7 @@ class Procedure:
         performer: of the steps, at an open bench.
         plan_key: where ``run.json`` keeps the steps.
         gap: of a mocked bench where none is asked for; None for the station's.
+        observe: in place of what a scene file observes by default; None for just that.
     """
 
     name: str
@@ -233,6 +234,7 @@ class Procedure:
     performer: Callable[[RunFiles, Helpers], StepPerformer[Bench]]
     plan_key: str = "steps"
     gap: str | None = None
+    observe: tuple[str, ...] | None = None
 
     @property
     def plural(self) -> str:

@@ -35,7 +35,7 @@ class RunPlan:
         bench: the twin it was rehearsed in.
         sites: where the gel is to go.
         contacts: how it gets there.
-        strikes: how the hammer gets there after each; empty where the arm makes none.
+        strikes: how the hammer gets there after each of the first; empty where the arm makes none.
         rehearsal: what the twin found.
         seconds: by stage of the planning.
     """
@@ -62,7 +62,7 @@ class RunPlan:
         motions: list[Segment] = []
         for k, contact in enumerate(self.contacts):
             motions += contact.segments(k)
-            motions += self.strikes[k].segments(k) if self.strikes else ()
+            motions += self.strikes[k].segments(k) if k < len(self.strikes) else ()
         return motions
 
 
@@ -74,11 +74,13 @@ class ContactRequest:
         contacts: how many.
         spacing: ``"close"``, each within ``presses.step`` of the last; ``"spread"``, over the object.
         presses: how far apart, how tilted, how deep.
+        strikes: how many of the first places are struck too, where the scene is heard; None for all.
     """
 
     contacts: int
     spacing: Literal["close", "spread"]
     presses: PressLimits
+    strikes: int | None = None
 
 
 def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int, wanted: ContactRequest) -> RunPlan:
@@ -96,7 +98,8 @@ def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int, wanted: 
         MotionRefused: the rehearsal found a motion that must not be made.
     """
     bench = twin_of(scene, station, mesh)
-    itinerary = Itinerary(bench, seed, planner(scene, station, bench))
+    struck = wanted.contacts if wanted.strikes is None else wanted.strikes
+    itinerary = Itinerary(bench, seed, planner(scene, station, bench), struck)
     sites = plan_sites(
         RasterMesh(mesh),
         station.gel.sensor,
@@ -120,14 +123,18 @@ class Itinerary:
         bench: the twin.
         seed: of the searches for ways.
         planner: of the strikes; None where the arm makes none.
+        struck: how many of the first places are struck.
     """
 
-    def __init__(self, bench: TwinBench, seed: int, planner: StrikePlanner | None = None) -> None:
+    def __init__(
+        self, bench: TwinBench, seed: int, planner: StrikePlanner | None = None, struck: int = 0
+    ) -> None:
         self.contacts: list[PlannedContact] = []
         self.strikes: list[PlannedStrike] = []
         self._bench = bench
         self._seed = seed
         self._planner = planner
+        self._struck = struck
         self._in_vain = 0
 
     def visit(self, before: int, base_from_gel: FloatArray, patient: bool) -> bool:
@@ -143,7 +150,7 @@ class Itinerary:
         contact = plan_contact(self._bench, base_from_gel, self._joints, seed=self._seed, searched=searched)
         if contact is None:
             return False
-        if self._planner is not None:
+        if self._planner is not None and len(self.contacts) < self._struck:
             strike = self._planner.plan(base_from_gel, contact.stand_off_joints, self._seed, searched)
             if strike is None:
                 return False
@@ -156,4 +163,5 @@ class Itinerary:
         """``(6,)`` rad, where the arm is after all contacts so far."""
         if not self.contacts:
             return HOME
-        return self.strikes[-1].ready_joints if self.strikes else self.contacts[-1].stand_off_joints
+        struck = len(self.strikes) == len(self.contacts)
+        return self.strikes[-1].ready_joints if struck else self.contacts[-1].stand_off_joints

@@ -4,23 +4,26 @@ The same world, the same pictures and the same JPEG bytes as on the wires. Time 
 simulated bench clock, from zero.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.errors import BenchFault, WrongUse
 from harness.bench.device import Health, Microphone
 from harness.bench.gap import load_gap
 from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile
-from harness.bench.station import Bench, RunContext
+from harness.bench.station import LOOK, PRESS, STRIKE, Bench, RunContext
 from harness.bench.station_file import Station
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.arm import InProcessArm
 from mocks.in_process.simulated_motion import Stage
 from mocks.lab_scene import nominal_bench
 from mocks.ur.hooks import LEFT_ABOVE
+from mocks.world.gap_draw import GapDraw
 from mocks.world.sound_of_run import strikes_of
 from mocks.world.truth import TruthFile
 from mocks.world.world import World
@@ -33,23 +36,35 @@ PACKET_RATE = 25.0
 """Hz of the arm's history: one packet for each frame of the gel is all that an estimate reads."""
 
 
-class InProcessGel:
-    """A ``TactileCamera`` that sees the world where the arm is.
+class InProcessCamera:
+    """A camera, the gel's or the scene's, that sees the world where the arm is.
 
     Args:
-        world: makes the pictures.
+        name: of the instrument; its channel is ``NAME.image``.
+        identity: its make.
+        shape: ``(rows, columns)`` of its pictures.
+        look: makes one, of the flange's pose, the step and the sample.
         arm: says where the flange is.
         stage: simulated time, step and sample.
         rate: frames a second.
     """
 
-    def __init__(self, world: World, arm: InProcessArm, stage: Stage, rate: float = 25.0) -> None:
-        self._world = world
+    def __init__(
+        self,
+        name: str,
+        identity: str,
+        shape: tuple[int, int],
+        look: Callable[[FloatArray, int, int], ByteArray],
+        arm: InProcessArm,
+        stage: Stage,
+        rate: float = 25.0,
+    ) -> None:
+        self._name, self._identity = name, identity
+        self._look = look
         self._arm = arm
         self._stage = stage
         self._rate = rate
-        sensor = world.sensor
-        self._channel = Channel("gel.image", "count", (sensor.rows, sensor.columns, 3), "uint8", "gel", rate)
+        self._channel = Channel(f"{name}.image", "count", (*shape, 3), "uint8", name, rate)
 
     def open(self) -> None:
         """Nothing to connect."""
@@ -60,11 +75,13 @@ class InProcessGel:
     def read(self, count: int, timeout: float) -> Reading:
         """The next ``count`` frames of simulated time."""
         if count / self._rate > timeout:
-            raise BenchFault(f"gel: {count} frames take {count / self._rate:g} s, more than {timeout:g} s")
+            raise BenchFault(
+                f"{self._name}: {count} frames take {count / self._rate:g} s, more than {timeout:g} s"
+            )
         first = int(np.floor(self._stage.time * self._rate + 1e-9)) + 1
         times = np.arange(first, first + count) / self._rate
         pose = self._arm.state().base_from_flange
-        jpeg = encode(self._world.tactile_image(pose, self._stage.step, self._stage.sample))
+        jpeg = encode(self._look(pose, self._stage.step, self._stage.sample))
         image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
         values = np.repeat(np.asarray(image)[None, ..., ::-1], count, axis=0)
         self._stage.time = float(times[-1])
@@ -72,7 +89,7 @@ class InProcessGel:
 
     def health(self) -> Health:
         """Every frame, on time."""
-        return Health("gel", f"{self._world.sensor.name} in process", self._rate, 0, 0.0, "simulated time")
+        return Health(self._name, f"{self._identity} in process", self._rate, 0, 0.0, "simulated time")
 
 
 def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Bench:
@@ -84,17 +101,14 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
         run: the run this is for; the truth is written where it says.
 
     Raises:
-        WrongUse: a station that is not mocked, or a scene that asks for the camera.
+        WrongUse: a station that is not mocked.
     """
     if station.mock is None:
         raise WrongUse("only a station with [mock] can be simulated in process; open this one over its wires")
-    if scene.sensors.camera:
-        raise WrongUse(
-            "the bench in process has no scene camera; run over the wires, or leave the camera out"
-        )
     mesh = None if scene.object.builtin is not None else run.mesh
-    nominal = nominal_bench(scene, station, mesh, scene.base_from_object(run.mesh))
     gap = load_gap(run.gap or station.mock.gap)
+    draw = GapDraw(gap, run.seed)
+    nominal = nominal_bench(scene, station, mesh, scene.base_from_object(run.mesh), draw)
     world = World(nominal, gap, run.seed)
     strikes = strikes_of(world, scene, station, gap, run.seed)
     truth = TruthFile(run.truth, world, run.seed, None if strikes is None else strikes.sound)
@@ -103,15 +117,22 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
 
     def mark(step: int, sample: int) -> None:
         stage.step, stage.sample = step, sample
-        if sample >= 0:
+        if sample in (PRESS, STRIKE):
             truth.append(arm.state().base_from_flange, step, sample)
+        elif sample == LOOK:
+            truth.looked()
 
     hammer = None if strikes is None else _hammer(strikes, arm, station, stage)
     microphone = None
     if strikes is not None and hammer is not None and station.own_microphone is not None:
         microphone = _microphone(strikes, hammer, station, stage)
-    gel = InProcessGel(world, arm, stage)
-    return Bench(arm, gel, None, station, hammer, mark, stage.pause, microphone=microphone)
+    sensor, seen = world.sensor, nominal.camera
+    gel = InProcessCamera("gel", sensor.name, (sensor.rows, sensor.columns), world.tactile_image, arm, stage)
+    camera = None
+    if seen is not None:
+        shape = seen.rows, seen.columns
+        camera = InProcessCamera("camera", "scene camera", shape, world.scene_image, arm, stage)
+    return Bench(arm, gel, camera, station, hammer, mark, stage.pause, microphone=microphone)
 
 
 def _hammer(strikes: "StrikeCounts", arm: InProcessArm, station: Station, stage: Stage) -> "InProcessHammer":

@@ -20,6 +20,7 @@ from mocks.world.mesh import ShapeDeviation
 
 # What a stream of numbers is for; each stays what it is when another is added.
 _OBJECT, _SENSOR, _GEL, _SHAPE, _SHADING, _ARM, _TILT, _OFFSET, _PIXELS, _CAMERA = range(10)
+_SCENE_CAMERA, _SCENE_NOISE, _SIZE = range(10, 13)
 
 _VERTICAL = np.array([0.0, 0.0, 1.0])
 _SHADING_SHARE = 0.15
@@ -101,10 +102,12 @@ class GapDraw:
     def run(self) -> RunDraw:
         """The draws that hold for the whole run."""
         thing, sensor = self.gap.object, self.gap.sensor
+        height = thing.position if thing.height is None else thing.height
+        spread = np.array([thing.position, thing.position, height])
         of_object, of_sensor, of_gel = self.random(_OBJECT), self.random(_SENSOR), self.random(_GEL)
         of_camera = self.random(_CAMERA)
         return RunDraw(
-            position=read_only(thing.position * of_object.standard_normal(3)),
+            position=read_only(spread * of_object.standard_normal(3)),
             yaw=thing.yaw * of_object.standard_normal(),
             tilt=read_only(thing.tilt * of_object.standard_normal(2)),
             sensor_tilt=read_only(sensor.tilt * of_sensor.standard_normal(2)),
@@ -128,6 +131,23 @@ class GapDraw:
                 height_offset=self.gap.gel.height_offset * self.random(_OFFSET, step).standard_normal(),
             )
         return self._contacts[step]
+
+    def camera(self, base_from_camera: FloatArray, focal_length: float) -> tuple[FloatArray, float]:
+        """Where the scene camera really is, ``(4, 4)``, and its focal length in pixels."""
+        gap, random = self.gap.camera, self.random(_SCENE_CAMERA)
+        moved = base_from_camera.copy()
+        moved[:3, 3] += gap.position * random.standard_normal(3)
+        moved[:3, :3] = moved[:3, :3] @ rotation_from_vector(gap.rotation * random.standard_normal(3))
+        return read_only(moved), focal_length * (1.0 + gap.focal_length * float(random.standard_normal()))
+
+    def camera_noise(self, rows: int, columns: int, step: int, sample: int) -> FloatArray:
+        """``(rows, columns, 3)`` grey levels that the scene camera adds to one picture."""
+        noise = self.random(_SCENE_NOISE, step, sample).standard_normal((rows, columns, 3))
+        return read_only(self.gap.camera.noise * noise)
+
+    def hidden_size(self, low: float, high: float) -> float:
+        """M, the longest side of an object whose size nobody is told: even in its logarithm."""
+        return float(np.exp(self.random(_SIZE).uniform(np.log(low), np.log(high))))
 
     def deviation(self, centre: FloatArray) -> ShapeDeviation:
         """How the object's shape differs; scaling leaves ``centre``, ``(3,)`` metres, in place."""

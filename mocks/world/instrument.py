@@ -50,7 +50,8 @@ def instrument_of(world: World, scene: SceneFile, draw: GapDraw) -> SoundingObje
         MeshRefused: an object that cannot be filled with elements.
     """
     made_of = material(scene.object.material)
-    solid = walled(world.nominal, scene.object.wall)
+    wall = scene.object.wall
+    solid = walled(world.nominal, None if wall is None else wall * world.made_scale)
     edge = FINER * default_edge(solid, made_of, LIMIT)
     modes = _modes(solid, made_of, edge, SoundDraw(draw), Store(default_folder()))
     return SoundingObject(modes, dampings(modes.frequencies, made_of), radiation(modes, DISTANCE))

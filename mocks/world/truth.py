@@ -56,6 +56,13 @@ class TruthFile:
                 "penetration_m": self._world.penetration(base_from_flange, step),
                 "base_from_flange": base_from_flange.tolist(),
             }
+        self._write()
+
+    def looked(self) -> None:
+        """Write what is true of the whole run: the scene camera has looked, and nothing was touched."""
+        self._write()
+
+    def _write(self) -> None:
         contacts = [self._contacts[index] for index in sorted(self._contacts)]
         write_text_whole(self._path, json.dumps({**self._head, "contacts": contacts}, indent=1) + "\n")
 

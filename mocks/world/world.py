@@ -17,6 +17,7 @@ from harness.basics.geometry import apply, inverse, transform, translation
 from harness.basics.mesh import Mesh
 from harness.bench.gap import Gap
 from harness.bench.sensor import TactileSensor
+from harness.bench.station import BARE
 from harness.sim.gel.height_map import RasterMesh, depth_image, penetration
 from mocks.camera.picture_grid import PictureGrid
 from mocks.camera.scene_view import Body, SceneView, box
@@ -72,6 +73,7 @@ class NominalBench:
             the world has the estimator's.
         camera: the scene camera, None where there is none.
         furniture: around the object.
+        made_scale: of the object over its drawing, in ``mesh`` already; None where its size is stated.
     """
 
     mesh: Mesh
@@ -82,6 +84,7 @@ class NominalBench:
     other_calibration: str | None
     camera: Camera | None = None
     furniture: Furniture = Furniture()
+    made_scale: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +112,8 @@ class World:
         sensor: the gel as it was made: the make's, but for its pitch.
         nominal: the object's drawing, on the world's own tessellation.
         mesh: the true object, in its own frame; the same faces.
-        scale: of the true object.
+        made_scale: of the drawing, over the one that the scene names: other than 1 where its size is hidden.
+        scale: of the true object, over that.
         base_from_object: ``(4, 4)``, where it truly stands.
         background: ``(rows, columns, 3)``, the picture of the untouched gel.
     """
@@ -118,6 +122,7 @@ class World:
         if bench.sensor.markers is not None or bench.sensor.casts_shadow:
             raise NotImplementedError("mocks.world.world: printed markers and shadows in the gel")
         self._bench = bench
+        self.made_scale = 1.0 if bench.made_scale is None else bench.made_scale
         self._draw = GapDraw(gap, seed)
         self._flange_from_gel: dict[int, FloatArray] = {}
         self._grid = PictureGrid.drawn(bench.sensor, self._draw.run.pitch, self._draw.run.aspect)
@@ -207,38 +212,57 @@ class World:
         return {
             **self._draw.summary(),
             "calibration": "the estimator's" if self._believed else "other presses",
+            **self._hidden(),
             "mesh_vertices": len(self.mesh.vertices),
             "mesh_faces": len(self.mesh.faces),
             "optics_level": "exact",
             "calibration_sha256": self._gel.calibration.sha256,
         }
 
-    def scene_image(self, base_from_flange: FloatArray) -> ByteArray:
-        """What the scene camera sees, ``(rows, columns, 3)`` uint8, RGB."""
-        if self._view is None:
+    def scene_image(self, base_from_flange: FloatArray, step: int = -1, sample: int = -1) -> ByteArray:
+        """What the scene camera sees, ``(rows, columns, 3)`` uint8, RGB; at ``BARE`` without the object."""
+        camera = self._bench.camera
+        if camera is None:
             raise ValueError("this scene has no camera; ask for none of its pictures")
+        view = self._bare_view if sample == BARE else self._view
         width, height = self.sensor.housing
         length = float(self._bench.flange_from_gel[2, 3])
         tool = box((width, height, length), (0.0, 0.0, -length / 2))
-        return self._view.picture([Body(tool, base_from_flange @ self._bench.flange_from_gel, (70, 90, 200))])
+        seen = view.picture([Body(tool, base_from_flange @ self._bench.flange_from_gel, (70, 90, 200))])
+        noise = self._draw.camera_noise(camera.rows, camera.columns, step, sample)
+        return np.clip(np.rint(seen + noise), 0, 255).astype(np.uint8) if noise.any() else seen
+
+    def _hidden(self) -> Mapping[str, Any]:
+        """The size, of an object whose size nobody is told."""
+        if self._bench.made_scale is None:
+            return {}
+        longest = float(np.ptp(self.mesh.bounds, axis=0).max())
+        return {"made_scale": self._bench.made_scale, "longest_side_m": longest}
 
     @cached_property
-    def _view(self) -> SceneView | None:
+    def _view(self) -> SceneView:
+        return self._looking(with_object=True)
+
+    @cached_property
+    def _bare_view(self) -> SceneView:
+        return self._looking(with_object=False)
+
+    def _looking(self, with_object: bool) -> SceneView:
         camera = self._bench.camera
-        if camera is None:
-            return None
+        assert camera is not None
         furniture = self._bench.furniture
         vertices = apply(self.base_from_object, self.mesh.vertices)
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         (x, y, _), lowest, top = 0.5 * (low + high), float(low[2]), furniture.table_height
-        fixed = [Body(self.mesh, self.base_from_object, (225, 205, 170))]
+        fixed = [Body(self.mesh, self.base_from_object, (225, 205, 170))] if with_object else []
         table = box((*furniture.table_size, 0.02), (0.0, 0.0, top - 0.01))
         fixed.append(Body(split_long_edges(table, 0.1), np.eye(4), (120, 110, 100)))
         if lowest > top:
             width = furniture.pedestal_width
             foam = box((width, width, lowest - top), (x, y, 0.5 * (lowest + top)))
             fixed.append(Body(foam, np.eye(4), (90, 90, 95)))
-        return SceneView(camera.base_from_camera, camera.rows, camera.columns, camera.focal_length, fixed)
+        base_from_camera, focal = self._draw.camera(camera.base_from_camera, camera.focal_length)
+        return SceneView(base_from_camera, camera.rows, camera.columns, focal, fixed)
 
     def _placed(self) -> FloatArray:
         """``base_from_object``: turned and moved about the middle of the object."""

@@ -7,13 +7,13 @@ import pytest
 
 from experiments.contact_localization.answer import observe, prior_of
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.estimate import Estimate
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.experiment.truth import read_truth
 from harness.objects.household import build
+from harness.recording.observation import Observation
 from harness.recording.run_folder import RunFiles
 from tests.support.localization import estimate
 from tests.support.whole_run import in_process_run, touch_scene

@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.contact_localization.answer import observe_step
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.dials import Senses
 from experiments.contact_localization.posterior.estimate import Estimate
@@ -24,6 +22,7 @@ from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station import RunContext
 from harness.bench.station_file import Station, load_station, station_path
 from harness.effects.scene_object import known_object
+from harness.recording.observation import Observation, observe_step
 from harness.recording.run_folder import station_acquisition, station_calibration
 from harness.recording.step_file import Step, StepRecord
 from harness.skills.planning import RunPlan

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.sound import analysis as sound_analysis
 from harness.bench.acquisition import Strike
 from harness.effects import sound_effects
 from harness.recording.recording import Recording
+from harness.strikes import peaks as sound_analysis
 from tests.support import sessions as session_of
 from tests.support.localization import chosen
 from tests.support.whole_run import in_process_run, touch_scene
@@ -30,13 +30,13 @@ OF_SOUND = (
     "harness.sim.modal.modes",
     "harness.sim.sound.room",
     "harness.sim.solid.tetrahedra",
-    "experiments.contact_localization.sound.analysis",
+    "harness.strikes.peaks",
     "experiments.contact_localization.sound.gains",
     "experiments.contact_localization.sound.likelihood",
     "experiments.contact_localization.sound.matching",
     "experiments.contact_localization.sound.mfcc",
     "experiments.contact_localization.sound.places",
-    "experiments.contact_localization.sound.spectra",
+    "harness.strikes.spectra",
     "mocks.daq.strike_counts",
     "mocks.world.instrument",
     "mocks.world.modes",
@@ -97,4 +97,4 @@ def test_calls_of_sound_would_be_counted() -> None:
     with pytest.MonkeyPatch.context() as patch:
         calls = count_calls(patch)
         sound_analysis.analyse([strike, strike])
-    assert calls["experiments.contact_localization.sound.spectra.spectra_of"] == 1
+    assert calls["harness.strikes.spectra.spectra_of"] == 1

@@ -21,7 +21,6 @@ import pytest
 
 from experiments.contact_localization.accuracy.benchmark_runs import Cell, scene_of
 from experiments.contact_localization.answer import Answer
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.estimate import Estimate
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.geometry import inverse
@@ -31,12 +30,14 @@ from harness.bench.station import PRESS, RunContext
 from harness.bench.station_file import load_station, station_path
 from harness.experiment.subjects import REAL, objects
 from harness.objects.household import MATERIALS
+from harness.recording.observation import Observation
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.bench import in_process_bench
 from mocks.lab_scene import nominal_bench
+from mocks.world.gap_draw import GapDraw
 from mocks.world.world import World
 from tests.support import sessions as session_of
 from tests.support.localization import answer, dials, estimate
@@ -105,7 +106,9 @@ def both(scene: SceneFile, folder: Path) -> tuple[Side, Side]:
 
 def world_of(run: RunFiles) -> World:
     mesh = None if run.scene.object.builtin is not None else run.mesh
-    nominal = nominal_bench(run.scene, run.station, mesh, run.scene.base_from_object(run.mesh))
+    nominal = nominal_bench(
+        run.scene, run.station, mesh, run.scene.base_from_object(run.mesh), GapDraw(load_gap(GAP), SEED)
+    )
     return World(nominal, load_gap(GAP), SEED)
 
 

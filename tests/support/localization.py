@@ -8,11 +8,11 @@ from experiments.contact_localization.accuracy.solving import located, read
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.estimate import Estimate
 from harness.effects.accuracy import Accuracy, Level
 from harness.experiment.answer import score
 from harness.experiment.levels import chosen_levels
+from harness.recording.observation import Observation
 from harness.recording.run_folder import RunFiles
 
 

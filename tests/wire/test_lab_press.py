@@ -31,6 +31,7 @@ from harness.twin.bench_of import way_between
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.bench import in_process_bench
 from mocks.lab_scene import nominal_bench
+from mocks.world.gap_draw import GapDraw
 from mocks.world.world import World
 
 SEED, GAP = 5, "default"
@@ -96,7 +97,11 @@ def test_of_the_wires_pose_the_world_shows_the_wires_picture(
     runs: tuple[Run, Run], scene: SceneFile, station: Station
 ) -> None:
     mesh = known_object(scene).mesh
-    world = World(nominal_bench(scene, station, None, scene.base_from_object(mesh)), load_gap(GAP), SEED)
+    world = World(
+        nominal_bench(scene, station, None, scene.base_from_object(mesh), GapDraw(load_gap(GAP), SEED)),
+        load_gap(GAP),
+        SEED,
+    )
     picture = world.tactile_image(pose_when_pictured(runs[0].readings), STEP, 0)
     received = runs[0].readings["gel.image"]
     assert len(set(received.encoded)) == 1

@@ -22,10 +22,8 @@ from experiments.contact_localization.accuracy.solving import (
     prepare,
     solve,
 )
-from experiments.contact_localization.answer import in_time, observe_step
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.posterior.baselines import mean_random_error
 from harness.basics.arrays import FloatArray
@@ -42,6 +40,7 @@ from harness.experiment.experiment import Say
 from harness.experiment.solving import Solved
 from harness.experiment.subjects import object_key
 from harness.picture.square_pixels import aspect_stated
+from harness.recording.observation import Observation, in_time, observe_step
 from harness.recording.run_folder import station_acquisition, station_calibration
 from harness.recording.step_file import Step, StepRecord
 from harness.skills.press import PressPerformer

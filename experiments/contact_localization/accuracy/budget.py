@@ -20,7 +20,6 @@ from experiments.contact_localization.accuracy.solving import Models, Readings, 
 from experiments.contact_localization.answer import observe, prior_of
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.dials import METHOD, SENSES, SPACING
 from experiments.contact_localization.posterior.problem_size import places_left
 from experiments.contact_localization.section import Localization
@@ -32,6 +31,7 @@ from harness.effects.accuracy import Level, Setting
 from harness.experiment.solving import Budgets, Solved
 from harness.experiment.subjects import object_key
 from harness.experiment.truth import read_truth
+from harness.recording.observation import Observation
 from harness.recording.run_folder import RunFiles
 
 SHIPPED = "data/cost.json"

@@ -9,7 +9,7 @@ from numba.core.event import install_recorder
 
 from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_at, needs_images, needs_sound
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation, contact_of, height_map
+from experiments.contact_localization.observation import contact_of, height_map
 from experiments.contact_localization.posterior.dials import BLOCK, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
@@ -17,6 +17,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.effects.accuracy import Accuracy, Level, Setting
 from harness.experiment.solving import Solved
+from harness.recording.observation import Observation
 
 T = TypeVar("T")
 

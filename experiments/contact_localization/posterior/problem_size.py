@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.search import Search
+from harness.recording.observation import Observation
 
 SPACING = 8.0e-3
 """Metres between the surface's samples: coarse, as counting must cost little beside any answer."""

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
-from experiments.contact_localization.sound.spectra import Analysis
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.materials import Material
 from harness.bench.acquisition import Strike
 from harness.sim.modal.modes import Modes, dampings
 from harness.sim.sound.modal_radiation import radiation
 from harness.sim.sound.modal_sound import ring
+from harness.strikes.spectra import Analysis
 
 _FRAME = 0.02
 _HOP = 0.004

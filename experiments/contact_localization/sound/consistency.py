@@ -5,17 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.hypotheses import Hypotheses, anchors
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.analysis import analyse
 from experiments.contact_localization.sound.evidence import StrikeEvidence
 from experiments.contact_localization.sound.places import ANCHORS, strike_places
 from experiments.contact_localization.touch.contact_scales import SAME_AXIS, SAME_PLACE
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.bench.acquisition import Strike
+from harness.recording.observation import Observation
+from harness.strikes.peaks import analyse
 
 UNEXPLAINED = 0.3
 """Share of the resonances heard that no mode explains, beyond which the sound may be another object's.

@@ -8,13 +8,13 @@ import numpy as np
 from experiments.contact_localization.model import Model
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.analysis import analyse
 from experiments.contact_localization.sound.likelihood import SoundTerm
 from experiments.contact_localization.sound.matching import SoundNoise
 from experiments.contact_localization.sound.places import sound_nats
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.bench.acquisition import Strike
+from harness.strikes.peaks import analyse
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp
 
-from experiments.contact_localization.sound.analysis import Peak, SoundEvidence
 from experiments.contact_localization.sound.density import MOST_RANK, sound_scores
 from experiments.contact_localization.sound.gains import GainTable
 from experiments.contact_localization.sound.matching import (
@@ -28,6 +27,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import Material
 from harness.sim.modal.modes import Modes, dampings
+from harness.strikes.peaks import Peak, SoundEvidence
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,11 @@ from experiments.contact_localization.posterior.baselines import without_images
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import Search
-from experiments.contact_localization.sound.analysis import analyse
 from experiments.contact_localization.sound.gains import GainTable, gain_table
 from experiments.contact_localization.sound.likelihood import SoundTerm
 from experiments.contact_localization.sound.matching import SoundNoise
 from experiments.contact_localization.sound.mfcc import MfccTable, mfcc_filter
 from experiments.contact_localization.sound.places import by_sound, sound_nats
-from experiments.contact_localization.sound.spectra import Analysis
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest import nearest_point
 from harness.basics.geometry import rotation_about, transform, translation
@@ -43,6 +41,8 @@ from harness.sim.optics.tactile_calibration import shipped_calibration
 from harness.sim.solid.surface_measure import thin_wall
 from harness.sim.sound.modal_radiation import radiation
 from harness.skills.sites import Steps, plan_sites
+from harness.strikes.peaks import analyse
+from harness.strikes.spectra import Analysis
 from mocks.world.sound import SoundingObject, WorldSound
 from mocks.world.world import NominalBench, World
 

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from experiments.contact_localization.answer import AROUND_IMAGES, observe_step
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation, contact_of, height_map
+from experiments.contact_localization.observation import contact_of, height_map
 from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise
 from harness.basics.arrays import ByteArray, FloatArray
@@ -16,6 +15,7 @@ from harness.basics.geometry import quaternion_from_rotation, rotation_about, ro
 from harness.bench.reading import Channel, Reading
 from harness.bench.sensor import GELSIGHT_R15
 from harness.picture.square_pixels import made_square
+from harness.recording.observation import AROUND_IMAGES, Observation, observe_step
 from harness.recording.step_file import Step, StepRecord
 from harness.sim.optics.optics import Optics
 from harness.sim.optics.tactile_calibration import shipped_calibration

@@ -15,7 +15,7 @@ from harness.bench.gap import load_gap
 from harness.bench.kinematics import forward, nearest_branch
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.arm import CYCLE, NOTICED_AFTER, InProcessArm
-from mocks.in_process.bench import InProcessGel
+from mocks.in_process.bench import InProcessCamera
 from mocks.in_process.simulated_motion import Stage
 from mocks.ur.hooks import HOME
 from mocks.world.truth import TruthFile
@@ -41,7 +41,14 @@ class Bench:
         joints = nearest_branch("ur5e", self.start, np.array(HOME), RANGE)
         assert joints is not None
         self.arm = InProcessArm("ur5e", joints, world, self.stage)
-        self.gel = InProcessGel(world, self.arm, self.stage)
+        self.gel = InProcessCamera(
+            "gel",
+            world.sensor.name,
+            (world.sensor.rows, world.sensor.columns),
+            world.tactile_image,
+            self.arm,
+            self.stage,
+        )
         self.stage.step = 0
         self.axis = self.start[:3, 2].copy()
 

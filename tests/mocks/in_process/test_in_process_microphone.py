@@ -7,7 +7,6 @@ import pytest
 
 from experiments.contact_localization.plan import plan_contacts
 from experiments.contact_localization.section import Localization
-from experiments.contact_localization.sound.analysis import analyse
 from harness.basics.mesh import Mesh
 from harness.bench.acquisition import Strike, strike_from_readings
 from harness.bench.acquisition_channels import PRESSURE
@@ -22,6 +21,7 @@ from harness.recording.run_folder import RunFiles, create_run, station_acquisiti
 from harness.recording.step_file import Step
 from harness.recording.synchronise import synchronised
 from harness.skills.planning import RunPlan
+from harness.strikes.peaks import analyse
 from mocks.in_process.bench import in_process_bench
 from mocks.in_process.microphone import DRIFT_PPM, LATENCY, WANDER
 from tests.support.heard_strikes import Readings, delay, performed, strikes_on

@@ -13,7 +13,6 @@ from experiments.contact_localization.accuracy.dials import (
 )
 from experiments.contact_localization.accuracy.solving import Models, read, solve
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.dials import SENSES, SPACING
 from harness.basics.errors import WrongUse
 from harness.basics.geometry import frame_facing, transform
@@ -24,6 +23,7 @@ from harness.effects.accuracy import Accuracy, Setting
 from harness.experiment.budget import ask
 from harness.experiment.front import Front
 from harness.experiment.solving import Target
+from harness.recording.observation import Observation
 from harness.sim.optics.tactile_calibration import shipped_calibration
 from tests.samples import sounding_plate as plate
 

@@ -14,7 +14,6 @@ from experiments.contact_localization.accuracy.solving import read
 from experiments.contact_localization.accuracy.table_cell import METHODS
 from experiments.contact_localization.experiment import EXPERIMENT, MEASUREMENT
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.baselines import mean_random_error
 from experiments.contact_localization.posterior.dials import SPACING
 from harness.basics.errors import WrongUse
@@ -23,6 +22,7 @@ from harness.bench.scene import scene_from_options
 from harness.experiment.subjects import objects
 from harness.experiment.tables import TableRow, measure
 from harness.experiment.tables import rows as rows_of
+from harness.recording.observation import Observation
 
 Results = dict[Cell, Mapping[str, Any]]
 

@@ -13,7 +13,6 @@ from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
@@ -25,6 +24,7 @@ from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import levels_of_result
 from harness.experiment.experiment import Scored
 from harness.experiment.truth import Truth, read_truth
+from harness.recording.observation import Observation
 from harness.recording.recording import Recording
 from tests.samples.synthetic_press import PRESSES
 from tests.support.localization import chosen, dials

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from experiments.contact_localization.accuracy.dials import KNOBS
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.dials import SPACING
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
@@ -25,6 +24,7 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Scored
 from harness.experiment.truth import Truth
+from harness.recording.observation import Observation
 from harness.report.sound_data import Sound
 from harness.report.values import Missing
 from harness.sim.optics.tactile_calibration import shipped_calibration

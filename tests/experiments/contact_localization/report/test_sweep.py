@@ -9,13 +9,13 @@ from experiments.contact_localization.accuracy.dials import accuracy_at
 from experiments.contact_localization.accuracy.solving import read
 from experiments.contact_localization.answer import Answer
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, ROUNDS, SPACING
 from experiments.contact_localization.posterior.estimate import locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.report.comparison import object_from_gels
 from experiments.contact_localization.report.sweep import LEVELS, trade
 from harness.basics.arrays import FloatArray
+from harness.recording.observation import Observation
 from harness.sim.optics.optics import Optics
 from tests.samples.synthetic_press import PRESSES, felt
 from tests.support.localization import dials

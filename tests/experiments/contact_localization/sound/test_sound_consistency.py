@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization.observation import Observation
 from experiments.contact_localization.sound.consistency import (
     REFUSE_BELOW,
     REFUSE_UNHEARD_BELOW,
@@ -16,6 +15,7 @@ from experiments.contact_localization.sound.consistency import (
 )
 from harness.basics.geometry import rotation_about, transform
 from harness.bench.acquisition import Strike
+from harness.recording.observation import Observation
 
 RATE = 50_000.0
 

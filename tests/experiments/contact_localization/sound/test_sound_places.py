@@ -11,7 +11,6 @@ from experiments.contact_localization.posterior.hypotheses import Contact, Hypot
 from experiments.contact_localization.posterior.posterior import best_point
 from experiments.contact_localization.posterior.search import MOST_HYPOTHESES, Search
 from experiments.contact_localization.report.sound_pictures import sound_pair, spectrogram
-from experiments.contact_localization.sound.analysis import SoundEvidence, analyse
 from experiments.contact_localization.sound.evidence import StrikeEvidence, hear
 from experiments.contact_localization.sound.gains import gain_table
 from experiments.contact_localization.sound.likelihood import SoundTerm
@@ -22,6 +21,7 @@ from harness.basics.geometry import frame_facing, rotation_about, transform
 from harness.basics.materials import Material
 from harness.bench.sensor import GELSIGHT_R15
 from harness.sim.optics.tactile_calibration import shipped_calibration
+from harness.strikes.peaks import SoundEvidence, analyse
 from tests.samples import sounding_plate as plate
 
 MODES = plate.plate_modes()

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import oaconvolve, resample_poly
 
-from experiments.contact_localization.sound.analysis import analyse
 from experiments.contact_localization.sound.gains import gain_table
 from experiments.contact_localization.sound.likelihood import SoundTerm
 from harness.basics.arrays import FloatArray
 from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
+from harness.strikes.peaks import analyse
 from tests.samples import sounding_plate as plate
 
 K = 6

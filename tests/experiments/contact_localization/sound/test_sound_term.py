@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.contact_localization.sound.analysis import Peak, SoundEvidence, analyse
 from experiments.contact_localization.sound.density import MOST_RANK, add_densities, sound_scores
 from experiments.contact_localization.sound.gains import gain_table
 from experiments.contact_localization.sound.likelihood import SoundTerm
@@ -16,6 +15,7 @@ from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
 from harness.sim.modal.modes import Modes
+from harness.strikes.peaks import Peak, SoundEvidence, analyse
 from tests.samples import sounding_plate as plate
 
 GLASS = MATERIALS["glass"]

@@ -14,10 +14,10 @@ from typing import TypeVar
 import numpy as np
 from scipy.signal import find_peaks
 
-from experiments.contact_localization.sound.spectra import Analysis, ComplexArray, Spectra, spectra_of
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.errors import DataRefused
 from harness.bench.acquisition import Strike
+from harness.strikes.spectra import Analysis, ComplexArray, Spectra, spectra_of
 
 _Values = TypeVar("_Values", FloatArray, ComplexArray)
 
@@ -61,6 +61,7 @@ class SoundEvidence:
         rejected: peaks that are not, being two modes at once or noise; and echoes' peaks on the skirts
             of stronger ones.
         band: Hz, least and greatest frequency that at least two strikes excited; zeros where none.
+        loudest: dB re 1 Pa/N of the strongest peak's top, which the peaks' levels are against.
     """
 
     used: BoolArray
@@ -68,6 +69,7 @@ class SoundEvidence:
     peaks: tuple[Peak, ...]
     rejected: tuple[Peak, ...]
     band: tuple[float, float]
+    loudest: float = 0.0
 
 
 def analyse(strikes: Sequence[Strike], settings: Analysis | None = None) -> SoundEvidence:
@@ -97,7 +99,8 @@ def analyse(strikes: Sequence[Strike], settings: Analysis | None = None) -> Soun
     found = [_peak(spectra, low, top, high, used, settings) for low, top, high in _bands(spectra, settings)]
     kept, rejected = _sorted_out([peak for peak in found if peak is not None], settings)
     band = (float(usable[0]), float(usable[-1]))
-    return SoundEvidence(read_only(used), reasons, kept, rejected, band)
+    loudest = max((peak.level for peak in found if peak is not None), default=0.0)
+    return SoundEvidence(read_only(used), reasons, kept, rejected, band, loudest)
 
 
 def _why_not(strike: Strike, settings: Analysis) -> str:

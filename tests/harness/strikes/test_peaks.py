@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import oaconvolve
 
-from experiments.contact_localization.sound.analysis import Peak, analyse
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.bench.acquisition import Strike
 from harness.sim.modal.modes import Modes
+from harness.strikes.peaks import Peak, analyse
 from tests.samples import sounding_plate as plate
 
 STRIKES = 5

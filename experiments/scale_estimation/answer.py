@@ -1,0 +1,167 @@
+"""From a run's readings to the size of its object, by each sense and by all."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from experiments.scale_estimation.dials import STARTS, YAWS
+from experiments.scale_estimation.model import ObjectModel
+from experiments.scale_estimation.readings import outline_of, patch_of_contact, peaks_of
+from experiments.scale_estimation.size import Belief, fused
+from experiments.scale_estimation.sound.hearing import Hearing, by_sound
+from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.touch.touch import Touch, by_touch
+from experiments.scale_estimation.vision.outline import Outline
+from experiments.scale_estimation.vision.vision import Sight, by_sight
+from harness.basics.errors import DataRefused, FitRefused, WrongUse
+from harness.bench.acquisition import Strike
+from harness.effects.accuracy import Accuracy
+from harness.picture.square_pixels import aspect_stated
+from harness.recording.observation import observe_step
+from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import StepRecord
+
+COMMON_SIGMA = 0.041
+"""Relative deviation of all frequencies together: 3 % of material, 2.6 % of wall, 1 % of unevenness."""
+
+SENSES = ("vision", "audio", "touch")
+
+OUTSIDE = 0.5
+"""Probability beyond which a size is said to lie outside the range that was asked about."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a run says of a size.
+
+    Attributes:
+        by_sense: the answer of each sense that was asked, or why it has none.
+        fused: all that answered, together; what is known without any where none did.
+        seconds: s of each sense's estimate, from readings to belief.
+        contacts: that touched something.
+        strikes: that may be used.
+    """
+
+    by_sense: Mapping[str, Sight | Hearing | Touch | FitRefused]
+    fused: Belief
+    seconds: Mapping[str, float]
+    contacts: int
+    strikes: int
+
+    @property
+    def sight(self) -> Sight | None:
+        """The answer by sight."""
+        found = self.by_sense.get("vision")
+        return found if isinstance(found, Sight) else None
+
+    @property
+    def touch(self) -> Touch | None:
+        """The answer by touch."""
+        found = self.by_sense.get("touch")
+        return found if isinstance(found, Touch) else None
+
+    @property
+    def hearing(self) -> Hearing | None:
+        """The answer by sound."""
+        found = self.by_sense.get("audio")
+        return found if isinstance(found, Hearing) else None
+
+
+@dataclass(eq=False)
+class ScaleAnswering:
+    """Readings to answer: each step's pictures, contact and strike are read once.
+
+    Args:
+        run: the folder.
+        accuracy: of the estimators.
+    """
+
+    run: RunFiles
+    accuracy: Accuracy
+    model: ObjectModel = field(init=False)
+
+    def __post_init__(self) -> None:
+        run = self.run
+        self.model = ObjectModel(run.mesh, run.scene, run.station)
+        self.outline: Outline | FitRefused | None = None
+        self.patches: list[Patch] = []
+        self.strikes: list[Strike] = []
+        self._read = dict.fromkeys(SENSES, 0.0)
+
+    def read(self, record: StepRecord) -> None:
+        """Take in a step's readings."""
+        began = time.perf_counter()
+        try:
+            outline = outline_of(record)
+        except DataRefused as refusal:
+            self.outline = FitRefused(str(refusal))
+            return
+        if outline is not None:
+            self.outline = outline
+            self._read["vision"] += time.perf_counter() - began
+        if "gel.image" in record.readings:
+            self._read_contact(record)
+
+    def _read_contact(self, record: StepRecord) -> None:
+        run, began = self.run, time.perf_counter()
+        aspect = aspect_stated(run.calibration.header.made_from)
+        seen = observe_step(record, run.station.flange_from_gel, run.acquisition, aspect)
+        patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
+        if patch is not None:
+            self.patches.append(patch)
+        if seen.strike is not None:
+            self.strikes.append(seen.strike)
+        self._read["touch"] += time.perf_counter() - began
+
+    def answer(self) -> Answer:
+        """By each sense that the scene asks for, and by all that answer.
+
+        Raises:
+            WrongUse: no step was read.
+        """
+        sensors = self.run.scene.sensors
+        asked = {"vision": sensors.camera, "audio": sensors.sound, "touch": sensors.touch}
+        ways = {"vision": self._by_sight, "audio": self._by_sound, "touch": self._by_touch}
+        found: dict[str, Sight | Hearing | Touch | FitRefused] = {}
+        seconds = {}
+        for sense in SENSES:
+            if asked[sense]:
+                began = time.perf_counter()
+                found[sense] = self._tried(ways[sense])
+                seconds[sense] = self._read[sense] + time.perf_counter() - began
+        if not found:
+            raise WrongUse("the scene asks for no sense; set sensors.camera, sensors.sound or sensors.touch")
+        beliefs = [one.belief for one in found.values() if not isinstance(one, FitRefused)]
+        together = fused(beliefs) if beliefs else Belief.ignorant(self.model.sizes)
+        usable = sum(not strike.fault for strike in self.strikes)
+        return Answer(found, together, seconds, len(self.patches), usable)
+
+    @staticmethod
+    def _tried(way: "Callable[[], Sight | Hearing | Touch]") -> Sight | Hearing | Touch | FitRefused:
+        try:
+            return way()
+        except FitRefused as refusal:
+            return refusal
+
+    def _by_sight(self) -> Sight:
+        if isinstance(self.outline, FitRefused):
+            raise self.outline
+        if self.outline is None:
+            raise FitRefused("the camera has not looked yet")
+        model, yaws = self.model, int(self.accuracy[YAWS.name])
+        return by_sight(model.view, self.outline, model.nominal, model.sizes, yaws)
+
+    def _by_sound(self) -> Hearing:
+        peaks = peaks_of(self.strikes)
+        if peaks is None:
+            raise FitRefused(
+                "nothing was heard: no strike was made, or none rang; strike a place of the object"
+            )
+        model = self.model
+        return by_sound(peaks, model.ringing(self.accuracy), model.nominal, model.sizes, COMMON_SIGMA)
+
+    def _by_touch(self) -> Touch:
+        if not self.patches:
+            raise FitRefused("the gel touched nothing yet")
+        model, starts = self.model, int(self.accuracy[STARTS.name])
+        return by_touch(model.stand, self.patches, model.nominal, model.sizes, starts)

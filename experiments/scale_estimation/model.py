@@ -1,0 +1,114 @@
+"""The object at its nominal size as each sense knows it, and where it nominally stands."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from experiments.scale_estimation.section import Scale
+from experiments.scale_estimation.size import SizeRange
+from experiments.scale_estimation.sound.model import RingingModel
+from experiments.scale_estimation.touch.fit import Stand, StandErrors
+from experiments.scale_estimation.vision.fit import CameraErrors, View
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import WrongUse
+from harness.basics.materials import MATERIALS
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
+from harness.effects.accuracy import Accuracy
+from harness.experiment.object_modes import object_modes
+from harness.sim.solid.surface_samples import sample_surface
+
+_SAMPLES = 60
+"""Samples along the longest side of the nominal object: of its surface, for contacts."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectModel:
+    """An object of known shape.
+
+    Attributes:
+        mesh: in metres, at its nominal size.
+        scene: says how it stands, and which sizes it may have.
+        station: whose camera looks at it.
+    """
+
+    mesh: Mesh
+    scene: SceneFile
+    station: Station
+    _ringing: dict[Accuracy, RingingModel] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def nominal(self) -> float:
+        """M, the longest side of its bounding box."""
+        return float(np.ptp(self.mesh.bounds, axis=0).max())
+
+    @cached_property
+    def sizes(self) -> SizeRange:
+        """That are asked about."""
+        return SizeRange(*self.scene.object.sizes_of(self.nominal))
+
+    @property
+    def upright(self) -> FloatArray:
+        """``(3, 3)`` rotation of the object in base, at the scene's yaw."""
+        return self.scene.base_from_object(self.mesh)[:3, :3]
+
+    @property
+    def place(self) -> FloatArray:
+        """``(3,)`` m in base: where the scene puts its anchor."""
+        return np.array(self.scene.object.pose.position)
+
+    @cached_property
+    def anchor(self) -> FloatArray:
+        """``(3,)`` m in the object's frame: the point that the scene puts there, and that it grows about."""
+        pose = self.scene.base_from_object(self.mesh)
+        return np.asarray(pose[:3, :3].T @ (self.place - pose[:3, 3]))
+
+    @cached_property
+    def stand(self) -> Stand:
+        """For contacts."""
+        surface = sample_surface(self.mesh, self.nominal / _SAMPLES)
+        errors = StandErrors(support=self.scene.section(Scale).support_error)
+        return Stand.of(surface, self.upright, self.anchor, self.place, errors)
+
+    @cached_property
+    def view(self) -> View:
+        """For a picture.
+
+        Raises:
+            WrongUse: the station has no camera.
+        """
+        camera = self.station.camera
+        if camera is None:
+            raise WrongUse(
+                f"the station {self.station.title!r} has no [camera]; describe it, or leave vision out"
+            )
+        standing = (self.mesh.vertices - self.anchor) @ self.upright.T
+        centre = 0.5 * camera.columns, 0.5 * camera.rows
+        errors = CameraErrors(support=self.scene.section(Scale).support_error)
+        matrix = camera.base_from_camera.matrix
+        return View(matrix, camera.focal_length, centre, standing, self.place, errors)
+
+    def ringing(self, accuracy: Accuracy) -> RingingModel:
+        """For strikes, at the accuracy of its modes.
+
+        Raises:
+            MeshRefused: its surface cannot be filled with elements.
+        """
+        if accuracy not in self._ringing:
+            modes = object_modes(self.scene, self.station, self.mesh, accuracy)
+            self._ringing[accuracy] = RingingModel.of(modes, MATERIALS[self.scene.object.material])
+        return self._ringing[accuracy]
+
+    def scene_at(self, size: float, x: float, y: float, yaw: float) -> SceneFile:
+        """The scene with the object of a size in m, off its nominal place by m and rad."""
+        pose = self.scene.object.pose
+        position = (pose.position[0] + x, pose.position[1] + y, pose.position[2])
+        there = pose.model_copy(update={"position": position, "yaw": pose.yaw + yaw})
+        stated = {"pose": there, "scale": size / self.nominal, "sizes": None}
+        return self.scene.model_copy(update={"object": self.scene.object.model_copy(update=stated)})
+
+    def mesh_at(self, size: float) -> Mesh:
+        """Its mesh at a size in m."""
+        return Mesh(self.mesh.vertices * (size / self.nominal), self.mesh.faces)

@@ -1,0 +1,67 @@
+"""Readings of a run as each sense has them: an outline, patches of contacts, peaks of strikes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from experiments.scale_estimation.sound.peaks import Peaks
+from experiments.scale_estimation.touch.patch import Patch, patch_of
+from experiments.scale_estimation.vision.outline import Outline, read_outline
+from harness.basics.arrays import ByteArray
+from harness.bench.acquisition import Strike
+from harness.picture.object_mask import mask_by_background
+from harness.recording.observation import Observation
+from harness.recording.step_file import StepRecord
+from harness.sim.optics.inverse import invert
+from harness.sim.optics.tactile_calibration import TactileCalibration
+from harness.skills.look import BARE_IMAGE, IMAGE
+from harness.strikes.peaks import analyse
+from harness.strikes.spectra import Analysis
+
+
+def outline_of(record: StepRecord) -> Outline | None:
+    """The object's outline in the camera's pictures; None where the step was no look.
+
+    Raises:
+        DataRefused: the object is not seen.
+    """
+    if IMAGE not in record.readings or BARE_IMAGE not in record.readings:
+        return None
+    live, bare = (_median(record.readings[name].values) for name in (IMAGE, BARE_IMAGE))
+    anywhere = np.ones(live.shape[:2], bool)
+    return read_outline(mask_by_background(live, bare, anywhere))
+
+
+def patch_of_contact(seen: Observation, calibration: TactileCalibration, pitch: float) -> Patch | None:
+    """Where a contact met the object; None where the gel touched nothing.
+
+    Args:
+        seen: the contact.
+        calibration: of the gel.
+        pitch: m of gel that a pixel shows.
+    """
+    mean = np.rint(seen.images.mean(axis=0)).astype(np.uint8)
+    return patch_of(invert(mean[None], calibration).height[0], pitch, seen.base_from_gel)
+
+
+def peaks_of(strikes: Sequence[Strike]) -> Peaks | None:
+    """The resonances of all strikes together; None where none was made, or none may be used.
+
+    Peaks that are two modes at once count too: only where they lie is asked, not which place was struck.
+    """
+    usable = [strike for strike in strikes if not strike.fault]
+    if not usable:
+        return None
+    settings = Analysis()
+    # One strike alone stands for two: nothing is compared between places.
+    found = analyse(usable if len(usable) > 1 else usable * 2, settings)
+    peaks = sorted((*found.peaks, *found.rejected), key=lambda peak: peak.frequency)
+    if not peaks:
+        return None
+    frequencies = np.array([peak.frequency for peak in peaks])
+    levels = found.loudest + np.array([peak.level for peak in peaks])
+    return Peaks(frequencies, levels, found.band, settings.decay)
+
+
+def _median(frames: ByteArray) -> ByteArray:
+    return np.asarray(np.median(frames, axis=0)).astype(np.uint8)

@@ -1,0 +1,122 @@
+"""A scale estimation's answer as JSON values, and in lines for people."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from experiments.scale_estimation.answer import OUTSIDE, Answer
+from experiments.scale_estimation.size import Belief
+from experiments.scale_estimation.sound.hearing import Hearing
+from harness.basics.errors import FitRefused
+from harness.experiment.experiment import Scored
+
+
+def result_of(scored: Scored) -> dict[str, Any]:
+    """The answer as JSON values; keys carry their unit."""
+    found: Answer = scored.found
+    truth = None if scored.truth is None else scored.truth.differences.get("longest_side_m")
+    asked = scored.run.scene.sensors
+    absent = {"vision": not asked.camera, "audio": not asked.sound, "touch": not asked.touch}
+    estimates: dict[str, Any] = {}
+    for sense, missing in absent.items():
+        if missing:
+            estimates[sense] = _none("the scene does not ask for it")
+            continue
+        one, seconds = found.by_sense[sense], found.seconds[sense]
+        refused = isinstance(one, FitRefused)
+        estimates[sense] = _none(str(one), seconds) if refused else estimate_of(one.belief, truth, seconds)
+    seconds = sum(found.seconds.values())
+    estimates["fused"] = estimate_of(found.fused, truth, seconds)
+    model = scored.answering.model
+    return {
+        "size_m": found.fused.size,
+        "error_m": estimates["fused"]["error_m"],
+        "nominal_m": model.nominal,
+        "range_m": [model.sizes.low, model.sizes.high],
+        "contacts": found.contacts,
+        "strikes": found.strikes,
+        "estimates": estimates,
+        "sqrt_young_over_density": _material(scored),
+        "seconds": seconds,
+        "warnings": list(_doubts(found)),
+    }
+
+
+def estimate_of(belief: Belief, truth: float | None, seconds: float) -> dict[str, Any]:
+    """One belief."""
+    low, high = belief.interval
+    return {
+        "size_m": belief.size,
+        "error_m": None if truth is None else abs(belief.size - truth),
+        "low90_m": low,
+        "high90_m": high,
+        "in_interval90": None if truth is None else bool(low <= truth <= high),
+        "outside_range": belief.outside,
+        "seconds": seconds,
+        "refused": None,
+    }
+
+
+def _none(why: str, seconds: float | None = None) -> dict[str, Any]:
+    names = ("size_m", "error_m", "low90_m", "high90_m", "in_interval90", "outside_range")
+    return {**dict.fromkeys(names), "seconds": seconds, "refused": why}
+
+
+def _material(scored: Scored) -> dict[str, Any] | None:
+    """What sound alone knows once sight or touch have fixed the size: the speed sqrt(E / density), m/s."""
+    found: Answer = scored.found
+    heard, other = found.by_sense.get("audio"), found.sight or found.touch
+    if not isinstance(heard, Hearing) or other is None:
+        return None
+    material = scored.answering.model.ringing(scored.accuracy).material
+    stated = (material.young / material.density) ** 0.5
+    return heard.speed(stated, other.belief)
+
+
+def _doubts(found: Answer) -> list[str]:
+    said = []
+    for sense, one in found.by_sense.items():
+        if isinstance(one, FitRefused):
+            said.append(f"{sense}: {one}")
+        elif one.belief.outside > OUTSIDE:
+            said.append(
+                f"{sense}: the size is likely outside the range that was asked about "
+                f"({100 * one.belief.outside:.0f} %); widen object.sizes"
+            )
+        else:
+            low, high = one.belief.interval
+            if not low <= found.fused.size <= high and not _wider(one.belief, found.fused):
+                said.append(
+                    f"{sense} alone says {1e2 * low:.1f} to {1e2 * high:.1f} cm, which leaves the fused "
+                    "answer out: look at its readings"
+                )
+    return said
+
+
+def _wider(one: Belief, other: Belief) -> bool:
+    """Whether two nine-tenths intervals overlap at all."""
+    (a, b), (c, d) = one.interval, other.interval
+    return max(a, c) <= min(b, d)
+
+
+def lines_of(result: Mapping[str, Any]) -> list[str]:
+    """A line a sense, the fused one last."""
+    mock = "mock bench, " if result["mock"] else ""
+    said = []
+    for sense, one in result["estimates"].items():
+        if one["size_m"] is None:
+            said.append(f"{mock}{sense}: no answer: {one['refused']}")
+            continue
+        low, high = 1e2 * one["low90_m"], 1e2 * one["high90_m"]
+        error = "" if one["error_m"] is None else f"; error {1e3 * one['error_m']:.1f} mm"
+        said.append(
+            f"{mock}{sense}: the {result['object']} is {1e2 * one['size_m']:.2f} cm long; 90 % within "
+            f"{low:.1f} to {high:.1f} cm{error}; {one['seconds']:.2f} s"
+        )
+    speed = result["sqrt_young_over_density"]
+    if speed is not None:
+        said.append(
+            f"{mock}sound, at that size: sqrt(E / density) {speed['value_m_per_s']:.0f} m/s, 90 % within "
+            f"{speed['low90_m_per_s']:.0f} to {speed['high90_m_per_s']:.0f}; the material's "
+            f"{speed['stated_m_per_s']:.0f}"
+        )
+    return said

@@ -1,0 +1,172 @@
+"""What is believed of an object's size: a density over the logarithm of its longest side.
+
+Each sense hands on a density of its own, and the fused one is their product. Each is first mixed with a
+little of the uniform density, so that one wrong sense cannot silence the others.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.errors import OutOfDomain
+
+STEP = 1.0e-3
+"""Of the logarithm, between points of the grid: a tenth of what the best sense can tell apart."""
+
+BEYOND = 2.0
+"""Factor by which every sense searches beyond the range it is asked about, each way: an object outside is
+recognised as such. A search within the range would pile it up at the border, or take a wrong place inside."""
+
+FLOOR = 0.02
+"""Share of the uniform density that every sense is mixed with before the product is taken."""
+
+CREDIBLE = 0.9
+"""Probability that the stated interval holds."""
+
+
+@dataclass(frozen=True)
+class SizeRange:
+    """Sizes that an object may have.
+
+    Attributes:
+        low: m, the least longest side of its bounding box.
+        high: m, the greatest.
+    """
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite([self.low, self.high]).all() and 0.0 < self.low < self.high):
+            raise OutOfDomain(
+                f"sizes from {self.low!r} to {self.high!r} m were asked about; give a range whose low end is "
+                "greater than zero and less than its high end"
+            )
+
+    @cached_property
+    def logs(self) -> FloatArray:
+        """``(n,)`` logarithms of the sizes in m that are searched, ``STEP`` apart, beyond the range."""
+        low, high = np.log(self.low / BEYOND), np.log(self.high * BEYOND)
+        return read_only(np.linspace(low, high, round((high - low) / STEP) + 1))
+
+    @cached_property
+    def inside(self) -> FloatArray:
+        """``(n,)`` bool: which of them are in the range that was asked about."""
+        logs = self.logs
+        return read_only((logs >= np.log(self.low) - 0.5 * STEP) & (logs <= np.log(self.high) + 0.5 * STEP))
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """What is believed of a size.
+
+    Attributes:
+        range: of sizes asked about.
+        log_density: ``(n,)`` over ``range.logs``, normalised over all that is searched.
+    """
+
+    range: SizeRange
+    log_density: FloatArray
+
+    @classmethod
+    def of(cls, range_: SizeRange, log_density: FloatArray) -> "Belief":
+        """From a density that need not be normalised; minus infinity where a size is impossible.
+
+        Raises:
+            OutOfDomain: not a number, of another length than the grid, or impossible everywhere.
+        """
+        given = np.asarray(log_density, dtype=np.float64)
+        if given.shape != range_.logs.shape or np.isnan(given).any() or not given.max() > -np.inf:
+            raise OutOfDomain(
+                f"a density of shape {given.shape} was given for {len(range_.logs)} sizes; give one finite "
+                "number a size, or minus infinity for a size that cannot be (not for all of them)"
+            )
+        given = given - given.max()
+        return cls(range_, read_only(given - np.log(np.exp(given).sum() * STEP)))
+
+    @classmethod
+    def ignorant(cls, range_: SizeRange) -> "Belief":
+        """Every size of the range as likely, in its logarithm; none beyond."""
+        return cls.of(range_, np.where(range_.inside, 0.0, -np.inf))
+
+    @cached_property
+    def _shares(self) -> FloatArray:
+        """``(n,)`` probabilities of the sizes in the range, as the answer is about those."""
+        found = np.where(self.range.inside, np.exp(self.log_density), 0.0)
+        total = found.sum()
+        # Nothing inside: the border nearest to what is believed.
+        return found / total if total > 0.0 else _nearest(self.range, self.log_density)
+
+    @property
+    def outside(self) -> float:
+        """Probability that the size is not in the range that was asked about."""
+        return float(np.exp(self.log_density)[~self.range.inside.astype(bool)].sum() * STEP)
+
+    @property
+    def size(self) -> float:
+        """M, the median of the sizes in the range."""
+        return float(np.exp(_quantile(self.range.logs, self._shares, 0.5)))
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """M, the shortest interval in the logarithm that holds nine tenths of the probability."""
+        ends = np.cumsum(self._shares)
+        starts = ends - self._shares
+        last = np.searchsorted(ends, np.minimum(starts + CREDIBLE, ends[-1]) - 1e-12)
+        length = np.where(starts + CREDIBLE <= ends[-1] + 1e-12, last - np.arange(len(ends)), len(ends))
+        first = int(np.argmin(length))
+        logs = self.range.logs
+        end = int(last[first])
+        return float(np.exp(logs[first] - 0.5 * STEP)), float(np.exp(logs[end] + 0.5 * STEP))
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the logarithm, over the range."""
+        logs = self.range.logs
+        middle = float(self._shares @ logs)
+        return float(np.sqrt(self._shares @ (logs - middle) ** 2))
+
+    def widened(self, sigma: float) -> "Belief":
+        """The same, its logarithm off by a normal error of that standard deviation besides."""
+        if sigma < 0.25 * STEP:
+            return self
+        reach = int(np.ceil(6.0 * sigma / STEP))
+        kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) * STEP / sigma) ** 2)
+        density = np.exp(self.log_density - self.log_density.max())
+        spread = np.convolve(np.pad(density, reach, mode="edge"), kernel / kernel.sum(), mode="valid")
+        with np.errstate(divide="ignore"):
+            return Belief.of(self.range, np.log(spread))
+
+
+def fused(beliefs: Sequence[Belief]) -> Belief:
+    """What several senses believe together, each on evidence of its own.
+
+    Raises:
+        OutOfDomain: no belief was given, or of different ranges.
+    """
+    if not beliefs or any(one.range != beliefs[0].range for one in beliefs):
+        raise OutOfDomain("beliefs about one range of sizes can be fused, one or more; give such")
+    if len(beliefs) == 1:
+        return beliefs[0]
+    uniform = 1.0 / (STEP * len(beliefs[0].log_density))
+    product = sum(np.log((1.0 - FLOOR) * np.exp(one.log_density) + FLOOR * uniform) for one in beliefs)
+    return Belief.of(beliefs[0].range, np.asarray(product))
+
+
+def _quantile(logs: FloatArray, shares: FloatArray, share: float) -> float:
+    """Within the grid's step, as if each share were spread evenly over its own."""
+    ends = np.cumsum(shares)
+    k = int(np.searchsorted(ends, share * ends[-1]))
+    before = ends[k] - shares[k]
+    return float(logs[k] + STEP * ((share * ends[-1] - before) / shares[k] - 0.5))
+
+
+def _nearest(range_: SizeRange, log_density: FloatArray) -> FloatArray:
+    shares = np.zeros(len(log_density))
+    inside = np.flatnonzero(range_.inside)
+    best = int(np.argmax(log_density))
+    shares[inside[0] if best < inside[0] else inside[-1]] = 1.0
+    return shares

@@ -1,0 +1,188 @@
+"""Contacts against the surface of a model at any size, place and turn: least squares of many hypotheses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from experiments.scale_estimation.touch.patch import Patch
+from harness.basics.arrays import FloatArray
+from harness.sim.solid.surface_samples import Surface
+
+FACING = 12.0e-3
+"""M of distance on the nominal object that a normal off by one unit is worth in the search for the nearest
+sample: on a thin wall it is then the face that looks the contact's way."""
+
+DISTANCE_SIGMA = 1.1e-3
+"""M, of where a contact is along its normal: the arm's, the gel's and the shape's errors together."""
+
+NORMAL_SIGMA = float(np.radians(10.0))
+"""Rad; a contact on a rim has a plane's normal 20 to 40 degrees off, so it counts softly."""
+
+CAP = 8.0
+"""Of a contact's cost: one that is not of the object, or where the model errs, does not decide alone."""
+
+_SIZE, _X, _Y, _YAW, _Z = range(5)
+
+
+@dataclass(frozen=True)
+class StandErrors:
+    """How well it is known where the object stands: standard deviations.
+
+    Attributes:
+        place: m, per axis of the plane.
+        support: m, of the height.
+    """
+
+    place: float = 0.1
+    support: float = 1.0e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Stand:
+    """The nominal object as it stands, upright in base, its bottom's middle at the origin.
+
+    Attributes:
+        points: ``(n, 3)`` m, samples of its surface.
+        normals: ``(n, 3)`` unit, outward.
+        place: ``(3,)`` m in base: where that middle nominally is.
+        errors: of that.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    place: FloatArray
+    errors: StandErrors = StandErrors()
+
+    @classmethod
+    def of(
+        cls,
+        surface: Surface,
+        upright: FloatArray,
+        bottom: FloatArray,
+        place: FloatArray,
+        errors: StandErrors | None = None,
+    ) -> "Stand":
+        """From samples in the object's frame.
+
+        Args:
+            surface: samples.
+            upright: ``(3, 3)`` rotation of the object, standing, in base.
+            bottom: ``(3,)`` m in the object's frame: its bottom's middle.
+            place: ``(3,)`` m in base.
+            errors: of that; None for the usual ones.
+        """
+        turned = (surface.points - bottom) @ upright.T, surface.normals @ upright.T
+        return cls(*turned, place, errors or StandErrors())
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Over places and, weighed, the way that the surface faces there."""
+        return cKDTree(np.hstack([self.points, FACING * self.normals]))
+
+
+class TouchProblem:
+    """Least squares of contacts over ``(k, 5)`` unknowns: log of size over nominal, x, y, yaw, height.
+
+    Args:
+        stand: the object.
+        patches: of the contacts.
+        points: of each patch that are used; the first are spread the widest.
+    """
+
+    def __init__(self, stand: Stand, patches: Sequence[Patch], points: int) -> None:
+        self.stand = stand
+        self._points = np.stack([patch.points[:points] for patch in patches]) - stand.place
+        self._normals = np.stack([patch.normal for patch in patches])
+        self.contacts = len(patches)
+
+    def refined(self, unknowns: FloatArray, rounds: int, fixed_size: bool) -> tuple[FloatArray, FloatArray]:
+        """Downhill from each hypothesis.
+
+        Args:
+            unknowns: ``(k, 5)``.
+            rounds: steps, each with the nearest samples looked up anew.
+            fixed_size: whether the size stays as it is.
+
+        Returns:
+            ``(k, 5)`` unknowns and ``(k,)`` costs, half sums of squares with the prior, each's best.
+        """
+        best, least = unknowns.copy(), np.full(len(unknowns), np.inf)
+        here = unknowns.copy()
+        for last in range(rounds + 1):
+            residuals, slopes, cost = self._linear(here)
+            better = cost < least
+            best[better], least[better] = here[better], cost[better]
+            if last < rounds:
+                here = here + self._step(residuals, slopes, here, fixed_size)
+        return best, least
+
+    def sigma(self, unknowns: FloatArray) -> float:
+        """Of the size's logarithm at ``(5,)`` unknowns, all else free, to first order."""
+        _, slopes, _ = self._linear(unknowns[None])
+        normal = slopes[0].T @ slopes[0] + np.diag(self._prior**2) + 1e-9 * np.eye(5)
+        return float(np.sqrt(np.linalg.inv(normal)[_SIZE, _SIZE]))
+
+    @property
+    def _prior(self) -> FloatArray:
+        e = self.stand.errors
+        return np.array([0.0, 1.0 / e.place, 1.0 / e.place, 0.0, 1.0 / e.support])
+
+    def _step(
+        self, residuals: FloatArray, slopes: FloatArray, here: FloatArray, fixed_size: bool
+    ) -> FloatArray:
+        prior = self._prior**2
+        normal = np.einsum("kri,krj->kij", slopes, slopes) + np.diag(prior)
+        gradient = np.einsum("kri,kr->ki", slopes, residuals) + prior * here
+        first = 1 if fixed_size else 0
+        scale = np.einsum("kii->ki", normal)[:, first:] * 1e-3 + 1e-6
+        inner = normal[:, first:, first:] + scale[..., None] * np.eye(5 - first)
+        step = np.zeros_like(here)
+        step[:, first:] = -np.linalg.solve(inner, gradient[:, first:, None])[..., 0]
+        reach = np.array([0.3, 0.05, 0.05, 0.5, 0.01])
+        return np.asarray(np.clip(step, -reach, reach))
+
+    def _linear(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Residuals ``(k, c)`` in deviations, weighed by the cap, slopes ``(k, c, 5)``, costs ``(k,)``."""
+        k, (c, m) = len(unknowns), self._points.shape[:2]
+        scale = np.exp(unknowns[:, _SIZE])
+        cosine, sine = np.cos(unknowns[:, _YAW]), np.sin(unknowns[:, _YAW])
+        turn = np.zeros((k, 3, 3))
+        turn[:, 0, 0] = turn[:, 1, 1] = cosine
+        turn[:, 1, 0], turn[:, 0, 1], turn[:, 2, 2] = sine, -sine, 1.0
+        moved = np.stack([unknowns[:, _X], unknowns[:, _Y], unknowns[:, _Z]], axis=-1)
+        offset = self._points[None] - moved[:, None, None]
+        standing = np.einsum("kcmj,kji->kcmi", offset, turn)
+        normals = np.einsum("cj,kji->kci", self._normals, turn)
+        facing = np.broadcast_to(FACING * normals[:, :, None], standing.shape)
+        query = np.concatenate([standing / scale[:, None, None, None], facing], axis=-1)
+        near = self.stand.tree.query(query.reshape(-1, 6))[1].reshape(k, c, m)
+        points, faced = self.stand.points[near], self.stand.normals[near]
+        apart = standing - scale[:, None, None, None] * points
+        distance = np.einsum("kcmi,kcmi->kcm", apart, faced).mean(axis=2) / DISTANCE_SIGMA
+        mean = faced.mean(axis=2)
+        across = np.linalg.norm(np.cross(normals, mean), axis=-1)
+        angle = np.arctan2(across, np.einsum("kci,kci->kc", normals, mean)) / NORMAL_SIGMA
+        along = apart - np.einsum("kcmi,kcmi->kcm", apart, faced)[..., None] * faced
+        lateral = np.linalg.norm(along, axis=-1).mean(axis=2)
+        beyond = np.maximum(lateral - scale[:, None] * 3.0e-3, 0.0) / DISTANCE_SIGMA
+        cost = 0.5 * (distance**2 + np.minimum(angle, 3.0) ** 2 / 3.0 + beyond**2)
+        capped = CAP * (1.0 - np.exp(-cost / CAP))
+        weight = np.exp(-0.5 * cost / CAP)
+        slopes = np.empty((k, c, 5))
+        # Slopes of the distance along the sample's normal, in the standing frame.
+        slopes[..., _SIZE] = -scale[:, None] * np.einsum("kcmi,kcmi->kcm", points, faced).mean(axis=2)
+        in_base = np.einsum("kci,kji->kcj", mean, turn)
+        slopes[..., _X], slopes[..., _Y], slopes[..., _Z] = (
+            -in_base[..., 0],
+            -in_base[..., 1],
+            -in_base[..., 2],
+        )
+        # d(R^T v)/dyaw = (v_y, -v_x, 0) in the standing frame.
+        turned = standing[..., 1] * faced[..., 0] - standing[..., 0] * faced[..., 1]
+        slopes[..., _YAW] = turned.mean(axis=2)
+        prior = 0.5 * ((self._prior * unknowns) ** 2).sum(axis=1)
+        weighed = weight[..., None] * slopes / DISTANCE_SIGMA
+        return weight * distance, weighed, capped.sum(axis=1) + prior

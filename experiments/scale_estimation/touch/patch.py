@@ -1,0 +1,69 @@
+"""From the height map of a press to places on the object's surface, in the robot's base."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray, read_only
+from harness.basics.geometry import apply
+
+POINTS = 12
+"""Places kept of a press."""
+
+SHARE = 0.5
+"""Of the deepest indentation: what lies deeper is the object's own surface, not gel that hangs from it."""
+
+TOUCHED = 0.12e-3
+"""M of indentation below which nothing was touched."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Where a press met the object.
+
+    Attributes:
+        points: ``(POINTS, 3)`` m in base.
+        normal: ``(3,)`` unit in base, out of the object: of the plane through them.
+    """
+
+    points: FloatArray
+    normal: FloatArray
+
+
+def patch_of(heights: FloatArray, pitch: float, base_from_gel: FloatArray) -> Patch | None:
+    """The places that a press met; None where the gel touched nothing.
+
+    Args:
+        heights: ``(rows, columns)`` m of indentation.
+        pitch: m of gel that a pixel shows.
+        base_from_gel: ``(4, 4)`` as the arm reported it; z into the object.
+    """
+    deepest = float(heights.max())
+    if not deepest > TOUCHED:
+        return None
+    rows, columns = np.nonzero(heights >= SHARE * deepest)
+    count = np.array(heights.shape)
+    across = (columns - 0.5 * (count[1] - 1)) * pitch
+    along = (rows - 0.5 * (count[0] - 1)) * pitch
+    in_gel = np.column_stack([across, along, -heights[rows, columns]])
+    normal = _normal(in_gel)
+    chosen = in_gel[_spread(in_gel[:, :2], POINTS)]
+    return Patch(read_only(apply(base_from_gel, chosen)), read_only(base_from_gel[:3, :3] @ normal))
+
+
+def _normal(points: FloatArray) -> FloatArray:
+    """``(3,)`` unit towards the gel, -z, of the plane z = a x + b y + c through the points."""
+    terms = np.column_stack([points[:, :2], np.ones(len(points))])
+    slope = np.linalg.lstsq(terms, points[:, 2], rcond=None)[0]
+    normal = np.array([slope[0], slope[1], -1.0])
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _spread(places: FloatArray, count: int) -> list[int]:
+    """Indices of places far from each other: each the farthest from those before, the middle first."""
+    chosen = [int(np.linalg.norm(places - places.mean(axis=0), axis=1).argmin())]
+    apart = np.linalg.norm(places - places[chosen[0]], axis=1)
+    while len(chosen) < count:
+        chosen.append(int(apart.argmax()))
+        apart = np.minimum(apart, np.linalg.norm(places - places[chosen[-1]], axis=1))
+    return chosen

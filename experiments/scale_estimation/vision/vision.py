@@ -1,0 +1,108 @@
+"""What one picture by a calibrated camera says of the size of a known object."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from experiments.scale_estimation.size import Belief, SizeRange
+from experiments.scale_estimation.vision.fit import OutlineFit, OutlineProblem, View
+from experiments.scale_estimation.vision.outline import Outline
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused
+
+MISFIT = 0.9
+"""Pixels rms between the outlines beyond which the picture is not of this object."""
+
+NO_SIZE = 0.3
+"""Deviation of the size's logarithm beyond which a picture says nothing of it."""
+
+_FIRST_ROUNDS = 4
+_FOLLOWED = 4
+_ROUNDS = 8
+_SCAN = np.linspace(-5.0, 5.0, 21)
+_SCAN_ROUNDS = 4
+_FAR = 20.0
+_MOST_MODES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """The answer by sight.
+
+    Attributes:
+        belief: over the size.
+        fit: the best.
+        seconds: s of the estimate.
+    """
+
+    belief: Belief
+    fit: OutlineFit
+    seconds: float
+
+
+def by_sight(view: View, outline: Outline, nominal: float, sizes: SizeRange, yaws: int = 12) -> Sight:
+    """The size at which the model's outline is that of the picture.
+
+    Args:
+        view: camera and object.
+        outline: of the picture.
+        nominal: m, the longest side of the model.
+        sizes: asked about.
+        yaws: that the fit starts from.
+
+    Raises:
+        FitRefused: at no size and turn is it this object's outline.
+    """
+    began = time.perf_counter()
+    problem = OutlineProblem(view, outline)
+    begun = sorted(problem.fit(_starts(view, outline, yaws), _FIRST_ROUNDS), key=lambda fit: fit.cost)
+    fits = problem.fit(np.array([fit.unknowns for fit in begun[:_FOLLOWED]]), _ROUNDS)
+    best = min(fits, key=lambda fit: fit.cost)
+    if best.rms > MISFIT:
+        raise FitRefused(
+            f"the outline in the picture is {best.rms:.1f} px (rms) off this object's at any size and turn "
+            f"(limit {MISFIT:g} px); check that it is this object, upright, with nothing in front of it"
+        )
+    log_nominal = np.log(nominal)
+    density = np.full(len(sizes.logs), -np.inf)
+    for fit in _apart(fits, best.cost):
+        density = np.logaddexp(density, _scanned(problem, fit, sizes.logs - log_nominal))
+    return Sight(Belief.of(sizes, density), best, time.perf_counter() - began)
+
+
+def _starts(view: View, outline: Outline, yaws: int) -> FloatArray:
+    """``(yaws, 14)``: as large as the picture's outline is, and where it is."""
+    starts = np.zeros((yaws, len(view.sigmas)))
+    starts[:, 3] = np.arange(yaws) * 2.0 * np.pi / yaws
+    half = len(outline.extents) // 2
+    widths = outline.extents[:half] + outline.extents[half:]
+    for _ in range(3):
+        places = view.project(starts, view.corners)
+        low, high = places.min(axis=1), places.max(axis=1)
+        seen = 0.5 * ((high - low)[:, 0] / widths[0] + (high - low)[:, 1] / widths[half // 2])
+        starts[:, 0] -= np.log(np.maximum(seen, 1e-3))
+    return starts
+
+
+def _apart(fits: list[OutlineFit], least: float) -> list[OutlineFit]:
+    """The minima worth a scan, of each place and turn one."""
+    found: list[OutlineFit] = []
+    for fit in sorted(fits, key=lambda one: one.cost):
+        new = all(abs(fit.unknowns[0] - one.unknowns[0]) > 2e-3 for one in found)
+        if fit.cost < least + _FAR and new and len(found) < _MOST_MODES:
+            found.append(fit)
+    return found
+
+
+def _scanned(problem: OutlineProblem, fit: OutlineFit, logs: FloatArray) -> FloatArray:
+    """``(n,)`` minus the least cost at each logarithm of the size over the nominal one."""
+    middle, sigma = float(fit.unknowns[0]), min(problem.sigma(fit.unknowns), NO_SIZE)
+    starts = np.tile(fit.unknowns, (len(_SCAN), 1))
+    starts[:, 0] = middle + sigma * _SCAN
+    costs = np.array([one.cost for one in problem.fit(starts, _SCAN_ROUNDS, fixed_size=True)])
+    away = (logs - middle) / sigma
+    within = CubicSpline(_SCAN, costs)(np.clip(away, _SCAN[0], _SCAN[-1]))
+    beyond = np.maximum(np.abs(away) - _SCAN[-1], 0.0)
+    return np.asarray(-within - _SCAN[-1] * beyond)

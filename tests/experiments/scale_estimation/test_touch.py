@@ -1,0 +1,106 @@
+"""Size by touch: contacts on a model itself are read back; what they leave open stays open."""
+
+import numpy as np
+import pytest
+
+from experiments.scale_estimation.size import SizeRange
+from experiments.scale_estimation.touch.fit import Stand
+from experiments.scale_estimation.touch.patch import POINTS, Patch, patch_of
+from experiments.scale_estimation.touch.touch import by_touch
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused
+from harness.basics.geometry import rotation_about, transform
+from harness.objects.household import build
+from harness.sim.solid.surface_samples import sample_surface
+
+RANGE = SizeRange(0.05, 0.45)
+PLACE = np.array([-0.42, 0.0, 0.25])
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def stand_of(name: str) -> tuple[Stand, float]:
+    mesh = build(name)
+    nominal = float(np.ptp(mesh.bounds, axis=0).max())
+    low, high = mesh.bounds
+    anchor = np.array([*(0.5 * (low + high))[:2], low[2]])
+    return Stand.of(sample_surface(mesh, nominal / 60), np.eye(3), anchor, PLACE), nominal
+
+
+def contacts(name: str, scale: float, count: int, seed: int = 0, yaw: float = 0.7, sigma: float = 0.5e-3) -> list[Patch]:
+    """Presses all over an object that is larger by a factor, turned and moved."""
+    stand, _ = stand_of(name)
+    random = np.random.default_rng(seed)
+    turn, moved = rotation_about(UP, yaw), np.array([0.01, -0.015, 0.0])
+    outer = np.flatnonzero(stand.normals[:, 2] > -0.3)
+    made = []
+    for index in random.choice(outer, count, replace=False):
+        near = np.argsort(np.linalg.norm(stand.points - stand.points[index], axis=1) * scale)[:POINTS]
+        facing = near[(stand.normals[near] @ stand.normals[index]) > 0.7]
+        points = stand.points[np.resize(facing, POINTS)] * scale
+        error = sigma * random.standard_normal(3)
+        made.append(Patch(points @ turn.T + moved + PLACE + error, turn @ stand.normals[index]))
+    return made
+
+
+@pytest.mark.parametrize("name", ["mug", "bowl", "pitcher"])
+@pytest.mark.parametrize("scale", [0.6, 1.0, 1.7])
+def test_contacts_all_over_give_the_size(name: str, scale: float) -> None:
+    stand, nominal = stand_of(name)
+    found = by_touch(stand, contacts(name, scale, 10), nominal, RANGE)
+    assert found.belief.size == pytest.approx(scale * nominal, rel=0.03)
+    low, high = found.belief.interval
+    assert 0.98 * low < scale * nominal < 1.02 * high
+
+
+def test_one_contact_says_hardly_anything() -> None:
+    stand, nominal = stand_of("mug")
+    found = by_touch(stand, contacts("mug", 1.0, 1), nominal, RANGE)
+    low, high = found.belief.interval
+    assert high / low > 2.0
+
+
+def test_contacts_on_one_side_leave_the_size_open() -> None:
+    """A wall touched on one side only: large and far, or small and near."""
+    stand, nominal = stand_of("mug")
+    angle, heights = 0.0, np.linspace(0.03, 0.06, 6)
+    out = np.array([np.cos(angle), np.sin(angle), 0.0])
+    patches = []
+    for height in heights:
+        middle = PLACE + 0.04 * out + height * UP
+        across = np.linspace(-4e-3, 4e-3, POINTS)[:, None] * UP
+        patches.append(Patch(middle + across, out))
+    found = by_touch(stand, patches, nominal, RANGE)
+    low, high = found.belief.interval
+    assert high / low > 2.0
+
+
+def test_another_object_is_refused() -> None:
+    stand, nominal = stand_of("wrench")
+    with pytest.raises(FitRefused, match="off this object's surface"):
+        by_touch(stand, contacts("pitcher", 1.0, 12), nominal, RANGE)
+
+
+def test_refining_more_places_never_costs_the_answer() -> None:
+    stand, nominal = stand_of("mug")
+    patches = contacts("mug", 1.3, 8)
+    for starts in (4, 12, 40):
+        found = by_touch(stand, patches, nominal, RANGE, starts)
+        assert found.belief.size == pytest.approx(1.3 * nominal, rel=0.03)
+
+
+def ball_press(radius: float, depth: float, pitch: float) -> FloatArray:
+    rows, columns = np.mgrid[-60:61, -80:81] * pitch
+    return np.maximum(depth - (rows**2 + columns**2) / (2.0 * radius), 0.0)
+
+
+def test_a_press_becomes_places_on_the_surface_with_its_normal() -> None:
+    pitch, base = 1e-4, transform(rotation_about(np.array([1.0, 0.0, 0.0]), np.pi), np.array([0.1, 0.2, 0.3]))
+    patch = patch_of(ball_press(5e-3, 0.8e-3, pitch), pitch, base)
+    assert patch is not None
+    assert patch.points.shape == (POINTS, 3)
+    assert patch.normal @ UP > 0.99  # the gel points down, so the surface looks up
+    assert patch.points[:, 2].max() == pytest.approx(0.3 + 0.8e-3, abs=1e-4)
+
+
+def test_an_untouched_gel_is_no_contact() -> None:
+    assert patch_of(np.zeros((120, 160)), 1e-4, np.eye(4)) is None
