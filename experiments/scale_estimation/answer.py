@@ -9,10 +9,11 @@ from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.readings import outline_of, patch_of_contact, peaks_of
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.sound.hearing import Hearing, by_sound
-from experiments.scale_estimation.touch.patch import Patch
+from experiments.scale_estimation.touch.patch import Patch, free_line
 from experiments.scale_estimation.touch.touch import Touch, by_touch
 from experiments.scale_estimation.vision.outline import Outline
 from experiments.scale_estimation.vision.vision import Sight, by_sight
+from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, WrongUse
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
@@ -85,6 +86,7 @@ class ScaleAnswering:
         self.model = ObjectModel(run.mesh, run.scene, run.station)
         self.outline: Outline | FitRefused | None = None
         self.patches: list[Patch] = []
+        self.free: list[FloatArray] = []
         self.strikes: list[Strike] = []
         self._read = dict.fromkeys(SENSES, 0.0)
 
@@ -109,6 +111,8 @@ class ScaleAnswering:
         patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
         if patch is not None:
             self.patches.append(patch)
+        length = float(record.step.parameters["search_m"])
+        self.free.append(free_line(seen.base_from_gel, length, patch is not None))
         if seen.strike is not None:
             self.strikes.append(seen.strike)
         self._read["touch"] += time.perf_counter() - began
@@ -135,6 +139,13 @@ class ScaleAnswering:
         together = fused(beliefs) if beliefs else Belief.ignorant(self.model.sizes)
         usable = sum(not strike.fault for strike in self.strikes)
         return Answer(found, together, seconds, len(self.patches), usable)
+
+    def stands_seen(self) -> tuple[FloatArray, ...]:
+        """``(4,)`` each, log of the size, x, y, yaw: how the object may stand by the look; none if unseen."""
+        try:
+            return tuple(fit.unknowns[:4] for fit in self._by_sight().fits)
+        except FitRefused:
+            return ()
 
     @staticmethod
     def _tried(way: "Callable[[], Sight | Hearing | Touch]") -> Sight | Hearing | Touch | FitRefused:
@@ -164,4 +175,4 @@ class ScaleAnswering:
         if not self.patches:
             raise FitRefused("the gel touched nothing yet")
         model, starts = self.model, int(self.accuracy[STARTS.name])
-        return by_touch(model.stand, self.patches, model.nominal, model.sizes, starts)
+        return by_touch(model.stand, self.patches, model.nominal, model.sizes, starts, self.free)

@@ -34,4 +34,9 @@ EXPERIMENT = Experiment(
     plan_key=PLAN_KEY,
     gap="unplaced",
     observe=(),
+    assumed={
+        "object": {"scale": "hidden"},
+        "sensors": {"camera": True, "sound": True, "touch": True},
+    },
+    sizes_unknown=True,
 )

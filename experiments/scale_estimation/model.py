@@ -10,15 +10,19 @@ from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.touch.fit import Stand, StandErrors
 from experiments.scale_estimation.vision.fit import CameraErrors, View
+from experiments.scale_estimation.vision.outline import hull_of
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
+from harness.basics.mesh_hull import closed_hull
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.object_modes import object_modes
 from harness.sim.solid.surface_samples import sample_surface
+from harness.twin.bench import TwinBench
+from harness.twin.bench_of import twin_of
 
 _SAMPLES = 60
 """Samples along the longest side of the nominal object: of its surface, for contacts."""
@@ -65,11 +69,34 @@ class ObjectModel:
         pose = self.scene.base_from_object(self.mesh)
         return np.asarray(pose[:3, :3].T @ (self.place - pose[:3, 3]))
 
+    @property
+    def place_error(self) -> float:
+        """M, one standard deviation per axis of the plane."""
+        return self.scene.section(Scale).place_error
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """``(n, 3)`` m: of its convex hull, upright in base, the anchor at the origin."""
+        return hull_of((self.mesh.vertices - self.anchor) @ self.upright.T)
+
+    @property
+    def nowhere(self) -> Mesh:
+        """A mark of 2 mm on the support, in base: stands for an object of which nothing is known."""
+        low = np.array([-1.0e-3, -1.0e-3, 0.0])
+        ends = np.array([low, low + 2.0e-3]) + self.place
+        corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+        return closed_hull(corners)
+
+    def twin_around(self, mesh_in_base: Mesh, has_object: bool = True) -> TwinBench:
+        """The bench with this in the object's place, m in base."""
+        return twin_of(self.scene, self.station, mesh_in_base, np.eye(4), has_object)
+
     @cached_property
     def stand(self) -> Stand:
         """For contacts."""
         surface = sample_surface(self.mesh, self.nominal / _SAMPLES)
-        errors = StandErrors(support=self.scene.section(Scale).support_error)
+        asked = self.scene.section(Scale)
+        errors = StandErrors(asked.place_error, asked.support_error)
         return Stand.of(surface, self.upright, self.anchor, self.place, errors)
 
     @cached_property
@@ -84,11 +111,11 @@ class ObjectModel:
             raise WrongUse(
                 f"the station {self.station.title!r} has no [camera]; describe it, or leave vision out"
             )
-        standing = (self.mesh.vertices - self.anchor) @ self.upright.T
         centre = 0.5 * camera.columns, 0.5 * camera.rows
-        errors = CameraErrors(support=self.scene.section(Scale).support_error)
+        asked = self.scene.section(Scale)
+        errors = CameraErrors(support=asked.support_error, place=asked.place_error)
         matrix = camera.base_from_camera.matrix
-        return View(matrix, camera.focal_length, centre, standing, self.place, errors)
+        return View(matrix, camera.focal_length, centre, self.corners, self.place, errors)
 
     def ringing(self, accuracy: Accuracy) -> RingingModel:
         """For strikes, at the accuracy of its modes.

@@ -23,6 +23,9 @@ recognised as such. A search within the range would pile it up at the border, or
 FLOOR = 0.02
 """Share of the uniform density that every sense is mixed with before the product is taken."""
 
+STRANGE = 0.05
+"""How much less likely a size beyond the range is than one within, before anything is read."""
+
 CREDIBLE = 0.9
 """Probability that the stated interval holds."""
 
@@ -102,8 +105,10 @@ class Belief:
 
     @property
     def outside(self) -> float:
-        """Probability that the size is not in the range that was asked about."""
-        return float(np.exp(self.log_density)[~self.range.inside.astype(bool)].sum() * STEP)
+        """Probability that the size is not in the range that was asked about, which is thought of as rare."""
+        density, inside = np.exp(self.log_density), self.range.inside.astype(bool)
+        beyond = STRANGE * float(density[~inside].sum())
+        return beyond / (beyond + float(density[inside].sum())) if beyond > 0.0 else 0.0
 
     @property
     def size(self) -> float:
@@ -113,14 +118,12 @@ class Belief:
     @property
     def interval(self) -> tuple[float, float]:
         """M, the shortest interval in the logarithm that holds nine tenths of the probability."""
-        ends = np.cumsum(self._shares)
-        starts = ends - self._shares
-        last = np.searchsorted(ends, np.minimum(starts + CREDIBLE, ends[-1]) - 1e-12)
-        length = np.where(starts + CREDIBLE <= ends[-1] + 1e-12, last - np.arange(len(ends)), len(ends))
-        first = int(np.argmin(length))
-        logs = self.range.logs
-        end = int(last[first])
-        return float(np.exp(logs[first] - 0.5 * STEP)), float(np.exp(logs[end] + 0.5 * STEP))
+        edges = np.append(self.range.logs - 0.5 * STEP, self.range.logs[-1] + 0.5 * STEP)
+        below = np.append(0.0, np.cumsum(self._shares))
+        starts = np.flatnonzero(below + CREDIBLE <= below[-1] + 1e-12)
+        ends = np.interp(below[starts] + CREDIBLE, below, edges)
+        shortest = int(np.argmin(ends - edges[starts]))
+        return float(np.exp(edges[starts[shortest]])), float(np.exp(ends[shortest]))
 
     @property
     def spread(self) -> float:
@@ -128,6 +131,11 @@ class Belief:
         logs = self.range.logs
         middle = float(self._shares @ logs)
         return float(np.sqrt(self._shares @ (logs - middle) ** 2))
+
+    def doubted(self, share: float) -> "Belief":
+        """The same with so much probability spread evenly over all that is searched."""
+        uniform = 1.0 / (STEP * len(self.log_density))
+        return Belief.of(self.range, np.log((1.0 - share) * np.exp(self.log_density) + share * uniform))
 
     def widened(self, sigma: float) -> "Belief":
         """The same, its logarithm off by a normal error of that standard deviation besides."""
@@ -151,9 +159,7 @@ def fused(beliefs: Sequence[Belief]) -> Belief:
         raise OutOfDomain("beliefs about one range of sizes can be fused, one or more; give such")
     if len(beliefs) == 1:
         return beliefs[0]
-    uniform = 1.0 / (STEP * len(beliefs[0].log_density))
-    product = sum(np.log((1.0 - FLOOR) * np.exp(one.log_density) + FLOOR * uniform) for one in beliefs)
-    return Belief.of(beliefs[0].range, np.asarray(product))
+    return Belief.of(beliefs[0].range, np.sum([one.doubted(FLOOR).log_density for one in beliefs], axis=0))
 
 
 def _quantile(logs: FloatArray, shares: FloatArray, share: float) -> float:

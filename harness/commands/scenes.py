@@ -21,8 +21,12 @@ def resolve(
     section: type[Section] | None = None,
     keys: Mapping[str, Any] | None = None,
     assignments: Sequence[str] = (),
+    sizes: tuple[str, str] | None = None,
+    assumed: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> SceneFile:
     """The scene of a file or of ``--object``, with what the command line changes of it.
+
+    ``assumed`` are keys of its tables that a scene from ``--object`` has where no option says otherwise.
 
     Raises:
         WrongUse: neither or both are given, or something that the scene does not allow.
@@ -38,8 +42,33 @@ def resolve(
     else:
         assert object_ is not None
         found = scene_from_options(object_, material, units, wall, objectfile)
-    sensors = None if sense is None else {"touch": True, "sound": sense == "both"}
-    return _changed(found, section, _asked(section, keys or {}, assignments), sensors)
+        found = _with(found, assumed or {})
+    tables: dict[str, Mapping[str, Any]] = {}
+    if section is not None:
+        tables[section.table] = _asked(section, keys or {}, assignments)
+    if sense is not None:
+        tables["sensors"] = _sensors(sense)
+    if sizes is not None:
+        tables["object"] = {"scale": "hidden", "sizes": sizes}
+    return _with(found, tables)
+
+
+_SENSORS = {"vision": "camera", "audio": "sound", "touch": "touch"}
+"""By the sense that reads them."""
+
+
+def _sensors(sense: str) -> dict[str, bool]:
+    """What ``--sense vision,touch`` switches on and off; ``both`` is touch and audio, as ``touch`` is touch."""
+    if sense in ("touch", "both"):
+        return {"touch": True, "sound": sense == "both"}
+    named = [name.strip() for name in sense.split(",")]
+    for name in named:
+        if name not in _SENSORS:
+            raise WrongUse(
+                f"--sense {sense}: {name!r} is no sense; {nearest(name, (*_SENSORS, 'both'))}, or several "
+                "with commas between"
+            )
+    return {sensor: name in named for name, sensor in _SENSORS.items()}
 
 
 def _asked(
@@ -72,16 +101,12 @@ def str_or_int(value: Any) -> Any:
     return value if isinstance(value, int) else str(value)
 
 
-def _changed(
-    scene: SceneFile,
-    section: type[Section] | None,
-    asked: dict[str, Any],
-    sensors: dict[str, Any] | None,
-) -> SceneFile:
-    if not asked and sensors is None:
+def _with(scene: SceneFile, tables: Mapping[str, Mapping[str, Any]]) -> SceneFile:
+    """The scene with keys of its tables changed."""
+    if not any(tables.values()):
         return scene
     tree = scene.model_dump(mode="json", by_alias=True)
-    if section is not None:
-        tree.setdefault(section.table, {}).update(asked)
-    tree["sensors"].update(sensors or {})
+    for name, changed in tables.items():
+        if changed:
+            tree.setdefault(name, {}).update(changed)
     return scene_from_json(tree, "the options")

@@ -52,6 +52,11 @@ def begin(
         require_unused(folder)
     if gap is not None and station.mock is None:
         raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")
+    if scene.object.is_hidden and not procedure.sizes_unknown:
+        raise WrongUse(
+            f'the scene says object.scale = "hidden", and {procedure.name} needs to know how large the object '
+            "is; give its scale, or find it first with touchstone run scale-estimation"
+        )
     mock = None
     if station.mock is not None:
         mock = {"gap": lasting_name(gap or procedure.gap or station.mock.gap)}

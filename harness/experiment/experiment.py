@@ -225,6 +225,8 @@ class Procedure:
         plan_key: where ``run.json`` keeps the steps.
         gap: of a mocked bench where none is asked for; None for the station's.
         observe: in place of what a scene file observes by default; None for just that.
+        assumed: tables and keys of a scene made from options, where they say nothing else.
+        sizes_unknown: whether it can do with an object whose size is hidden.
     """
 
     name: str
@@ -235,6 +237,8 @@ class Procedure:
     plan_key: str = "steps"
     gap: str | None = None
     observe: tuple[str, ...] | None = None
+    assumed: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    sizes_unknown: bool = False
 
     @property
     def plural(self) -> str:

@@ -124,11 +124,20 @@ class Itinerary:
         seed: of the searches for ways.
         planner: of the strikes; None where the arm makes none.
         struck: how many of the first places are struck.
+        start: ``(6,)`` rad, where the arm is before the first.
+        travels: the twin that is travelled in, where it is another; see ``plan_contact``.
     """
 
     def __init__(
-        self, bench: TwinBench, seed: int, planner: StrikePlanner | None = None, struck: int = 0
+        self,
+        bench: TwinBench,
+        seed: int,
+        planner: StrikePlanner | None = None,
+        struck: int = 0,
+        start: FloatArray = HOME,
+        travels: TwinBench | None = None,
     ) -> None:
+        self._start, self._travels = start, travels
         self.contacts: list[PlannedContact] = []
         self.strikes: list[PlannedStrike] = []
         self._bench = bench
@@ -147,7 +156,14 @@ class Itinerary:
         return True
 
     def _visit(self, base_from_gel: FloatArray, searched: int) -> bool:
-        contact = plan_contact(self._bench, base_from_gel, self._joints, seed=self._seed, searched=searched)
+        contact = plan_contact(
+            self._bench,
+            base_from_gel,
+            self._joints,
+            seed=self._seed,
+            searched=searched,
+            travels=self._travels,
+        )
         if contact is None:
             return False
         if self._planner is not None and len(self.contacts) < self._struck:
@@ -162,6 +178,6 @@ class Itinerary:
     def _joints(self) -> FloatArray:
         """``(6,)`` rad, where the arm is after all contacts so far."""
         if not self.contacts:
-            return HOME
+            return self._start
         struck = len(self.strikes) == len(self.contacts)
         return self.strikes[-1].ready_joints if struck else self.contacts[-1].stand_off_joints

@@ -3,6 +3,7 @@
 Everything a step needs is in its parameters, planned and rehearsed before the first one moves.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -19,7 +20,7 @@ from harness.bench.travel import Trajectory, travel
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
 from harness.skills.first_touch import first_touch
-from harness.skills.strike import Ask, StrikeMotion, strike, strike_by_hand
+from harness.skills.strike import FARTHEST, Ask, StrikeMotion, strike, strike_by_hand
 from harness.twin.motion import PlannedContact
 
 FRAMES_PER_CONTACT = 3
@@ -118,6 +119,8 @@ class PressPerformer:
         speeds: of the motions.
         ask: shows a person what to do, where the station has one strike; None where nobody is there.
         plan_key: where ``run.json`` keeps the planned contacts.
+        explores: whether nobody knows where the object is: a search that meets nothing is a reading too,
+            and a place that was met elsewhere than planned is not struck.
     """
 
     def __init__(
@@ -126,7 +129,9 @@ class PressPerformer:
         speeds: Speeds | None = None,
         ask: Ask | None = None,
         plan_key: str = "contacts",
+        explores: bool = False,
     ) -> None:
+        self._explores = explores
         self.plan_key = plan_key
         self.way = way
         self.speeds = speeds or Speeds()
@@ -146,13 +151,15 @@ class PressPerformer:
         self._travel(motion, bench)
         arm.zero_force()
         began = arm.state().time
-        self._touch(step, motion, arm)
-        moved = self._press(motion, arm, began)
+        met = self._touch(step, motion, arm)
+        moved = self._press(motion, arm, began) if met else math.inf
         bench.pause(SETTLE)
         bench.mark(step.index, PRESS)
         image = self._read(bench, motion)
         history = arm.history(arm.state().time - began)
         self._line(arm, motion.base_from_stand_off, "retreat")
+        if self._explores and abs(moved) > FARTHEST:
+            return (image, *history)
         return (image, *history, *self._strike(step, moved, bench))
 
     def _strike(self, step: Step, moved: float, bench: Bench) -> tuple[Reading, ...]:
@@ -160,7 +167,7 @@ class PressPerformer:
         if bench.hammer is None:
             return ()
         if "strike" not in step.parameters:
-            return strike_by_hand(step.index, bench, self.ask)
+            return () if self._explores else strike_by_hand(step.index, bench, self.ask)
         motion = StrikeMotion.from_parameters(step.parameters["strike"])
         self._travel(motion, bench)
         return strike(motion, step.index, moved, bench)
@@ -192,10 +199,12 @@ class PressPerformer:
             self._line(bench.arm, motion.base_from_stand_off, "retreat")
             raise
 
-    def _touch(self, step: Step, motion: ContactMotion, arm: Arm) -> None:
+    def _touch(self, step: Step, motion: ContactMotion, arm: Arm) -> bool:
         travel = motion.search + self.speeds.overtravel
         if arm.move_until_contact(motion.axis, self.speeds.approach, self.speeds.touch_force, travel):
-            return
+            return True
+        if self._explores:
+            return False
         self._line(arm, motion.base_from_stand_off, "retreat")
         raise NotTouched(
             f"contact {step.index + 1}: the gel travelled {travel * 1e3:.0f} mm and met nothing "

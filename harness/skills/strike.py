@@ -109,8 +109,12 @@ class StrikeSpeeds:
     acceleration: float = 0.2
 
 
-def planner(scene: SceneFile, station: Station, bench: TwinBench) -> StrikePlanner | None:
+def planner(
+    scene: SceneFile, station: Station, bench: TwinBench, travels: TwinBench | None = None
+) -> StrikePlanner | None:
     """Plans the strikes that the scene asks for and the arm is to make; None where there are none.
+
+    ``travels`` is the twin that is travelled in, where it is another; see ``plan_contact``.
 
     Raises:
         WrongUse: the scene asks for sound and the station has no hammer.
@@ -123,7 +127,9 @@ def planner(scene: SceneFile, station: Station, bench: TwinBench) -> StrikePlann
             f"the scene asks for sound, and the station {station.title!r} has no [hammer]; add one, or set "
             "sensors.sound = false in the scene"
         )
-    return StrikePlanner(bench, flange_from_hammer, hammer.stand_off) if hammer.strike == "arm" else None
+    if hammer.strike != "arm":
+        return None
+    return StrikePlanner(bench, flange_from_hammer, hammer.stand_off, travels)
 
 
 def strike(

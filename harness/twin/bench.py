@@ -88,6 +88,7 @@ class TwinBench:
         workspace: ``(2, 3)`` m in base, the corners of the box that the station keeps the tool in; None
             without one.
         tool_points: ``(n, 3)`` m in the flange's frame, the points that are kept in it.
+        has_object: false where nobody knows what stands there: the mesh is then only a mark on the support.
 
     Raises:
         WrongUse: an unknown arm, or an object that reaches below the table.
@@ -107,10 +108,12 @@ class TwinBench:
         flange_from_hammer: FloatArray | None = None,
         workspace: FloatArray | None = None,
         tool_points: FloatArray | None = None,
+        has_object: bool = True,
     ) -> None:
         if clearance < 1e-3:
             raise WrongUse(f"twin: a clearance of {1e3 * clearance:g} mm; it must be at least 1 mm")
         self.model = model
+        self.has_object = has_object
         self.flange_from_gel = read_only(np.array(flange_from_gel, dtype=np.float64))
         self.gel_from_flange = read_only(inverse(self.flange_from_gel))
         self.base_from_object = read_only(np.array(base_from_object, dtype=np.float64))

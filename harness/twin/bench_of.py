@@ -11,21 +11,36 @@ from harness.twin.bench import TwinBench
 from harness.twin.ways import connect
 
 
-def twin_of(scene: SceneFile, station: Station, mesh: Mesh) -> TwinBench:
-    """The bench as the scene and the station state it."""
+def twin_of(
+    scene: SceneFile,
+    station: Station,
+    mesh: Mesh,
+    base_from_object: FloatArray | None = None,
+    has_object: bool = True,
+) -> TwinBench:
+    """The bench as the scene and the station state it.
+
+    Args:
+        scene: the table and what stands on it.
+        station: the arm and its tools.
+        mesh: of the object, in metres.
+        base_from_object: ``(4, 4)``; None for the scene's.
+        has_object: see ``TwinBench``.
+    """
     safety = station.arm.safety
     return TwinBench(
         station.arm.model,
         station.flange_from_gel,
         station.gel.sensor,
         mesh,
-        scene.base_from_object(mesh),
+        scene.base_from_object(mesh) if base_from_object is None else base_from_object,
         table_height=scene.table.height,
         pedestal_radius=0.5 * scene.support.width,
         joint_range=np.array([safety.joint_low, safety.joint_high]),
         flange_from_hammer=station.flange_from_hammer,
         workspace=np.array([safety.workspace_low, safety.workspace_high]),
         tool_points=station.tool_points,
+        has_object=has_object,
     )
 
 

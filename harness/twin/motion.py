@@ -17,7 +17,9 @@ from harness.twin.ways import connect
 
 STAND_OFF: Final = 0.03  # m between the gel and the place where it is fully pressed
 SEARCHED: Final = 2  # branches for which a way is searched where no natural one is free
-GREATEST_TURN: Final = 0.6  # rad of a joint from the stand-off to the press
+GREATEST_TURN: Final = 0.6  # rad of a joint from the stand-off to the press, for every 60 mm of it
+FARTHEST: Final = 0.4  # m of a stand-off: no line of this arm about an object is longer
+_FARTHER: Final = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +64,33 @@ class PlannedContact:
 
     def segments(self, step: int) -> tuple[Segment, ...]:
         """What the arm does for this contact, to be rehearsed."""
+        return (*self.travels(step), *self.lines(step))
+
+    def travels(self, step: int) -> tuple[Segment, ...]:
+        """The joint motions to the stand-off."""
         stations = [self.start, *self.travel]
+        return tuple(Segment(step, "travel", "joint", a, b) for a, b in itertools.pairwise(stations))
+
+    def lines(self, step: int, press: bool = True) -> tuple[Segment, Segment]:
+        """There and back along the gel's axis.
+
+        Args:
+            step: of the experiment.
+            press: whether the object is where the line ends.
+        """
         there = self.stand_off_joints
         return (
-            *(Segment(step, "travel", "joint", a, b) for a, b in itertools.pairwise(stations)),
-            Segment(step, "press", "line", there, self.base_from_pressed, touches=True, press=True),
+            Segment(step, "press", "line", there, self.base_from_pressed, touches=True, press=press),
             Segment(step, "retreat", "line", self.pressed_joints, self.base_from_stand_off, touches=True),
         )
 
 
-def reachable(bench: TwinBench, base_from_gel: FloatArray, stand_off: float = STAND_OFF) -> bool:
+def reachable(
+    bench: TwinBench,
+    base_from_gel: FloatArray,
+    stand_off: float = STAND_OFF,
+    travels: TwinBench | None = None,
+) -> bool:
     """Whether some branch puts the gel there and at the stand-off before it, hitting nothing.
 
     Quick, for choosing among hundreds of places; the way there is not looked at.
@@ -80,8 +99,37 @@ def reachable(bench: TwinBench, base_from_gel: FloatArray, stand_off: float = ST
         bench: the twin.
         base_from_gel: ``(4, 4)``, fully pressed.
         stand_off: m back along the gel's axis.
+        travels: the twin that is travelled in, where it is another; see ``plan_contact``.
     """
-    return next(_approaches(bench, base_from_gel, stand_off), None) is not None
+    found = stand_off_outside(travels, base_from_gel, stand_off)
+    return found is not None and next(_approaches(bench, base_from_gel, found, travels), None) is not None
+
+
+def stand_off_outside(
+    travels: TwinBench | None,
+    base_from_gel: FloatArray,
+    least: float = STAND_OFF,
+    axis: FloatArray | None = None,
+) -> float | None:
+    """M back along an axis to where the tool is clear of what is travelled around.
+
+    Args:
+        travels: the twin that is travelled in; None for the least.
+        base_from_gel: ``(4, 4)``, fully pressed, or where a strike is fired.
+        least: m.
+        axis: ``(3,)`` unit in base, forward; None for the gel's.
+
+    Returns:
+        None where it is farther than any line of this arm.
+    """
+    if travels is None:
+        return least
+    forward = base_from_gel[:3, 2] if axis is None else axis
+    for back in np.arange(least, FARTHEST, _FARTHER).tolist():
+        before = translation(-back * forward) @ base_from_gel
+        if not travels.tool_hits(before, press=False):
+            return float(back)
+    return None
 
 
 def plan_contact(
@@ -91,6 +139,7 @@ def plan_contact(
     stand_off: float = STAND_OFF,
     seed: int = 0,
     searched: int = SEARCHED,
+    travels: TwinBench | None = None,
 ) -> PlannedContact | None:
     """Travel, approach and retreat for one contact; None where no branch has a free way.
 
@@ -98,19 +147,25 @@ def plan_contact(
         bench: the twin.
         base_from_gel: ``(4, 4)``, fully pressed.
         seed_joints: ``(6,)`` rad, where the arm is.
-        stand_off: m back along the gel's axis.
+        stand_off: m back along the gel's axis, at least.
         seed: of the search, should one be needed.
         searched: branches for which a way is searched where no natural one is free; the nearest first.
+        travels: the twin that is travelled in, where it is another: its object is all the space that an
+            object of uncertain place and size may take, so that only the straight approach enters it.
     """
+    back = stand_off_outside(travels, base_from_gel, stand_off)
+    if back is None:
+        return None
+    stand_off, around = back, travels or bench
     candidates = [
         approach
-        for found in _approaches(bench, base_from_gel, stand_off)
+        for found in _approaches(bench, base_from_gel, stand_off, travels)
         if (approach := _turned_to(bench, found, seed_joints)) is not None and _line_free(bench, approach)
     ]
     candidates.sort(key=lambda approach: float(np.abs(approach.stand_off_joints - seed_joints).max()))
     for thorough in (False, True):
         for approach in candidates[: searched if thorough else None]:
-            travel = connect(bench, seed_joints, approach.stand_off_joints, seed, thorough)
+            travel = connect(around, seed_joints, approach.stand_off_joints, seed, thorough)
             if travel is not None:
                 return _planned(bench, approach, seed_joints, travel, stand_off)
     return None
@@ -124,10 +179,14 @@ def _planned(
     return PlannedContact(start, travel, before, pressed, approach.pressed_joints, stand_off)
 
 
-def _approaches(bench: TwinBench, base_from_gel: FloatArray, stand_off: float) -> Iterator[Approach]:
+def _approaches(
+    bench: TwinBench, base_from_gel: FloatArray, stand_off: float, travels: TwinBench | None
+) -> Iterator[Approach]:
     """The cheap questions first: the pad, the tool, the reach, the branch's posture, the whole arm."""
-    if not 0.0 < bench.pad_depth(base_from_gel) <= bench.sensor.gel_thickness:
+    if bench.has_object and not 0.0 < bench.pad_depth(base_from_gel) <= bench.sensor.gel_thickness:
         return
+    greatest = GREATEST_TURN * max(1.0, stand_off / 0.06)
+    around = travels or bench
     before = base_from_gel @ translation(np.array([0.0, 0.0, -stand_off]))
     if bench.tool_hits(base_from_gel, press=True) or bench.tool_hits(before, press=False):
         return
@@ -139,9 +198,9 @@ def _approaches(bench: TwinBench, base_from_gel: FloatArray, stand_off: float) -
         back = kinematics.nearest_branch(
             bench.model, before @ bench.gel_from_flange, joints, bench.joint_range
         )
-        if back is None or np.abs(back - joints).max() > GREATEST_TURN:
+        if back is None or np.abs(back - joints).max() > greatest:
             continue
-        if bench.hits(joints, press=True) or bench.hits(back):
+        if bench.hits(joints, press=True) or around.hits(back):
             continue
         if float(kinematics.singularity(bench.model, back)) >= NEARLY_SINGULAR:
             yield Approach(base_from_gel, back, joints)

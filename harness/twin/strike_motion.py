@@ -12,7 +12,7 @@ from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply, frame_facing, inverse, transform, translation
 from harness.bench import kinematics
 from harness.twin.bench import TwinBench
-from harness.twin.motion import GREATEST_TURN
+from harness.twin.motion import GREATEST_TURN, stand_off_outside
 from harness.twin.rehearsal import NEARLY_SINGULAR, Segment, contact_point
 from harness.twin.sweep import line_poses, line_postures, sweep_postures
 from harness.twin.ways import connect
@@ -48,9 +48,16 @@ class PlannedStrike:
 
     def segments(self, step: int) -> tuple[Segment, ...]:
         """What the arm does for this strike, to be rehearsed; it touches nothing, the striker does."""
+        return (*self.travels(step), *self.lines(step))
+
+    def travels(self, step: int) -> tuple[Segment, ...]:
+        """The joint motions to where the strike begins."""
         stations = [self.start, *self.travel]
+        return tuple(Segment(step, "travel to strike", "joint", a, b) for a, b in itertools.pairwise(stations))
+
+    def lines(self, step: int) -> tuple[Segment, Segment]:
+        """There and back along the strike."""
         return (
-            *(Segment(step, "travel to strike", "joint", a, b) for a, b in itertools.pairwise(stations)),
             Segment(step, "strike", "line", self.ready_joints, self.base_from_firing),
             Segment(step, "draw back", "line", self.firing_joints, self.base_from_ready),
         )
@@ -74,18 +81,27 @@ class StrikePlanner:
         flange_from_hammer: ``(4, 4)``, the tip at rest, z along the strike.
         stand_off: m between the tip and the surface when the striker is fired; more than the
             twin's clearance.
+        travels: the twin that is travelled in, where it is another; see ``plan_contact``.
 
     Raises:
         WrongUse: a stand-off within the clearance.
     """
 
-    def __init__(self, bench: TwinBench, flange_from_hammer: FloatArray, stand_off: float) -> None:
+    def __init__(
+        self,
+        bench: TwinBench,
+        flange_from_hammer: FloatArray,
+        stand_off: float,
+        travels: TwinBench | None = None,
+    ) -> None:
         if stand_off <= bench.clearance:
             raise WrongUse(
                 f"hammer.stand_off = {1e3 * stand_off:g} mm; the tip must stay more than "
                 f"{1e3 * bench.clearance:g} mm from the object until it is fired"
             )
         self._bench = bench
+        self._travels = travels
+        self._around = travels or bench
         self._hammer_from_flange = inverse(flange_from_hammer)
         self._stand_off = stand_off
 
@@ -111,7 +127,7 @@ class StrikePlanner:
             for posture in near[: searched if thorough else None]:
                 if not self._line_free(posture):
                     continue
-                travel = connect(self._bench, seed_joints, posture.ready, seed, thorough)
+                travel = connect(self._around, seed_joints, posture.ready, seed, thorough)
                 if travel is not None:
                     return PlannedStrike(
                         seed_joints,
@@ -130,22 +146,26 @@ class StrikePlanner:
         for yaw in np.linspace(0.0, 2 * np.pi, YAWS, endpoint=False):
             hammer = transform(frame_facing(axis, yaw), point - self._stand_off * axis)
             firing = hammer @ self._hammer_from_flange
-            ready = hammer @ translation(np.array([0.0, 0.0, -BACK])) @ self._hammer_from_flange
             if bench.tool_hits(firing @ bench.flange_from_gel, press=False):
                 continue
+            way_back = stand_off_outside(self._travels, firing @ bench.flange_from_gel, BACK, axis)
+            if way_back is None:
+                continue
+            ready = hammer @ translation(np.array([0.0, 0.0, -way_back])) @ self._hammer_from_flange
             for joints in kinematics.inverse(bench.model, firing):
                 back = kinematics.nearest_branch(bench.model, ready, joints, bench.joint_range)
-                if back is not None and self._good(joints, back):
+                turn = GREATEST_TURN * max(1.0, way_back / 0.06)
+                if back is not None and self._good(joints, back, turn):
                     yield _Posture(ready, firing, back, joints)
 
-    def _good(self, firing: FloatArray, ready: FloatArray) -> bool:
+    def _good(self, firing: FloatArray, ready: FloatArray, turn: float) -> bool:
         bench = self._bench
-        if float(np.abs(ready - firing).max()) > GREATEST_TURN:
+        if float(np.abs(ready - firing).max()) > turn:
             return False
         both = np.stack([firing, ready])
         if float(kinematics.singularity(bench.model, both).min()) < NEARLY_SINGULAR:
             return False
-        return not bench.hits(firing) and not bench.hits(ready)
+        return not bench.hits(firing) and not self._around.hits(ready)
 
     def _near(self, posture: _Posture, seed_joints: FloatArray) -> _Posture | None:
         """The same posture, whole turns nearer to where the arm is."""

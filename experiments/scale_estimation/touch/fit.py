@@ -24,7 +24,16 @@ NORMAL_SIGMA = float(np.radians(10.0))
 CAP = 8.0
 """Of a contact's cost: one that is not of the object, or where the model errs, does not decide alone."""
 
-_SIZE, _X, _Y, _YAW, _Z = range(5)
+PASSED = 4.0e-3
+"""M around the middle of the gel within which nothing can have been where it passed."""
+
+THROUGH = 3.0
+"""Cost of a way that would have led through the object."""
+
+UNKNOWNS = 8
+"""Log of the size over the nominal one; x, y, m; yaw, rad; height, m; tilts about x and y, rad; depth, m."""
+
+_SIZE, _X, _Y, _YAW, _Z, _TILT_X, _TILT_Y, _DEPTH = range(UNKNOWNS)
 
 
 @dataclass(frozen=True)
@@ -34,10 +43,14 @@ class StandErrors:
     Attributes:
         place: m, per axis of the plane.
         support: m, of the height.
+        tilt: rad, per axis, of the object's own stand.
+        depth: m, along its axis, of where the gel is on the arm and how deep it reads: of all contacts alike.
     """
 
     place: float = 0.1
     support: float = 1.0e-3
+    tilt: float = float(np.radians(0.5))
+    depth: float = 0.8e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +91,43 @@ class Stand:
         return cls(*turned, place, errors or StandErrors())
 
     @cached_property
+    def places(self) -> cKDTree:
+        """Over places alone."""
+        return cKDTree(self.points)
+
+    @cached_property
     def tree(self) -> cKDTree:
         """Over places and, weighed, the way that the surface faces there."""
         return cKDTree(np.hstack([self.points, FACING * self.normals]))
 
 
+class FreeSpace:
+    """Places that the gel has passed: no part of the object is there.
+
+    Args:
+        stand: the object.
+        lines: ``(n, 3)`` m in base each, places along one way of the gel's middle.
+    """
+
+    def __init__(self, stand: Stand, lines: Sequence[FloatArray]) -> None:
+        self._stand = stand
+        kept = [line for line in lines if len(line)]
+        self._ends = np.cumsum([0, *map(len, kept)])[:-1]
+        self._places = np.concatenate(kept) - stand.place if kept else np.zeros((0, 3))
+
+    def cost(self, unknowns: FloatArray) -> FloatArray:
+        """``(k,)`` for ``(k, UNKNOWNS)`` hypotheses: so much for every way that leads through the object."""
+        if not len(self._places):
+            return np.zeros(len(unknowns))
+        standing, _ = _in_stand(unknowns, self._places[None])
+        scale = np.exp(unknowns[:, _SIZE])
+        away = self._stand.places.query((standing[:, 0] / scale[:, None, None]).reshape(-1, 3))[0]
+        inside = away.reshape(len(unknowns), -1) * scale[:, None] < PASSED
+        return THROUGH * np.asarray(np.logical_or.reduceat(inside, self._ends, axis=1).sum(axis=1), np.float64)
+
+
 class TouchProblem:
-    """Least squares of contacts over ``(k, 5)`` unknowns: log of size over nominal, x, y, yaw, height.
+    """Least squares of contacts over ``(k, UNKNOWNS)``.
 
     Args:
         stand: the object.
@@ -94,20 +137,21 @@ class TouchProblem:
 
     def __init__(self, stand: Stand, patches: Sequence[Patch], points: int) -> None:
         self.stand = stand
-        self._points = np.stack([patch.points[:points] for patch in patches]) - stand.place
-        self._normals = np.stack([patch.normal for patch in patches])
+        places = [patch.points[:points] - stand.place for patch in patches]
+        self._points = np.array(places).reshape(len(patches), points, 3)
+        self._normals = np.array([patch.normal for patch in patches]).reshape(-1, 3)
         self.contacts = len(patches)
 
     def refined(self, unknowns: FloatArray, rounds: int, fixed_size: bool) -> tuple[FloatArray, FloatArray]:
         """Downhill from each hypothesis.
 
         Args:
-            unknowns: ``(k, 5)``.
+            unknowns: ``(k, UNKNOWNS)``.
             rounds: steps, each with the nearest samples looked up anew.
             fixed_size: whether the size stays as it is.
 
         Returns:
-            ``(k, 5)`` unknowns and ``(k,)`` costs, half sums of squares with the prior, each's best.
+            ``(k, UNKNOWNS)`` unknowns and ``(k,)`` costs, half sums of squares with the prior, each's best.
         """
         best, least = unknowns.copy(), np.full(len(unknowns), np.inf)
         here = unknowns.copy()
@@ -120,15 +164,20 @@ class TouchProblem:
         return best, least
 
     def sigma(self, unknowns: FloatArray) -> float:
-        """Of the size's logarithm at ``(5,)`` unknowns, all else free, to first order."""
-        _, slopes, _ = self._linear(unknowns[None])
-        normal = slopes[0].T @ slopes[0] + np.diag(self._prior**2) + 1e-9 * np.eye(5)
+        """Of the size's logarithm at ``(UNKNOWNS,)`` unknowns, all else free, to first order."""
+        normal = self.information(unknowns) + 1e-9 * np.eye(UNKNOWNS)
         return float(np.sqrt(np.linalg.inv(normal)[_SIZE, _SIZE]))
+
+    def information(self, unknowns: FloatArray) -> FloatArray:
+        """``(UNKNOWNS, UNKNOWNS)`` inverse covariance of the unknowns at ``(UNKNOWNS,)`` of them, to first order."""
+        _, slopes, _ = self._linear(unknowns[None])
+        return np.asarray(slopes[0].T @ slopes[0] + np.diag(self._prior**2))
 
     @property
     def _prior(self) -> FloatArray:
         e = self.stand.errors
-        return np.array([0.0, 1.0 / e.place, 1.0 / e.place, 0.0, 1.0 / e.support])
+        sigmas = [np.inf, e.place, e.place, np.inf, e.support, e.tilt, e.tilt, e.depth]
+        return 1.0 / np.array(sigmas)
 
     def _step(
         self, residuals: FloatArray, slopes: FloatArray, here: FloatArray, fixed_size: bool
@@ -138,30 +187,25 @@ class TouchProblem:
         gradient = np.einsum("kri,kr->ki", slopes, residuals) + prior * here
         first = 1 if fixed_size else 0
         scale = np.einsum("kii->ki", normal)[:, first:] * 1e-3 + 1e-6
-        inner = normal[:, first:, first:] + scale[..., None] * np.eye(5 - first)
+        inner = normal[:, first:, first:] + scale[..., None] * np.eye(UNKNOWNS - first)
         step = np.zeros_like(here)
         step[:, first:] = -np.linalg.solve(inner, gradient[:, first:, None])[..., 0]
-        reach = np.array([0.3, 0.05, 0.05, 0.5, 0.01])
+        reach = np.array([0.3, 0.05, 0.05, 0.5, 0.01, 0.02, 0.02, 2.0e-3])
         return np.asarray(np.clip(step, -reach, reach))
 
     def _linear(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Residuals ``(k, c)`` in deviations, weighed by the cap, slopes ``(k, c, 5)``, costs ``(k,)``."""
+        """Residuals ``(k, c)`` in deviations, weighed by the cap, slopes ``(k, c, UNKNOWNS)``, costs ``(k,)``."""
         k, (c, m) = len(unknowns), self._points.shape[:2]
-        scale = np.exp(unknowns[:, _SIZE])
-        cosine, sine = np.cos(unknowns[:, _YAW]), np.sin(unknowns[:, _YAW])
-        turn = np.zeros((k, 3, 3))
-        turn[:, 0, 0] = turn[:, 1, 1] = cosine
-        turn[:, 1, 0], turn[:, 0, 1], turn[:, 2, 2] = sine, -sine, 1.0
-        moved = np.stack([unknowns[:, _X], unknowns[:, _Y], unknowns[:, _Z]], axis=-1)
-        offset = self._points[None] - moved[:, None, None]
-        standing = np.einsum("kcmj,kji->kcmi", offset, turn)
+        scale, turn = np.exp(unknowns[:, _SIZE]), _turns(unknowns)
+        standing, offset = _in_stand(unknowns, self._points)
         normals = np.einsum("cj,kji->kci", self._normals, turn)
         facing = np.broadcast_to(FACING * normals[:, :, None], standing.shape)
         query = np.concatenate([standing / scale[:, None, None, None], facing], axis=-1)
         near = self.stand.tree.query(query.reshape(-1, 6))[1].reshape(k, c, m)
         points, faced = self.stand.points[near], self.stand.normals[near]
         apart = standing - scale[:, None, None, None] * points
-        distance = np.einsum("kcmi,kcmi->kcm", apart, faced).mean(axis=2) / DISTANCE_SIGMA
+        distance = np.einsum("kcmi,kcmi->kcm", apart, faced).mean(axis=2) + unknowns[:, _DEPTH, None]
+        distance = distance / DISTANCE_SIGMA
         mean = faced.mean(axis=2)
         across = np.linalg.norm(np.cross(normals, mean), axis=-1)
         angle = np.arctan2(across, np.einsum("kci,kci->kc", normals, mean)) / NORMAL_SIGMA
@@ -171,7 +215,7 @@ class TouchProblem:
         cost = 0.5 * (distance**2 + np.minimum(angle, 3.0) ** 2 / 3.0 + beyond**2)
         capped = CAP * (1.0 - np.exp(-cost / CAP))
         weight = np.exp(-0.5 * cost / CAP)
-        slopes = np.empty((k, c, 5))
+        slopes = np.empty((k, c, UNKNOWNS))
         # Slopes of the distance along the sample's normal, in the standing frame.
         slopes[..., _SIZE] = -scale[:, None] * np.einsum("kcmi,kcmi->kcm", points, faced).mean(axis=2)
         in_base = np.einsum("kci,kji->kcj", mean, turn)
@@ -183,6 +227,34 @@ class TouchProblem:
         # d(R^T v)/dyaw = (v_y, -v_x, 0) in the standing frame.
         turned = standing[..., 1] * faced[..., 0] - standing[..., 0] * faced[..., 1]
         slopes[..., _YAW] = turned.mean(axis=2)
+        middle = offset.mean(axis=2)
+        slopes[..., _TILT_X] = in_base[..., 1] * middle[..., 2] - in_base[..., 2] * middle[..., 1]
+        slopes[..., _TILT_Y] = in_base[..., 2] * middle[..., 0] - in_base[..., 0] * middle[..., 2]
+        slopes[..., _DEPTH] = 1.0
         prior = 0.5 * ((self._prior * unknowns) ** 2).sum(axis=1)
         weighed = weight[..., None] * slopes / DISTANCE_SIGMA
         return weight * distance, weighed, capped.sum(axis=1) + prior
+
+
+def _turns(unknowns: FloatArray) -> FloatArray:
+    """``(k, 3, 3)`` rotations about the vertical."""
+    cosine, sine = np.cos(unknowns[:, _YAW]), np.sin(unknowns[:, _YAW])
+    turn = np.zeros((len(unknowns), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = cosine
+    turn[:, 1, 0], turn[:, 0, 1], turn[:, 2, 2] = sine, -sine, 1.0
+    return turn
+
+
+def _in_stand(unknowns: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``(k, c, m, 3)`` places ``(c, m, 3)`` as the standing object has them, and off its place in base."""
+    moved = unknowns[:, [_X, _Y, _Z]]
+    offset = places[None] - moved[:, None, None]
+    tilts = unknowns[:, None, None, _TILT_X], unknowns[:, None, None, _TILT_Y]
+    return np.einsum("kcmj,kji->kcmi", offset - _turned(tilts, offset), _turns(unknowns)), offset
+
+
+def _turned(tilts: tuple[FloatArray, FloatArray], places: FloatArray) -> FloatArray:
+    """``(k, c, m, 3)``: how far small turns about x and y move places."""
+    x, y, z = np.moveaxis(places, -1, 0)
+    about_x, about_y = tilts
+    return np.stack([about_y * z, -about_x * z, about_x * y - about_y * x], axis=-1)

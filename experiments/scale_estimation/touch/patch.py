@@ -17,6 +17,13 @@ TOUCHED = 0.12e-3
 """M of indentation below which nothing was touched."""
 
 
+NEAR = 6.0e-3
+"""M before a touch within which the surface may be: the press, and the gel's and the model's errors."""
+
+BETWEEN = 3.0e-3
+"""M between places on a way that met nothing."""
+
+
 @dataclass(frozen=True, eq=False)
 class Patch:
     """Where a press met the object.
@@ -28,6 +35,18 @@ class Patch:
 
     points: FloatArray
     normal: FloatArray
+
+
+def free_line(base_from_gel: FloatArray, length: float, touched: bool) -> FloatArray:
+    """``(n, 3)`` m in base: places that the middle of the gel has passed, on its straight way to a press.
+
+    Args:
+        base_from_gel: ``(4, 4)`` at the end of the way; z into the object.
+        length: m of the way.
+        touched: whether it ended at the object, whose surface is then nearer than ``NEAR`` to its end.
+    """
+    back = np.arange(NEAR if touched else 0.0, length, BETWEEN)
+    return read_only(base_from_gel[:3, 3] - back[:, None] * base_from_gel[:3, 2])
 
 
 def patch_of(heights: FloatArray, pitch: float, base_from_gel: FloatArray) -> Patch | None:

@@ -34,11 +34,13 @@ class Sight:
     Attributes:
         belief: over the size.
         fit: the best.
+        fits: that and all others that may be it, of each turn one.
         seconds: s of the estimate.
     """
 
     belief: Belief
     fit: OutlineFit
+    fits: tuple[OutlineFit, ...]
     seconds: float
 
 
@@ -69,7 +71,8 @@ def by_sight(view: View, outline: Outline, nominal: float, sizes: SizeRange, yaw
     density = np.full(len(sizes.logs), -np.inf)
     for fit in _apart(fits, best.cost):
         density = np.logaddexp(density, _scanned(problem, fit, sizes.logs - log_nominal))
-    return Sight(Belief.of(sizes, density), best, time.perf_counter() - began)
+    found = tuple(_turns_apart(fits, best.cost))
+    return Sight(Belief.of(sizes, density), best, found, time.perf_counter() - began)
 
 
 def _starts(view: View, outline: Outline, yaws: int) -> FloatArray:
@@ -92,6 +95,16 @@ def _apart(fits: list[OutlineFit], least: float) -> list[OutlineFit]:
     for fit in sorted(fits, key=lambda one: one.cost):
         new = all(abs(fit.unknowns[0] - one.unknowns[0]) > 2e-3 for one in found)
         if fit.cost < least + _FAR and new and len(found) < _MOST_MODES:
+            found.append(fit)
+    return found
+
+
+def _turns_apart(fits: list[OutlineFit], least: float) -> list[OutlineFit]:
+    """The minima that the object may stand at, of each turn one, the best first."""
+    found: list[OutlineFit] = []
+    for fit in sorted(fits, key=lambda one: one.cost):
+        turns = [(fit.unknowns[3] - one.unknowns[3] + np.pi) % (2.0 * np.pi) - np.pi for one in found]
+        if fit.cost < least + _FAR and all(abs(turn) > 0.1 for turn in turns):
             found.append(fit)
     return found
 

@@ -7,7 +7,7 @@ import typer
 
 from harness.commands import options
 from harness.commands.output import CONSOLE
-from harness.commands.run.run import DEFAULT, Sense, Spacing, run
+from harness.commands.run.run import DEFAULT, Spacing, run
 
 
 def demo(
@@ -38,7 +38,7 @@ def demo(
         level=level,
         contacts=4,
         spacing=Spacing.SPREAD,
-        sense=Sense.BOTH,
+        sense="both",
         seed=seed,
         out=out,
         json=json,

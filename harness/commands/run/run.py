@@ -24,13 +24,6 @@ class Spacing(StrEnum):
     SPREAD = "spread"
 
 
-class Sense(StrEnum):
-    """What is done at each place."""
-
-    TOUCH = "touch"
-    BOTH = "both"
-
-
 class Yaw(StrEnum):
     """Whether the estimator knows the object's yaw."""
 
@@ -66,7 +59,19 @@ def run(
     ] = None,
     yaw: Annotated[Yaw | None, typer.Option(help="Whether the estimator knows the object's yaw.")] = None,
     sense: Annotated[
-        Sense | None, typer.Option(help="touch: press only; both: strike each place too, and listen.")
+        str | None,
+        typer.Option(
+            help="touch: press only; both: strike each place too, and listen; or any of vision, audio and "
+            "touch with commas between."
+        ),
+    ] = None,
+    range_: Annotated[
+        tuple[str, str] | None,
+        typer.Option(
+            "--range",
+            help="The longest side that an object of unknown size may have, as 5cm 30cm.",
+            metavar="LOW HIGH",
+        ),
     ] = None,
     level: options.LevelOption = None,
     budget: options.Budget = None,
@@ -115,6 +120,7 @@ def run(
             spacing=spacing,
             yaw=yaw,
             sense=sense,
+            range=range_,
         )
         recording = Recording(resume)
         kind = experiment_of(recording)
@@ -126,7 +132,18 @@ def run(
         accuracy = chosen_levels(kind.knobs, level or [])
         keys = {"contacts": contacts, "spacing": spacing, "yaw": yaw}
         wanted = resolve(
-            scene, object_, material, units, wall, sense, objectfile, kind.section, keys, set_ or []
+            scene,
+            object_,
+            material,
+            units,
+            wall,
+            sense,
+            objectfile,
+            kind.section,
+            keys,
+            set_ or [],
+            range_,
+            kind.assumed,
         )
         bench = load_station(station_path(station or "mock"))
         if target is not None:
