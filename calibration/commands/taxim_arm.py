@@ -91,7 +91,7 @@ def _begun(wanted: PressRequest) -> "Recording":
     if radius is None:
         if scene is None:
             raise WrongUse("--ball-radius is missing: the radius of the ball on the table, as 2mm")
-        radius = BALL_RADIUS * scene.object.scale
+        radius = BALL_RADIUS * scene.object.drawn_scale
     usual = PressSettings()
     settings = PressSettings(
         presses=usual.presses if wanted.presses is None else wanted.presses,

@@ -12,7 +12,7 @@ from experiments.scale_estimation.sound.hearing import Hearing, by_sound
 from experiments.scale_estimation.touch.patch import Patch, free_line
 from experiments.scale_estimation.touch.touch import Touch, by_touch
 from experiments.scale_estimation.vision.outline import Outline
-from experiments.scale_estimation.vision.vision import Sight, by_sight
+from experiments.scale_estimation.vision.vision import Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, WrongUse
 from harness.bench.acquisition import Strike
@@ -125,7 +125,11 @@ class ScaleAnswering:
         """
         sensors = self.run.scene.sensors
         asked = {"vision": sensors.camera, "audio": sensors.sound, "touch": sensors.touch}
-        ways = {"vision": self._by_sight, "audio": self._by_sound, "touch": self._by_touch}
+        ways: dict[str, Callable[[], Sight | Hearing | Touch]] = {
+            "vision": self._by_sight,
+            "audio": self._by_sound,
+            "touch": self._by_touch,
+        }
         found: dict[str, Sight | Hearing | Touch | FitRefused] = {}
         seconds = {}
         for sense in SENSES:
@@ -142,10 +146,8 @@ class ScaleAnswering:
 
     def stands_seen(self) -> tuple[FloatArray, ...]:
         """``(4,)`` each, log of the size, x, y, yaw: how the object may stand by the look; none if unseen."""
-        try:
-            return tuple(fit.unknowns[:4] for fit in self._by_sight().fits)
-        except FitRefused:
-            return ()
+        seen = self.outline
+        return stands_seen(self.model.view, seen) if isinstance(seen, Outline) else ()
 
     @staticmethod
     def _tried(way: "Callable[[], Sight | Hearing | Touch]") -> Sight | Hearing | Touch | FitRefused:

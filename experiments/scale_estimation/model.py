@@ -84,7 +84,9 @@ class ObjectModel:
         """A mark of 2 mm on the support, in base: stands for an object of which nothing is known."""
         low = np.array([-1.0e-3, -1.0e-3, 0.0])
         ends = np.array([low, low + 2.0e-3]) + self.place
-        corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+        corners = np.array(
+            [[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+        )
         return closed_hull(corners)
 
     def twin_around(self, mesh_in_base: Mesh, has_object: bool = True) -> TwinBench:

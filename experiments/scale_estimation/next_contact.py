@@ -1,11 +1,12 @@
 """Where the next contact of a scale estimation goes: where it tells most of the size, on a free way.
 
 The arm travels around all the space that the object may take, and enters it on straight lines only, slowly,
-stopping at a touch. Lines are chosen on the object as it is believed to stand; where nothing is known yet they
-lead to the middle of where it should be.
+stopping at a touch. Lines are chosen on the object as it is believed to stand; where nothing is known yet
+they lead to the middle of where it should be.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -35,7 +36,7 @@ from harness.twin.motion import plan_contact, reachable
 from harness.twin.rehearsal import rehearse
 
 CANDIDATES = 6
-"""Places drawn on the object as it is believed to stand, of which the most telling with a free way is taken."""
+"""Places drawn on the object as it is believed to stand; the most telling with a free way is taken."""
 
 BELIEVED_AFTER = 2
 """Contacts without a look after which the object is believed to stand where they say."""
@@ -44,7 +45,7 @@ STRUCK_AFTER = 1
 """Contacts before the first strike: one has then shown that the object is where it is believed to be."""
 
 SLANTS = (0.0, 0.0, 0.45, 0.9, 1.3)
-"""Rad from straight down, of lines into the unknown: what stands on a support is met from above at the latest."""
+"""Rad from straight down, of lines into the unknown: a flat thing is met from above alone."""
 
 _RAYS = 40
 _WEAK_SIGMAS = np.array([0.6, np.inf, np.inf, np.pi, *[np.inf] * (UNKNOWNS - 4)])
@@ -89,9 +90,8 @@ class Explorer:
         random = np.random.default_rng((recording.header.seed, index))
         stand = self._believed()
         if stand is not None:
-            made = self._on_object(travels, stand, random)
-            if made is not None:
-                return made
+            with suppress(WrongUse, MotionRefused):
+                return self._on_object(travels, stand, random)
         return self._blind(travels, random)
 
     def _take_in(self, recording: Recording, index: int) -> None:
@@ -134,41 +134,41 @@ class Explorer:
         if len(patches) < BELIEVED_AFTER:
             return None
         try:
-            free = self._answering.free
-            found = by_touch(model.stand, patches, model.nominal, model.sizes, free=free)
+            found = by_touch(model.stand, patches, model.nominal, model.sizes, free=self._answering.free)
         except FitRefused:
             return None
         return np.asarray(found.unknowns[:4])
 
     def _on_object(
         self, travels: TwinBench, stand: FloatArray, random: np.random.Generator
-    ) -> dict[str, Any] | None:
-        """The most telling place that has a free way; None where none has."""
+    ) -> dict[str, Any]:
+        """The most telling place that has a free way.
+
+        Raises:
+            WrongUse: none has.
+        """
         model, asked = self._model, self._run.scene.section(Scale)
         size = model.nominal * float(np.exp(stand[0]))
         mesh, scene = model.mesh_at(size), model.scene_at(size, stand[1], stand[2], stand[3])
         lines = twin_of(scene, self._run.station, mesh)
         limits = PressLimits(tilt=asked.tilt, depth=asked.depth)
-        try:
-            sites = plan_sites(
-                RasterMesh(mesh),
-                self._run.station.gel.sensor,
-                lines.base_from_object,
-                CANDIDATES,
-                "spread",
-                int(random.integers(2**31)),
-                reachable=partial(reachable, lines, travels=travels),
-                presses=limits,
-            )
-        except WrongUse:
-            return None
+        sites = plan_sites(
+            RasterMesh(mesh),
+            self._run.station.gel.sensor,
+            lines.base_from_object,
+            CANDIDATES,
+            "spread",
+            int(random.integers(2**31)),
+            reachable=partial(reachable, lines, travels=travels),
+            presses=limits,
+        )
         strikes = self._strikes_left() > 0
         strike_planner = planner(scene, self._run.station, lines, travels) if strikes else None
         for site in self._most_telling(sites, stand):
             itinerary = Itinerary(lines, 0, strike_planner, int(strikes), self._joints, travels)
             if itinerary.visit(0, site.base_from_gel, patient=False):
                 return self._rehearsed(itinerary, lines, travels, site)
-        return None
+        raise WrongUse("none of the most telling places has a free way")
 
     def _strikes_left(self) -> int:
         if not self._run.scene.sensors.sound or self._touches < STRUCK_AFTER:
@@ -222,8 +222,8 @@ class Explorer:
             press = float(np.mean(self._run.scene.section(Scale).depth))
             return ContactMotion.planned(contact, lines.flange_from_gel, press).to_parameters()
         raise WrongUse(
-            f"no free way was found on any of {_RAYS} lines to the middle of where the object should be, around "
-            f"one of up to {1e2 * model.sizes.high:.0f} cm; give a smaller range, or another place"
+            f"no free way was found on any of {_RAYS} lines to the middle of where the object should be, "
+            f"around one of up to {1e2 * model.sizes.high:.0f} cm; give a smaller range, or another place"
         )
 
     def _rays(self, random: np.random.Generator) -> Iterator[FloatArray]:

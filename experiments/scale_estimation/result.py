@@ -22,8 +22,10 @@ def result_of(scored: Scored) -> dict[str, Any]:
             estimates[sense] = _none("the scene does not ask for it")
             continue
         one, seconds = found.by_sense[sense], found.seconds[sense]
-        refused = isinstance(one, FitRefused)
-        estimates[sense] = _none(str(one), seconds) if refused else estimate_of(one.belief, truth, seconds)
+        if isinstance(one, FitRefused):
+            estimates[sense] = _none(str(one), seconds)
+        else:
+            estimates[sense] = estimate_of(one.belief, truth, seconds)
     seconds = sum(found.seconds.values())
     estimates["fused"] = estimate_of(found.fused, truth, seconds)
     model = scored.answering.model

@@ -8,11 +8,16 @@ from harness.bench import kinematics
 from harness.bench.station_file import Station
 
 _SAMPLES = 60
+_NEARER = 1.0e-3
+"""M by which a place may be nearer than it is computed to be."""
+
 _SHARE = 0.9
 """Of the limit: what is sampled here may be slower than what is limited in between."""
 
 
-def joint_speed(station: Station, start: FloatArray, end: FloatArray, most: float) -> float:
+def joint_speed(
+    station: Station, start: FloatArray, end: FloatArray, most: float, contact: FloatArray | None = None
+) -> float:
     """rad/s of the joint that turns most, for a straight motion of the joints.
 
     Args:
@@ -20,6 +25,8 @@ def joint_speed(station: Station, start: FloatArray, end: FloatArray, most: floa
         start: ``(6,)`` rad.
         end: ``(6,)`` rad.
         most: rad/s, never more than this.
+        contact: ``(3,)`` m in base, where the flange was when it last met something; None for nowhere. A
+            motion that begins or ends near there keeps the lower limit.
     """
     turn = float(np.abs(end - start).max())
     if turn == 0.0:
@@ -29,5 +36,9 @@ def joint_speed(station: Station, start: FloatArray, end: FloatArray, most: floa
     poses = kinematics.forward(station.arm.model, start + shares[:, None] * (end - start))
     places = np.array([apply(pose, points) for pose in poses])
     farthest = float(np.linalg.norm(np.diff(places, axis=0), axis=-1).max()) * (_SAMPLES - 1)
-    limit = _SHARE * station.arm.safety.speed
+    safety = station.arm.safety
+    near = contact is not None and any(
+        float(np.linalg.norm(pose[:3, 3] - contact)) < safety.near + _NEARER for pose in poses[[0, -1]]
+    )
+    limit = _SHARE * (safety.speed_near if near else safety.speed)
     return min(most, limit * turn / farthest) if farthest > 0.0 else most

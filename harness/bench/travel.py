@@ -26,6 +26,7 @@ def travel(
     elsewhere: Trajectory,
     speed: float,
     acceleration: float,
+    contact: FloatArray | None = None,
 ) -> None:
     """Move along planned way points; from elsewhere than planned, by another way to the last of them.
 
@@ -36,9 +37,11 @@ def travel(
         elsewhere: finds the other way.
         speed: rad/s of the fastest joint, at most.
         acceleration: rad/s^2.
+        contact: ``(3,)`` m in base, where the flange last met something; None for nowhere.
     """
     here = bench.arm.state().joints
     there = np.abs(here - start).max() < WHERE_PLANNED
     for joints in planned if there else elsewhere(here, np.vstack([start, planned])):
-        bench.arm.move_joints(joints, joint_speed(bench.station, here, joints, speed), acceleration)
+        pace = joint_speed(bench.station, here, joints, speed, contact)
+        bench.arm.move_joints(joints, pace, acceleration)
         here = joints

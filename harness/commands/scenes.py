@@ -58,7 +58,7 @@ _SENSORS = {"vision": "camera", "audio": "sound", "touch": "touch"}
 
 
 def _sensors(sense: str) -> dict[str, bool]:
-    """What ``--sense vision,touch`` switches on and off; ``both`` is touch and audio, as ``touch`` is touch."""
+    """What ``--sense vision,touch`` switches on and off; ``both`` is touch and audio."""
     if sense in ("touch", "both"):
         return {"touch": True, "sound": sense == "both"}
     named = [name.strip() for name in sense.split(",")]

@@ -54,8 +54,8 @@ def begin(
         raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")
     if scene.object.is_hidden and not procedure.sizes_unknown:
         raise WrongUse(
-            f'the scene says object.scale = "hidden", and {procedure.name} needs to know how large the object '
-            "is; give its scale, or find it first with touchstone run scale-estimation"
+            f'the scene says object.scale = "hidden", and {procedure.name} needs to know how large the '
+            "object is; give its scale, or find it first with touchstone run scale-estimation"
         )
     mock = None
     if station.mock is not None:

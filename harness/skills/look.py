@@ -32,8 +32,8 @@ def look(step: int, bench: Bench, ask: Ask | None) -> tuple[Reading, ...]:
         raise WrongUse("a look needs the scene camera: set sensors.camera = true, or leave vision out")
     if ask is None and bench.lab is None and bench.station.mock is None:
         raise WrongUse(
-            "the camera must see the bench without the object first, and nobody can be asked to clear it; run "
-            "without --json at a terminal"
+            "the camera must see the bench without the object first, and nobody can be asked to clear it; "
+            "run without --json at a terminal"
         )
     readings = []
     for sample, name, request in (

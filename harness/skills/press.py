@@ -132,6 +132,7 @@ class PressPerformer:
         explores: bool = False,
     ) -> None:
         self._explores = explores
+        self._met: FloatArray | None = None
         self.plan_key = plan_key
         self.way = way
         self.speeds = speeds or Speeds()
@@ -174,7 +175,15 @@ class PressPerformer:
 
     def _travel(self, motion: ContactMotion | StrikeMotion, bench: Bench) -> None:
         speeds = self.speeds
-        travel(bench, motion.start, motion.travel, self.way, speeds.travel, speeds.travel_acceleration)
+        travel(
+            bench,
+            motion.start,
+            motion.travel,
+            self.way,
+            speeds.travel,
+            speeds.travel_acceleration,
+            self._met,
+        )
 
     def _press(self, motion: ContactMotion, arm: Arm, began: float) -> float:
         """On to the planned depth behind the first touch, wherever the search came to rest.
@@ -202,6 +211,7 @@ class PressPerformer:
     def _touch(self, step: Step, motion: ContactMotion, arm: Arm) -> bool:
         travel = motion.search + self.speeds.overtravel
         if arm.move_until_contact(motion.axis, self.speeds.approach, self.speeds.touch_force, travel):
+            self._met = arm.state().base_from_flange[:3, 3]
             return True
         if self._explores:
             return False

@@ -11,13 +11,14 @@ from harness.basics.arrays import FloatArray
 from harness.basics.geometry import translation
 from harness.bench import kinematics
 from harness.twin.bench import TwinBench
-from harness.twin.rehearsal import NEARLY_SINGULAR, Segment
+from harness.twin.rehearsal import NEARLY_SINGULAR, SAME, Segment
 from harness.twin.sweep import line_poses, line_postures, sweep_postures
 from harness.twin.ways import connect
 
 STAND_OFF: Final = 0.03  # m between the gel and the place where it is fully pressed
 SEARCHED: Final = 2  # branches for which a way is searched where no natural one is free
-GREATEST_TURN: Final = 0.6  # rad of a joint from the stand-off to the press, for every 60 mm of it
+GREATEST_TURN: Final = 0.6  # rad of a joint from the stand-off to the press
+GREATEST_TURN_OF_LONG: Final = 1.2  # rad, of a line that leads through all that an object may take
 FARTHEST: Final = 0.4  # m of a stand-off: no line of this arm about an object is longer
 _FARTHER: Final = 0.02
 
@@ -160,7 +161,8 @@ def plan_contact(
     candidates = [
         approach
         for found in _approaches(bench, base_from_gel, stand_off, travels)
-        if (approach := _turned_to(bench, found, seed_joints)) is not None and _line_free(bench, approach)
+        if (approach := _turned_to(bench, found, seed_joints)) is not None
+        and _line_free(bench, approach, NEARLY_SINGULAR if travels is not None else 0.0)
     ]
     candidates.sort(key=lambda approach: float(np.abs(approach.stand_off_joints - seed_joints).max()))
     for thorough in (False, True):
@@ -185,7 +187,7 @@ def _approaches(
     """The cheap questions first: the pad, the tool, the reach, the branch's posture, the whole arm."""
     if bench.has_object and not 0.0 < bench.pad_depth(base_from_gel) <= bench.sensor.gel_thickness:
         return
-    greatest = GREATEST_TURN * max(1.0, stand_off / 0.06)
+    greatest = GREATEST_TURN if travels is None else GREATEST_TURN_OF_LONG
     around = travels or bench
     before = base_from_gel @ translation(np.array([0.0, 0.0, -stand_off]))
     if bench.tool_hits(base_from_gel, press=True) or bench.tool_hits(before, press=False):
@@ -218,8 +220,13 @@ def _turned_to(bench: TwinBench, approach: Approach, seed_joints: FloatArray) ->
     return Approach(approach.base_from_gel, back[0], pressed)
 
 
-def _line_free(bench: TwinBench, approach: Approach) -> bool:
+def _line_free(bench: TwinBench, approach: Approach, least: float) -> bool:
     start = kinematics.forward(bench.model, approach.stand_off_joints)
     poses = line_poses(start, approach.base_from_gel @ bench.gel_from_flange)
     postures = line_postures(bench, approach.stand_off_joints, poses)
-    return len(postures) == len(poses) and sweep_postures(bench, postures, press=True) is None
+    # A long line may leave its branch on the way: it is only this approach if it ends in its posture.
+    if len(postures) < len(poses) or np.abs(postures[-1] - approach.pressed_joints).max() > SAME:
+        return False
+    if float(kinematics.singularity(bench.model, postures).min()) < least:
+        return False
+    return sweep_postures(bench, postures, press=True) is None

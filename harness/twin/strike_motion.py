@@ -12,8 +12,8 @@ from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply, frame_facing, inverse, transform, translation
 from harness.bench import kinematics
 from harness.twin.bench import TwinBench
-from harness.twin.motion import GREATEST_TURN, stand_off_outside
-from harness.twin.rehearsal import NEARLY_SINGULAR, Segment, contact_point
+from harness.twin.motion import GREATEST_TURN, GREATEST_TURN_OF_LONG, stand_off_outside
+from harness.twin.rehearsal import NEARLY_SINGULAR, SAME, Segment, contact_point
 from harness.twin.sweep import line_poses, line_postures, sweep_postures
 from harness.twin.ways import connect
 
@@ -53,7 +53,9 @@ class PlannedStrike:
     def travels(self, step: int) -> tuple[Segment, ...]:
         """The joint motions to where the strike begins."""
         stations = [self.start, *self.travel]
-        return tuple(Segment(step, "travel to strike", "joint", a, b) for a, b in itertools.pairwise(stations))
+        return tuple(
+            Segment(step, "travel to strike", "joint", a, b) for a, b in itertools.pairwise(stations)
+        )
 
     def lines(self, step: int) -> tuple[Segment, Segment]:
         """There and back along the strike."""
@@ -154,7 +156,7 @@ class StrikePlanner:
             ready = hammer @ translation(np.array([0.0, 0.0, -way_back])) @ self._hammer_from_flange
             for joints in kinematics.inverse(bench.model, firing):
                 back = kinematics.nearest_branch(bench.model, ready, joints, bench.joint_range)
-                turn = GREATEST_TURN * max(1.0, way_back / 0.06)
+                turn = GREATEST_TURN if self._travels is None else GREATEST_TURN_OF_LONG
                 if back is not None and self._good(joints, back, turn):
                     yield _Posture(ready, firing, back, joints)
 
@@ -182,4 +184,9 @@ class StrikePlanner:
         start = kinematics.forward(self._bench.model, posture.ready)
         poses = line_poses(start, posture.base_from_firing)
         postures = line_postures(self._bench, posture.ready, poses)
-        return len(postures) == len(poses) and sweep_postures(self._bench, postures, press=False) is None
+        if len(postures) < len(poses) or np.abs(postures[-1] - posture.firing).max() > SAME:
+            return False
+        singular = float(kinematics.singularity(self._bench.model, postures).min()) < NEARLY_SINGULAR
+        if self._travels is not None and singular:
+            return False
+        return sweep_postures(self._bench, postures, press=False) is None

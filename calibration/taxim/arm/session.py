@@ -62,7 +62,7 @@ def procedure(settings: PressSettings | None = None) -> Procedure:
 
 
 def _planned(settings: PressSettings, scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
-    radius = BALL_RADIUS * scene.object.scale
+    radius = BALL_RADIUS * scene.object.drawn_scale
     top = mesh.vertices[int(np.argmax(mesh.vertices[:, 2]))]
     twin, sensor = twin_of(scene, station, mesh), station.gel.sensor
     plan = plan_presses(twin, top, radius, settings, seed)

@@ -73,7 +73,7 @@ def log_likelihood(peaks: Peaks, model: RingingModel, log_sizes: FloatArray) -> 
     matches = _matched(
         np.log(peaks.frequencies), peaks.levels, logs, levels, loud, log_sizes, clutter,
     )  # fmt: skip
-    return matches - expected
+    return np.asarray(matches - expected)
 
 
 def _overlapping(model: RingingModel, heard: FloatArray, window_decay: float) -> FloatArray:

@@ -121,9 +121,11 @@ class FreeSpace:
             return np.zeros(len(unknowns))
         standing, _ = _in_stand(unknowns, self._places[None])
         scale = np.exp(unknowns[:, _SIZE])
-        away = self._stand.places.query((standing[:, 0] / scale[:, None, None]).reshape(-1, 3))[0]
+        away = np.asarray(self._stand.places.query((standing[:, 0] / scale[:, None, None]).reshape(-1, 3))[0])
         inside = away.reshape(len(unknowns), -1) * scale[:, None] < PASSED
-        return THROUGH * np.asarray(np.logical_or.reduceat(inside, self._ends, axis=1).sum(axis=1), np.float64)
+        return THROUGH * np.asarray(
+            np.logical_or.reduceat(inside, self._ends, axis=1).sum(axis=1), np.float64
+        )
 
 
 class TouchProblem:
@@ -169,7 +171,7 @@ class TouchProblem:
         return float(np.sqrt(np.linalg.inv(normal)[_SIZE, _SIZE]))
 
     def information(self, unknowns: FloatArray) -> FloatArray:
-        """``(UNKNOWNS, UNKNOWNS)`` inverse covariance of the unknowns at ``(UNKNOWNS,)`` of them, to first order."""
+        """``(UNKNOWNS, UNKNOWNS)`` inverse covariance at ``(UNKNOWNS,)`` of them, to first order."""
         _, slopes, _ = self._linear(unknowns[None])
         return np.asarray(slopes[0].T @ slopes[0] + np.diag(self._prior**2))
 
@@ -194,7 +196,7 @@ class TouchProblem:
         return np.asarray(np.clip(step, -reach, reach))
 
     def _linear(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Residuals ``(k, c)`` in deviations, weighed by the cap, slopes ``(k, c, UNKNOWNS)``, costs ``(k,)``."""
+        """``(k, c)`` deviations, weighed by the cap, their slopes ``(k, c, UNKNOWNS)``, costs ``(k,)``."""
         k, (c, m) = len(unknowns), self._points.shape[:2]
         scale, turn = np.exp(unknowns[:, _SIZE]), _turns(unknowns)
         standing, offset = _in_stand(unknowns, self._points)

@@ -14,7 +14,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 
 CHANCE = 0.5
-"""Of a contact: that it lies on the object at a wrong size and place too, where there are many to choose from."""
+"""Of a contact: that it lies on the object at a wrong size too, where there are many places to be."""
 
 MISFIT = 5.0
 """Cost a contact beyond which the contacts are not of this object."""
@@ -82,8 +82,8 @@ def by_touch(
     found, costs = rough.refined(starts, 3, fixed_size=True)
     fine = TouchProblem(stand, patches, len(patches[0].points))
     # Every size is followed alike: one that was not would look worse than it is beside one that was.
-    best = np.argsort(costs.reshape(len(coarse), -1), axis=1)[:, :_FOLLOWED]
-    kept = (np.arange(len(coarse))[:, None] * len(stands) + best).ravel()
+    likely = np.argsort(costs.reshape(len(coarse), -1), axis=1)[:, :_FOLLOWED]
+    kept = (np.arange(len(coarse))[:, None] * len(stands) + likely).ravel()
     passed = FreeSpace(stand, free)
     found, costs = fine.refined(found[kept], 5, fixed_size=True)
     costs = costs + passed.cost(found)

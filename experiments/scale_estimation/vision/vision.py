@@ -25,6 +25,9 @@ _SCAN = np.linspace(-5.0, 5.0, 21)
 _SCAN_ROUNDS = 4
 _FAR = 20.0
 _MOST_MODES = 4
+_TURNS = 24
+_ROUNDS_OF_TURNS = 12
+_TURNS_APART = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +37,11 @@ class Sight:
     Attributes:
         belief: over the size.
         fit: the best.
-        fits: that and all others that may be it, of each turn one.
         seconds: s of the estimate.
     """
 
     belief: Belief
     fit: OutlineFit
-    fits: tuple[OutlineFit, ...]
     seconds: float
 
 
@@ -71,8 +72,30 @@ def by_sight(view: View, outline: Outline, nominal: float, sizes: SizeRange, yaw
     density = np.full(len(sizes.logs), -np.inf)
     for fit in _apart(fits, best.cost):
         density = np.logaddexp(density, _scanned(problem, fit, sizes.logs - log_nominal))
-    found = tuple(_turns_apart(fits, best.cost))
-    return Sight(Belief.of(sizes, density), best, found, time.perf_counter() - began)
+    return Sight(Belief.of(sizes, density), best, time.perf_counter() - began)
+
+
+def stands_seen(view: View, outline: Outline) -> tuple[FloatArray, ...]:
+    """How the object may stand: every turn at which its outline is nearly that of the picture.
+
+    A picture does not tell some turns apart, as those of a mug whose handle is behind it. What moves around
+    the object keeps clear of all of them.
+
+    Args:
+        view: camera and object.
+        outline: of the picture.
+
+    Returns:
+        ``(4,)`` each, the best first: log of the size over the nominal one, x, y, m, yaw, rad. None at all
+        where the outline is not this object's.
+    """
+    fits = OutlineProblem(view, outline).fit(_starts(view, outline, _TURNS), _ROUNDS_OF_TURNS)
+    found: list[OutlineFit] = []
+    for fit in sorted(fits, key=lambda one: one.cost):
+        turns = [(fit.unknowns[3] - one.unknowns[3] + np.pi) % (2.0 * np.pi) - np.pi for one in found]
+        if fit.rms <= MISFIT and all(abs(turn) > _TURNS_APART for turn in turns):
+            found.append(fit)
+    return tuple(fit.unknowns[:4] for fit in found)
 
 
 def _starts(view: View, outline: Outline, yaws: int) -> FloatArray:
@@ -95,16 +118,6 @@ def _apart(fits: list[OutlineFit], least: float) -> list[OutlineFit]:
     for fit in sorted(fits, key=lambda one: one.cost):
         new = all(abs(fit.unknowns[0] - one.unknowns[0]) > 2e-3 for one in found)
         if fit.cost < least + _FAR and new and len(found) < _MOST_MODES:
-            found.append(fit)
-    return found
-
-
-def _turns_apart(fits: list[OutlineFit], least: float) -> list[OutlineFit]:
-    """The minima that the object may stand at, of each turn one, the best first."""
-    found: list[OutlineFit] = []
-    for fit in sorted(fits, key=lambda one: one.cost):
-        turns = [(fit.unknowns[3] - one.unknowns[3] + np.pi) % (2.0 * np.pi) - np.pi for one in found]
-        if fit.cost < least + _FAR and all(abs(turn) > 0.1 for turn in turns):
             found.append(fit)
     return found
 

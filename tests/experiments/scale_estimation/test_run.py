@@ -1,4 +1,4 @@
-"""A run of scale estimation in process: a look, contacts on what it saw, strikes; answered from the folder alone."""
+"""A run of scale estimation in process: a look, contacts, strikes; answered from the folder alone."""
 
 import json
 from pathlib import Path
@@ -38,7 +38,9 @@ def ran(folder: Path, scene: SceneFile, station: Station, seed: int = 3) -> Reco
     recording = begin(EXPERIMENT, scene, station, seed, "unplaced", folder).recording
     run = RunFiles(recording)
     context = RunContext(recording.truth_path, run.mesh, seed, "unplaced")
-    assert perform_on(EXPERIMENT, loaded(IN_PROCESS)(run.scene, run.station, context), recording, Quiet()).complete
+    assert perform_on(
+        EXPERIMENT, loaded(IN_PROCESS)(run.scene, run.station, context), recording, Quiet()
+    ).complete
     return recording
 
 
@@ -106,7 +108,9 @@ def test_sight_alone_needs_no_contact(tmp_path: Path, station: Station) -> None:
     assert result["estimates"]["touch"]["size_m"] is None
 
 
-def test_a_scene_that_reads_nothing_is_refused_before_anything_moves(tmp_path: Path, station: Station) -> None:
+def test_a_scene_that_reads_nothing_is_refused_before_anything_moves(
+    tmp_path: Path, station: Station
+) -> None:
     with pytest.raises(WrongUse, match="nothing is to be read"):
         begin(EXPERIMENT, scene_of(0, camera=False), station, 0, "unplaced", tmp_path / "run")
     with pytest.raises(NotImplementedError, match="camera has not seen"):

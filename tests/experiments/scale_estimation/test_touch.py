@@ -26,7 +26,9 @@ def stand_of(name: str) -> tuple[Stand, float]:
     return Stand.of(sample_surface(mesh, nominal / 60), np.eye(3), anchor, PLACE), nominal
 
 
-def contacts(name: str, scale: float, count: int, seed: int = 0, yaw: float = 0.7, sigma: float = 0.5e-3) -> list[Patch]:
+def contacts(
+    name: str, scale: float, count: int, seed: int = 0, yaw: float = 0.7, sigma: float = 0.5e-3
+) -> list[Patch]:
     """Presses all over an object that is larger by a factor, turned and moved."""
     stand, _ = stand_of(name)
     random = np.random.default_rng(seed)
@@ -90,7 +92,7 @@ def test_refining_more_places_never_costs_the_answer() -> None:
 
 def ball_press(radius: float, depth: float, pitch: float) -> FloatArray:
     rows, columns = np.mgrid[-60:61, -80:81] * pitch
-    return np.maximum(depth - (rows**2 + columns**2) / (2.0 * radius), 0.0)
+    return np.asarray(np.maximum(depth - (rows**2 + columns**2) / (2.0 * radius), 0.0))
 
 
 def test_a_press_becomes_places_on_the_surface_with_its_normal() -> None:

@@ -97,9 +97,9 @@ def test_what_hides_a_side_leaves_the_size_and_widens_it() -> None:
 
 
 def test_another_object_is_refused() -> None:
+    view, other = view_of("mug"), outline_at(view_of("wrench"), 0.8, yaw=0.7)
     with pytest.raises(FitRefused, match=r"px \(rms\) off"):
-        view = view_of("mug")
-        by_sight(view, outline_at(view_of("wrench"), 0.8, yaw=0.7), nominal(view), RANGE)
+        by_sight(view, other, nominal(view), RANGE)
 
 
 def test_without_the_camera_s_place_a_picture_says_hardly_anything() -> None:
