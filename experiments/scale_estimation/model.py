@@ -18,7 +18,7 @@ from harness.basics.mesh import Mesh
 from harness.basics.mesh_hull import closed_hull
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
-from harness.effects.accuracy import Accuracy
+from harness.effects.accuracy import Accuracy, Level
 from harness.experiment.object_modes import object_modes
 from harness.sim.solid.surface_samples import sample_surface
 from harness.twin.bench import TwinBench
@@ -41,7 +41,7 @@ class ObjectModel:
     mesh: Mesh
     scene: SceneFile
     station: Station
-    _ringing: dict[Accuracy, RingingModel] = field(default_factory=dict, init=False, repr=False)
+    _ringing: dict[tuple[tuple[str, Level], ...], RingingModel] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def nominal(self) -> float:
@@ -125,10 +125,11 @@ class ObjectModel:
         Raises:
             MeshRefused: its surface cannot be filled with elements.
         """
-        if accuracy not in self._ringing:
+        levels = tuple(accuracy.items())
+        if levels not in self._ringing:
             modes = object_modes(self.scene, self.station, self.mesh, accuracy)
-            self._ringing[accuracy] = RingingModel.of(modes, MATERIALS[self.scene.object.material])
-        return self._ringing[accuracy]
+            self._ringing[levels] = RingingModel.of(modes, MATERIALS[self.scene.object.material])
+        return self._ringing[levels]
 
     def scene_at(self, size: float, x: float, y: float, yaw: float) -> SceneFile:
         """The scene with the object of a size in m, off its nominal place by m and rad."""

@@ -16,19 +16,24 @@ from harness.basics.errors import FitRefused
 CHANCE = 0.5
 """Of a contact: that it lies on the object at a wrong size too, where there are many places to be."""
 
-MISFIT = 5.0
+MISFIT = 3.5
 """Cost a contact beyond which the contacts are not of this object."""
 
-_COARSE = 0.06
-"""Of the size's logarithm, between the sizes of the first scan."""
+_COARSE = 0.2
+"""Of the size's logarithm, between the sizes of the first search; its steps lead from one to the next."""
+
+_PROFILED = 0.06
+"""Of the same, between the sizes at which the cost is known."""
+
+_OUT = 1.5
+"""Deviations of the place, between the places of the first search."""
 
 _YAWS = 16
 _FOLLOWED = 2
-"""Stands of each size that are followed with all points."""
+"""Stands of the first search that each size is followed from."""
 
-_FEW = 4
-"""Contacts up to which several places of the object are begun from."""
-
+_LIKELY = 12
+_PROFILE_POINTS = 6
 _COARSE_POINTS = 1
 _FINE = np.linspace(-4.0, 4.0, 17)
 _FAR = 12.0
@@ -74,21 +79,11 @@ def by_touch(
     """
     began = time.perf_counter()
     logs = sizes.logs - np.log(nominal)
-    coarse = np.linspace(logs[0], logs[-1], int(np.ceil((logs[-1] - logs[0]) / _COARSE)) + 1)
-    rough = TouchProblem(stand, patches, _COARSE_POINTS)
-    stands = _stands(stand, len(patches))
-    starts = np.tile(stands, (len(coarse), 1))
-    starts[:, 0] = np.repeat(coarse, len(stands))
-    found, costs = rough.refined(starts, 3, fixed_size=True)
-    fine = TouchProblem(stand, patches, len(patches[0].points))
-    # Every size is followed alike: one that was not would look worse than it is beside one that was.
-    likely = np.argsort(costs.reshape(len(coarse), -1), axis=1)[:, :_FOLLOWED]
-    kept = (np.arange(len(coarse))[:, None] * len(stands) + likely).ravel()
     passed = FreeSpace(stand, free)
-    found, costs = fine.refined(found[kept], 5, fixed_size=True)
-    costs = costs + passed.cost(found)
-    order = np.argsort(costs)[:refined]
-    minima, misfits = fine.refined(found[order], 8, fixed_size=False)
+    found, costs = TouchProblem(stand, patches, _COARSE_POINTS).refined(_starts(stand, logs), 5, fixed_size=False)
+    likely = found[np.argsort(costs)[: max(refined, _LIKELY)]]
+    fine = TouchProblem(stand, patches, len(patches[0].points))
+    minima, misfits = fine.refined(likely[:refined], 8, fixed_size=False)
     least = misfits + passed.cost(minima)
     best = int(least.argmin())
     if misfits[best] / len(patches) > MISFIT:
@@ -97,7 +92,7 @@ def by_touch(
             f"{misfits[best] / len(patches):.1f} a contact (limit {MISFIT:g}); check that it is this object, "
             "and that it stands upright where the scene says"
         )
-    scan = [np.column_stack([coarse, costs.reshape(len(coarse), _FOLLOWED).min(axis=1)])]
+    scan = [_profile(TouchProblem(stand, patches, _PROFILE_POINTS), passed, found, costs, minima[best], logs)]
     for k in _apart(minima, least):
         scan.append(_scanned(fine, minima[k], float(least[k] - misfits[k])))
     belief = Belief.of(sizes, -_least_of(np.vstack(scan), logs))
@@ -105,14 +100,38 @@ def by_touch(
     return Touch(belief, minima[best], float(misfits[best] / len(patches)), time.perf_counter() - began)
 
 
-def _stands(stand: Stand, contacts: int) -> FloatArray:
-    """``(n, UNKNOWNS)`` turns, and places where the contacts are too few to lead there, to begin from."""
-    reach = (0.0, 1.0, -1.0) if contacts <= _FEW else (0.0,)
-    places = stand.errors.place * np.array([(x, y) for x in reach for y in reach])
-    starts = np.zeros((len(places) * _YAWS, UNKNOWNS))
-    starts[:, 1:3] = np.repeat(places, _YAWS, axis=0)
-    starts[:, 3] = np.tile(np.arange(_YAWS) * 2.0 * np.pi / _YAWS, len(places))
+def _starts(stand: Stand, logs: FloatArray) -> FloatArray:
+    """``(n, UNKNOWNS)`` sizes, places and turns, all with all, that the first search begins from."""
+    sizes = np.arange(logs[0], logs[-1] + _COARSE, _COARSE)
+    reach = stand.errors.place * np.array([0.0, _OUT, -_OUT])
+    turns = np.arange(_YAWS) * 2.0 * np.pi / _YAWS
+    size, x, y, yaw = (grid.ravel() for grid in np.meshgrid(sizes, reach, reach, turns))
+    starts = np.zeros((len(size), UNKNOWNS))
+    starts[:, :4] = np.column_stack([size, x, y, yaw])
     return starts
+
+
+def _profile(
+    problem: TouchProblem,
+    passed: FreeSpace,
+    found: FloatArray,
+    costs: FloatArray,
+    best: FloatArray,
+    logs: FloatArray,
+) -> FloatArray:
+    """``(n, 2)`` logarithms of sizes all over, and the least cost that was found at each.
+
+    Every size is followed alike, from what the first search found nearest to it and from the best of all: one
+    that was not would look worse than it is beside one that was.
+    """
+    sizes = np.linspace(logs[0], logs[-1], int(np.ceil((logs[-1] - logs[0]) / _PROFILED)) + 1)
+    away = costs + 0.5 * ((sizes[:, None] - found[:, 0]) / _COARSE) ** 2
+    near = found[np.argpartition(away, _FOLLOWED, axis=1)[:, :_FOLLOWED]]
+    starts = np.concatenate([near, np.broadcast_to(best, (len(sizes), 1, UNKNOWNS))], axis=1)
+    starts[..., 0] = sizes[:, None]
+    there, least = problem.refined(starts.reshape(-1, UNKNOWNS), 5, fixed_size=True)
+    least = (least + passed.cost(there)).reshape(len(sizes), -1)
+    return np.column_stack([sizes, least.min(axis=1)])
 
 
 def _apart(minima: FloatArray, least: FloatArray) -> list[int]:
