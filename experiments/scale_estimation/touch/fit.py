@@ -24,8 +24,8 @@ NORMAL_SIGMA = float(np.radians(10.0))
 CAP = 8.0
 """Of a contact's cost: one that is not of the object, or where the model errs, does not decide alone."""
 
-PASSED = 4.0e-3
-"""M around the middle of the gel within which nothing can have been where it passed."""
+PASSED = 1.0e-3
+"""M inside an object from where on the middle of the gel cannot have been: less is the errors' doing."""
 
 THROUGH = 3.0
 """Cost of a way that would have led through the object."""
@@ -60,12 +60,14 @@ class Stand:
     Attributes:
         points: ``(n, 3)`` m, samples of its surface.
         normals: ``(n, 3)`` unit, outward.
+        spacing: m between samples.
         place: ``(3,)`` m in base: where that middle nominally is.
         errors: of that.
     """
 
     points: FloatArray
     normals: FloatArray
+    spacing: float
     place: FloatArray
     errors: StandErrors = StandErrors()
 
@@ -88,7 +90,7 @@ class Stand:
             errors: of that; None for the usual ones.
         """
         turned = (surface.points - bottom) @ upright.T, surface.normals @ upright.T
-        return cls(*turned, place, errors or StandErrors())
+        return cls(*turned, surface.spacing, place, errors or StandErrors())
 
     @cached_property
     def places(self) -> cKDTree:
@@ -120,9 +122,15 @@ class FreeSpace:
         if not len(self._places):
             return np.zeros(len(unknowns))
         standing, _ = _in_stand(unknowns, self._places[None])
-        scale = np.exp(unknowns[:, _SIZE])
-        away = np.asarray(self._stand.places.query((standing[:, 0] / scale[:, None, None]).reshape(-1, 3))[0])
-        inside = away.reshape(len(unknowns), -1) * scale[:, None] < PASSED
+        scale = np.exp(unknowns[:, _SIZE])[:, None, None]
+        near = np.asarray(self._stand.places.query((standing[:, 0] / scale).reshape(-1, 3))[1])
+        shape = standing[:, 0].shape
+        points, faced = self._stand.points[near].reshape(shape), self._stand.normals[near].reshape(shape)
+        apart = standing[:, 0] - scale * points
+        deep = -np.einsum("kni,kni->kn", apart, faced)
+        # Straight under a sample, not beside an edge of which it is the nearest.
+        aside = np.linalg.norm(apart + deep[..., None] * faced, axis=-1)
+        inside = (deep > PASSED) & (aside < self._stand.spacing * scale[..., 0])
         return THROUGH * np.asarray(
             np.logical_or.reduceat(inside, self._ends, axis=1).sum(axis=1), np.float64
         )

@@ -20,7 +20,7 @@ TOUCHED = 0.12e-3
 NEAR = 6.0e-3
 """M before a touch within which the surface may be: the press, and the gel's and the model's errors."""
 
-BETWEEN = 3.0e-3
+BETWEEN = 1.5e-3
 """M between places on a way that met nothing."""
 
 

@@ -29,6 +29,10 @@ _OUT = 1.5
 """Deviations of the place, between the places of the first search."""
 
 _YAWS = 16
+"""Turns of a round object that the first search begins from; as many more as one is slender, for its ends move
+farther."""
+
+_SLENDER = 3.0
 _FOLLOWED = 2
 """Stands of the first search that each size is followed from."""
 
@@ -80,7 +84,7 @@ def by_touch(
     began = time.perf_counter()
     logs = sizes.logs - np.log(nominal)
     passed = FreeSpace(stand, free)
-    found, costs = TouchProblem(stand, patches, _COARSE_POINTS).refined(_starts(stand, logs), 5, fixed_size=False)
+    found, costs = TouchProblem(stand, patches, _COARSE_POINTS).refined(_starts(stand, patches, logs), 5, fixed_size=False)
     likely = found[np.argsort(costs)[: max(refined, _LIKELY)]]
     fine = TouchProblem(stand, patches, len(patches[0].points))
     minima, misfits = fine.refined(likely[:refined], 8, fixed_size=False)
@@ -100,14 +104,19 @@ def by_touch(
     return Touch(belief, minima[best], float(misfits[best] / len(patches)), time.perf_counter() - began)
 
 
-def _starts(stand: Stand, logs: FloatArray) -> FloatArray:
+def _starts(stand: Stand, patches: Sequence[Patch], logs: FloatArray) -> FloatArray:
     """``(n, UNKNOWNS)`` sizes, places and turns, all with all, that the first search begins from."""
     sizes = np.arange(logs[0], logs[-1] + _COARSE, _COARSE)
-    reach = stand.errors.place * np.array([0.0, _OUT, -_OUT])
-    turns = np.arange(_YAWS) * 2.0 * np.pi / _YAWS
-    size, x, y, yaw = (grid.ravel() for grid in np.meshgrid(sizes, reach, reach, turns))
+    across = np.linalg.svd(stand.points[:, :2] - stand.points[:, :2].mean(axis=0), compute_uv=False)
+    count = round(_YAWS * min(across[0] / across[1], _SLENDER))
+    turns = np.arange(count) * 2.0 * np.pi / count
+    out = stand.errors.place * np.array([0.0, _OUT, -_OUT])
+    ends = np.concatenate([patch.points for patch in patches])[:, :2] - stand.place[:2]
+    # The middle of contacts all over an object is near its own.
+    places = np.array([0.5 * (ends.min(axis=0) + ends.max(axis=0)), *((x, y) for x in out for y in out)])
+    size, place, yaw = (grid.ravel() for grid in np.meshgrid(sizes, np.arange(len(places)), turns))
     starts = np.zeros((len(size), UNKNOWNS))
-    starts[:, :4] = np.column_stack([size, x, y, yaw])
+    starts[:, :4] = np.column_stack([size, places[place.astype(int)], yaw])
     return starts
 
 
