@@ -1,6 +1,7 @@
 """Scale estimation as an experiment: how big is an object of known shape?"""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from experiments.scale_estimation.answer import ScaleAnswering
@@ -8,8 +9,11 @@ from experiments.scale_estimation.dials import KNOBS, OWN
 from experiments.scale_estimation.explore import PLAN_KEY, ScalePerformer, plan
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
-from harness.experiment.experiment import Experiment, Scored
-from harness.experiment.plain import plain_measurement
+from experiments.scale_estimation.table import LOOKING, METHODS, OURS, PAPER_CM, cells, run_cell, scene_of
+from harness.experiment.experiment import Experiment, MeasuredCondition, Scored
+from harness.experiment.plain import PlainPerforms, plain_measurement
+
+NAME = "scale-estimation"
 
 
 def _sources(_scored: Scored) -> Mapping[str, Any]:
@@ -17,8 +21,20 @@ def _sources(_scored: Scored) -> Mapping[str, Any]:
     return {}
 
 
+MEASUREMENT = replace(
+    plain_measurement(NAME, *OWN),
+    conditions=(MeasuredCondition("look", LOOKING, ("yes",), ("yes",)),),
+    cells=cells,
+    run_cell=run_cell,
+    methods=METHODS,
+    performed=PlainPerforms(NAME, scene_of),
+    counts=(4, 11),
+    regions=OURS,
+    published=PAPER_CM,
+)
+
 EXPERIMENT = Experiment(
-    name="scale-estimation",
+    name=NAME,
     title="Scale estimation",
     step="step",
     section=Scale,
@@ -30,7 +46,7 @@ EXPERIMENT = Experiment(
     lines=lines_of,
     sources=_sources,
     gives=(),
-    measurement=plain_measurement("scale-estimation", *OWN),
+    measurement=MEASUREMENT,
     plan_key=PLAN_KEY,
     gap="unplaced",
     observe=(),

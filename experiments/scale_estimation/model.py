@@ -41,7 +41,9 @@ class ObjectModel:
     mesh: Mesh
     scene: SceneFile
     station: Station
-    _ringing: dict[tuple[tuple[str, Level], ...], RingingModel] = field(default_factory=dict, init=False, repr=False)
+    _ringing: dict[tuple[tuple[str, Level], ...], RingingModel] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @property
     def nominal(self) -> float:

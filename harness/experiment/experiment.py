@@ -183,7 +183,7 @@ class Measurement:
         cells: the runs of so many objects, seeds and levels of the conditions, ``gap`` among them.
         run_cell: performs one in process and answers it by every method: ``rows`` by method, each with
             ``error_m`` and ``seconds``; a share of rows may have ``error_symmetric_m``, ``in_region90``,
-            ``refused``.
+            ``refused``, and ``gross`` where an error beyond ``gross`` m is not what a failure is.
         methods: in the order of a table's rows.
         performed: runs for a cost curve.
         settings: of the dials, that a cost curve measures: every one of them, or the usual ones.

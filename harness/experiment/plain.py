@@ -17,7 +17,7 @@ from harness.bench.station_file import Station
 from harness.cost.curve import Sample
 from harness.effects.accuracy import Accuracy, Knob, Level, Setting
 from harness.experiment.begin import begin
-from harness.experiment.experiment import Experiment, Measurement, Say, Scored
+from harness.experiment.experiment import Experiment, Measurement, RunCell, Say, Scored
 from harness.experiment.lookup import named
 from harness.experiment.perform import perform_on
 from harness.experiment.solving import Budgets, Solved
@@ -159,7 +159,7 @@ class PlainRun:
 class PlainCase:
     """A performed run, to be answered at any setting of the dials."""
 
-    cell: PlainCell
+    cell: RunCell
     run: PlainRun
     kept: TemporaryDirectory[str] = field(repr=False)
 
@@ -198,7 +198,7 @@ def plain_measurement(name: str, *knobs: Knob[Level]) -> Measurement:
         cells=_cells,
         run_cell=_Answers(name, settings),
         methods=tuple(settings),
-        performed=_Performs(name),
+        performed=PlainPerforms(name),
         settings=lambda _thorough, _chosen, _scenes: tuple(settings.values()),
         setting_name=lambda setting: next(
             (name for name, levels in settings.items() if levels == setting), "every dial at its finest"
@@ -242,10 +242,16 @@ class _Answers:
 
 
 @dataclass(frozen=True)
-class _Performs:
-    """Performs the runs of a cost curve, one after the other."""
+class PlainPerforms:
+    """Performs the runs of a cost curve, one after the other.
+
+    Attributes:
+        name: of the experiment.
+        scene_of: the scene of a cell, from that of its object.
+    """
 
     name: str
+    scene_of: Callable[[SceneFile, Any], SceneFile] = lambda scene, _: scene
 
     def __call__(
         self,
@@ -256,23 +262,27 @@ class _Performs:
         models: MutableMapping[str, Any],
         say: Say,
     ) -> dict[Any, Any]:
+        """The cases by cell; what could not be performed is said."""
         del pool, models  # runs are few, and no model outlives its run
         found = {}
         for cell in cells:
             try:
-                found[cell] = perform_in_process(named(self.name), cell, scenes[cell.object], station)
+                found[cell] = perform_in_process(
+                    named(self.name), cell, self.scene_of(scenes[cell.object], cell), station
+                )
             except TouchstoneError as error:
                 say(f"{cell.name} was not performed: {error}")
         return found
 
 
 def perform_in_process(
-    experiment: Experiment, cell: PlainCell, scene: SceneFile, station: Station
+    experiment: Experiment, cell: RunCell, scene: SceneFile, station: Station
 ) -> PlainCase:
     """Plan, rehearse and perform a run on the mocked bench in process; its folder goes with the case."""
     kept = TemporaryDirectory(prefix="touchstone-case-")
-    recording = begin(experiment, scene, station, cell.seed, cell.gap, Path(kept.name) / "run").recording
+    gap = cell.conditions["gap"]
+    recording = begin(experiment, scene, station, cell.seed, gap, Path(kept.name) / "run").recording
     run = RunFiles(recording)
-    context = RunContext(recording.truth_path, run.mesh, cell.seed, cell.gap)
+    context = RunContext(recording.truth_path, run.mesh, cell.seed, gap)
     perform_on(experiment, loaded(IN_PROCESS)(run.scene, run.station, context), recording, Quiet())
     return PlainCase(cell, PlainRun(experiment, recording, recording.committed), kept)

@@ -38,7 +38,8 @@ class TableRow:
         symmetric: the same, modulo the object's symmetry; None for a random point.
         held: share of runs whose 90 % region holds the truth; None where there is no region.
         seconds: median of an answer; from all of the run's readings.
-        refused: of the runs, how many were not answered; each counts as a random answer.
+        refused: of the runs, how many were not answered; each counts as the experiment says.
+        answered: mean of the others; None where none was refused, or all were.
     """
 
     conditions: Mapping[str, str]
@@ -49,6 +50,7 @@ class TableRow:
     held: float | None
     seconds: float
     refused: int = 0
+    answered: Interval | None = None
 
 
 def measure(
@@ -168,17 +170,26 @@ def _row(performed: Results, condition: Key, method: str, measured: Measurement)
     held = [bool(one["in_region90"]) for one in found if "in_region90" in one]
     raw = np.array([one["error_m"] for one in found])
     symmetric = [one.get("error_symmetric_m") for one in found]
+    answered = raw[["refused" not in one for one in found]]
     return TableRow(
         dict(condition),
         method,
         len(found),
-        _statistics(raw, measured.gross),
+        _statistics(raw, measured.gross, [one["gross"] for one in found if "gross" in one]),
         None if None in symmetric else _statistics(np.array(symmetric), measured.gross),
         float(np.mean(held)) if held and method in measured.regions else None,
         float(np.median([one["seconds"] for one in found])),
-        sum("refused" in one for one in found),
+        len(raw) - len(answered),
+        bootstrap(answered, mean) if 0 < len(answered) < len(raw) else None,
     )
 
 
-def _statistics(errors: FloatArray, gross: float) -> tuple[Interval, Interval, Interval]:
-    return bootstrap(errors, median), bootstrap(errors, mean), bootstrap(errors, share_above(gross))
+def _statistics(
+    errors: FloatArray, gross: float, marked: Sequence[bool] = ()
+) -> tuple[Interval, Interval, Interval]:
+    """Median, mean and share of gross errors: those that their runs mark, or those beyond ``gross`` m."""
+    if len(marked) == len(errors):
+        share = bootstrap(np.array(marked, dtype=np.float64), mean)
+    else:
+        share = bootstrap(errors, share_above(gross))
+    return bootstrap(errors, median), bootstrap(errors, mean), share

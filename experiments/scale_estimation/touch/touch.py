@@ -29,8 +29,7 @@ _OUT = 1.5
 """Deviations of the place, between the places of the first search."""
 
 _YAWS = 16
-"""Turns of a round object that the first search begins from; as many more as one is slender, for its ends move
-farther."""
+"""Turns of a round object that the first search begins from; more of a slender one, whose ends move farther."""
 
 _SLENDER = 3.0
 _FOLLOWED = 2
@@ -84,7 +83,9 @@ def by_touch(
     began = time.perf_counter()
     logs = sizes.logs - np.log(nominal)
     passed = FreeSpace(stand, free)
-    found, costs = TouchProblem(stand, patches, _COARSE_POINTS).refined(_starts(stand, patches, logs), 5, fixed_size=False)
+    found, costs = TouchProblem(stand, patches, _COARSE_POINTS).refined(
+        _starts(stand, patches, logs), 5, fixed_size=False
+    )
     likely = found[np.argsort(costs)[: max(refined, _LIKELY)]]
     fine = TouchProblem(stand, patches, len(patches[0].points))
     minima, misfits = fine.refined(likely[:refined], 8, fixed_size=False)

@@ -42,7 +42,8 @@ def tables(
 
     Every run is planned, rehearsed and performed on the mocked bench in process, then answered by every
     method. Errors are in millimetres, with 90 % bootstrap intervals; gross is the share above 20 mm.
-    A refused answer counts as a random one. Region is the share of runs whose 90 % region holds the truth.
+    A refused answer counts as one without readings; beside it the mean of those answered. Region is the share
+    of runs whose 90 % region or interval holds the truth.
 
     Try: touchstone tables contact-localization --seeds 2 --only mug
     """
@@ -69,7 +70,7 @@ def tables(
     given = {"spacing": spacing, "yaw": yaw, "sense": sense}
     chosen = {
         **levels_of(measured.conditions, given, where or [], tabled=True),
-        "gap": gap or ["default", "none"],
+        "gap": gap or [kind.gap or "default", "none"],
     }
     wanted = measured.cells(only or list(scenes), range(first_seed, first_seed + seeds), chosen)
     results: dict[Any, Any] = {}
@@ -101,7 +102,7 @@ def _data_folder() -> Path | None:
     return next((path for path in candidates if (path / "meshes").is_dir()), None)
 
 
-_HEADINGS = ("method", "median", "mean", "gross", "refused", "modulo symmetry", "region", "s")
+_HEADINGS = ("method", "median", "mean", "gross", "refused", "answered", "modulo symmetry", "region", "s")
 _GAPS = {"default": "on", "none": "off"}
 """Of gaps, in a title."""
 
@@ -117,10 +118,12 @@ def _print(table: list[Any], published: Any) -> None:
         chosen = [row for row in table if tuple(row.conditions.items()) == condition]
         said = ", ".join(f"{name} {_GAPS.get(level, level)}" for name, level in condition)
         drawn = Table(title=f"mock: {said}; {chosen[0].runs} runs; mm [5 to 95 %]")
-        for heading in _HEADINGS:
-            drawn.add_column(heading, no_wrap=True)
-        for row in chosen:
-            drawn.add_row(*_cells(row))
+        lines = [_cells(row) for row in chosen]
+        shown = [k for k in range(len(_HEADINGS)) if any(line[k] for line in lines)]
+        for k in shown:
+            drawn.add_column(_HEADINGS[k], no_wrap=True)
+        for line in lines:
+            drawn.add_row(*(line[k] for k in shown))
         ANSWERS.print(drawn)
     if published:
         said = "; ".join(
@@ -141,6 +144,7 @@ def _cells(row: Any) -> list[str]:
         _interval(mean, 1e3, 1),
         _interval(gross, 100, 0) + " %",
         str(row.refused or ""),
+        "" if row.answered is None else _interval(row.answered, 1e3, 1),
         symmetric,
         "" if row.held is None else f"{100 * row.held:.0f} %",
         f"{row.seconds:.2f}",

@@ -1,0 +1,195 @@
+"""One cell of the table of sizes: a mocked run in process, answered by every method, trivial ones too."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+from experiments.scale_estimation.answer import Answer, ScaleAnswering
+from experiments.scale_estimation.baselines import (
+    by_area,
+    by_box,
+    by_contacts_box,
+    by_first_peak,
+    constant,
+    random_error,
+)
+from experiments.scale_estimation.readings import peaks_of
+from experiments.scale_estimation.section import Scale
+from experiments.scale_estimation.size import Belief, fused
+from experiments.scale_estimation.touch.touch import by_touch
+from experiments.scale_estimation.vision.outline import Outline
+from harness.basics.clock import now
+from harness.basics.errors import FitRefused
+from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.station_file import Station
+from harness.effects.accuracy import Accuracy
+from harness.experiment.experiment import Experiment
+from harness.experiment.lookup import named
+from harness.experiment.plain import perform_in_process
+from harness.experiment.truth import read_truth
+from harness.recording.run_folder import RunFiles
+
+TRIVIAL = ("random", "constant", "first peak", "outline's area", "outline's box", "contacts' box")
+OURS = (
+    "vision",
+    "audio",
+    "touch",
+    "touch, 3 contacts",
+    "audio + touch, 3 contacts",
+    "audio + touch",
+    "fused",
+)
+METHODS = (*TRIVIAL, *OURS)
+
+GROSS = 0.1
+"""Of the size: an error beyond is a failure."""
+
+LOOKING = ("yes", "no")
+"""Whether the camera looks first; where it does not, the first contacts are made blindly."""
+
+PAPER_CM = {"vision": (5.08,), "audio": (4.68,), "touch": (3.51,)}
+"""Mean errors on real objects, of networks that do not know the object: ObjectFolder 2.0, table 3."""
+
+FEW = 3
+
+
+@dataclass(frozen=True)
+class ScaleCell:
+    """Which run."""
+
+    object: str
+    gap: str
+    seed: int
+    look: str
+
+    @property
+    def name(self) -> str:
+        """Of the run's file; a gap may be a path."""
+        return f"{self.object}-{self.gap.replace('/', '_')}-{self.look}-{self.seed}"
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """What was varied."""
+        return {"gap": self.gap, "look": self.look}
+
+
+def cells(
+    objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]
+) -> list[ScaleCell]:
+    """All of them, an object's after the other's of one seed."""
+    return [
+        ScaleCell(name, gap, seed, look)
+        for seed in seeds
+        for gap in chosen["gap"]
+        for look in chosen["look"]
+        for name in objects
+    ]
+
+
+def scene_of(scene: SceneFile, cell: ScaleCell) -> SceneFile:
+    """The scene of a table's object, its size hidden and every sense asked for."""
+    tree = scene.model_dump(mode="json", by_alias=True)
+    tree["object"]["scale"] = "hidden"
+    tree["sensors"].update(camera=cell.look == "yes", sound=True, touch=True)
+    tree[Scale.table] = {}
+    return scene_from_json(tree, cell.name)
+
+
+def run_cell(cell: ScaleCell, scene: SceneFile, station: Station) -> dict[str, Any]:
+    """Perform and answer one run; the result as JSON values."""
+    experiment: Experiment = named("scale-estimation")
+    with closing(perform_in_process(experiment, cell, scene_of(scene, cell), station)) as case:
+        recording = case.run.recording
+        truth = read_truth(recording)
+        assert truth is not None
+        answering: ScaleAnswering = experiment.answering(
+            RunFiles(recording), Accuracy.default(experiment.knobs)
+        )
+        for record in recording.steps():
+            answering.read(record)
+        true = float(truth.differences["longest_side_m"])
+        rows = _rows(answering, answering.answer(), true)
+        return {"schema": 1, "cell": vars(cell), "steps": recording.committed, "size_m": true, "rows": rows}
+
+
+def _rows(answering: ScaleAnswering, found: Answer, true: float) -> dict[str, Any]:
+    sizes = answering.model.sizes
+    rows: dict[str, Any] = {"random": {"error_m": random_error(sizes, true), "seconds": 0.0}}
+    for name, method in _trivial(answering).items():
+        began = now()
+        value = method()
+        if value is not None:
+            rows[name] = _value(value, true, now() - began)
+    for sense in ("vision", "audio", "touch"):
+        if sense in found.by_sense:
+            rows[sense] = _answered(found.by_sense[sense], answering, true, found.seconds[sense])
+    rows.update(_pairs(answering, found, true))
+    rows["fused"] = _belief(found.fused, true, sum(found.seconds.values()))
+    return rows
+
+
+def _trivial(answering: ScaleAnswering) -> dict[str, Callable[[], float | None]]:
+    model = answering.model
+
+    def first_peak() -> float | None:
+        peaks = peaks_of(answering.strikes)
+        if peaks is None:
+            return None
+        return by_first_peak(peaks, model.ringing(answering.accuracy), model.nominal)
+
+    methods: dict[str, Callable[[], float | None]] = {
+        "constant": lambda: constant(model.sizes),
+        "first peak": first_peak,
+    }
+    outline = answering.outline
+    if isinstance(outline, Outline):
+        methods["outline's area"] = lambda: by_area(outline, model.view, model.nominal)
+        methods["outline's box"] = lambda: by_box(outline, model.view)
+    if answering.patches:
+        methods["contacts' box"] = lambda: by_contacts_box(answering.patches, model)
+    return methods
+
+
+def _pairs(answering: ScaleAnswering, found: Answer, true: float) -> dict[str, Any]:
+    """What some of the readings say together."""
+    model, rows = answering.model, {}
+    began, heard = now(), found.by_sense.get("audio")
+    few: FitRefused | Any
+    try:
+        few = by_touch(
+            model.stand, answering.patches[:FEW], model.nominal, model.sizes, free=answering.free[:FEW]
+        )
+    except FitRefused as refusal:
+        few = refusal
+    seconds = now() - began
+    rows["touch, 3 contacts"] = _answered(few, answering, true, seconds)
+    for name, touched in (
+        ("audio + touch, 3 contacts", few),
+        ("audio + touch", found.by_sense.get("touch")),
+    ):
+        answered = [
+            one.belief for one in (heard, touched) if one is not None and not isinstance(one, FitRefused)
+        ]
+        together = fused(answered) if answered else Belief.ignorant(model.sizes)
+        rows[name] = _belief(together, true, seconds)
+    return rows
+
+
+def _answered(one: Any, answering: ScaleAnswering, true: float, seconds: float) -> dict[str, Any]:
+    """A sense's row; a refusal counts as the middle of the range, and claims no more than the range."""
+    if not isinstance(one, FitRefused):
+        return _belief(one.belief, true, seconds)
+    sizes = answering.model.sizes
+    return {**_value(constant(sizes), true, seconds), "refused": str(one)}
+
+
+def _belief(belief: Belief, true: float, seconds: float) -> dict[str, Any]:
+    low, high = belief.interval
+    claimed = {"in_region90": bool(low <= true <= high), "low90_m": low, "high90_m": high}
+    return {**_value(belief.size, true, seconds), **claimed}
+
+
+def _value(size: float, true: float, seconds: float) -> dict[str, Any]:
+    error = abs(size - true)
+    return {"size_m": size, "error_m": error, "gross": bool(error > GROSS * true), "seconds": seconds}
