@@ -87,6 +87,7 @@ class ScaleAnswering:
         self.outline: Outline | FitRefused | None = None
         self.patches: list[Patch] = []
         self.free: list[FloatArray] = []
+        self.met: list[bool] = []
         self.strikes: list[Strike] = []
         self._read = dict.fromkeys(SENSES, 0.0)
 
@@ -112,6 +113,7 @@ class ScaleAnswering:
         if patch is not None:
             self.patches.append(patch)
         length = float(record.step.parameters["search_m"])
+        self.met.append(patch is not None)
         self.free.append(free_line(seen.base_from_gel, length, patch is not None))
         if seen.strike is not None:
             self.strikes.append(seen.strike)

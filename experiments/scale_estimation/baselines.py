@@ -31,7 +31,7 @@ def by_first_peak(peaks: Peaks, model: RingingModel, nominal: float) -> float:
 
 
 def by_area(outline: Outline, view: View, nominal: float) -> float:
-    """M, from the area of the outline's hull over the model's, averaged over turns, at its nominal place."""
+    """M, from the area of the outline's hull over the model's, over turns, at its nominal place."""
     stands = np.zeros((_TURNS, len(view.sigmas)))
     stands[:, 3] = np.arange(_TURNS) * 2.0 * np.pi / _TURNS
     reach = view.project(stands, view.corners) @ directions().T
@@ -48,7 +48,7 @@ def by_box(outline: Outline, view: View) -> float:
 
 
 def by_contacts_box(patches: list[Patch], model: ObjectModel) -> float:
-    """M, the longest side of the box around all contacts and the support under them; no model of the object."""
+    """M, from the area of the outline's hull over the model's, averaged over turns."""
     places = np.concatenate([patch.points for patch in patches])
     low = np.minimum(places.min(axis=0), [np.inf, np.inf, model.place[2]])
     return float((places.max(axis=0) - low).max())

@@ -7,6 +7,7 @@ from typing import Any
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.dials import KNOBS, OWN
 from experiments.scale_estimation.explore import PLAN_KEY, ScalePerformer, plan
+from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.table import LOOKING, METHODS, OURS, PAPER_CM, cells, run_cell, scene_of
@@ -46,6 +47,7 @@ EXPERIMENT = Experiment(
     lines=lines_of,
     sources=_sources,
     gives=(),
+    report=write,
     measurement=MEASUREMENT,
     plan_key=PLAN_KEY,
     gap="unplaced",

@@ -103,9 +103,7 @@ def run_cell(cell: ScaleCell, scene: SceneFile, station: Station) -> dict[str, A
         recording = case.run.recording
         truth = read_truth(recording)
         assert truth is not None
-        answering: ScaleAnswering = experiment.answering(
-            RunFiles(recording), Accuracy.default(experiment.knobs)
-        )
+        answering = ScaleAnswering(RunFiles(recording), Accuracy.default(experiment.knobs))
         for record in recording.steps():
             answering.read(record)
         true = float(truth.differences["longest_side_m"])

@@ -1,7 +1,8 @@
 """The plain page of a run: what every experiment can show, whatever it asks."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from harness.bench.device import Health
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Experiment, Scored
 from harness.report import wording
+from harness.report.figures.figures import Picture
 from harness.report.instruments import artefacts, instruments
 from harness.report.simulated import effect_rows, flat, observed_rows, world_rows
 from harness.report.template import write_page
@@ -18,12 +20,28 @@ PAGE = "report.html"
 TEMPLATE = "run.html"
 
 
+@dataclass(frozen=True)
+class PageSection:
+    """A part of a page that an experiment adds.
+
+    Attributes:
+        title: over it.
+        words: a sentence or two.
+        picture: below them; None for none.
+    """
+
+    title: str
+    words: str
+    picture: Picture | None = None
+
+
 def write_run_page(
     experiment: Experiment,
     scored: Scored,
     comparison: Comparison,
     health: Mapping[str, Health] | None,
     folder: Path,
+    sections: Sequence[PageSection] = (),
 ) -> Path:
     """Write the page; its path.
 
@@ -33,6 +51,7 @@ def write_run_page(
         comparison: what the scene observes.
         health: of the instruments at the end of the session; None for a replay.
         folder: made if it does not exist.
+        sections: that the experiment adds, after the answer.
     """
     folder.mkdir(parents=True, exist_ok=True)
     run, result = scored.run, scored.result
@@ -41,6 +60,7 @@ def write_run_page(
         **facts_of(experiment.title, scored, comparison, health),
         "lines": experiment.lines({**result, **named}),
         "answer": [(name, _text(value)) for name, value in flat(result) if name.split(".")[-1] != "warnings"],
+        "sections": sections,
         "steps": f"{run.recording.committed} {experiment.plural}",
         "warnings": (*scored.warnings, *result.get("warnings", ())),
     }

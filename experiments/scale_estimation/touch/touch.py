@@ -29,7 +29,7 @@ _OUT = 1.5
 """Deviations of the place, between the places of the first search."""
 
 _YAWS = 16
-"""Turns of a round object that the first search begins from; more of a slender one, whose ends move farther."""
+"""Turns of a round object that the first search begins from; more of a slender one."""
 
 _SLENDER = 3.0
 _FOLLOWED = 2

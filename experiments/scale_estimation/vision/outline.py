@@ -76,6 +76,15 @@ def hull_of(points: FloatArray) -> FloatArray:
         return np.unique(points, axis=0)
 
 
+def corners_of(outline: Outline) -> FloatArray:
+    """``(DIRECTIONS, 2)`` pixels: corners of the polygon that reaches as far, in order around it."""
+    step = 2.0 * np.pi / DIRECTIONS
+    towards, extents = directions(), outline.extents
+    along = (np.roll(extents, -1) - extents * np.cos(step)) / np.sin(step)
+    aside = np.column_stack([-towards[:, 1], towards[:, 0]])
+    return np.asarray(extents[:, None] * towards + along[:, None] * aside)
+
+
 def _extents(mask: BoolArray) -> FloatArray:
     rows, columns = np.nonzero(mask ^ ndimage.binary_erosion(mask))
     spanning = hull_of(np.column_stack([columns + 0.5, rows + 0.5]))

@@ -1,11 +1,11 @@
 """Bodies that stand about on a bench, for its picture."""
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply, rotation_about, transform, translation
 from harness.basics.mesh import Mesh
+from harness.basics.mesh_hull import closed_hull
 from harness.bench.kinematics import link_frames
 from harness.bench.sensor import TactileSensor
 from harness.bench.ur_tables import arm_table
@@ -20,28 +20,17 @@ CLAY = (0.93, 0.91, 0.87)
 _Z = np.array([0.0, 0.0, 1.0])
 
 
-def convex(points: FloatArray) -> Mesh:
-    """The convex hull of ``(n, 3)`` points, outward."""
-    hull = ConvexHull(points)
-    corners = points[hull.simplices]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    wrong = np.einsum("ij,ij->i", normal, hull.equations[:, :3]) < 0.0
-    faces = hull.simplices.astype(np.int64)
-    faces[wrong] = faces[wrong][:, ::-1]
-    return Mesh(points, faces)
-
-
 def box(low: FloatArray, high: FloatArray) -> Mesh:
     """A box between two corners in metres."""
     corners = [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
-    return convex(np.array(corners))
+    return closed_hull(np.array(corners))
 
 
 def cylinder(radius: float, low: float, high: float) -> Mesh:
     """An upright cylinder about z, in metres."""
     angle = 2.0 * np.pi * np.arange(64) / 64
     ring = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(64)])
-    return convex(np.vstack([ring + low * _Z, ring + high * _Z]))
+    return closed_hull(np.vstack([ring + low * _Z, ring + high * _Z]))
 
 
 def object_part(mesh: Mesh, base_from_object: FloatArray) -> BenchPart:
@@ -80,7 +69,7 @@ def sensor_parts(
     return (
         BenchPart(gel, base_from_gel, GEL, smooth=False),
         BenchPart(housing, base_from_gel, HOUSING, smooth=False),
-        BenchPart(convex(mount), base_from_gel, MOUNT),
+        BenchPart(closed_hull(mount), base_from_gel, MOUNT),
     )
 
 
@@ -93,5 +82,5 @@ def arm_parts(model: str, joints: FloatArray) -> tuple[BenchPart, ...]:
         if index > 0:
             turned = transform(rotation_about(_Z, float(joints[index - 1])), table.d[index - 1] * _Z)
             base_from_link = frames[index - 1] @ turned
-        parts.append(BenchPart(convex(hull), base_from_link, BLUE if index in (4, 5) else ALUMINIUM))
+        parts.append(BenchPart(closed_hull(hull), base_from_link, BLUE if index in (4, 5) else ALUMINIUM))
     return tuple(parts)

@@ -7,11 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.basics.geometry import translation
+from harness.basics.mesh_hull import closed_hull
 from harness.report.data import BenchPart, ErrorCurve
 from harness.report.figures.camera import back_projected, look_at, see
 from harness.report.figures.charts import error_chart
 from harness.report.figures.pictures import Heat
-from harness.report.figures.props import box, convex, cylinder
+from harness.report.figures.props import box, cylinder
 from harness.report.figures.shading import Shot
 from harness.report.figures.tiles import difference, height_picture, png
 from harness.report.values import Posterior
@@ -116,7 +117,7 @@ def test_props_are_closed_and_outward(mesh: object) -> None:
     volume = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
     expected = 1.0 if len(part.vertices) == 8 else 0.5 * 64 * np.sin(2 * np.pi / 64) * 0.01 * 0.4
     assert volume == pytest.approx(expected)
-    assert convex(part.vertices).face_areas.sum() == pytest.approx(part.face_areas.sum())
+    assert closed_hull(part.vertices).face_areas.sum() == pytest.approx(part.face_areas.sum())
 
 
 def test_equal_images_differ_by_middle_grey_and_the_sign_shows() -> None:

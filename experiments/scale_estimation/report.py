@@ -1,0 +1,145 @@
+"""The pictures of a scale estimation's report: what each sense read, beside the model at the size found."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from experiments.scale_estimation.answer import Answer, ScaleAnswering
+from experiments.scale_estimation.envelope import placed
+from experiments.scale_estimation.readings import peaks_of
+from experiments.scale_estimation.sound.hearing import Hearing
+from experiments.scale_estimation.touch.touch import Touch
+from experiments.scale_estimation.vision.outline import Outline, corners_of, hull_of
+from experiments.scale_estimation.vision.vision import Sight
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused
+from harness.bench.device import Health
+from harness.experiment.compare import Comparison
+from harness.experiment.experiment import Scored
+from harness.experiment.lookup import named
+from harness.report.figures.figures import Album
+from harness.report.figures.size import (
+    Resonances,
+    TouchedObject,
+    beliefs_figure,
+    outline_figure,
+    resonances_figure,
+    touched_figure,
+)
+from harness.report.run_page import PageSection, write_run_page
+from harness.skills.look import IMAGE
+
+_NAME = "scale-estimation"
+
+
+def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
+    """Draw the report; the path of its page."""
+    folder.mkdir(parents=True, exist_ok=True)
+    sections = tuple(_sections(scored, Album(folder)))
+    return write_run_page(named(_NAME), scored, comparison, health, folder, sections)
+
+
+def _sections(scored: Scored, album: Album) -> Iterator[PageSection]:
+    answering: ScaleAnswering = scored.answering
+    found: Answer = scored.found
+    yield _believed(scored, album)
+    if isinstance(answering.outline, Outline):
+        yield _seen(answering, answering.outline, found.sight, album)
+    if answering.strikes:
+        yield _heard(answering, found, album)
+    if answering.free:
+        yield _touched(answering, found, album)
+
+
+def _believed(scored: Scored, album: Album) -> PageSection:
+    found: Answer = scored.found
+    sizes = scored.answering.model.sizes
+    beliefs = {
+        name: np.exp(one.belief.log_density)
+        for name, one in found.by_sense.items()
+        if not isinstance(one, FitRefused)
+    }
+    beliefs["fused"] = np.exp(found.fused.log_density)
+    true = None if scored.truth is None else scored.truth.differences.get("longest_side_m")
+    figure = beliefs_figure(np.exp(sizes.logs), beliefs, (sizes.low, sizes.high), true)
+    return PageSection(
+        "What is believed of the size",
+        "Each sense searches twice beyond the range that was asked about, so that an object outside is "
+        "recognised as such. The fused belief is their product, each with a floor of 2 %.",
+        album.drawing("beliefs", figure),
+    )
+
+
+def _seen(answering: ScaleAnswering, outline: Outline, sight: Sight | None, album: Album) -> PageSection:
+    look = next(record for record in answering.run.recording.steps() if IMAGE in record.readings)
+    picture = np.asarray(np.median(look.readings[IMAGE].values, axis=0)).astype(np.uint8)
+    fitted, words = None, "The outline is at no size this object's; see the warnings."
+    if sight is not None:
+        view = answering.model.view
+        fitted = _around(hull_of(view.project(sight.fit.unknowns[None], view.corners)[0]))
+        words = f"The two leave each other by {sight.fit.rms:.2f} px (rms)."
+    return PageSection(
+        "By sight", words, album.photograph("outline", outline_figure(picture, corners_of(outline), fitted))
+    )
+
+
+def _heard(answering: ScaleAnswering, found: Answer, album: Album) -> PageSection:
+    peaks = peaks_of(answering.strikes)
+    if peaks is None:
+        return PageSection("By sound", "No strike may be used.", None)
+    hearing = found.hearing
+    model = answering.model.ringing(answering.accuracy)
+    size = found.fused.size if hearing is None else hearing.match.size
+    log_size = np.log(size / answering.model.nominal)
+    levels = model.levels(np.array([log_size]), peaks.window_decay)[0]
+    shown = Resonances(
+        np.column_stack([peaks.frequencies, peaks.levels]),
+        np.column_stack([model.frequencies * np.exp(-log_size), levels]),
+        peaks.band,
+    )
+    return PageSection(
+        "By sound",
+        _heard_words(hearing, len(peaks.frequencies)),
+        album.drawing("peaks", resonances_figure(shown)),
+    )
+
+
+def _heard_words(hearing: Hearing | None, count: int) -> str:
+    if hearing is None:
+        return f"{count} peaks were heard, and are no answer; the model is drawn at the fused size."
+    return (
+        f"{count} peaks were heard; the model explains them by {hearing.matched:.1f} nats each over chance."
+    )
+
+
+def _touched(answering: ScaleAnswering, found: Answer, album: Album) -> PageSection:
+    model, touch = answering.model, found.touch
+    stand = _stand(found, answering)
+    surface = placed(model, model.stand.points, stand) - model.place
+    contacts = np.array([patch.points.mean(axis=0) - model.place for patch in answering.patches]).reshape(
+        -1, 3
+    )
+    passed = [line - model.place for line, met in zip(answering.free, answering.met, strict=True) if not met]
+    words = (
+        f"{len(contacts)} contacts, {len(passed)} ways that met nothing (dotted), round the nominal place."
+    )
+    if isinstance(touch, Touch):
+        words += f" The contacts cost {touch.cost:.2f} each at the size found by touch."
+    shown = TouchedObject(surface, contacts, passed)
+    return PageSection("By touch", words, album.drawing("contacts", touched_figure(shown)))
+
+
+def _stand(found: Answer, answering: ScaleAnswering) -> FloatArray:
+    """``(4,)`` the size found, where and how turned touch or else sight has it."""
+    if found.touch is not None:
+        return found.touch.unknowns[:4]
+    if found.sight is not None:
+        return found.sight.fit.unknowns[:4]
+    return np.array([np.log(found.fused.size / answering.model.nominal), 0.0, 0.0, 0.0])
+
+
+def _around(corners: FloatArray) -> FloatArray:
+    """Corners of a convex polygon in order around it."""
+    middle = corners.mean(axis=0)
+    return np.asarray(corners[np.argsort(np.arctan2(*(corners - middle).T[::-1]))])
