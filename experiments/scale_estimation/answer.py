@@ -12,7 +12,7 @@ from experiments.scale_estimation.sound.hearing import Hearing, by_sound
 from experiments.scale_estimation.touch.patch import Patch, free_line
 from experiments.scale_estimation.touch.touch import Touch, by_touch
 from experiments.scale_estimation.vision.outline import Outline
-from experiments.scale_estimation.vision.vision import Sight, by_sight, stands_seen
+from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, WrongUse
 from harness.bench.acquisition import Strike
@@ -146,8 +146,8 @@ class ScaleAnswering:
         usable = sum(not strike.fault for strike in self.strikes)
         return Answer(found, together, seconds, len(self.patches), usable)
 
-    def stands_seen(self) -> tuple[FloatArray, ...]:
-        """``(4,)`` each, log of the size, x, y, yaw: how the object may stand by the look; none if unseen."""
+    def stands_seen(self) -> tuple[SeenStand, ...]:
+        """How the object may stand by the look; none where it was not seen."""
         seen = self.outline
         return stands_seen(self.model.view, seen) if isinstance(seen, Outline) else ()
 

@@ -5,17 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.scale_estimation.model import ObjectModel
+from experiments.scale_estimation.vision.vision import SeenStand
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 from harness.basics.mesh_hull import closed_hull
 
-BLIND_PLACES = 2.5
-"""Standard deviations of its place that are kept free where nothing was seen or touched yet."""
+PLACES = 3.0
+"""Standard deviations of its place that are kept free around it."""
 
-SEEN_MARGIN = 15.0e-3
-"""M around an object as it was seen: its place along the line of sight, its tilt, and a part of its size."""
+SEEN_MARGIN = 5.0e-3
+"""M around an object as it was seen, in addition: its tilt, and what its model leaves out."""
 
-SEEN_SHARE = 0.05
+SEEN_SHARE = 0.03
 """Of its size, in addition."""
 
 _YAWS = 16
@@ -27,18 +28,14 @@ def blind_envelope(model: ObjectModel) -> Mesh:
     largest = np.log(model.sizes.high / model.nominal)
     turns = np.arange(_YAWS) * 2.0 * np.pi / _YAWS
     stands = [np.array([largest, 0.0, 0.0, yaw]) for yaw in turns]
-    return envelope(model, stands, BLIND_PLACES * model.place_error)
+    return envelope(model, stands, PLACES * model.place_error)
 
 
-def seen_envelope(model: ObjectModel, stands: Sequence[FloatArray]) -> Mesh:
-    """Where it may be after a look.
-
-    Args:
-        model: of the object.
-        stands: log of the size over the nominal one, x, y, m, yaw, rad: of every turn it may have.
-    """
-    largest = model.nominal * float(np.exp(max(stand[0] for stand in stands)))
-    return envelope(model, stands, SEEN_MARGIN + SEEN_SHARE * largest)
+def seen_envelope(model: ObjectModel, stands: Sequence[SeenStand]) -> Mesh:
+    """Where it may be after a look, in every turn that was not ruled out; in base."""
+    largest = model.nominal * float(np.exp(max(stand.unknowns[0] for stand in stands)))
+    off = PLACES * max(stand.place_error for stand in stands)
+    return envelope(model, [stand.unknowns for stand in stands], SEEN_MARGIN + SEEN_SHARE * largest + off)
 
 
 def envelope(model: ObjectModel, stands: Sequence[FloatArray], margin: float) -> Mesh:

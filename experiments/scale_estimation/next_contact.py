@@ -19,6 +19,7 @@ from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.touch.fit import DISTANCE_SIGMA, UNKNOWNS, FreeSpace, TouchProblem
 from experiments.scale_estimation.touch.touch import by_touch
+from experiments.scale_estimation.vision.vision import SeenStand
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, MotionRefused, WrongUse
 from harness.basics.geometry import frame_facing, transform
@@ -67,7 +68,7 @@ class Explorer:
         self._struck = 0
         self._touches = 0
         self._travels: TwinBench | None = None
-        self._seen: tuple[FloatArray, ...] = ()
+        self._seen: tuple[SeenStand, ...] = ()
 
     def way(self, here: FloatArray, planned: FloatArray) -> FloatArray:
         """A way around all that the object may take, from where the arm is to the end of a travel."""
@@ -118,19 +119,19 @@ class Explorer:
         """``(4,)`` of the hypothesis that fits all contacts best; None where there is none yet."""
         model, patches = self._model, self._answering.patches
         if not patches:
-            return self._seen[0] if self._seen else None
+            return self._seen[0].unknowns if self._seen else None
         if self._seen:
             problem = TouchProblem(model.stand, patches, len(patches[0].points))
             free = FreeSpace(model.stand, self._answering.free)
             starts = np.zeros((len(self._seen), UNKNOWNS))
-            starts[:, :4] = np.stack(self._seen)
+            starts[:, :4] = np.stack([stand.unknowns for stand in self._seen])
             minima, costs = problem.refined(starts, 8, fixed_size=False)
             costs = costs + free.cost(minima)
             best = minima[int(costs.argmin())]
             # A few contacts can be fitted by another size: what was seen of it holds.
-            if abs(best[0] - self._seen[0][0]) < 0.1:
+            if abs(best[0] - self._seen[0].unknowns[0]) < 0.1:
                 return np.asarray(best[:4])
-            return self._seen[int(costs.argmin())]
+            return self._seen[int(costs.argmin())].unknowns
         if len(patches) < BELIEVED_AFTER:
             return None
         try:
@@ -231,7 +232,9 @@ class Explorer:
         model = self._model
         half = 0.5 * max(self._run.station.gel.sensor.housing)
         height = float(model.stand.points[:, 2].max()) * model.sizes.low / model.nominal
-        centre = model.place if not self._seen else model.place + np.array([*self._seen[0][1:3], 0.0])
+        centre = (
+            model.place if not self._seen else model.place + np.array([*self._seen[0].unknowns[1:3], 0.0])
+        )
         for k in range(_RAYS):
             slant = 0.0 if k == 0 and self._touches == 0 else random.choice(SLANTS)
             way = random.uniform(-np.pi, np.pi)

@@ -165,11 +165,10 @@ class OutlineProblem:
         rms = np.sqrt((seen[:, counted] ** 2).mean(axis=1)) if counted.any() else np.zeros(len(here))
         return [OutlineFit(*one) for one in zip(here, cost.tolist(), rms.tolist(), strict=True)]
 
-    def sigma(self, unknowns: FloatArray) -> float:
-        """Of the logarithm of the size at a minimum, all else free, to first order."""
+    def covariance(self, unknowns: FloatArray) -> FloatArray:
+        """``(14, 14)`` of the unknowns at a minimum, to first order."""
         _, slopes = self._residuals(unknowns[None])
-        normal = slopes[0].T @ slopes[0] + 1e-9 * np.eye(_UNKNOWNS)
-        return float(np.sqrt(np.linalg.inv(normal)[_SIZE, _SIZE]))
+        return np.asarray(np.linalg.inv(slopes[0].T @ slopes[0] + 1e-9 * np.eye(_UNKNOWNS)))
 
     def _step(
         self, residuals: FloatArray, slopes: FloatArray, damping: FloatArray, fixed_size: bool

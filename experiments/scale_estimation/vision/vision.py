@@ -75,7 +75,20 @@ def by_sight(view: View, outline: Outline, nominal: float, sizes: SizeRange, yaw
     return Sight(Belief.of(sizes, density), best, time.perf_counter() - began)
 
 
-def stands_seen(view: View, outline: Outline) -> tuple[FloatArray, ...]:
+@dataclass(frozen=True, eq=False)
+class SeenStand:
+    """How the object may stand, by a look.
+
+    Attributes:
+        unknowns: ``(4,)`` log of the size over the nominal one, x, y, m, yaw, rad.
+        place_error: m, the greatest standard deviation of its place: along the line of sight.
+    """
+
+    unknowns: FloatArray
+    place_error: float
+
+
+def stands_seen(view: View, outline: Outline) -> tuple[SeenStand, ...]:
     """How the object may stand: every turn at which its outline is nearly that of the picture.
 
     A picture does not tell some turns apart, as those of a mug whose handle is behind it. What moves around
@@ -86,16 +99,21 @@ def stands_seen(view: View, outline: Outline) -> tuple[FloatArray, ...]:
         outline: of the picture.
 
     Returns:
-        ``(4,)`` each, the best first: log of the size over the nominal one, x, y, m, yaw, rad. None at all
-        where the outline is not this object's.
+        The best first; none at all where the outline is not this object's.
     """
-    fits = OutlineProblem(view, outline).fit(_starts(view, outline, _TURNS), _ROUNDS_OF_TURNS)
+    problem = OutlineProblem(view, outline)
+    fits = problem.fit(_starts(view, outline, _TURNS), _ROUNDS_OF_TURNS)
     found: list[OutlineFit] = []
     for fit in sorted(fits, key=lambda one: one.cost):
         turns = [(fit.unknowns[3] - one.unknowns[3] + np.pi) % (2.0 * np.pi) - np.pi for one in found]
         if fit.rms <= MISFIT and all(abs(turn) > _TURNS_APART for turn in turns):
             found.append(fit)
-    return tuple(fit.unknowns[:4] for fit in found)
+    return tuple(_stand(problem, fit) for fit in found)
+
+
+def _stand(problem: OutlineProblem, fit: OutlineFit) -> SeenStand:
+    greatest = np.linalg.eigvalsh(problem.covariance(fit.unknowns)[1:3, 1:3])[-1]
+    return SeenStand(fit.unknowns[:4], float(np.sqrt(greatest)))
 
 
 def _starts(view: View, outline: Outline, yaws: int) -> FloatArray:
@@ -124,7 +142,10 @@ def _apart(fits: list[OutlineFit], least: float) -> list[OutlineFit]:
 
 def _scanned(problem: OutlineProblem, fit: OutlineFit, logs: FloatArray) -> FloatArray:
     """``(n,)`` minus the least cost at each logarithm of the size over the nominal one."""
-    middle, sigma = float(fit.unknowns[0]), min(problem.sigma(fit.unknowns), NO_SIZE)
+    middle, sigma = (
+        float(fit.unknowns[0]),
+        min(float(np.sqrt(problem.covariance(fit.unknowns)[0, 0])), NO_SIZE),
+    )
     starts = np.tile(fit.unknowns, (len(_SCAN), 1))
     starts[:, 0] = middle + sigma * _SCAN
     costs = np.array([one.cost for one in problem.fit(starts, _SCAN_ROUNDS, fixed_size=True)])

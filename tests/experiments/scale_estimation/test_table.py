@@ -1,0 +1,38 @@
+"""The table's trivial rows: what they say of a model's own readings."""
+
+import numpy as np
+import pytest
+
+from experiments.scale_estimation.baselines import by_area, by_box, by_first_peak, constant, random_error
+from experiments.scale_estimation.size import SizeRange
+from tests.experiments.scale_estimation.test_sound import NOMINAL, model, peaks_at
+from tests.experiments.scale_estimation.test_vision import nominal, outline_at, view_of
+
+RANGE = SizeRange(0.05, 0.2)
+
+
+def test_a_constant_is_the_middle_and_random_is_worse() -> None:
+    assert constant(RANGE) == pytest.approx(0.1)
+    for true in (0.05, 0.1, 0.2):
+        assert random_error(RANGE, true) > 0.6 * abs(constant(RANGE) - true)
+    assert random_error(RANGE, 0.1) == pytest.approx(
+        np.mean(np.abs(np.exp(np.linspace(np.log(0.05), np.log(0.2), 100_001)) - 0.1)), rel=2e-3
+    )
+
+
+def test_the_first_peak_is_right_where_the_first_mode_is_heard() -> None:
+    assert by_first_peak(peaks_at(1.3, every=1), model(), NOMINAL) == pytest.approx(1.3 * NOMINAL)
+
+
+@pytest.mark.parametrize("scale", [0.7, 1.5])
+def test_the_outline_s_area_gives_a_round_object_s_size_where_it_stands(scale: float) -> None:
+    view = view_of("bowl")
+    found = by_area(outline_at(view, scale), view, nominal(view))
+    assert found == pytest.approx(scale * nominal(view), rel=0.02)
+
+
+def test_the_outline_s_box_is_foreshortened_and_knows_no_model() -> None:
+    view = view_of("bowl")
+    assert by_box(outline_at(view, 1.0), view) == pytest.approx(nominal(view), rel=0.1)
+    doubled = by_box(outline_at(view, 2.0), view) / by_box(outline_at(view, 1.0), view)
+    assert doubled == pytest.approx(2.0, rel=0.15)
