@@ -22,9 +22,6 @@ from harness.recording.observation import observe_step
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 
-COMMON_SIGMA = 0.041
-"""Relative deviation of all frequencies together: 3 % of material, 2.6 % of wall, 1 % of unevenness."""
-
 SENSES = ("vision", "audio", "touch")
 
 OUTSIDE = 0.5
@@ -173,7 +170,7 @@ class ScaleAnswering:
                 "nothing was heard: no strike was made, or none rang; strike a place of the object"
             )
         model = self.model
-        return by_sound(peaks, model.ringing(self.accuracy), model.nominal, model.sizes, COMMON_SIGMA)
+        return by_sound(peaks, model.materials(self.accuracy), model.nominal, model.sizes)
 
     def _by_touch(self) -> Touch:
         if not self.patches:

@@ -6,13 +6,13 @@ from typing import Any
 
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.dials import KNOBS, OWN
-from experiments.scale_estimation.explore import PLAN_KEY, ScalePerformer, plan
+from experiments.scale_estimation.explore import PLAN_KEY, ScalePerformer, plan, steps_of
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.table import LOOKING, METHODS, OURS, PAPER_CM, cells, run_cell, scene_of
 from harness.experiment.experiment import Experiment, MeasuredCondition, Scored
-from harness.experiment.plain import PlainPerforms, plain_measurement
+from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
 
 NAME = "scale-estimation"
 
@@ -56,5 +56,7 @@ EXPERIMENT = Experiment(
         "object": {"scale": "hidden"},
         "sensors": {"camera": True, "sound": True, "touch": True},
     },
+    error_key="until",
+    budgets=plain_budgets(NAME, steps_of, *OWN),
     sizes_unknown=True,
 )

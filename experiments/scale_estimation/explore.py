@@ -26,17 +26,24 @@ SPEEDS = Speeds(approach=0.02)
 """A search may be tens of centimetres long here; at this speed the arm stops within 1.5 mm of a touch."""
 
 
+def steps_of(scene: SceneFile) -> int:
+    """How many steps a run of a scene has, if it is not surer before."""
+    return len(_kinds(scene))
+
+
+def _kinds(scene: SceneFile) -> list[str]:
+    sensors = scene.sensors
+    contacts = scene.section(Scale).contacts if sensors.touch or sensors.sound else 0
+    return ["look"] * sensors.camera + ["contact"] * contacts
+
+
 def plan(scene: SceneFile, station: Station, mesh: Mesh, _seed: int) -> Planned:
     """A look where there is a camera, then so many contacts; each is planned once those before are read.
 
     Raises:
         WrongUse: nothing is to be read, or strikes are asked for and no contacts.
     """
-    asked = scene.section(Scale)
-    sensors = scene.sensors
-    contacts = asked.contacts if sensors.touch or sensors.sound else 0
-    steps = [{"kind": "look"}] if sensors.camera else []
-    steps += [{"kind": "contact"} for _ in range(contacts)]
+    steps = [{"kind": kind} for kind in _kinds(scene)]
     if not steps:
         raise WrongUse("nothing is to be read: ask for vision, for contacts, or for both")
     model = ObjectModel(mesh, scene, station)
@@ -54,6 +61,7 @@ class ScalePerformer:
 
     def __init__(self, run: RunFiles, helpers: Helpers) -> None:
         self._ask: Ask | None = helpers.ask
+        self._say = helpers.say
         self._explorer = Explorer(run)
         self._press = PressPerformer(
             self._explorer.way, SPEEDS, ask=helpers.ask, plan_key=PLAN_KEY, explores=True
@@ -63,6 +71,9 @@ class ScalePerformer:
         """Those that are not on the disk; each contact is planned on what was read before it."""
         planned = recording.header.plan[PLAN_KEY]
         for index in range(recording.committed, len(planned)):
+            if self._explorer.is_sure(recording, index):
+                self._say("the size is known as well as was asked; no more contacts are made")
+                return
             if planned[index]["kind"] == "look":
                 yield Step(index, "look", planned[index])
             else:

@@ -7,13 +7,14 @@ import numpy as np
 
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import SizeRange
+from experiments.scale_estimation.sound.hearing import MaterialGuess
 from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.touch.fit import Stand, StandErrors
 from experiments.scale_estimation.vision.fit import CameraErrors, View
 from experiments.scale_estimation.vision.outline import hull_of
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
-from harness.basics.materials import MATERIALS
+from harness.basics.materials import KNOWN, MATERIALS
 from harness.basics.mesh import Mesh
 from harness.basics.mesh_hull import closed_hull
 from harness.bench.scene import SceneFile
@@ -23,6 +24,9 @@ from harness.experiment.object_modes import object_modes
 from harness.sim.solid.surface_samples import sample_surface
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import twin_of
+
+MEASURED_SIGMA = 0.03
+"""Of sqrt(E / density), relative, where it was measured on a thing of the same material."""
 
 _SAMPLES = 60
 """Samples along the longest side of the nominal object: of its surface, for contacts."""
@@ -117,9 +121,31 @@ class ObjectModel:
             )
         centre = 0.5 * camera.columns, 0.5 * camera.rows
         asked = self.scene.section(Scale)
-        errors = CameraErrors(support=asked.support_error, place=asked.place_error)
+        errors = CameraErrors(
+            position=asked.camera_position_error,
+            rotation=asked.camera_rotation_error,
+            focal_length=asked.focal_length_error,
+            support=asked.support_error,
+            place=asked.place_error,
+        )
         matrix = camera.base_from_camera.matrix
         return View(matrix, camera.focal_length, centre, self.corners, self.place, errors)
+
+    def materials(self, accuracy: Accuracy) -> list[MaterialGuess]:
+        """What the object may be made of, with how surely; what the scene states first.
+
+        Raises:
+            MeshRefused: its surface cannot be filled with elements.
+        """
+        stated, asked = self.ringing(accuracy), self.scene.section(Scale).material
+        if asked == "measured":
+            return [MaterialGuess(stated, MEASURED_SIGMA)]
+        names = [self.scene.object.material]
+        if asked == "unknown":
+            names += [name for name in MATERIALS if name != names[0]]
+        return [
+            MaterialGuess(stated.made_of(MATERIALS[name]), KNOWN[name].uncertainty.speed) for name in names
+        ]
 
     def ringing(self, accuracy: Accuracy) -> RingingModel:
         """For strikes, at the accuracy of its modes.

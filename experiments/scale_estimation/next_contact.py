@@ -75,6 +75,15 @@ class Explorer:
         assert self._travels is not None
         return way_between(self._travels, here, planned)
 
+    def is_sure(self, recording: Recording, index: int) -> bool:
+        """Whether the steps before one tell the size as well as the scene asks."""
+        until = self._run.scene.section(Scale).until
+        if until is None or index == 0:
+            return False
+        self._take_in(recording, index)
+        low, high = self._answering.answer().fused.interval
+        return bool(0.5 * (high - low) <= until)
+
     def plan(self, recording: Recording, index: int) -> dict[str, Any]:
         """The parameters of a contact.
 

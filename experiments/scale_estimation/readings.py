@@ -60,7 +60,8 @@ def peaks_of(strikes: Sequence[Strike]) -> Peaks | None:
         return None
     frequencies = np.array([peak.frequency for peak in peaks])
     levels = found.loudest + np.array([peak.level for peak in peaks])
-    return Peaks(frequencies, levels, found.band, settings.decay)
+    decays = np.array([peak.damping for peak in peaks])
+    return Peaks(frequencies, levels, found.band, settings.decay, decays)
 
 
 def _median(frames: ByteArray) -> ByteArray:

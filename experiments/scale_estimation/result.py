@@ -32,6 +32,7 @@ def result_of(scored: Scored) -> dict[str, Any]:
     return {
         "size_m": found.fused.size,
         "error_m": estimates["fused"]["error_m"],
+        "credible90_m": 0.5 * (estimates["fused"]["high90_m"] - estimates["fused"]["low90_m"]),
         "nominal_m": model.nominal,
         "range_m": [model.sizes.low, model.sizes.high],
         "contacts": found.contacts,

@@ -1,11 +1,11 @@
 """The table ``[scale]`` of a scene file."""
 
 import math
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from harness.basics.quantities import Angle, Length, Nonnegative, Ordered, Positive
+from harness.basics.quantities import Angle, Length, Nonnegative, Ordered, Positive, Ratio
 from harness.bench.scene import Section
 
 
@@ -19,6 +19,13 @@ class Scale(Section):
         tilt: rad, the greatest angle of the tool from the surface's normal.
         place_error: m, one standard deviation, per axis, of where on its support the object was put.
         support_error: m, one standard deviation of the height on which the object stands.
+        camera_position_error: m, one standard deviation per axis, of where the camera is.
+        camera_rotation_error: rad, likewise, of how it is turned.
+        focal_length_error: relative.
+        material: how well the object's material is known: ``"measured"``, its sqrt(E / density) to 3 %;
+            ``"named"``, as well as an object said to be of it; ``"unknown"``, one of all seven.
+        until: m: a run ends when half its 90 % interval is no wider, whatever contacts are left; None to
+            make them all.
         seed: of where, how deep and how tilted the contacts are; a run may say another.
     """
 
@@ -29,3 +36,8 @@ class Scale(Section):
     tilt: Annotated[Angle, Nonnegative] = math.radians(15.0)
     place_error: Annotated[Length, Positive] = 20.0e-3
     support_error: Annotated[Length, Positive] = 1.0e-3
+    camera_position_error: Annotated[Length, Positive] = 2.0e-3
+    camera_rotation_error: Annotated[Angle, Positive] = math.radians(0.2)
+    focal_length_error: Annotated[Ratio, Positive] = 5.0e-3
+    material: Literal["measured", "named", "unknown"] = "measured"
+    until: Annotated[Length, Positive] | None = None

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import numpy as np
+
 from harness.basics.errors import WrongUse
 from harness.basics.toml_file import nearest
 
@@ -48,6 +50,11 @@ class Uncertainty:
     poisson: float
     alpha: float
     beta: float
+
+    @property
+    def speed(self) -> float:
+        """Of sqrt(young / density), with which all frequencies of an object go."""
+        return 0.5 * float(np.hypot(self.young, self.density))
 
 
 @dataclass(frozen=True)

@@ -125,6 +125,8 @@ class SoundGap(StrictModel):
         silent_strikes: contacts, counted from 0, at which the striker does not reach the object.
         saturated_strikes: contacts at which the blow is ten times as hard.
         double_strikes: contacts at which the hammer bounces and hits twice.
+        material: whether stiffness, density and damping are as uncertain as ``harness.basics.materials``
+            says of the object's material, in place of ``frequency`` and ``damping``.
     """
 
     wall: Annotated[tuple[Ratio, Ratio], Ordered]
@@ -149,6 +151,7 @@ class SoundGap(StrictModel):
     silent_strikes: tuple[int, ...] = ()
     saturated_strikes: tuple[int, ...] = ()
     double_strikes: tuple[int, ...] = ()
+    material: bool = False
 
 
 class CameraGap(StrictModel):

@@ -226,6 +226,8 @@ class Procedure:
         gap: of a mocked bench where none is asked for; None for the station's.
         observe: in place of what a scene file observes by default; None for just that.
         assumed: tables and keys of a scene made from options, where they say nothing else.
+        error_key: of its table, that ``--error`` sets: the run itself ends when that is met; None where
+            ``--error`` chooses the levels of the answer.
         sizes_unknown: whether it can do with an object whose size is hidden.
     """
 
@@ -238,6 +240,7 @@ class Procedure:
     gap: str | None = None
     observe: tuple[str, ...] | None = None
     assumed: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    error_key: str | None = None
     sizes_unknown: bool = False
 
     @property

@@ -54,7 +54,9 @@ def instrument_of(world: World, scene: SceneFile, draw: GapDraw) -> SoundingObje
     solid = walled(world.nominal, None if wall is None else wall * world.made_scale)
     edge = FINER * default_edge(solid, made_of, LIMIT)
     modes = _modes(solid, made_of, edge, SoundDraw(draw), Store(default_folder()))
-    return SoundingObject(modes, dampings(modes.frequencies, made_of), radiation(modes, DISTANCE))
+    return SoundingObject(
+        modes, dampings(modes.frequencies, made_of), radiation(modes, DISTANCE), made_of.name
+    )
 
 
 def _modes(solid: Mesh, made_of: Material, edge: float, draw: SoundDraw, store: Store) -> Modes:

@@ -41,11 +41,13 @@ class SoundingObject:
         dampings: ``(m,)`` 1/s, of its material.
         levels: ``(m,)`` Pa for each unit of a mode's ringing, as ``harness.sim.sound.modal_sound.ring``
             makes it of a force in N and a gain in 1/sqrt(kg), at the microphone.
+        material: of which it is, by name; None where no gap draws its constants.
     """
 
     modes: Modes
     dampings: FloatArray
     levels: FloatArray
+    material: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +110,7 @@ class WorldSound:
     ) -> None:
         self._world = world
         self._modes = instrument.modes
-        self._draw = SoundDraw(GapDraw(gap, seed))
+        self._draw = SoundDraw(GapDraw(gap, seed), instrument.material)
         self._flange_from_hammer = flange_from_hammer
         self._rate = rate
         self._room = self._room_of(gap)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.geometry import rotation_from_vector, transform
+from harness.basics.materials import KNOWN
 from harness.bench.gap import SoundGap
 from mocks.world.gap_draw import GapDraw
 
@@ -61,14 +62,21 @@ class SoundDraw:
 
     Args:
         draw: of the same run.
+        material: the object's, by name; needed where the gap draws its constants.
     """
 
-    def __init__(self, draw: GapDraw) -> None:
+    def __init__(self, draw: GapDraw, material: str | None = None) -> None:
         self._draw = draw
         self._gap: SoundGap = draw.gap.sound
         run = draw.random(_RUN)
-        self.frequency = 1.0 + self._gap.frequency * run.standard_normal()
-        self.damping = float(np.exp(self._gap.damping * run.standard_normal()))
+        stiffness, damping = run.standard_normal(2)
+        self.frequency = 1.0 + self._gap.frequency * stiffness
+        self.damping = float(np.exp(self._gap.damping * damping))
+        if self._gap.material and material is not None:
+            known = KNOWN[material].uncertainty
+            self.frequency = float(np.exp(known.speed * stiffness))
+            # One factor for both terms of the damping, as uncertain as the two are on average.
+            self.damping = float(np.exp(0.5 * (known.alpha + known.beta) * damping))
         self.force_gain = 1.0 + self._gap.force_gain * run.standard_normal()
         self.room_seed = int(run.integers(2**31))
 

@@ -1,6 +1,7 @@
 """What strikes say of the size of a known object."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.sound.peaks import Peaks, log_likelihood
 from harness.basics.errors import FitRefused
+from harness.basics.materials import Material
+from harness.sim.modal.modes import dampings
 
 FEWEST = 3
 """Peaks below which a match by chance is too likely."""
@@ -20,11 +23,30 @@ TEMPER = 0.5
 """Power of the likelihood: modes of one family are off together, so that peaks say less than their number."""
 
 
+DAMPING_SIGMA = 0.8
+"""Of the logarithm of a material's damping, as published values differ."""
+
+PEAK_DAMPING_SIGMA = 0.5
+"""Likewise, of one peak's."""
+
 SHAPE_SIGMA = 0.028
 """Relative deviation of all frequencies together that is of wall and unevenness, not of the material."""
 
 NINE_TENTHS = 1.645
 """Standard deviations within which nine tenths of a normal distribution lie, each way."""
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialGuess:
+    """What the object may be made of.
+
+    Attributes:
+        model: of the object, were it that.
+        sigma: of the logarithm of sqrt(E / density).
+    """
+
+    model: RingingModel
+    sigma: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,20 +82,17 @@ class Hearing:
         }
 
 
-def by_sound(
-    peaks: Peaks, model: RingingModel, nominal: float, sizes: SizeRange, common_sigma: float
-) -> Hearing:
+def by_sound(peaks: Peaks, materials: Sequence[MaterialGuess], nominal: float, sizes: SizeRange) -> Hearing:
     """The sizes at which the object's modes are heard where the peaks are.
 
     Args:
         peaks: heard.
-        model: of the object at its nominal size.
+        materials: that the object may be of, each as likely before anything is heard; what is stated first.
         nominal: m, the longest side of the model.
         sizes: asked about.
-        common_sigma: deviation of the logarithm of all frequencies together: of the material and the wall.
 
     Raises:
-        FitRefused: too few peaks, or modes at no size explain them.
+        FitRefused: too few peaks, or modes at no size and of no material explain them.
     """
     began = time.perf_counter()
     if len(peaks.frequencies) < FEWEST:
@@ -82,13 +101,30 @@ def by_sound(
             "places"
         )
     logs = sizes.logs - np.log(nominal)
-    likelihood = log_likelihood(peaks, model, logs)
-    best = int(likelihood.argmax())
-    matched = float(likelihood[best]) / len(peaks.frequencies)
+    likelihoods = [log_likelihood(peaks, guess.model, logs) for guess in materials]
+    matched = max(float(likelihood.max()) for likelihood in likelihoods) / len(peaks.frequencies)
     if matched < WORTH:
         raise FitRefused(
             f"what was heard fits this object's modes at no size: {matched:.1f} nats a peak over chance, and "
             f"{WORTH:g} are needed; check object and material, or strike more places"
         )
-    match = Belief.of(sizes, TEMPER * likelihood)
-    return Hearing(match.widened(common_sigma), match, matched, time.perf_counter() - began)
+    density = np.full(len(logs), -np.inf)
+    for guess, likelihood in zip(materials, likelihoods, strict=True):
+        weight = float(np.logaddexp.reduce(TEMPER * likelihood)) + log_ringing(peaks, guess.model.material)
+        sigma = float(np.hypot(guess.sigma, SHAPE_SIGMA))
+        density = np.logaddexp(
+            density, weight + Belief.of(sizes, TEMPER * likelihood).widened(sigma).log_density
+        )
+    match = Belief.of(sizes, TEMPER * likelihoods[0])
+    return Hearing(Belief.of(sizes, density), match, matched, time.perf_counter() - began)
+
+
+def log_ringing(peaks: Peaks, material: Material) -> float:
+    """Of how long the peaks ring, were the object of that material: their mean over the material's own.
+
+    At a heard frequency the damping is that of the material, whatever the size.
+    """
+    expected = dampings(peaks.frequencies, material)
+    apart = np.log(np.maximum(peaks.decays, 0.1 * expected) / expected)
+    sigma = np.hypot(DAMPING_SIGMA, PEAK_DAMPING_SIGMA / np.sqrt(len(apart)))
+    return float(-0.5 * (np.median(apart) / sigma) ** 2)

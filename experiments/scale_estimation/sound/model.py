@@ -37,6 +37,19 @@ class RingingModel:
             read_only(modes.frequencies.copy()), read_only(middling * radiation(modes, distance)), material
         )
 
+    def made_of(self, material: Material) -> "RingingModel":
+        """The same body of another material: frequencies as sqrt(E / density), amplitudes as 1 / density.
+
+        Poisson's ratio stays as it was, which shifts modes against each other by a percent or two.
+        """
+        if material == self.material:
+            return self
+        faster = np.sqrt(material.young / material.density * self.material.density / self.material.young)
+        lighter = self.material.density / material.density
+        return RingingModel(
+            read_only(self.frequencies * faster), read_only(self.amplitudes * lighter), material
+        )
+
     def levels(self, log_sizes: FloatArray, window_decay: float) -> FloatArray:
         """``(k, m)`` dB re 1 Pa/N of each peak of an object larger by ``exp(log_sizes)``.
 

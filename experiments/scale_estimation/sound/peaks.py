@@ -42,12 +42,14 @@ class Peaks:
         levels: ``(p,)`` dB re 1 Pa/N.
         band: Hz, from and to, that the strikes excited.
         window_decay: 1/s that the analysis adds to every decay.
+        decays: ``(p,)`` 1/s, the window's taken off.
     """
 
     frequencies: FloatArray
     levels: FloatArray
     band: tuple[float, float]
     window_decay: float
+    decays: FloatArray
 
 
 def log_likelihood(peaks: Peaks, model: RingingModel, log_sizes: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import PchipInterpolator
 
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.vision.fit import OutlineFit, OutlineProblem, View
@@ -142,14 +142,13 @@ def _apart(fits: list[OutlineFit], least: float) -> list[OutlineFit]:
 
 def _scanned(problem: OutlineProblem, fit: OutlineFit, logs: FloatArray) -> FloatArray:
     """``(n,)`` minus the least cost at each logarithm of the size over the nominal one."""
-    middle, sigma = (
-        float(fit.unknowns[0]),
-        min(float(np.sqrt(problem.covariance(fit.unknowns)[0, 0])), NO_SIZE),
-    )
-    starts = np.tile(fit.unknowns, (len(_SCAN), 1))
-    starts[:, 0] = middle + sigma * _SCAN
+    covariance = problem.covariance(fit.unknowns)
+    middle, sigma = float(fit.unknowns[0]), min(float(np.sqrt(covariance[0, 0])), NO_SIZE)
+    # The other unknowns go with the size as they do to first order, and are refined from there.
+    along = covariance[0] / covariance[0, 0]
+    starts = fit.unknowns + sigma * _SCAN[:, None] * along
     costs = np.array([one.cost for one in problem.fit(starts, _SCAN_ROUNDS, fixed_size=True)])
     away = (logs - middle) / sigma
-    within = CubicSpline(_SCAN, costs)(np.clip(away, _SCAN[0], _SCAN[-1]))
+    within = PchipInterpolator(_SCAN, costs)(np.clip(away, _SCAN[0], _SCAN[-1]))
     beyond = np.maximum(np.abs(away) - _SCAN[-1], 0.0)
     return np.asarray(-within - _SCAN[-1] * beyond)

@@ -102,7 +102,9 @@ def run(
     from harness.recording.recording import Recording
     from harness.recording.run_folder import RunFiles
 
-    target = _target(budget, error, level)
+    kind = named(experiment or DEFAULT)
+    ends_run = error is not None and resume is None and kind.error_key is not None
+    target = _target(budget, None if ends_run else error, level)
     if resume is not None:
         _refuse_with_resume(
             station=station,
@@ -128,9 +130,10 @@ def run(
             require_of(recording, named(experiment).name, "--resume")
         accuracy = chosen_levels(kind.knobs, level or [])
     else:
-        kind = named(experiment or DEFAULT)
         accuracy = chosen_levels(kind.knobs, level or [])
-        keys = {"contacts": contacts, "spacing": spacing, "yaw": yaw}
+        keys: dict[str, Any] = {"contacts": contacts, "spacing": spacing, "yaw": yaw}
+        if ends_run and kind.error_key is not None:
+            keys[kind.error_key] = error
         wanted = resolve(
             scene,
             object_,

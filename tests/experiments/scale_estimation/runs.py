@@ -18,14 +18,16 @@ from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 
 
-def scene_of(contacts: int, camera: bool = True, sound: bool = False, **thing: Any) -> SceneFile:
+def scene_of(
+    contacts: int, camera: bool = True, sound: bool = False, until: str | None = None, **thing: Any
+) -> SceneFile:
     """A built-in object of hidden size; the mug where none is named."""
     return scene_from_json(
         {
             "schema": 1,
             "object": {"mesh": "builtin:mug", "scale": "hidden", **thing},
             "sensors": {"camera": camera, "touch": contacts > 0, "sound": sound},
-            "scale": {"contacts": contacts},
+            "scale": {"contacts": contacts, **({} if until is None else {"until": until})},
         },
         "the scene",
     )

@@ -74,6 +74,16 @@ def test_sight_alone_needs_no_contact(tmp_path: Path, station: Station) -> None:
     assert result["estimates"]["touch"]["size_m"] is None
 
 
+def test_a_run_ends_when_the_size_is_known_as_well_as_was_asked(tmp_path: Path, station: Station) -> None:
+    scene = scene_of(5, until="2 cm")
+    recording = ran(tmp_path / "run", scene, station)
+    assert recording.committed < 6
+    result = answered(recording)
+    assert result["credible90_m"] <= 0.02
+    assert went_on(Recording(recording.folder), Quiet())
+    assert Recording(recording.folder).committed == recording.committed
+
+
 def test_a_scene_that_reads_nothing_is_refused_before_anything_moves(
     tmp_path: Path, station: Station
 ) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.touch.fit import Stand
+from experiments.scale_estimation.touch.fit import THROUGH, UNKNOWNS, FreeSpace, Stand
 from experiments.scale_estimation.touch.patch import POINTS, Patch, patch_of
 from experiments.scale_estimation.touch.touch import by_touch
 from harness.basics.arrays import FloatArray
@@ -74,6 +74,39 @@ def test_contacts_on_one_side_leave_the_size_open() -> None:
     found = by_touch(stand, patches, nominal, RANGE)
     low, high = found.belief.interval
     assert high / low > 2.0
+
+
+def test_a_bar_never_touched_at_its_ends_is_not_called_short() -> None:
+    stand, nominal = stand_of("wrench")
+    middle = np.flatnonzero((np.abs(stand.points[:, 0]) < 0.15 * nominal) & (stand.normals[:, 2] > -0.3))
+    random, patches = np.random.default_rng(1), []
+    for index in random.choice(middle, 8, replace=False):
+        near = np.argsort(np.linalg.norm(stand.points - stand.points[index], axis=1))[:POINTS]
+        facing = near[(stand.normals[near] @ stand.normals[index]) > 0.7]
+        patches.append(Patch(stand.points[np.resize(facing, POINTS)] + PLACE, stand.normals[index]))
+    low, high = by_touch(stand, patches, nominal, RANGE).belief.interval
+    assert low < nominal < high
+
+
+def test_a_way_through_the_object_counts_against_its_being_there() -> None:
+    """The gel has passed beside a small tray, and would have had to pass through a large one."""
+    stand, nominal = stand_of("tray")
+    aside = PLACE + np.array([0.75 * nominal, 0.0, 0.0])
+    way = aside + np.linspace(0.2, 0.001, 140)[:, None] * UP
+    small, large = np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
+    large[0] = np.log(2.0)
+    both = np.stack([small, large])
+    assert FreeSpace(stand, [way]).cost(both).tolist() == [0.0, THROUGH]
+    assert FreeSpace(stand, [way, way]).cost(both).tolist() == [0.0, 2.0 * THROUGH]
+    assert FreeSpace(stand, []).cost(both).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("scale", [0.35, 2.6])
+def test_a_size_beyond_the_range_is_named(scale: float) -> None:
+    stand, nominal = stand_of("mug")
+    asked = SizeRange(0.5 * nominal, 2.0 * nominal)
+    found = by_touch(stand, contacts("mug", scale, 10), nominal, asked)
+    assert found.belief.outside > 0.5
 
 
 def test_another_object_is_refused() -> None:

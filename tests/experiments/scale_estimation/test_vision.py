@@ -96,14 +96,24 @@ def test_what_hides_a_side_leaves_the_size_and_widens_it() -> None:
     assert found.belief.spread > seen.belief.spread
 
 
+@pytest.mark.parametrize("scale", [0.35, 2.6])
+def test_a_size_beyond_the_range_is_named(scale: float) -> None:
+    view = view_of("mug")
+    asked = SizeRange(0.5 * nominal(view), 2.0 * nominal(view))
+    assert by_sight(view, outline_at(view, scale), nominal(view), asked).belief.outside > 0.5
+
+
 def test_another_object_is_refused() -> None:
     view, other = view_of("mug"), outline_at(view_of("wrench"), 0.8, yaw=0.7)
     with pytest.raises(FitRefused, match=r"px \(rms\) off"):
         by_sight(view, other, nominal(view), RANGE)
 
 
-def test_without_the_camera_s_place_a_picture_says_hardly_anything() -> None:
-    view = view_of("mug", CameraErrors(position=1.0, support=0.5))
+@pytest.mark.parametrize("unknown", [{"position": 1.0}, {"support": 0.5}])
+def test_without_the_camera_s_place_or_the_support_s_a_picture_says_hardly_anything(
+    unknown: dict[str, float],
+) -> None:
+    view = view_of("mug", CameraErrors(**unknown))
     found = by_sight(view, outline_at(view, 1.2), nominal(view), RANGE)
     low, high = found.belief.interval
     assert np.log(high / low) > NO_SIZE
