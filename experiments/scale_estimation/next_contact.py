@@ -42,6 +42,12 @@ CANDIDATES = 6
 BELIEVED_AFTER = 2
 """Contacts without a look after which the object is believed to stand where they say."""
 
+ALONG_SIGHT = (0.0, 1.0, -1.0, 2.0, -2.0)
+"""Standard deviations of its place along the line of sight at which a seen object is thought of."""
+
+SURE_OF_SIZE = 0.1
+"""Of the size's logarithm: where contacts fit a seen object farther off than that, it is by chance."""
+
 STRUCK_AFTER = 1
 """Contacts before the first strike: one has then shown that the object is where it is believed to be."""
 
@@ -126,21 +132,9 @@ class Explorer:
 
     def _believed(self) -> FloatArray | None:
         """``(4,)`` of the hypothesis that fits all contacts best; None where there is none yet."""
-        model, patches = self._model, self._answering.patches
-        if not patches:
-            return self._seen[0].unknowns if self._seen else None
         if self._seen:
-            problem = TouchProblem(model.stand, patches, len(patches[0].points))
-            free = FreeSpace(model.stand, self._answering.free)
-            starts = np.zeros((len(self._seen), UNKNOWNS))
-            starts[:, :4] = np.stack([stand.unknowns for stand in self._seen])
-            minima, costs = problem.refined(starts, 8, fixed_size=False)
-            costs = costs + free.cost(minima)
-            best = minima[int(costs.argmin())]
-            # A few contacts can be fitted by another size: what was seen of it holds.
-            if abs(best[0] - self._seen[0].unknowns[0]) < 0.1:
-                return np.asarray(best[:4])
-            return self._seen[int(costs.argmin())].unknowns
+            return self._believed_of_seen()
+        model, patches = self._model, self._answering.patches
         if len(patches) < BELIEVED_AFTER:
             return None
         try:
@@ -148,6 +142,25 @@ class Explorer:
         except FitRefused:
             return None
         return np.asarray(found.unknowns[:4])
+
+    def _believed_of_seen(self) -> FloatArray:
+        """Of every turn that was seen, and places along the line of sight: what the contacts fit best."""
+        model, patches = self._model, self._answering.patches
+        away = np.array(ALONG_SIGHT)
+        starts = np.zeros((len(self._seen) * len(away), UNKNOWNS))
+        for row, (stand, far) in enumerate((stand, far) for stand in self._seen for far in away):
+            starts[row, :4] = stand.unknowns
+            starts[row, 1:3] += far * stand.farthest
+        costs = 0.5 * np.tile(away, len(self._seen)) ** 2
+        problem = TouchProblem(model.stand, patches, len(patches[0].points) if patches else 1)
+        found = starts
+        if patches:
+            found, misfits = problem.refined(starts, 8, fixed_size=False)
+            costs = costs + misfits
+        best = int((costs + FreeSpace(model.stand, self._answering.free).cost(found)).argmin())
+        # A few contacts can be fitted by another size: what was seen of it holds.
+        kept = found if abs(found[best, 0] - starts[best, 0]) < SURE_OF_SIZE else starts
+        return np.asarray(kept[best, :4])
 
     def _on_object(
         self, travels: TwinBench, stand: FloatArray, random: np.random.Generator

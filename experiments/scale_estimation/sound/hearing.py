@@ -16,7 +16,7 @@ from harness.sim.modal.modes import dampings
 FEWEST = 3
 """Peaks below which a match by chance is too likely."""
 
-WORTH = 2.8
+WORTH = 2.2
 """Nats a peak over chance, below which the object's modes do not explain what was heard."""
 
 TEMPER = 0.5

@@ -81,11 +81,17 @@ class SeenStand:
 
     Attributes:
         unknowns: ``(4,)`` log of the size over the nominal one, x, y, m, yaw, rad.
-        place_error: m, the greatest standard deviation of its place: along the line of sight.
+        farthest: ``(2,)`` m along x and y: one standard deviation of its place the way it is known worst, the
+            line of sight.
     """
 
     unknowns: FloatArray
-    place_error: float
+    farthest: FloatArray
+
+    @property
+    def place_error(self) -> float:
+        """M, the length of ``farthest``."""
+        return float(np.linalg.norm(self.farthest))
 
 
 def stands_seen(view: View, outline: Outline) -> tuple[SeenStand, ...]:
@@ -112,8 +118,8 @@ def stands_seen(view: View, outline: Outline) -> tuple[SeenStand, ...]:
 
 
 def _stand(problem: OutlineProblem, fit: OutlineFit) -> SeenStand:
-    greatest = np.linalg.eigvalsh(problem.covariance(fit.unknowns)[1:3, 1:3])[-1]
-    return SeenStand(fit.unknowns[:4], float(np.sqrt(greatest)))
+    variances, axes = np.linalg.eigh(problem.covariance(fit.unknowns)[1:3, 1:3])
+    return SeenStand(fit.unknowns[:4], np.sqrt(variances[-1]) * axes[:, -1])
 
 
 def _starts(view: View, outline: Outline, yaws: int) -> FloatArray:
