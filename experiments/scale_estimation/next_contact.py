@@ -33,7 +33,7 @@ from harness.skills.sites import PressLimits, Site, plan_sites
 from harness.skills.strike import POSE, StrikeMotion, planner
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import twin_of, way_between
-from harness.twin.motion import plan_contact, reachable
+from harness.twin.motion import PlannedContact, plan_contact, reachable
 from harness.twin.rehearsal import rehearse
 
 CANDIDATES = 6
@@ -42,14 +42,17 @@ CANDIDATES = 6
 BELIEVED_AFTER = 2
 """Contacts without a look after which the object is believed to stand where they say."""
 
+BEYOND = (0.04, 0.02, 0.008)
+"""M that a search may go on beyond where the object is believed to be; the first with a free way."""
+
 ALONG_SIGHT = (0.0, 1.0, -1.0, 2.0, -2.0)
 """Standard deviations of its place along the line of sight at which a seen object is thought of."""
 
 SURE_OF_SIZE = 0.1
 """Of the size's logarithm: where contacts fit a seen object farther off than that, it is by chance."""
 
-STRUCK_AFTER = 1
-"""Contacts before the first strike: one has then shown that the object is where it is believed to be."""
+STRUCK_AFTER = 2
+"""Contacts that met the object before the first strike: a tip then meets it where it is believed to be."""
 
 SLANTS = (0.0, 0.0, 0.45, 0.9, 1.3)
 """Rad from straight down, of lines into the unknown: a flat thing is met from above alone."""
@@ -74,6 +77,7 @@ class Explorer:
         self._struck = 0
         self._touches = 0
         self._travels: TwinBench | None = None
+        self._nothing: TwinBench | None = None
         self._seen: tuple[SeenStand, ...] = ()
 
     def way(self, here: FloatArray, planned: FloatArray) -> FloatArray:
@@ -129,6 +133,11 @@ class Explorer:
             around = seen_envelope(model, self._seen) if self._seen else blind_envelope(model)
             self._travels = model.twin_around(around)
         return self._travels
+
+    def _without_object(self) -> TwinBench:
+        if self._nothing is None:
+            self._nothing = self._model.twin_around(self._model.nowhere, has_object=False)
+        return self._nothing
 
     def _believed(self) -> FloatArray | None:
         """``(4,)`` of the hypothesis that fits all contacts best; None where there is none yet."""
@@ -194,7 +203,7 @@ class Explorer:
         raise WrongUse("none of the most telling places has a free way")
 
     def _strikes_left(self) -> int:
-        if not self._run.scene.sensors.sound or self._touches < STRUCK_AFTER:
+        if not self._run.scene.sensors.sound or len(self._answering.patches) < STRUCK_AFTER:
             return 0
         return self._run.scene.section(Scale).strikes - self._struck
 
@@ -204,12 +213,21 @@ class Explorer:
         contact, strikes = itinerary.contacts[0], itinerary.strikes
         rehearse(travels, contact.travels(0)).require()
         rehearse(lines, contact.lines(0)).require()
-        made = ContactMotion.planned(contact, lines.flange_from_gel, site.press).to_parameters()
+        beyond = self._overtravel(contact, site.base_from_gel[:3, 2])
+        motion = ContactMotion.planned(contact, lines.flange_from_gel, site.press, beyond)
+        made = motion.to_parameters()
         for strike in strikes:
             rehearse(travels, strike.travels(0)).require()
             rehearse(lines, strike.lines(0)).require()
             made["strike"] = StrikeMotion.planned(strike).to_parameters()
         return made
+
+    def _overtravel(self, contact: PlannedContact, axis: FloatArray) -> float:
+        """M that a search may go on beyond where the object is believed to be, nothing else being met."""
+        for beyond in BEYOND:
+            if not rehearse(self._without_object(), [contact.searched(0, beyond, axis)]).refusals:
+                return beyond
+        return 0.0
 
     def _most_telling(self, sites: Sequence[Site], stand: FloatArray) -> list[Site]:
         """The sites by the standard deviation of the size that a contact there would leave, least first."""
@@ -232,7 +250,7 @@ class Explorer:
     def _blind(self, travels: TwinBench, random: np.random.Generator) -> dict[str, Any]:
         """A line to the middle of where the object should be."""
         model = self._model
-        lines = model.twin_around(model.nowhere, has_object=False)
+        lines = self._without_object()
         for base_from_gel in self._rays(random):
             contact = plan_contact(lines, base_from_gel, self._joints, searched=1, travels=travels)
             if contact is None:
@@ -243,7 +261,7 @@ class Explorer:
             except MotionRefused:
                 continue
             press = float(np.mean(self._run.scene.section(Scale).depth))
-            return ContactMotion.planned(contact, lines.flange_from_gel, press).to_parameters()
+            return ContactMotion.planned(contact, lines.flange_from_gel, press, 0.0).to_parameters()
         raise WrongUse(
             f"no free way was found on any of {_RAYS} lines to the middle of where the object should be, "
             f"around one of up to {1e2 * model.sizes.high:.0f} cm; give a smaller range, or another place"

@@ -41,6 +41,7 @@ class ContactMotion:
         axis: ``(3,)`` unit in base: the way the gel is pressed.
         search: m from the stand-off to where the gel would first touch the nominal surface.
         press: m to press on after the first touch.
+        overtravel: m beyond ``search`` before a touch is given up; None for that of the performer's speeds.
     """
 
     start: FloatArray
@@ -49,17 +50,26 @@ class ContactMotion:
     axis: FloatArray
     search: float
     press: float
+    overtravel: float | None = None
 
     @classmethod
-    def planned(cls, contact: PlannedContact, flange_from_gel: FloatArray, press: float) -> "ContactMotion":
+    def planned(
+        cls,
+        contact: PlannedContact,
+        flange_from_gel: FloatArray,
+        press: float,
+        overtravel: float | None = None,
+    ) -> "ContactMotion":
         """The motion of a planned contact whose last ``press`` metres are in the gel."""
         axis = (contact.base_from_stand_off @ flange_from_gel)[:3, 2]
         search = contact.stand_off - press
-        return cls(contact.start, contact.travel, contact.base_from_stand_off, axis, search, press)
+        return cls(
+            contact.start, contact.travel, contact.base_from_stand_off, axis, search, press, overtravel
+        )
 
     def to_parameters(self) -> dict[str, Any]:
         """As JSON values, with the unit in each key."""
-        return {
+        parameters: dict[str, Any] = {
             "start_rad": self.start.tolist(),
             "travel_rad": self.travel.tolist(),
             "base_from_stand_off": self.base_from_stand_off.tolist(),
@@ -67,6 +77,7 @@ class ContactMotion:
             "search_m": self.search,
             "press_m": self.press,
         }
+        return parameters if self.overtravel is None else {**parameters, "overtravel_m": self.overtravel}
 
     @classmethod
     def from_parameters(cls, parameters: Mapping[str, Any]) -> "ContactMotion":
@@ -79,6 +90,7 @@ class ContactMotion:
             arrays["axis_in_base"],
             float(parameters["search_m"]),
             float(parameters["press_m"]),
+            parameters.get("overtravel_m"),
         )
 
 
@@ -209,7 +221,8 @@ class PressPerformer:
             raise
 
     def _touch(self, step: Step, motion: ContactMotion, arm: Arm) -> bool:
-        travel = motion.search + self.speeds.overtravel
+        over = self.speeds.overtravel if motion.overtravel is None else motion.overtravel
+        travel = motion.search + over
         if arm.move_until_contact(motion.axis, self.speeds.approach, self.speeds.touch_force, travel):
             self._met = arm.state().base_from_flange[:3, 3]
             return True

@@ -72,6 +72,17 @@ class PlannedContact:
         stations = [self.start, *self.travel]
         return tuple(Segment(step, "travel", "joint", a, b) for a, b in itertools.pairwise(stations))
 
+    def searched(self, step: int, beyond: float, axis: FloatArray) -> Segment:
+        """The line to the press and so many metres beyond, where the object may be met later or not at all.
+
+        Args:
+            step: of the experiment.
+            beyond: m.
+            axis: ``(3,)`` unit in base, the way of the press.
+        """
+        end = translation(beyond * axis) @ self.base_from_pressed
+        return Segment(step, "search", "line", self.stand_off_joints, end, touches=True)
+
     def lines(self, step: int, press: bool = True) -> tuple[Segment, Segment]:
         """There and back along the gel's axis.
 

@@ -12,7 +12,7 @@ from tests.support.whole_run import in_process_run, touch_scene
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
-OVER_WIRES = ("run contact-localization", "check ", "calibrate taxim --station")
+OVER_WIRES = ("run ", "demo ", "check ", "calibrate taxim --station")
 MEASURED = ("tables ", "cost ")
 LONG = (*OVER_WIRES, *MEASURED)
 """A run over every wire takes a minute, and each of these commands has quicker tests of its own."""

@@ -36,7 +36,7 @@ _FOLLOWED = 2
 """Stands of the first search that each size is followed from."""
 
 _LIKELY = 12
-_PROFILE_POINTS = 6
+_FINE_POINTS = 6
 _COARSE_POINTS = 1
 _FINE = np.linspace(-4.0, 4.0, 17)
 _FAR = 12.0
@@ -87,7 +87,7 @@ def by_touch(
         _starts(stand, patches, logs), 5, fixed_size=False
     )
     likely = found[np.argsort(costs)[: max(refined, _LIKELY)]]
-    fine = TouchProblem(stand, patches, len(patches[0].points))
+    fine = TouchProblem(stand, patches, _FINE_POINTS)
     minima, misfits = fine.refined(likely[:refined], 8, fixed_size=False)
     least = misfits + passed.cost(minima)
     best = int(least.argmin())
@@ -97,8 +97,9 @@ def by_touch(
             f"{misfits[best] / len(patches):.1f} a contact (limit {MISFIT:g}); check that it is this object, "
             "and that it stands upright where the scene says"
         )
-    scan = [_profile(TouchProblem(stand, patches, _PROFILE_POINTS), passed, found, costs, minima[best], logs)]
-    for k in _apart(minima, least):
+    apart = _apart(minima, least)
+    scan = [_profile(fine, passed, found, costs, minima[apart[:_FOLLOWED]], logs)]
+    for k in apart:
         scan.append(_scanned(fine, minima[k], float(least[k] - misfits[k])))
     belief = Belief.of(sizes, -_least_of(np.vstack(scan), logs))
     belief = belief.doubted(CHANCE ** (len(patches) - 1))
@@ -126,18 +127,19 @@ def _profile(
     passed: FreeSpace,
     found: FloatArray,
     costs: FloatArray,
-    best: FloatArray,
+    minima: FloatArray,
     logs: FloatArray,
 ) -> FloatArray:
     """``(n, 2)`` logarithms of sizes all over, and the least cost that was found at each.
 
-    Every size is followed alike, from what the first search found nearest to it and from the best of all: one
+    Every size is followed alike, from what the first search found nearest to it and from the best minima: one
     that was not would look worse than it is beside one that was.
     """
     sizes = np.linspace(logs[0], logs[-1], int(np.ceil((logs[-1] - logs[0]) / _PROFILED)) + 1)
     away = costs + 0.5 * ((sizes[:, None] - found[:, 0]) / _COARSE) ** 2
     near = found[np.argpartition(away, _FOLLOWED, axis=1)[:, :_FOLLOWED]]
-    starts = np.concatenate([near, np.broadcast_to(best, (len(sizes), 1, UNKNOWNS))], axis=1)
+    followed = np.broadcast_to(minima, (len(sizes), *minima.shape))
+    starts = np.concatenate([near, followed], axis=1)
     starts[..., 0] = sizes[:, None]
     there, least = problem.refined(starts.reshape(-1, UNKNOWNS), 5, fixed_size=True)
     least = (least + passed.cost(there)).reshape(len(sizes), -1)

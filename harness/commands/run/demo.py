@@ -7,10 +7,13 @@ import typer
 
 from harness.commands import options
 from harness.commands.output import CONSOLE
-from harness.commands.run.run import DEFAULT, Spacing, run
+from harness.commands.run.run import DEFAULT, RUNNABLE, Spacing, run
 
 
 def demo(
+    experiment: Annotated[
+        str, typer.Argument(help=f"What to run: {', '.join(RUNNABLE)}.", metavar="NAME")
+    ] = DEFAULT,
     object_: Annotated[
         str, typer.Option("--object", help="A built-in object: mug, bowl, plate, pitcher, tray, wrench.")
     ] = "mug",
@@ -20,25 +23,28 @@ def demo(
     out: Annotated[Path | None, typer.Option(help="The run's folder.")] = None,
     json: options.Json = False,
 ) -> int:
-    """Localize a contact on the mocked bench from end to end, by touch, by sound and by both.
+    """Run an experiment on the mocked bench from end to end, by every sense that it has.
 
-    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object four times and strikes each
-    place with a mocked hammer (over a serial line); the drivers are those of a real bench. The estimates are
+    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object four times and strikes it
+    with a mocked hammer (over a serial line); the drivers are those of a real bench. The estimates are
     made from the recording alone. The object's modes are computed the first time and kept;
     with --objectfile and --level sound.shapes=network they come from its ObjectFile, and nothing is solved.
+
+    Try: touchstone demo scale-estimation
     """
     CONSOLE.print(
         "mock bench: a UR5e's controller and a GelSight's stream on loopback, a hammer and a microphone on a "
         "serial line, with a reality gap of their own"
     )
+    localizes = experiment == DEFAULT
     return run(
-        DEFAULT,
+        experiment,
         object_=f"builtin:{object_}",
         objectfile=objectfile,
         level=level,
-        contacts=4,
-        spacing=Spacing.SPREAD,
-        sense="both",
+        contacts=4 if localizes else 5,
+        spacing=Spacing.SPREAD if localizes else None,
+        sense="both" if localizes else None,
         seed=seed,
         out=out,
         json=json,
