@@ -35,6 +35,9 @@ _SLENDER = 3.0
 _FOLLOWED = 2
 """Stands of the first search that each size is followed from."""
 
+CHEAP = 4
+"""Refined starts up to which the first search begins at two places of the object alone."""
+
 _LIKELY = 12
 _FINE_POINTS = 6
 _COARSE_POINTS = 1
@@ -84,7 +87,7 @@ def by_touch(
     logs = sizes.logs - np.log(nominal)
     passed = FreeSpace(stand, free)
     found, costs = TouchProblem(stand, patches, _COARSE_POINTS).refined(
-        _starts(stand, patches, logs), 5, fixed_size=False
+        _starts(stand, patches, logs, refined > CHEAP), 5, fixed_size=False
     )
     likely = found[np.argsort(costs)[: max(refined, _LIKELY)]]
     fine = TouchProblem(stand, patches, _FINE_POINTS)
@@ -106,7 +109,7 @@ def by_touch(
     return Touch(belief, minima[best], float(misfits[best] / len(patches)), time.perf_counter() - began)
 
 
-def _starts(stand: Stand, patches: Sequence[Patch], logs: FloatArray) -> FloatArray:
+def _starts(stand: Stand, patches: Sequence[Patch], logs: FloatArray, everywhere: bool) -> FloatArray:
     """``(n, UNKNOWNS)`` sizes, places and turns, all with all, that the first search begins from."""
     sizes = np.arange(logs[0], logs[-1] + _COARSE, _COARSE)
     across = np.linalg.svd(stand.points[:, :2] - stand.points[:, :2].mean(axis=0), compute_uv=False)
@@ -116,6 +119,7 @@ def _starts(stand: Stand, patches: Sequence[Patch], logs: FloatArray) -> FloatAr
     ends = np.concatenate([patch.points for patch in patches])[:, :2] - stand.place[:2]
     # The middle of contacts all over an object is near its own.
     places = np.array([0.5 * (ends.min(axis=0) + ends.max(axis=0)), *((x, y) for x in out for y in out)])
+    places = places if everywhere else places[:2]
     size, place, yaw = (grid.ravel() for grid in np.meshgrid(sizes, np.arange(len(places)), turns))
     starts = np.zeros((len(size), UNKNOWNS))
     starts[:, :4] = np.column_stack([size, places[place.astype(int)], yaw])
