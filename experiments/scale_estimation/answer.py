@@ -11,7 +11,7 @@ from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.sound.hearing import Hearing, by_sound
 from experiments.scale_estimation.touch.patch import Patch, free_line
 from experiments.scale_estimation.touch.touch import Touch, by_touch
-from experiments.scale_estimation.vision.outline import Outline
+from experiments.scale_estimation.vision.outline import SeenOutline
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, WrongUse
@@ -29,7 +29,7 @@ OUTSIDE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class SizeAnswer:
     """What a run says of a size.
 
     Attributes:
@@ -81,7 +81,7 @@ class ScaleAnswering:
     def __post_init__(self) -> None:
         run = self.run
         self.model = ObjectModel(run.mesh, run.scene, run.station)
-        self.outline: Outline | FitRefused | None = None
+        self.outline: SeenOutline | FitRefused | None = None
         self.patches: list[Patch] = []
         self.free: list[FloatArray] = []
         self.met: list[bool] = []
@@ -116,7 +116,7 @@ class ScaleAnswering:
             self.strikes.append(seen.strike)
         self._read["touch"] += time.perf_counter() - began
 
-    def answer(self) -> Answer:
+    def answer(self) -> SizeAnswer:
         """By each sense that the scene asks for, and by all that answer.
 
         Raises:
@@ -141,12 +141,12 @@ class ScaleAnswering:
         beliefs = [one.belief for one in found.values() if not isinstance(one, FitRefused)]
         together = fused(beliefs) if beliefs else Belief.ignorant(self.model.sizes)
         usable = sum(not strike.fault for strike in self.strikes)
-        return Answer(found, together, seconds, len(self.patches), usable)
+        return SizeAnswer(found, together, seconds, len(self.patches), usable)
 
     def stands_seen(self) -> tuple[SeenStand, ...]:
         """How the object may stand by the look; none where it was not seen."""
         seen = self.outline
-        return stands_seen(self.model.view, seen) if isinstance(seen, Outline) else ()
+        return stands_seen(self.model.view, seen) if isinstance(seen, SeenOutline) else ()
 
     @staticmethod
     def _tried(way: "Callable[[], Sight | Hearing | Touch]") -> Sight | Hearing | Touch | FitRefused:

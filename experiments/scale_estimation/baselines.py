@@ -8,7 +8,7 @@ from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.sound.peaks import Peaks
 from experiments.scale_estimation.touch.patch import Patch
 from experiments.scale_estimation.vision.fit import View
-from experiments.scale_estimation.vision.outline import Outline, directions
+from experiments.scale_estimation.vision.outline import SeenOutline, directions
 from harness.basics.arrays import FloatArray
 
 _TURNS = 8
@@ -30,7 +30,7 @@ def by_first_peak(peaks: Peaks, model: RingingModel, nominal: float) -> float:
     return float(nominal * model.frequencies[0] / peaks.frequencies[0])
 
 
-def by_area(outline: Outline, view: View, nominal: float) -> float:
+def by_area(outline: SeenOutline, view: View, nominal: float) -> float:
     """M, from the area of the outline's hull over the model's, over turns, at its nominal place."""
     stands = np.zeros((_TURNS, len(view.sigmas)))
     stands[:, 3] = np.arange(_TURNS) * 2.0 * np.pi / _TURNS
@@ -39,7 +39,7 @@ def by_area(outline: Outline, view: View, nominal: float) -> float:
     return float(nominal * np.sqrt(_area(outline.extents) / mean))
 
 
-def by_box(outline: Outline, view: View) -> float:
+def by_box(outline: SeenOutline, view: View) -> float:
     """M, the longer side of the outline's box at the distance of where the object stands; no model of it."""
     count = len(outline.extents)
     widths = outline.extents + np.roll(outline.extents, -(count // 2))

@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.scale_estimation.sound.peaks import Peaks
 from experiments.scale_estimation.touch.patch import Patch, patch_of
-from experiments.scale_estimation.vision.outline import Outline, read_outline
+from experiments.scale_estimation.vision.outline import SeenOutline, read_outline
 from harness.basics.arrays import ByteArray
 from harness.bench.acquisition import Strike
 from harness.picture.object_mask import mask_by_background
@@ -19,7 +19,7 @@ from harness.strikes.peaks import analyse
 from harness.strikes.spectra import Analysis
 
 
-def outline_of(record: StepRecord) -> Outline | None:
+def outline_of(record: StepRecord) -> SeenOutline | None:
     """The object's outline in the camera's pictures; None where the step was no look.
 
     Raises:

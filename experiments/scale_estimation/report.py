@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.scale_estimation.answer import Answer, ScaleAnswering
+from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
 from experiments.scale_estimation.envelope import placed
 from experiments.scale_estimation.readings import peaks_of
 from experiments.scale_estimation.sound.hearing import Hearing
 from experiments.scale_estimation.touch.touch import Touch
-from experiments.scale_estimation.vision.outline import Outline, corners_of, hull_of
+from experiments.scale_estimation.vision.outline import SeenOutline, corners_of, hull_of
 from experiments.scale_estimation.vision.vision import Sight
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
@@ -42,9 +42,9 @@ def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] |
 
 def _sections(scored: Scored, album: Album) -> Iterator[PageSection]:
     answering: ScaleAnswering = scored.answering
-    found: Answer = scored.found
+    found: SizeAnswer = scored.found
     yield _believed(scored, album)
-    if isinstance(answering.outline, Outline):
+    if isinstance(answering.outline, SeenOutline):
         yield _seen(answering, answering.outline, found.sight, album)
     if answering.strikes:
         yield _heard(answering, found, album)
@@ -53,7 +53,7 @@ def _sections(scored: Scored, album: Album) -> Iterator[PageSection]:
 
 
 def _believed(scored: Scored, album: Album) -> PageSection:
-    found: Answer = scored.found
+    found: SizeAnswer = scored.found
     sizes = scored.answering.model.sizes
     beliefs = {
         name: np.exp(one.belief.log_density)
@@ -71,7 +71,7 @@ def _believed(scored: Scored, album: Album) -> PageSection:
     )
 
 
-def _seen(answering: ScaleAnswering, outline: Outline, sight: Sight | None, album: Album) -> PageSection:
+def _seen(answering: ScaleAnswering, outline: SeenOutline, sight: Sight | None, album: Album) -> PageSection:
     look = next(record for record in answering.run.recording.steps() if IMAGE in record.readings)
     picture = np.asarray(np.median(look.readings[IMAGE].values, axis=0)).astype(np.uint8)
     fitted, words = None, "The outline is at no size this object's; see the warnings."
@@ -84,7 +84,7 @@ def _seen(answering: ScaleAnswering, outline: Outline, sight: Sight | None, albu
     )
 
 
-def _heard(answering: ScaleAnswering, found: Answer, album: Album) -> PageSection:
+def _heard(answering: ScaleAnswering, found: SizeAnswer, album: Album) -> PageSection:
     peaks = peaks_of(answering.strikes)
     if peaks is None:
         return PageSection("By sound", "No strike may be used.", None)
@@ -113,7 +113,7 @@ def _heard_words(hearing: Hearing | None, count: int) -> str:
     )
 
 
-def _touched(answering: ScaleAnswering, found: Answer, album: Album) -> PageSection:
+def _touched(answering: ScaleAnswering, found: SizeAnswer, album: Album) -> PageSection:
     model, touch = answering.model, found.touch
     stand = _stand(found, answering)
     surface = placed(model, model.stand.points, stand) - model.place
@@ -130,7 +130,7 @@ def _touched(answering: ScaleAnswering, found: Answer, album: Album) -> PageSect
     return PageSection("By touch", words, album.drawing("contacts", touched_figure(shown)))
 
 
-def _stand(found: Answer, answering: ScaleAnswering) -> FloatArray:
+def _stand(found: SizeAnswer, answering: ScaleAnswering) -> FloatArray:
     """``(4,)`` the size found, where and how turned touch or else sight has it."""
     if found.touch is not None:
         return found.touch.unknowns[:4]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from experiments.scale_estimation.answer import OUTSIDE, Answer
+from experiments.scale_estimation.answer import OUTSIDE, SizeAnswer
 from experiments.scale_estimation.size import Belief
 from experiments.scale_estimation.sound.hearing import Hearing
 from harness.basics.errors import FitRefused
@@ -12,7 +12,7 @@ from harness.experiment.experiment import Scored
 
 def result_of(scored: Scored) -> dict[str, Any]:
     """The answer as JSON values; keys carry their unit."""
-    found: Answer = scored.found
+    found: SizeAnswer = scored.found
     truth = None if scored.truth is None else scored.truth.differences.get("longest_side_m")
     asked = scored.run.scene.sensors
     absent = {"vision": not asked.camera, "audio": not asked.sound, "touch": not asked.touch}
@@ -66,7 +66,7 @@ def _none(why: str, seconds: float | None = None) -> dict[str, Any]:
 
 def _material(scored: Scored) -> dict[str, Any] | None:
     """What sound alone knows once sight or touch have fixed the size: the speed sqrt(E / density), m/s."""
-    found: Answer = scored.found
+    found: SizeAnswer = scored.found
     heard, other = found.by_sense.get("audio"), found.sight or found.touch
     if not isinstance(heard, Hearing) or other is None:
         return None
@@ -75,7 +75,7 @@ def _material(scored: Scored) -> dict[str, Any] | None:
     return heard.speed(stated, other.belief)
 
 
-def _doubts(found: Answer) -> list[str]:
+def _doubts(found: SizeAnswer) -> list[str]:
     said = []
     for sense, one in found.by_sense.items():
         if isinstance(one, FitRefused):

@@ -5,7 +5,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.scale_estimation.answer import Answer, ScaleAnswering
+from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
 from experiments.scale_estimation.baselines import (
     by_area,
     by_box,
@@ -18,7 +18,7 @@ from experiments.scale_estimation.readings import peaks_of
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.touch.touch import by_touch
-from experiments.scale_estimation.vision.outline import Outline
+from experiments.scale_estimation.vision.outline import SeenOutline
 from harness.basics.clock import now
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_json
@@ -111,7 +111,7 @@ def run_cell(cell: ScaleCell, scene: SceneFile, station: Station) -> dict[str, A
         return {"schema": 1, "cell": vars(cell), "steps": recording.committed, "size_m": true, "rows": rows}
 
 
-def _rows(answering: ScaleAnswering, found: Answer, true: float) -> dict[str, Any]:
+def _rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str, Any]:
     sizes = answering.model.sizes
     rows: dict[str, Any] = {"random": {"error_m": random_error(sizes, true), "seconds": 0.0}}
     for name, method in _trivial(answering).items():
@@ -141,7 +141,7 @@ def _trivial(answering: ScaleAnswering) -> dict[str, Callable[[], float | None]]
         "first peak": first_peak,
     }
     outline = answering.outline
-    if isinstance(outline, Outline):
+    if isinstance(outline, SeenOutline):
         methods["outline's area"] = lambda: by_area(outline, model.view, model.nominal)
         methods["outline's box"] = lambda: by_box(outline, model.view)
     if answering.patches:
@@ -149,7 +149,7 @@ def _trivial(answering: ScaleAnswering) -> dict[str, Callable[[], float | None]]
     return methods
 
 
-def _pairs(answering: ScaleAnswering, found: Answer, true: float) -> dict[str, Any]:
+def _pairs(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str, Any]:
     """What some of the readings say together."""
     model, rows = answering.model, {}
     began, heard = now(), found.by_sense.get("audio")

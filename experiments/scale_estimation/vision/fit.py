@@ -5,7 +5,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from experiments.scale_estimation.vision.outline import Outline, directions, hull_of
+from experiments.scale_estimation.vision.outline import SeenOutline, directions, hull_of
 from harness.basics.arrays import FloatArray, read_only
 
 PIXEL_SIGMA = 0.4
@@ -133,7 +133,7 @@ class OutlineProblem:
         outline: of the picture.
     """
 
-    def __init__(self, view: View, outline: Outline) -> None:
+    def __init__(self, view: View, outline: SeenOutline) -> None:
         self.view = view
         self._outline = outline
         self._weight = 1.0 / (PIXEL_SIGMA * np.sqrt(ALIKE))

@@ -22,7 +22,7 @@ _LEAST = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
+class SeenOutline:
     """How far an object reaches in a picture.
 
     Attributes:
@@ -42,7 +42,7 @@ def directions() -> FloatArray:
     return read_only(np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
-def read_outline(mask: BoolArray, in_front: BoolArray | None = None) -> Outline:
+def read_outline(mask: BoolArray, in_front: BoolArray | None = None) -> SeenOutline:
     """The outline of a mask.
 
     Args:
@@ -65,7 +65,7 @@ def read_outline(mask: BoolArray, in_front: BoolArray | None = None) -> Outline:
         touching = np.unique(parts[ndimage.binary_dilation(mask, iterations=2)])
         reach = np.maximum(reach, _extents(mask | np.isin(parts, touching[touching > 0])))
     hidden = (reach > extents + 0.5) | _cut_off(mask)
-    return Outline(read_only(extents + OUTSIDE), read_only(hidden))
+    return SeenOutline(read_only(extents + OUTSIDE), read_only(hidden))
 
 
 def hull_of(points: FloatArray) -> FloatArray:
@@ -76,7 +76,7 @@ def hull_of(points: FloatArray) -> FloatArray:
         return np.unique(points, axis=0)
 
 
-def corners_of(outline: Outline) -> FloatArray:
+def corners_of(outline: SeenOutline) -> FloatArray:
     """``(DIRECTIONS, 2)`` pixels: corners of the polygon that reaches as far, in order around it."""
     step = 2.0 * np.pi / DIRECTIONS
     towards, extents = directions(), outline.extents

@@ -8,7 +8,7 @@ from scipy.interpolate import PchipInterpolator
 
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.vision.fit import OutlineFit, OutlineProblem, View
-from experiments.scale_estimation.vision.outline import Outline
+from experiments.scale_estimation.vision.outline import SeenOutline
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 
@@ -45,7 +45,7 @@ class Sight:
     seconds: float
 
 
-def by_sight(view: View, outline: Outline, nominal: float, sizes: SizeRange, yaws: int = 12) -> Sight:
+def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange, yaws: int = 12) -> Sight:
     """The size at which the model's outline is that of the picture.
 
     Args:
@@ -94,7 +94,7 @@ class SeenStand:
         return float(np.linalg.norm(self.farthest))
 
 
-def stands_seen(view: View, outline: Outline) -> tuple[SeenStand, ...]:
+def stands_seen(view: View, outline: SeenOutline) -> tuple[SeenStand, ...]:
     """How the object may stand: every turn at which its outline is nearly that of the picture.
 
     A picture does not tell some turns apart, as those of a mug whose handle is behind it. What moves around
@@ -122,7 +122,7 @@ def _stand(problem: OutlineProblem, fit: OutlineFit) -> SeenStand:
     return SeenStand(fit.unknowns[:4], np.sqrt(variances[-1]) * axes[:, -1])
 
 
-def _starts(view: View, outline: Outline, yaws: int) -> FloatArray:
+def _starts(view: View, outline: SeenOutline, yaws: int) -> FloatArray:
     """``(yaws, 14)``: as large as the picture's outline is, and where it is."""
     starts = np.zeros((yaws, len(view.sigmas)))
     starts[:, 3] = np.arange(yaws) * 2.0 * np.pi / yaws

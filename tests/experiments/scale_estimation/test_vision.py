@@ -7,7 +7,7 @@ import pytest
 
 from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.vision.fit import CameraErrors, View
-from experiments.scale_estimation.vision.outline import Outline, directions, read_outline
+from experiments.scale_estimation.vision.outline import SeenOutline, directions, read_outline
 from experiments.scale_estimation.vision.vision import NO_SIZE, by_sight
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused
@@ -44,11 +44,11 @@ def nominal(view: View) -> float:
     return float(np.ptp(view.standing, axis=0).max())
 
 
-def outline_at(view: View, scale: float, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Outline:
+def outline_at(view: View, scale: float, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> SeenOutline:
     unknowns = np.zeros((1, 14))
     unknowns[0, :4] = np.log(scale), x, y, yaw
     extents = (view.project(unknowns, view.corners)[0] @ directions().T).max(axis=0)
-    return Outline(extents, np.zeros(len(extents), bool))
+    return SeenOutline(extents, np.zeros(len(extents), bool))
 
 
 def mask_at(name: str, scale: float) -> BoolArray:
@@ -88,7 +88,7 @@ def test_what_hides_a_side_leaves_the_size_and_widens_it() -> None:
     view = view_of("mug")
     whole = outline_at(view, 1.3)
     right = directions()[:, 0] > 0.3
-    cut = Outline(whole.extents - 15.0 * right, right)
+    cut = SeenOutline(whole.extents - 15.0 * right, right)
     found = by_sight(view, cut, nominal(view), RANGE)
     seen = by_sight(view, whole, nominal(view), RANGE)
     low, high = found.belief.interval

@@ -71,8 +71,8 @@ def test_the_doubled_gap_is_the_default_twice_over() -> None:
             assert twice[name] - 1e-3 == pytest.approx(2 * (value - 1e-3))
         elif leaf == "signal_to_noise":
             assert twice[name] == pytest.approx(value - 20 * np.log10(2), abs=0.05)
-        elif isinstance(value, tuple) and not value:
-            assert twice[name] == ()
+        elif value is None or (isinstance(value, tuple) and not value):
+            assert twice[name] == value
         else:
             assert twice[name] == pytest.approx(2 * np.array(value)), name
 

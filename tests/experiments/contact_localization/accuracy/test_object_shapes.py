@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.contact_localization import build_model as model_of
 from experiments.contact_localization.accuracy.benchmark_runs import preparations
 from experiments.contact_localization.accuracy.budget import BUDGETS
 from experiments.contact_localization.accuracy.dials import KNOBS, needs_objectfile, settings
@@ -26,6 +25,7 @@ from harness.cost.curve import Point, Sample
 from harness.effects import sound_effects
 from harness.effects.accuracy import Accuracy, Level
 from harness.effects.scene_object import known_object
+from harness.experiment import object_modes
 from harness.experiment.front import Front
 from harness.objectfile.audio.part import with_audio
 from harness.objectfile.entries import Provenance
@@ -105,7 +105,7 @@ def test_nobody_reads_an_objectfile_where_modes_are_solved(
     def never(*_given: Any) -> Any:
         raise AssertionError("read")
 
-    monkeypatch.setattr(model_of, "known_file", never)
+    monkeypatch.setattr(object_modes, "known_file", never)
     with pytest.raises(AssertionError, match="solved"):
         model_of_scene(scene_of(of), STATION, MUG, CALIBRATION, at({}))
 
