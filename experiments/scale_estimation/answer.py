@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from experiments.scale_estimation.dials import STARTS, YAWS
@@ -14,7 +15,7 @@ from experiments.scale_estimation.touch.touch import Touch, by_touch
 from experiments.scale_estimation.vision.outline import SeenOutline
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import DataRefused, FitRefused, WrongUse
+from harness.basics.errors import DataRefused, FitRefused, MeshRefused, WrongUse
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
 from harness.picture.square_pixels import aspect_stated
@@ -88,6 +89,14 @@ class ScaleAnswering:
         self.strikes: list[Strike] = []
         self._read = dict.fromkeys(SENSES, 0.0)
 
+    def load(self) -> None:
+        """Make what depends on the object alone, while the arm has other things to do."""
+        if self.run.scene.sensors.touch:
+            _ = self.model.stand.tree, self.model.stand.places
+        if self.run.scene.sensors.sound:
+            with suppress(MeshRefused):  # said by the answer: sight and touch need no elements
+                self.model.ringing(self.accuracy)
+
     def read(self, record: StepRecord) -> None:
         """Take in a step's readings."""
         began = time.perf_counter()
@@ -154,6 +163,8 @@ class ScaleAnswering:
             return way()
         except FitRefused as refusal:
             return refusal
+        except MeshRefused as refusal:
+            return FitRefused(str(refusal))
 
     def _by_sight(self) -> Sight:
         if isinstance(self.outline, FitRefused):

@@ -11,10 +11,18 @@ from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.table import LOOKING, METHODS, OURS, PAPER_CM, cells, run_cell, scene_of
+from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Experiment, MeasuredCondition, Scored
 from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
+from harness.recording.run_folder import RunFiles
 
 NAME = "scale-estimation"
+
+
+def _answering(run: RunFiles, accuracy: Accuracy) -> ScaleAnswering:
+    answering = ScaleAnswering(run, accuracy)
+    answering.load()
+    return answering
 
 
 def _sources(_scored: Scored) -> Mapping[str, Any]:
@@ -42,7 +50,7 @@ EXPERIMENT = Experiment(
     knobs=KNOBS,
     plan=plan,
     performer=ScalePerformer,
-    answering=ScaleAnswering,
+    answering=_answering,
     result=result_of,
     lines=lines_of,
     sources=_sources,

@@ -92,7 +92,7 @@ def scene_of(scene: SceneFile, cell: ScaleCell) -> SceneFile:
     tree = scene.model_dump(mode="json", by_alias=True)
     tree["object"]["scale"] = "hidden"
     tree["sensors"].update(camera=cell.look == "yes", sound=True, touch=True)
-    tree[Scale.table] = {}
+    tree.setdefault(Scale.table, {})
     return scene_from_json(tree, cell.name)
 
 
@@ -154,9 +154,11 @@ def _pairs(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[st
     model, rows = answering.model, {}
     began, heard = now(), found.by_sense.get("audio")
     few: FitRefused | Any
+    met = [index for index, touched in enumerate(answering.met) if touched]
+    ways = met[FEW - 1] + 1 if len(met) >= FEW else len(answering.met)
     try:
         few = by_touch(
-            model.stand, answering.patches[:FEW], model.nominal, model.sizes, free=answering.free[:FEW]
+            model.stand, answering.patches[:FEW], model.nominal, model.sizes, free=answering.free[:ways]
         )
     except FitRefused as refusal:
         few = refusal

@@ -82,12 +82,11 @@ def _overlapping(model: RingingModel, heard: FloatArray, window_decay: float) ->
     """``(k, m)``: how many modes share each mode's peak: those nearer than its own width, itself included."""
     frequencies = np.exp(heard)
     widths = WIDTHS * (dampings(frequencies, model.material) + window_decay) / (2.0 * np.pi)
-    first = np.vstack(
-        [np.searchsorted(row, row - width) for row, width in zip(frequencies, widths, strict=True)]
-    )
-    last = np.vstack(
-        [np.searchsorted(row, row + width) for row, width in zip(frequencies, widths, strict=True)]
-    )
+    # Compared at the nominal size, where the modes are in order once and for all sizes.
+    nominal = model.frequencies
+    reach = widths * nominal / frequencies
+    first = np.searchsorted(nominal, nominal - reach)
+    last = np.searchsorted(nominal, nominal + reach)
     return np.asarray(last - first, dtype=np.float64)
 
 

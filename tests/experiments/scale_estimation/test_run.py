@@ -6,13 +6,16 @@ from typing import Any
 
 import pytest
 
+from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.experiment import EXPERIMENT
-from harness.basics.errors import WrongUse
+from experiments.scale_estimation.model import ObjectModel
+from harness.basics.errors import MeshRefused, WrongUse
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import finish
 from harness.experiment.begin import begin
 from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 from tests.experiments.scale_estimation.runs import answered, ran, scene_of, went_on
 
@@ -82,6 +85,25 @@ def test_a_run_ends_when_the_size_is_known_as_well_as_was_asked(tmp_path: Path, 
     assert result["credible90_m"] <= 0.02
     assert went_on(Recording(recording.folder), Quiet())
     assert Recording(recording.folder).committed == recording.committed
+
+
+def test_an_object_that_cannot_be_filled_with_elements_leaves_out_sound_alone(
+    touched: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cannot(*_: Any) -> Any:
+        raise MeshRefused("it cannot be filled")
+
+    monkeypatch.setattr(ObjectModel, "ringing", cannot)
+    monkeypatch.setattr(ScaleAnswering, "_by_sound", lambda self: self.model.ringing(self.accuracy))
+    run = RunFiles(touched)
+    sensors = run.scene.sensors.model_copy(update={"sound": True})
+    object.__setattr__(run, "scene", run.scene.model_copy(update={"sensors": sensors}))
+    answering = EXPERIMENT.answering(run, Accuracy.default(EXPERIMENT.knobs))
+    for record in touched.steps():
+        answering.read(record)
+    found = answering.answer()
+    assert "cannot be filled" in str(found.by_sense["audio"])
+    assert found.sight is not None
 
 
 def test_a_scene_that_reads_nothing_is_refused_before_anything_moves(

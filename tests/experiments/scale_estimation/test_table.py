@@ -5,6 +5,9 @@ import pytest
 
 from experiments.scale_estimation.baselines import by_area, by_box, by_first_peak, constant, random_error
 from experiments.scale_estimation.size import SizeRange
+from experiments.scale_estimation.table import METHODS, ScaleCell, run_cell
+from harness.bench.scene import scene_from_json
+from harness.bench.station_file import Station
 from tests.experiments.scale_estimation.test_sound import NOMINAL, model, peaks_at
 from tests.experiments.scale_estimation.test_vision import nominal, outline_at, view_of
 
@@ -36,3 +39,23 @@ def test_the_outline_s_box_is_foreshortened_and_knows_no_model() -> None:
     assert by_box(outline_at(view, 1.0), view) == pytest.approx(nominal(view), rel=0.1)
     doubled = by_box(outline_at(view, 2.0), view) / by_box(outline_at(view, 1.0), view)
     assert doubled == pytest.approx(2.0, rel=0.15)
+
+
+def test_a_cell_is_answered_by_every_method_and_a_refusal_claims_no_more_than_the_range(
+    station: Station,
+) -> None:
+    tree = {"schema": 1, "object": {"mesh": "builtin:mug"}, "scale": {"contacts": 3, "strikes": 1}}
+    cell = ScaleCell("mug", "unplaced", 3, "yes")
+    result = run_cell(cell, scene_from_json(tree, "the test"), station)
+    rows, true = result["rows"], result["size_m"]
+    assert result["steps"] == 4
+    assert set(rows) <= set(METHODS)
+    assert {"random", "constant", "outline's area", "outline's box", "vision", "touch", "fused"} <= set(rows)
+    for row in rows.values():
+        if "size_m" in row:
+            assert row["error_m"] == pytest.approx(abs(row["size_m"] - true))
+            assert row["gross"] == (row["error_m"] > 0.1 * true)
+        if "refused" in row:
+            assert row["size_m"] == pytest.approx(rows["constant"]["size_m"])
+            assert "in_region90" not in row
+    assert rows["vision"]["error_m"] < rows["constant"]["error_m"]
