@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from experiments.scale_estimation.dials import STARTS, YAWS
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.readings import outline_of, patch_of_contact, peaks_of
+from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.sound.hearing import Hearing, by_sound
 from experiments.scale_estimation.touch.patch import Patch, free_line
 from experiments.scale_estimation.touch.touch import Touch, by_touch
+from experiments.scale_estimation.unseen.regression import by_outline, features_of
 from experiments.scale_estimation.vision.outline import SeenOutline
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
@@ -30,6 +32,16 @@ OUTSIDE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
+class Glance:
+    """The answer by the outline of an object whose shape is not known."""
+
+    belief: Belief
+
+
+Said = Sight | Hearing | Touch | Glance
+
+
+@dataclass(frozen=True, eq=False)
 class SizeAnswer:
     """What a run says of a size.
 
@@ -41,7 +53,7 @@ class SizeAnswer:
         strikes: that may be used.
     """
 
-    by_sense: Mapping[str, Sight | Hearing | Touch | FitRefused]
+    by_sense: Mapping[str, Said | FitRefused]
     fused: Belief
     seconds: Mapping[str, float]
     contacts: int
@@ -133,12 +145,14 @@ class ScaleAnswering:
         """
         sensors = self.run.scene.sensors
         asked = {"vision": sensors.camera, "audio": sensors.sound, "touch": sensors.touch}
-        ways: dict[str, Callable[[], Sight | Hearing | Touch]] = {
+        ways: dict[str, Callable[[], Said]] = {
             "vision": self._by_sight,
             "audio": self._by_sound,
             "touch": self._by_touch,
         }
-        found: dict[str, Sight | Hearing | Touch | FitRefused] = {}
+        if self.run.scene.section(Scale).shape == "unknown":
+            ways = {"vision": self.by_outline_alone, "audio": self._no_shape, "touch": self._no_shape}
+        found: dict[str, Said | FitRefused] = {}
         seconds = {}
         for sense in SENSES:
             if asked[sense]:
@@ -158,7 +172,7 @@ class ScaleAnswering:
         return stands_seen(self.model.view, seen) if isinstance(seen, SeenOutline) else ()
 
     @staticmethod
-    def _tried(way: "Callable[[], Sight | Hearing | Touch]") -> Sight | Hearing | Touch | FitRefused:
+    def _tried(way: Callable[[], Said]) -> Said | FitRefused:
         try:
             return way()
         except FitRefused as refusal:
@@ -167,12 +181,31 @@ class ScaleAnswering:
             return FitRefused(str(refusal))
 
     def _by_sight(self) -> Sight:
+        model, yaws = self.model, int(self.accuracy[YAWS.name])
+        return by_sight(model.view, self._seen(), model.nominal, model.sizes, yaws)
+
+    def by_outline_alone(self) -> Glance:
+        """Of an object whose shape nobody knows: nothing of the scene's mesh is used but its range of sizes.
+
+        Raises:
+            FitRefused: it was not seen.
+        """
+        camera = self.model.station.camera
+        if camera is None:
+            raise FitRefused("the station has no [camera]")
+        looked = camera.base_from_camera.matrix, camera.focal_length, self.model.place
+        features, width = features_of(self._seen(), *looked)
+        return Glance(by_outline(features, width, self.model.sizes))
+
+    def _no_shape(self) -> Glance:
+        raise FitRefused("the object's shape is not known, and this sense has no answer without it yet")
+
+    def _seen(self) -> SeenOutline:
         if isinstance(self.outline, FitRefused):
             raise self.outline
         if self.outline is None:
             raise FitRefused("the camera has not looked yet")
-        model, yaws = self.model, int(self.accuracy[YAWS.name])
-        return by_sight(model.view, self.outline, model.nominal, model.sizes, yaws)
+        return self.outline
 
     def _by_sound(self) -> Hearing:
         peaks = peaks_of(self.strikes)

@@ -46,6 +46,11 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, _seed: int) -> Planned:
     steps = [{"kind": kind} for kind in _kinds(scene)]
     if not steps:
         raise WrongUse("nothing is to be read: ask for vision, for contacts, or for both")
+    if "contact" in _kinds(scene) and scene.section(Scale).shape == "unknown":
+        raise NotImplementedError(
+            "experiments.scale_estimation.explore: contacts of an object of unknown shape; look at "
+            "it alone (--sense vision)"
+        )
     model = ObjectModel(mesh, scene, station)
     bench = model.twin_around(model.nowhere)
     return Planned(steps, rehearse(bench, []), bench)

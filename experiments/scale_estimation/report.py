@@ -8,6 +8,7 @@ import numpy as np
 from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
 from experiments.scale_estimation.envelope import placed
 from experiments.scale_estimation.readings import peaks_of
+from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.sound.hearing import Hearing
 from experiments.scale_estimation.touch.touch import Touch
 from experiments.scale_estimation.vision.outline import SeenOutline, corners_of, hull_of
@@ -75,6 +76,8 @@ def _seen(answering: ScaleAnswering, outline: SeenOutline, sight: Sight | None, 
     look = next(record for record in answering.run.recording.steps() if IMAGE in record.readings)
     picture = np.asarray(np.median(look.readings[IMAGE].values, axis=0)).astype(np.uint8)
     fitted, words = None, "The outline is at no size this object's; see the warnings."
+    if answering.run.scene.section(Scale).shape == "unknown":
+        words = "The size is told from how far the outline reaches, by what household things look like."
     if sight is not None:
         view = answering.model.view
         fitted = _around(hull_of(view.project(sight.fit.unknowns[None], view.corners)[0]))

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.scale_estimation.answer import OUTSIDE, SizeAnswer
+from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief
 from experiments.scale_estimation.sound.hearing import Hearing
 from harness.basics.errors import FitRefused
@@ -33,6 +34,7 @@ def result_of(scored: Scored) -> dict[str, Any]:
         "size_m": found.fused.size,
         "error_m": estimates["fused"]["error_m"],
         "credible90_m": 0.5 * (estimates["fused"]["high90_m"] - estimates["fused"]["low90_m"]),
+        "shape_known": scored.run.scene.section(Scale).shape == "known",
         "nominal_m": model.nominal,
         "range_m": [model.sizes.low, model.sizes.high],
         "contacts": found.contacts,
@@ -104,6 +106,7 @@ def _wider(one: Belief, other: Belief) -> bool:
 def lines_of(result: Mapping[str, Any]) -> list[str]:
     """A line a sense, the fused one last."""
     mock = "mock bench, " if result["mock"] else ""
+    mock += "" if result["shape_known"] else "shape unknown, "
     said = []
     for sense, one in result["estimates"].items():
         if one["size_m"] is None:

@@ -22,6 +22,8 @@ class Scale(Section):
         camera_position_error: m, one standard deviation per axis, of where the camera is.
         camera_rotation_error: rad, likewise, of how it is turned.
         focal_length_error: relative.
+        shape: ``"unknown"`` where the object was never drawn: the scene's mesh is then the mocked world's
+            alone, and the size is told from the outline by what household things look like.
         material: how well the object's material is known: ``"measured"``, its sqrt(E / density) to 3 %;
             ``"named"``, as well as an object said to be of it; ``"unknown"``, one of all seven.
         until: m: a run ends when half its 90 % interval is no wider, whatever contacts are left; None to
@@ -39,5 +41,6 @@ class Scale(Section):
     camera_position_error: Annotated[Length, Positive] = 2.0e-3
     camera_rotation_error: Annotated[Angle, Positive] = math.radians(0.2)
     focal_length_error: Annotated[Ratio, Positive] = 5.0e-3
+    shape: Literal["known", "unknown"] = "known"
     material: Literal["measured", "named", "unknown"] = "measured"
     until: Annotated[Length, Positive] | None = None

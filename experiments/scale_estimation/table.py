@@ -32,6 +32,7 @@ from harness.recording.run_folder import RunFiles
 
 TRIVIAL = ("random", "constant", "first peak", "outline's area", "outline's box", "contacts' box")
 OURS = (
+    "vision, shape unknown",
     "vision",
     "audio",
     "touch",
@@ -122,6 +123,9 @@ def _rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str
     for sense in ("vision", "audio", "touch"):
         if sense in found.by_sense:
             rows[sense] = _answered(found.by_sense[sense], answering, true, found.seconds[sense])
+    if isinstance(answering.outline, SeenOutline):
+        began = now()
+        rows["vision, shape unknown"] = _belief(answering.by_outline_alone().belief, true, now() - began)
     rows.update(_pairs(answering, found, true))
     rows["fused"] = _belief(found.fused, true, sum(found.seconds.values()))
     return rows

@@ -1,0 +1,1 @@
+"""Size by the outline alone, of an object that nobody has drawn."""

@@ -1,0 +1,87 @@
+"""Size of an object never seen, from its outline: better than its box on shapes that were held out."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.scale_estimation.experiment import EXPERIMENT
+from experiments.scale_estimation.section import Scale
+from experiments.scale_estimation.size import SizeRange
+from experiments.scale_estimation.unseen.families import FAMILIES, draw
+from experiments.scale_estimation.unseen.regression import by_outline, features_of, shipped
+from experiments.scale_estimation.unseen.train import fitted, pictures
+from harness.bench.station_file import Station
+from harness.experiment.begin import begin
+from tests.experiments.scale_estimation.runs import answered, ran, scene_of
+from tests.experiments.scale_estimation.test_vision import FOCAL, PLACE, camera, nominal, outline_at, view_of
+
+RANGE = SizeRange(0.05, 0.6)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_shape_stands_about_its_middle_and_is_one_long(family: str) -> None:
+    points = draw(family, np.random.default_rng(2))
+    low, high = points.min(axis=0), points.max(axis=0)
+    assert (high - low).max() == pytest.approx(1.0)
+    assert low[2] == pytest.approx(0.0)
+    assert low[:2] + high[:2] == pytest.approx([0.0, 0.0])
+
+
+def test_shapes_that_were_held_out_are_sized_better_than_by_their_widest_side() -> None:
+    features, targets, sizes, numbers = pictures(360, seed=4)
+    held = numbers >= 288
+    found = fitted(features[~held], targets[~held])
+    expected, _ = found.size(features[held])
+    ours = np.abs(np.expm1(expected - targets[held])) * sizes[held]
+    widest = features[held, :-1].max(axis=1)  # of the outline, at the distance of the object
+    box = np.abs(np.expm1(widest - targets[held])) * sizes[held]
+    assert ours.mean() < 0.85 * box.mean()
+
+
+def test_nine_tenths_of_new_shapes_are_within_the_interval_of_the_shipped_fit() -> None:
+    features, targets, _, _ = pictures(360, seed=77)
+    expected, sigma = shipped().size(features)
+    assert 0.85 < float((np.abs(expected - targets) < 1.645 * sigma).mean()) < 0.95
+
+
+def test_an_outline_unlike_all_household_things_widens_the_answer() -> None:
+    usual, _ = pictures(24, seed=5)[:2]
+    strange = usual[:1] + np.append(1.5 * np.tile([1.0, -1.0], 9), 0.0)
+    assert shipped().size(strange)[1][0] > 2.0 * shipped().size(usual)[1].max()
+
+
+def test_twice_as_far_and_twice_as_large_is_the_same_outline() -> None:
+    """No scale comes from a picture but by the distance."""
+    outline = outline_at(view_of("bowl"), 1.0)
+    features, width = features_of(outline, camera(), FOCAL, PLACE)
+    away = camera().copy()
+    away[:3, 3] = PLACE + 2.0 * (away[:3, 3] - PLACE)
+    same, twice = features_of(outline, away, FOCAL, PLACE)
+    assert same == pytest.approx(features)
+    assert twice == pytest.approx(2.0 * width)
+
+
+@pytest.mark.parametrize("name", ["mug", "bowl", "pitcher"])
+def test_a_built_in_object_is_within_its_interval(name: str) -> None:
+    view = view_of(name)
+    features, width = features_of(outline_at(view, 1.2), camera(), FOCAL, PLACE)
+    low, high = by_outline(features, width, RANGE).interval
+    assert low < 1.2 * nominal(view) < high
+
+
+def test_a_run_tells_the_size_of_an_object_of_unknown_shape_by_sight_alone(
+    tmp_path: Path, station: Station
+) -> None:
+    scene = scene_of(0)
+    scene = scene.with_section(Scale(contacts=0, shape="unknown"))
+    result = answered(ran(tmp_path / "run", scene, station))
+    vision = result["estimates"]["vision"]
+    assert not result["shape_known"]
+    assert vision["in_interval90"]
+    with pytest.raises(NotImplementedError, match="unknown shape"):
+        begin(
+            EXPERIMENT, scene_of(2).with_section(Scale(contacts=2, shape="unknown")), station, 0, "unplaced",
+            tmp_path / "other",
+        )  # fmt: skip
+    assert not (tmp_path / "other").exists()
