@@ -193,6 +193,11 @@ class ScaleAnswering:
         camera = self.model.station.camera
         if camera is None:
             raise FitRefused("the station has no [camera]")
+        if self._seen().hidden.any():
+            raise FitRefused(
+                "the object's outline is cut off by the picture's border; move the camera back: without its "
+                "shape nobody knows what lies beyond"
+            )
         looked = camera.base_from_camera.matrix, camera.focal_length, self.model.place
         features, width = features_of(self._seen(), *looked)
         return Glance(by_outline(features, width, self.model.sizes))

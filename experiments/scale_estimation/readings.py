@@ -28,8 +28,7 @@ def outline_of(record: StepRecord) -> SeenOutline | None:
     if IMAGE not in record.readings or BARE_IMAGE not in record.readings:
         return None
     live, bare = (_median(record.readings[name].values) for name in (IMAGE, BARE_IMAGE))
-    anywhere = np.ones(live.shape[:2], bool)
-    return read_outline(mask_by_background(live, bare, anywhere))
+    return read_outline(mask_by_background(live, bare))
 
 
 def patch_of_contact(seen: Observation, calibration: TactileCalibration, pitch: float) -> Patch | None:

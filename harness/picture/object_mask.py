@@ -24,7 +24,9 @@ _SMALL = 3
 """Pixels along a side of what is taken for noise."""
 
 
-def mask_by_background(live: ByteArray, background: ByteArray, silhouette: BoolArray) -> BoolArray:
+def mask_by_background(
+    live: ByteArray, background: ByteArray, silhouette: BoolArray | None = None
+) -> BoolArray:
     """The object's pixels: those that differ from the bench without it, and those that these enclose.
 
     A shadow that the object throws on the bench differs too, where it is deep; a hole through which the bench
@@ -34,18 +36,20 @@ def mask_by_background(live: ByteArray, background: ByteArray, silhouette: BoolA
         live: ``(rows, columns, 3)`` RGB.
         background: the same by the same camera, the object taken away.
         silhouette: ``(rows, columns)`` where the object should be; what does not meet it, as an arm that
-            moved, is not the object.
+            moved, is not the object. None where nobody knows: it then covers less than half of the picture.
 
     Raises:
         DataRefused: pictures of two sizes.
     """
+    anywhere = silhouette is None
+    silhouette = np.ones(live.shape[:2], bool) if silhouette is None else silhouette
     if live.shape != background.shape or live.shape[:2] != silhouette.shape:
         raise DataRefused(
             f"the picture is {_pixels(live)} pixels, that of the bench {_pixels(background)} and the "
             f"simulated one {_pixels(silhouette)}; take all by one camera"
         )
     apart = np.abs(live.astype(np.int16) - background).max(axis=2)
-    bench = apart[~silhouette]
+    bench = apart.ravel() if anywhere else apart[~silhouette]
     noise = float(np.median(bench)) if bench.size else 0.0
     return ndimage.binary_fill_holes(_meeting(apart > max(_DIFFERS, _DIFFERS_NOISES * noise), silhouette))
 

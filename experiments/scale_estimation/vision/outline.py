@@ -17,6 +17,9 @@ OUTSIDE = 0.3
 """Pixels from the outermost pixel's centre to the outline, on average over where it crosses the pixel;
 left out, small objects come out smaller than they are."""
 
+_MOST_CUT = 0.8
+"""Of the directions in which a picture's border may cut an object off: two of its sides."""
+
 _LEAST = 12
 """Pixels that an object must cover to have an outline."""
 
@@ -50,7 +53,7 @@ def read_outline(mask: BoolArray, in_front: BoolArray | None = None) -> SeenOutl
         in_front: ``(rows, columns)`` where something may stand before it, as the arm; None for nowhere.
 
     Raises:
-        DataRefused: too few pixels.
+        DataRefused: too few pixels, or cut off all around.
     """
     if mask.sum() < _LEAST:
         raise DataRefused(
@@ -64,7 +67,13 @@ def read_outline(mask: BoolArray, in_front: BoolArray | None = None) -> SeenOutl
         parts, _ = ndimage.label(in_front & ~mask)
         touching = np.unique(parts[ndimage.binary_dilation(mask, iterations=2)])
         reach = np.maximum(reach, _extents(mask | np.isin(parts, touching[touching > 0])))
-    hidden = (reach > extents + 0.5) | _cut_off(mask)
+    cut = _cut_off(mask)
+    if cut.mean() > _MOST_CUT:
+        raise DataRefused(
+            "what differs from the picture of the bare bench reaches the picture's borders on most sides; "
+            "move the camera back, and check that both pictures are of one camera, in one light"
+        )
+    hidden = (reach > extents + 0.5) | cut
     return SeenOutline(read_only(extents + OUTSIDE), read_only(hidden))
 
 

@@ -13,6 +13,7 @@ from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused
 from harness.basics.geometry import transform
 from harness.objects.household import build
+from harness.picture.object_mask import mask_by_background
 from mocks.camera.scene_view import Body, SceneView
 
 RANGE = SizeRange(0.05, 0.45)
@@ -130,3 +131,21 @@ def test_the_picture_s_border_hides() -> None:
     outline = read_outline(mask)
     assert outline.hidden[0]
     assert not outline.hidden[len(outline.hidden) // 2]
+
+
+def test_a_mask_of_nearly_the_whole_picture_is_no_outline() -> None:
+    with pytest.raises(DataRefused, match="borders on most sides"):
+        read_outline(np.ones((ROWS, COLUMNS), bool))
+
+
+@pytest.mark.parametrize("noise", [0.0, 3.0, 8.0])
+def test_a_noisy_camera_is_not_taken_for_an_object_all_over(noise: float) -> None:
+    mask = mask_at("mug", 1.2)
+    random, bare = np.random.default_rng(0), np.full((ROWS, COLUMNS, 3), 90.0)
+    live = np.where(mask[..., None], 200.0, bare)
+    seen, without = (
+        np.clip(picture + noise * random.standard_normal(picture.shape), 0, 255).astype(np.uint8)
+        for picture in (live, bare)
+    )
+    found = read_outline(np.asarray(mask_by_background(seen, without)))
+    assert found.extents == pytest.approx(read_outline(mask).extents, abs=1.0)

@@ -1,0 +1,93 @@
+"""One look at each of the table's objects: sized by its shape, by its outline alone, by the outline's box.
+
+Run as ``PYTHONPATH=. python tests/benchmarks/scale/bench_looks.py [--seeds 10] [--first-seed 2000]
+[--gap unplaced]``; a second a look. The real meshes are taken from TOUCHSTONE_DATA or ../shared/data.
+"""
+
+import argparse
+import sys
+from contextlib import closing, suppress
+
+import numpy as np
+
+from experiments.scale_estimation.answer import ScaleAnswering
+from experiments.scale_estimation.baselines import by_box
+from experiments.scale_estimation.dials import KNOBS
+from experiments.scale_estimation.size import Belief
+from experiments.scale_estimation.table import ScaleCell, scene_of
+from experiments.scale_estimation.vision.outline import SeenOutline
+from harness.basics.errors import FitRefused
+from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.station_file import Station, load_station, station_path
+from harness.effects.accuracy import Accuracy
+from harness.experiment.lookup import named
+from harness.experiment.plain import perform_in_process
+from harness.experiment.subjects import objects
+from harness.experiment.truth import read_truth
+from harness.recording.run_folder import RunFiles
+from tests.support.real_data import find_shared_data
+
+Row = dict[str, tuple[float, bool]]
+"""Error in cm by method, and whether the interval holds the truth."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--first-seed", type=int, default=2000)
+    parser.add_argument("--gap", default="unplaced")
+    asked = parser.parse_args()
+    station, rows = load_station(station_path("mock")), list[Row]()
+    for name, scene in objects(find_shared_data()).items():
+        cells = [ScaleCell(name, asked.gap, asked.first_seed + seed, "yes") for seed in range(asked.seeds)]
+        mine = [look(cell, scene, station) for cell in cells]
+        rows += mine
+        sys.stdout.write(f"{name:10} {said(mine)}\n")
+        sys.stdout.flush()
+    sys.stdout.write(f"{'all':10} {said(rows)}\n")
+
+
+def look(cell: ScaleCell, scene: SceneFile, station: Station) -> Row:
+    """Perform one and answer it three ways."""
+    tree = scene_of(scene, cell).model_dump(mode="json", by_alias=True)
+    tree["scale"]["contacts"] = 0
+    tree["sensors"].update(sound=False, touch=False)
+    looks = scene_from_json(tree, cell.name)
+    with closing(perform_in_process(named("scale-estimation"), cell, looks, station)) as case:
+        recording = case.run.recording
+        answering = ScaleAnswering(RunFiles(recording), Accuracy.default(KNOBS))
+        for record in recording.steps():
+            answering.read(record)
+        truth = read_truth(recording)
+        assert truth is not None
+        true = float(truth.differences["longest_side_m"])
+        if not isinstance(answering.outline, SeenOutline):
+            return {}
+        row: Row = {}
+        with suppress(FitRefused):
+            row["shape unknown"] = scored(answering.by_outline_alone().belief, true)
+        row["box"] = (1e2 * abs(by_box(answering.outline, answering.model.view) - true), False)
+        sight = answering.answer().sight
+        return row if sight is None else {**row, "shape known": scored(sight.belief, true)}
+
+
+def scored(belief: Belief, true: float) -> tuple[float, bool]:
+    low, high = belief.interval
+    return 1e2 * abs(belief.size - true), bool(low <= true <= high)
+
+
+def said(rows: list[Row]) -> str:
+    parts = []
+    for method in ("shape known", "shape unknown", "box"):
+        found = [row[method] for row in rows if method in row]
+        if not found:
+            parts.append(f"{method}: refused")
+            continue
+        errors, held = np.array([error for error, _ in found]), np.mean([inside for _, inside in found])
+        claim = "" if method == "box" else f", held {100 * held:.0f} %"
+        parts.append(f"{method}: {np.median(errors):.2f} / {errors.mean():.2f} cm{claim} ({len(found)})")
+    return "; ".join(parts) + f" ({len(rows)} looks)"
+
+
+if __name__ == "__main__":
+    main()
