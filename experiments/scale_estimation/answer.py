@@ -13,11 +13,19 @@ from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.sound.hearing import Hearing, by_sound
 from experiments.scale_estimation.touch.patch import Patch, free_line
 from experiments.scale_estimation.touch.touch import Touch, by_touch
-from experiments.scale_estimation.unseen.regression import by_outline, features_of
+from experiments.scale_estimation.unseen.answer import (
+    ShapelessAnswer,
+    load_networks,
+    outline_alone,
+    strikes_alone,
+    ways_alone,
+)
+from experiments.scale_estimation.unseen.contact_set import GelWay
 from experiments.scale_estimation.vision.outline import SeenOutline
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, MeshRefused, WrongUse
+from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
 from harness.picture.square_pixels import aspect_stated
@@ -31,14 +39,7 @@ OUTSIDE = 0.5
 """Probability beyond which a size is said to lie outside the range that was asked about."""
 
 
-@dataclass(frozen=True, eq=False)
-class Glance:
-    """The answer by the outline of an object whose shape is not known."""
-
-    belief: Belief
-
-
-Said = Sight | Hearing | Touch | Glance
+Said = Sight | Hearing | Touch | ShapelessAnswer
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,16 +99,26 @@ class ScaleAnswering:
         self.patches: list[Patch] = []
         self.free: list[FloatArray] = []
         self.met: list[bool] = []
+        self.ways: list[GelWay] = []
         self.strikes: list[Strike] = []
         self._read = dict.fromkeys(SENSES, 0.0)
 
     def load(self) -> None:
         """Make what depends on the object alone, while the arm has other things to do."""
-        if self.run.scene.sensors.touch:
+        sensors = self.run.scene.sensors
+        if not self.shape_known:
+            load_networks(sensors.sound, sensors.touch)
+            return
+        if sensors.touch:
             _ = self.model.stand.tree, self.model.stand.places
-        if self.run.scene.sensors.sound:
+        if sensors.sound:
             with suppress(MeshRefused):  # said by the answer: sight and touch need no elements
                 self.model.ringing(self.accuracy)
+
+    @property
+    def shape_known(self) -> bool:
+        """Whether the scene's mesh is the object's."""
+        return self.run.scene.section(Scale).shape == "known"
 
     def read(self, record: StepRecord) -> None:
         """Take in a step's readings."""
@@ -132,6 +143,7 @@ class ScaleAnswering:
             self.patches.append(patch)
         length = float(record.step.parameters["search_m"])
         self.met.append(patch is not None)
+        self.ways.append(GelWay.made(seen.base_from_gel, self.model.place, patch))
         self.free.append(free_line(seen.base_from_gel, length, patch is not None))
         if seen.strike is not None:
             self.strikes.append(seen.strike)
@@ -150,8 +162,8 @@ class ScaleAnswering:
             "audio": self._by_sound,
             "touch": self._by_touch,
         }
-        if self.run.scene.section(Scale).shape == "unknown":
-            ways = {"vision": self.by_outline_alone, "audio": self._no_shape, "touch": self._no_shape}
+        if not self.shape_known:
+            ways = self.without_shape()
         found: dict[str, Said | FitRefused] = {}
         seconds = {}
         for sense in SENSES:
@@ -184,26 +196,18 @@ class ScaleAnswering:
         model, yaws = self.model, int(self.accuracy[YAWS.name])
         return by_sight(model.view, self._seen(), model.nominal, model.sizes, yaws)
 
-    def by_outline_alone(self) -> Glance:
-        """Of an object whose shape nobody knows: nothing of the scene's mesh is used but its range of sizes.
+    def without_shape(self) -> dict[str, Callable[[], Said]]:
+        """How each sense answers of an object whose shape nobody knows.
 
-        Raises:
-            FitRefused: it was not seen.
+        Nothing of the scene's mesh is used but its range of sizes, and of its material what the scene states.
         """
-        camera = self.model.station.camera
-        if camera is None:
-            raise FitRefused("the station has no [camera]")
-        if self._seen().hidden.any():
-            raise FitRefused(
-                "the object's outline is cut off by the picture's border; move the camera back: without its "
-                "shape nobody knows what lies beyond"
-            )
-        looked = camera.base_from_camera.matrix, camera.focal_length, self.model.place
-        features, width = features_of(self._seen(), *looked)
-        return Glance(by_outline(features, width, self.model.sizes))
-
-    def _no_shape(self) -> Glance:
-        raise FitRefused("the object's shape is not known, and this sense has no answer without it yet")
+        model = self.model
+        material = MATERIALS[model.scene.object.material]
+        return {
+            "vision": lambda: outline_alone(self._seen(), model.station.camera, model.place, model.sizes),
+            "audio": lambda: strikes_alone(self.strikes, material, model.sizes),
+            "touch": lambda: ways_alone(self.ways, model.sizes),
+        }
 
     def _seen(self) -> SeenOutline:
         if isinstance(self.outline, FitRefused):

@@ -8,13 +8,14 @@ import numpy as np
 from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
 from experiments.scale_estimation.envelope import placed
 from experiments.scale_estimation.readings import peaks_of
-from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.sound.hearing import Hearing
 from experiments.scale_estimation.touch.touch import Touch
+from experiments.scale_estimation.unseen.spectrogram import FRAMES, band_levels, response_of
 from experiments.scale_estimation.vision.outline import SeenOutline, corners_of, hull_of
 from experiments.scale_estimation.vision.vision import Sight
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
+from harness.basics.materials import MATERIALS
 from harness.bench.device import Health
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
@@ -26,6 +27,7 @@ from harness.report.figures.size import (
     beliefs_figure,
     outline_figure,
     resonances_figure,
+    spectrogram_figure,
     touched_figure,
 )
 from harness.report.run_page import PageSection, write_run_page
@@ -48,7 +50,7 @@ def _sections(scored: Scored, album: Album) -> Iterator[PageSection]:
     if isinstance(answering.outline, SeenOutline):
         yield _seen(answering, answering.outline, found.sight, album)
     if answering.strikes:
-        yield _heard(answering, found, album)
+        yield _heard(answering, found, album) if answering.shape_known else _spectrum(answering, album)
     if answering.free:
         yield _touched(answering, found, album)
 
@@ -76,7 +78,7 @@ def _seen(answering: ScaleAnswering, outline: SeenOutline, sight: Sight | None, 
     look = next(record for record in answering.run.recording.steps() if IMAGE in record.readings)
     picture = np.asarray(np.median(look.readings[IMAGE].values, axis=0)).astype(np.uint8)
     fitted, words = None, "The outline is at no size this object's; see the warnings."
-    if answering.run.scene.section(Scale).shape == "unknown":
+    if not answering.shape_known:
         words = "The size is told from how far the outline reaches, by what household things look like."
     if sight is not None:
         view = answering.model.view
@@ -116,20 +118,36 @@ def _heard_words(hearing: Hearing | None, count: int) -> str:
     )
 
 
+def _spectrum(answering: ScaleAnswering, album: Album) -> PageSection:
+    """What the network of sound is given."""
+    heard = response_of(answering.strikes)
+    if heard is None:
+        return PageSection("By sound", "No strike may be used.", None)
+    material = MATERIALS[answering.run.scene.object.material]
+    frequencies, levels = band_levels(*heard, material)
+    named = {
+        f"{1e3 * a:.0f} to {1e3 * b:.0f} ms": level for (a, b), level in zip(FRAMES, levels, strict=True)
+    }
+    words = (
+        "How loudly bands ring, early and late. The size is told from it and from the material, by what "
+        "household things of all sizes sound like."
+    )
+    return PageSection("By sound", words, album.drawing("spectrum", spectrogram_figure(frequencies, named)))
+
+
 def _touched(answering: ScaleAnswering, found: SizeAnswer, album: Album) -> PageSection:
     model, touch = answering.model, found.touch
-    stand = _stand(found, answering)
-    surface = placed(model, model.stand.points, stand) - model.place
-    contacts = np.array([patch.points.mean(axis=0) - model.place for patch in answering.patches]).reshape(
-        -1, 3
-    )
+    surface = np.zeros((0, 3))
+    if answering.shape_known:
+        surface = placed(model, model.stand.points, _stand(found, answering)) - model.place
+    contacts = np.array([patch.points.mean(axis=0) - model.place for patch in answering.patches])
     passed = [line - model.place for line, met in zip(answering.free, answering.met, strict=True) if not met]
     words = (
         f"{len(contacts)} contacts, {len(passed)} ways that met nothing (dotted), round the nominal place."
     )
     if isinstance(touch, Touch):
         words += f" The contacts cost {touch.cost:.2f} each at the size found by touch."
-    shown = TouchedObject(surface, contacts, passed)
+    shown = TouchedObject(surface, contacts.reshape(-1, 3), passed)
     return PageSection("By touch", words, album.drawing("contacts", touched_figure(shown)))
 
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.scale_estimation.answer import OUTSIDE, SizeAnswer
-from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief
 from experiments.scale_estimation.sound.hearing import Hearing
+from experiments.scale_estimation.unseen.answer import ShapelessAnswer
 from harness.basics.errors import FitRefused
 from harness.experiment.experiment import Scored
 
@@ -34,7 +34,7 @@ def result_of(scored: Scored) -> dict[str, Any]:
         "size_m": found.fused.size,
         "error_m": estimates["fused"]["error_m"],
         "credible90_m": 0.5 * (estimates["fused"]["high90_m"] - estimates["fused"]["low90_m"]),
-        "shape_known": scored.run.scene.section(Scale).shape == "known",
+        "shape_known": scored.answering.shape_known,
         "nominal_m": model.nominal,
         "range_m": [model.sizes.low, model.sizes.high],
         "contacts": found.contacts,
@@ -82,6 +82,11 @@ def _doubts(found: SizeAnswer) -> list[str]:
     for sense, one in found.by_sense.items():
         if isinstance(one, FitRefused):
             said.append(f"{sense}: {one}")
+        elif isinstance(one, ShapelessAnswer) and one.strange:
+            said.append(
+                f"{sense}: the reading is unlike the household shapes that were learnt ({one.distance:.1f} "
+                "times the usual distance from them); its interval is widened for it"
+            )
         elif one.belief.outside > OUTSIDE:
             said.append(
                 f"{sense}: the size is likely outside the range that was asked about "

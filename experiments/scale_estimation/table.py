@@ -31,8 +31,9 @@ from harness.experiment.truth import read_truth
 from harness.recording.run_folder import RunFiles
 
 TRIVIAL = ("random", "constant", "first peak", "outline's area", "outline's box", "contacts' box")
+UNSEEN = ("vision, shape unknown", "audio, shape unknown", "touch, shape unknown", "fused, shape unknown")
 OURS = (
-    "vision, shape unknown",
+    *UNSEEN,
     "vision",
     "audio",
     "touch",
@@ -123,9 +124,7 @@ def _rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str
     for sense in ("vision", "audio", "touch"):
         if sense in found.by_sense:
             rows[sense] = _answered(found.by_sense[sense], answering, true, found.seconds[sense])
-    if isinstance(answering.outline, SeenOutline):
-        began = now()
-        rows["vision, shape unknown"] = _belief(answering.by_outline_alone().belief, true, now() - began)
+    rows.update(_shapeless(answering, true))
     rows.update(_pairs(answering, found, true))
     rows["fused"] = _belief(found.fused, true, sum(found.seconds.values()))
     return rows
@@ -151,6 +150,25 @@ def _trivial(answering: ScaleAnswering) -> dict[str, Callable[[], float | None]]
     if answering.patches:
         methods["contacts' box"] = lambda: by_contacts_box(answering.patches, model)
     return methods
+
+
+def _shapeless(answering: ScaleAnswering, true: float) -> dict[str, Any]:
+    """What the same readings say where nobody knows the shape."""
+    rows, beliefs, seconds = {}, [], 0.0
+    for sense, way in answering.without_shape().items():
+        began = now()
+        one: Any
+        try:
+            one = way()
+            beliefs.append(one.belief)
+        except FitRefused as refusal:
+            one = refusal
+        spent = now() - began
+        seconds += spent
+        rows[f"{sense}, shape unknown"] = _answered(one, answering, true, spent)
+    together = fused(beliefs) if beliefs else Belief.ignorant(answering.model.sizes)
+    rows["fused, shape unknown"] = _belief(together, true, seconds)
+    return rows
 
 
 def _pairs(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str, Any]:

@@ -167,6 +167,11 @@ class Nodes:
         )
 
 
+def float_value(name: str, shape: Sequence[int | str]) -> ValueInfoProto:
+    """An input or an output of float32 numbers; a size in letters is that of queries."""
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, list(shape))
+
+
 def encoded_rows(inputs: int, encoding: Encoding) -> IntArray:
     """Which number of ``Encoding``'s order is at each place of ``Nodes.encoded``'s."""
     octave = np.arange(len(encoding.frequencies))[:, None] * 2 * inputs + inputs + np.arange(inputs)

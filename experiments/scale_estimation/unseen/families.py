@@ -1,130 +1,167 @@
-"""Household shapes drawn at random, as far as an outline sees them: points whose hull is the object's."""
+"""Household shapes drawn at random: of what a regression and networks learn, and on what they are tested."""
 
 from collections.abc import Callable
 from types import MappingProxyType
 
 import numpy as np
 
-from harness.basics.arrays import FloatArray
+from experiments.scale_estimation.unseen.solid_grid import Solid, SolidGrid
+from experiments.scale_estimation.unseen.vessel import Cross, Vessel, add_arm, add_handle, offset, turned
 
-_TURNS = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
-
-
-def draw(family: str, random: np.random.Generator) -> FloatArray:
-    """``(n, 3)`` corners of an object of that family, standing on z = 0 about z, its longest side 1."""
-    points = FAMILIES[family](random)
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle = np.array([*(0.5 * (low + high))[:2], low[2]])
-    return np.asarray((points - middle) / (high - low).max())
+_Random = np.random.Generator
 
 
-def _turned(profile: list[tuple[float, float]]) -> FloatArray:
-    """``(n, 3)`` of a solid of revolution from its radii and heights."""
-    rings = [
-        np.column_stack([r * np.cos(_TURNS), r * np.sin(_TURNS), np.full(len(_TURNS), z)]) for r, z in profile
-    ]
-    return np.concatenate(rings)
+def draw(family: str, random: _Random) -> Solid:
+    """An object of that family, standing on z = 0 about z, its longest side 1."""
+    return FAMILIES[family](random).standing()
 
 
-def _box(middle: tuple[float, float, float], sides: tuple[float, float, float]) -> FloatArray:
-    signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    return np.asarray(np.array(middle) + 0.5 * signs * np.array(sides))
+def _wall(random: _Random, least: float = 0.03, most: float = 0.12) -> float:
+    """Of a vessel's radius; as many thin as thick."""
+    return float(np.exp(random.uniform(np.log(least), np.log(most))))
 
 
-def _handle(reach: float, low: float, high: float, thick: float) -> FloatArray:
-    """A loop beside a vessel, out to a distance from its axis."""
-    return _box((reach - 0.5 * thick, 0.0, 0.5 * (low + high)), (thick, thick, high - low))
+def _vessel(
+    outline: list[tuple[float, float]], wall: float, cross: Cross | None = None, split: float = 0.5
+) -> tuple[SolidGrid, Vessel]:
+    grid = SolidGrid()
+    return grid, turned(grid, outline, offset(outline, wall), split * outline[-1][1], cross)
 
 
-def _cup(random: np.random.Generator) -> FloatArray:
+def _cup(random: _Random) -> Solid:
     radius, foot = random.uniform(0.3, 0.65), random.uniform(0.6, 1.0)
-    body = _turned([(radius * foot, 0.0), (radius, random.uniform(0.2, 1.0)), (radius, 1.0)])
-    if random.random() < 0.25:
-        return body
-    reach = radius + random.uniform(0.2, 0.5)
-    return np.concatenate([body, _handle(reach, random.uniform(0.1, 0.3), random.uniform(0.7, 0.9), 0.12)])
+    outline = [(0.0, 0.0), (radius * foot, 0.0), (radius, random.uniform(0.2, 0.9)), (radius, 1.0)]
+    grid, body = _vessel(outline, radius * _wall(random))
+    if random.random() < 0.75:
+        reach = radius + random.uniform(0.2, 0.5)
+        add_handle(body, random.uniform(0.7, 0.9), random.uniform(0.1, 0.3), reach, 0.12)
+    return grid.solid()
 
 
-def _bowl(random: np.random.Generator) -> FloatArray:
+def _bowl(random: _Random) -> Solid:
     height, foot, bulge = random.uniform(0.4, 1.1), random.uniform(0.3, 0.7), random.uniform(0.75, 1.0)
-    return _turned([(foot, 0.0), (bulge, 0.5 * height), (1.0, height)])
+    outline = [(0.0, 0.0), (foot, 0.0), (bulge, 0.5 * height), (1.0, height)]
+    return _vessel(outline, _wall(random))[0].solid()
 
 
-def _plate(random: np.random.Generator) -> FloatArray:
-    height = random.uniform(0.05, 0.3)
-    return _turned([(random.uniform(0.4, 0.8), 0.0), (1.0, height)])
+def _plate(random: _Random) -> Solid:
+    height, foot = random.uniform(0.05, 0.3), random.uniform(0.4, 0.8)
+    outline = [(0.0, 0.0), (foot, 0.0), (1.0, height)]
+    return _vessel(outline, _wall(random, 0.025, 0.08))[0].solid()
 
 
-def _tray(random: np.random.Generator) -> FloatArray:
-    across, height, foot = random.uniform(0.4, 1.0), random.uniform(0.05, 0.3), random.uniform(0.75, 1.0)
-    bottom = _box((0.0, 0.0, 0.0), (foot, foot * across, 0.0))
-    return np.concatenate([bottom, _box((0.0, 0.0, height), (1.0, across, 0.02))])
+def _tray(random: _Random) -> Solid:
+    across, height, foot = random.uniform(0.4, 1.0), random.uniform(0.1, 0.6), random.uniform(0.75, 1.0)
+    outline = [(0.0, 0.0), (foot, 0.0), (1.0, height)]
+    return _vessel(outline, _wall(random, 0.025, 0.08), Cross(across, random.uniform(2.0, 10.0)))[0].solid()
 
 
-def _bottle(random: np.random.Generator) -> FloatArray:
+def _bottle(random: _Random) -> Solid:
     radius, shoulder, neck = random.uniform(0.12, 0.35), random.uniform(0.4, 0.85), random.uniform(0.25, 0.8)
-    return _turned(
-        [(radius, 0.0), (radius, shoulder), (neck * radius, 0.5 * (1 + shoulder)), (neck * radius, 1.0)]
-    )
+    high = 0.5 * (1.0 + shoulder)
+    outline = [(0.0, 0.0), (radius, 0.0), (radius, shoulder), (neck * radius, high), (neck * radius, 1.0)]
+    return _vessel(outline, radius * _wall(random, 0.04, 0.15))[0].solid()
 
 
-def _bar(random: np.random.Generator) -> FloatArray:
-    return _box((0.0, 0.0, 0.0), (1.0, random.uniform(0.04, 0.3), random.uniform(0.03, 0.2)))
+def _grid_box(
+    sides: tuple[float, float, float], cells: tuple[int, int, int]
+) -> tuple[SolidGrid, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
+    axes = [np.linspace(-0.5 * side, 0.5 * side, count + 1) for side, count in zip(sides, cells, strict=True)]
+    return SolidGrid(), np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
-def _block(random: np.random.Generator) -> FloatArray:
-    return _box((0.0, 0.0, 0.0), (1.0, random.uniform(0.3, 1.0), random.uniform(0.2, 1.2)))
+def _bar(random: _Random) -> Solid:
+    grid, places = _grid_box((1.0, random.uniform(0.04, 0.3), random.uniform(0.03, 0.2)), (16, 2, 2))
+    grid.add_block(grid.add_nodes(places))
+    return grid.solid()
 
 
-def _tool(random: np.random.Generator) -> FloatArray:
-    thick = random.uniform(0.03, 0.1)
-    shaft = _box((0.0, 0.0, 0.0), (1.0, random.uniform(0.05, 0.12), thick))
-    ends = [
-        _box(
-            (side * random.uniform(0.38, 0.46), 0.0, 0.0),
-            (random.uniform(0.08, 0.24), random.uniform(0.1, 0.35), thick),
-        )
-        for side in (-1.0, 1.0)
-    ]
-    return np.concatenate([shaft, *ends[: random.integers(1, 3)]])
+def _block(random: _Random) -> Solid:
+    grid, places = _grid_box((1.0, random.uniform(0.3, 1.0), random.uniform(0.2, 1.2)), (6, 6, 6))
+    grid.add_block(grid.add_nodes(places))
+    return grid.solid()
 
 
-def _pan(random: np.random.Generator) -> FloatArray:
+def _tool(random: _Random) -> Solid:
+    """A flat shaft with a wider end or two."""
+    shaft = random.uniform(0.05, 0.12)
+    grid, places = _grid_box((1.0, shaft, random.uniform(0.03, 0.1)), (20, 4, 2))
+    first, second = random.uniform(1.0, 3.5, 2) if random.random() < 0.6 else (1.0, random.uniform(1.5, 3.5))
+    knots = [-0.5, -0.5 + random.uniform(0.1, 0.2), -0.25, 0.25, 0.5 - random.uniform(0.1, 0.2), 0.5]
+    wider = np.interp(places[..., 0], knots, [0.7 * first, first, 1.0, 1.0, second, 0.7 * second])
+    places[..., 1] *= wider
+    grid.add_block(grid.add_nodes(places))
+    return grid.solid()
+
+
+def _hammer(random: _Random) -> Solid:
+    """A shaft with a head across its end, lying."""
+    thick, head = random.uniform(0.06, 0.14), random.uniform(0.25, 0.5)
+    grid, places = _grid_box((thick, head, thick), (2, 6, 2))
+    numbers = grid.add_nodes(places + np.array([0.5, 0.0, 0.0]))
+    grid.add_block(numbers)
+    shaft = random.uniform(0.3, 1.0) * head / 6.0
+    ends = numbers[0, 2:5]
+    layers = [ends]
+    for x in np.linspace(0.5 - 0.5 * thick, -0.5, 16)[1:]:
+        at = places[0, 2:5].copy()
+        at[..., 0], at[..., 1] = x, at[..., 1] * shaft / (head / 6.0)
+        layers.append(grid.add_nodes(at))
+    grid.add_block(np.stack(layers))
+    return grid.solid()
+
+
+def _pan(random: _Random) -> Solid:
     height, length = random.uniform(0.15, 0.6), random.uniform(0.6, 1.8)
-    body = _turned([(random.uniform(0.7, 1.0), 0.0), (1.0, height)])
-    level = random.uniform(0.6, 1.1) * height
-    return np.concatenate([body, _box((1.0 + 0.5 * length, 0.0, level), (length, 0.2, 0.08))])
+    outline = [(0.0, 0.0), (random.uniform(0.7, 1.0), 0.0), (1.0, height)]
+    grid, body = _vessel(outline, _wall(random, 0.025, 0.08), split=0.0)
+    add_arm(body, 0.8 * height, (1.0 + length, random.uniform(0.6, 1.1) * height), 0.14)
+    return grid.solid()
 
 
-def _glass(random: np.random.Generator) -> FloatArray:
+def _glass(random: _Random) -> Solid:
     rim, widest = random.uniform(0.15, 0.32), random.uniform(0.18, 0.36)
-    return _turned(
-        [(random.uniform(0.15, 0.3), 0.0), (0.03, 0.1), (widest, random.uniform(0.55, 0.8)), (rim, 1.0)]
-    )
+    foot, stem = random.uniform(0.15, 0.3), random.uniform(0.02, 0.04)
+    low, high = random.uniform(0.2, 0.45), random.uniform(0.6, 0.8)
+    wall = widest * _wall(random, 0.03, 0.1)
+    outer = [(foot, 0.0), (foot, 0.02), (stem, 0.06), (stem, low), (widest, high), (rim, 1.0)]
+    inner = [
+        (0.0, 0.0),
+        (0.0, 0.02),
+        (0.0, 0.06),
+        (0.0, low + 0.03),
+        (widest - wall, high),
+        (rim - wall, 1.0),
+    ]
+    grid = SolidGrid()
+    turned(grid, outer, inner, 0.5)
+    return grid.solid()
 
 
-def _pot(random: np.random.Generator) -> FloatArray:
-    height, belly = random.uniform(0.8, 1.6), random.uniform(0.4, 0.6)
-    body = _turned(
-        [(0.6, 0.0), (1.0, belly * height), (random.uniform(0.3, 0.7), 0.85 * height), (0.1, height)]
-    )
-    spout = _box((-random.uniform(1.2, 1.7), 0.0, random.uniform(0.5, 0.9) * height), (0.15, 0.15, 0.1))
-    return np.concatenate([body, spout, _handle(random.uniform(1.2, 1.7), 0.2 * height, 0.8 * height, 0.15)])
+def _pot(random: _Random) -> Solid:
+    height, belly, lid = random.uniform(0.8, 1.6), random.uniform(0.4, 0.6), random.uniform(0.3, 0.7)
+    outline = [(0.0, 0.0), (0.6, 0.0), (1.0, belly * height), (lid, 0.95 * height), (lid, height)]
+    grid, body = _vessel(outline, _wall(random))
+    end = random.uniform(1.2, 1.7), random.uniform(0.6, 1.0) * height
+    add_arm(body, 0.6 * height, end, 0.2, opposite=True)
+    add_handle(body, 0.8 * height, 0.25 * height, random.uniform(1.2, 1.7), 0.15)
+    return grid.solid()
 
 
-def _jug(random: np.random.Generator) -> FloatArray:
+def _jug(random: _Random) -> Solid:
     radius, waist = random.uniform(0.22, 0.4), random.uniform(0.6, 1.0)
-    body = _turned(
-        [(radius * random.uniform(0.7, 1.0), 0.0), (radius, 0.4), (radius * waist, 0.8), (radius, 1.0)]
-    )
-    lip = _box((-radius - random.uniform(0.0, 0.12), 0.0, 0.97), (0.05, 0.1, 0.04))
-    return np.concatenate([body, lip, _handle(radius + random.uniform(0.12, 0.3), 0.2, 0.9, 0.08)])
+    foot = radius * random.uniform(0.7, 1.0)
+    outline = [(0.0, 0.0), (foot, 0.0), (radius, 0.4), (radius * waist, 0.8), (radius, 1.0)]
+    grid, body = _vessel(outline, radius * _wall(random))
+    add_handle(body, 0.85, 0.25, radius + random.uniform(0.12, 0.3), 0.08)
+    return grid.solid()
 
 
-FAMILIES: MappingProxyType[str, Callable[[np.random.Generator], FloatArray]] = MappingProxyType(
+FAMILIES: MappingProxyType[str, Callable[[_Random], Solid]] = MappingProxyType(
     {
         "cup": _cup, "bowl": _bowl, "plate": _plate, "tray": _tray, "bottle": _bottle, "bar": _bar,
-        "block": _block, "tool": _tool, "pan": _pan, "glass": _glass, "pot": _pot, "jug": _jug,
+        "block": _block, "tool": _tool, "hammer": _hammer, "pan": _pan, "glass": _glass, "pot": _pot,
+        "jug": _jug,
     }
 )  # fmt: skip
 """By name."""

@@ -1,118 +1,82 @@
-"""Fit the regression of outlines: ``python -m experiments.scale_estimation.unseen.train``.
+"""Train all that answers for objects never drawn: ``python -m experiments.scale_estimation.unseen.train``.
 
-Shapes are split, not pictures: what is held out is of shapes that no fitted picture shows. The error there is
-printed, and the width of the answers is made to hold there.
+Shapes are split, not samples: what is held out is of shapes that nothing was fitted to. The errors there are
+printed and written on the cards, and the width of the answers is made to hold there. Sound and touch need
+torch: ``pip install '.[author]'``. Modes that were solved are kept, so that a run that was stopped goes on.
 """
 
 import argparse
+import json
 import sys
+import time
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 
-import numpy as np
+from experiments.scale_estimation.unseen.training.outlines import train_outlines
+from harness.basics.cores import own_cores
 
-from experiments.scale_estimation.unseen.families import FAMILIES, draw
-from experiments.scale_estimation.unseen.regression import WEIGHTS, Regression, features_of, products
-from experiments.scale_estimation.vision.fit import CameraErrors, View
-from experiments.scale_estimation.vision.outline import SeenOutline, directions
-from harness.basics.arrays import FloatArray
-from harness.basics.geometry import transform
-
-PICTURES = 6
-"""Of each shape: other sizes, turns and cameras."""
-
-HELD_OUT = 0.2
-RIDGE = 3.0
-SIZES = (0.05, 0.6)
-PIXELS = 0.3
-"""Deviation of an outline's reach."""
-
-_PLACE = np.array([-0.42, 0.0, 0.25])
-_PUT = 20.0e-3
-_FOCAL = 600.0
+SENSES = ("outline", "sound", "touch")
 
 
-def pictures(shapes: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """``(n, d)`` features, ``(n,)`` logarithms of size over mean width, sizes in m, numbers of the shapes."""
-    random = np.random.default_rng(seed)
-    rows, targets, sizes, numbers = [], [], [], []
-    names = list(FAMILIES)
-    for shape in range(shapes):
-        corners = draw(names[shape % len(names)], random)
-        for _ in range(PICTURES):
-            size = float(np.exp(random.uniform(*np.log(SIZES))))
-            row, mean = _picture(corners, size, random)
-            rows.append(row)
-            targets.append(np.log(size / mean))
-            sizes.append(size)
-            numbers.append(shape)
-    return np.array(rows), np.array(targets), np.array(sizes), np.array(numbers)
+@dataclass(frozen=True)
+class Profile:
+    """How much is made and for how long it is learnt.
+
+    Attributes:
+        outlines: shapes whose outlines are fitted.
+        shapes: whose strikes and contacts are learnt.
+        strikes: samples of strikes of each.
+        contacts: explorations of each.
+        epochs: of sound, of touch.
+        members: networks of each sense.
+    """
+
+    outlines: int
+    shapes: int
+    strikes: int
+    contacts: int
+    epochs: tuple[int, int]
+    members: int = 3
 
 
-def _picture(corners: FloatArray, size: float, random: np.random.Generator) -> tuple[FloatArray, float]:
-    """One look by a camera that is a little off from where it is said to be."""
-    camera = _camera(random)
-    view = View(camera, _FOCAL, (320.0, 240.0), corners, _PLACE)
-    errors = CameraErrors(place=_PUT)
-    sigmas = View(camera, _FOCAL, (320.0, 240.0), corners, _PLACE, errors).sigmas
-    unknowns = np.where(
-        np.isinf(sigmas), 0.0, np.where(np.isinf(sigmas), 1.0, sigmas) * random.standard_normal(14)
-    )
-    unknowns[0], unknowns[3] = np.log(size), random.uniform(0.0, 2.0 * np.pi)
-    extents = (view.project(unknowns[None], corners)[0] @ directions().T).max(axis=0)
-    extents = extents + PIXELS * random.standard_normal(len(extents))
-    seen = SeenOutline(extents, np.zeros(len(extents), bool))
-    return features_of(seen, camera, _FOCAL, _PLACE)
+PROFILES = MappingProxyType(
+    {
+        "smoke": Profile(260, 26, 4, 8, (2, 2)),
+        "standard": Profile(1300, 520, 32, 48, (40, 60)),
+    }
+)
 
 
-def _camera(random: np.random.Generator) -> FloatArray:
-    """``(4, 4)``, looking at where the object stands."""
-    elevation, turn = random.uniform(0.2, 1.0), random.uniform(0.0, 2.0 * np.pi)
-    back = np.array([np.cos(elevation) * np.cos(turn), np.cos(elevation) * np.sin(turn), np.sin(elevation)])
-    eye = _PLACE + random.uniform(0.9, 1.8) * back
-    right = np.cross(-back, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    return transform(np.stack([right, np.cross(-back, right), -back], axis=1), eye)
-
-
-def fitted(features: FloatArray, targets: FloatArray) -> Regression:
-    """Ridge regression; its ``sigma`` is of the fit itself."""
-    middle, spread = features.mean(axis=0), features.std(axis=0)
-    terms = products((features - middle) / spread)
-    normal = terms.T @ terms + RIDGE * np.eye(terms.shape[1])
-    weights = np.linalg.solve(normal, terms.T @ targets)
-    sigma = float(np.std(terms @ weights - targets))
-    return Regression(middle, spread, np.asarray(weights), np.asarray(np.linalg.inv(normal)), sigma)
-
-
-def main() -> None:
-    """Fit, say what it reaches on shapes that were held out, write it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--shapes", type=int, default=1200)
+def main(arguments: list[str] | None = None) -> int:
+    """Make the samples, fit, say what is reached on shapes that were held out, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--profile", choices=list(PROFILES), default="standard")
+    parser.add_argument("--only", choices=SENSES, action="append", help="again for more than one")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / WEIGHTS)
-    asked = parser.parse_args()
-    features, targets, sizes, numbers = pictures(asked.shapes, asked.seed)
-    held = numbers >= (1.0 - HELD_OUT) * asked.shapes
-    found = fitted(features[~held], targets[~held])
-    expected, deviations = found.size(features[held])
-    apart = expected - targets[held]
-    # So wide that nine tenths of the shapes held out are within.
-    wider = float(np.quantile(np.abs(apart) / deviations, 0.9) / 1.645)
-    error = 1e2 * np.abs(np.expm1(apart)) * sizes[held]
-    np.savez(
-        asked.out,
-        middle=found.middle,
-        spread=found.spread,
-        weights=found.weights,
-        inverse=found.inverse,
-        sigma=found.sigma * wider,
-    )
-    sys.stdout.write(
-        f"{asked.shapes} shapes of {len(FAMILIES)} families, {len(targets)} outlines; held out {held.sum()}: "
-        f"mean error {error.mean():.2f} cm, median {np.median(error):.2f}, sizes {1e2 * SIZES[0]:g} to "
-        f"{1e2 * SIZES[1]:g} cm; fitted {1e2 * found.sigma:.1f} %, stated {1e2 * found.sigma * wider:.1f} %\n"
-    )
+    parser.add_argument("--processes", type=int, default=own_cores(), help="that make samples")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "data", help="a folder")
+    asked = parser.parse_args(arguments)
+    senses, profile = asked.only or SENSES, PROFILES[asked.profile]
+    if find_spec("torch") is None and {"sound", "touch"} & set(senses):
+        sys.stderr.write("sound and touch need torch: pip install '.[author]', or say --only outline\n")
+        return 2
+    asked.out.mkdir(parents=True, exist_ok=True)
+    if "outline" in senses:
+        sys.stdout.write(train_outlines(profile.outlines, asked.seed, asked.out) + "\n")
+    for sense in [sense for sense in ("sound", "touch") if sense in senses]:
+        from experiments.scale_estimation.unseen.training.train_network import train_network  # needs torch
+
+        began = time.perf_counter()
+        data, card = train_network(sense, profile, asked.seed, asked.processes)
+        card["profile"], card["seconds"] = asked.profile, round(time.perf_counter() - began, 1)
+        (asked.out / f"{sense}.onnx").write_bytes(data)
+        (asked.out / f"{sense}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
+        reached = {name: card[name] for name in ("held_out", "seconds")}
+        sys.stdout.write(f"{sense}: {json.dumps(reached)}\n")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -130,6 +130,26 @@ def resonances_figure(shown: Resonances) -> Figure:
     return figure
 
 
+def spectrogram_figure(frequencies: FloatArray, levels: Mapping[str, FloatArray]) -> Figure:
+    """How loudly bands ring, in one line for each stretch of time after the strike.
+
+    Args:
+        frequencies: ``(b,)`` Hz, the bands' middles.
+        levels: ``(b,)`` dB below the loudest by stretch of time, not a number where nothing was excited.
+    """
+    with styled():
+        figure = blank(8.2, 3.4, "constrained")
+        axes = figure.add_subplot()
+        for number, (name, level) in enumerate(levels.items()):
+            shade = 0.25 + 0.75 * (1.0 - number / max(1, len(levels)))
+            axes.plot(frequencies, level, color=ANSWER, alpha=shade, lw=1.4, label=name)
+        axes.set_xscale("log")
+        axes.set_xlabel("Hz")
+        axes.set_ylabel("dB below the loudest band")
+        axes.legend(loc="lower left", frameon=False, fontsize=8, title="after the strike", title_fontsize=8)
+    return figure
+
+
 def touched_figure(shown: TouchedObject) -> Figure:
     """The object from above and from the side, with its contacts and the ways that met nothing."""
     with styled():

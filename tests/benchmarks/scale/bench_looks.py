@@ -65,7 +65,7 @@ def look(cell: ScaleCell, scene: SceneFile, station: Station) -> Row:
             return {}
         row: Row = {}
         with suppress(FitRefused):
-            row["shape unknown"] = scored(answering.by_outline_alone().belief, true)
+            row["shape unknown"] = scored(answering.without_shape()["vision"]().belief, true)
         row["box"] = (1e2 * abs(by_box(answering.outline, answering.model.view) - true), False)
         sight = answering.answer().sight
         return row if sight is None else {**row, "shape known": scored(sight.belief, true)}

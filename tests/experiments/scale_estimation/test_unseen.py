@@ -4,15 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from experiments.scale_estimation.experiment import EXPERIMENT
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.unseen.families import FAMILIES, draw
 from experiments.scale_estimation.unseen.regression import by_outline, features_of, shipped
-from experiments.scale_estimation.unseen.train import fitted, pictures
+from experiments.scale_estimation.unseen.training.outlines import fitted, pictures
 from harness.bench.station_file import Station
 from harness.experiment.begin import begin
+from harness.sim.solid.surface_measure import enclosed_volume
 from tests.experiments.scale_estimation.runs import answered, ran, scene_of
 from tests.experiments.scale_estimation.test_vision import FOCAL, PLACE, camera, nominal, outline_at, view_of
 
@@ -21,11 +25,25 @@ RANGE = SizeRange(0.05, 0.6)
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_shape_stands_about_its_middle_and_is_one_long(family: str) -> None:
-    points = draw(family, np.random.default_rng(2))
+    points = draw(family, np.random.default_rng(2)).inside.nodes
     low, high = points.min(axis=0), points.max(axis=0)
     assert (high - low).max() == pytest.approx(1.0)
     assert low[2] == pytest.approx(0.0)
     assert low[:2] + high[:2] == pytest.approx([0.0, 0.0])
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("seed", range(4))
+def test_the_cells_of_a_shape_are_one_body_and_fill_its_surface(family: str, seed: int) -> None:
+    shape = draw(family, np.random.default_rng(seed))
+    inside, surface = shape.inside, shape.surface
+    assert (inside.volumes > 0.0).all()
+    edges = np.concatenate([inside.cells[:, [k, (k + 1) % 4]] for k in range(4)])
+    linked = coo_array((np.ones(len(edges)), edges.T), shape=(len(inside.nodes),) * 2)
+    assert connected_components(linked, directed=False)[0] == 1
+    assert trimesh.Trimesh(surface.vertices, surface.faces, process=False).is_watertight
+    # Where two tubes of a pot come close they may lap over each other by a little.
+    assert enclosed_volume(surface) == pytest.approx(inside.volumes.sum(), rel=0.05)
 
 
 def test_shapes_that_were_held_out_are_sized_better_than_by_their_widest_side() -> None:

@@ -1,0 +1,89 @@
+"""The size of an object never drawn, by each sense: what household things look, sound and feel like."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from experiments.scale_estimation.size import Belief, SizeRange
+from experiments.scale_estimation.unseen.contact_set import GelWay
+from experiments.scale_estimation.unseen.network import by_strikes, by_ways, shipped
+from experiments.scale_estimation.unseen.regression import by_outline, features_of
+from experiments.scale_estimation.unseen.spectrogram import response_of
+from experiments.scale_estimation.vision.outline import SeenOutline
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused
+from harness.basics.materials import Material
+from harness.bench.acquisition import Strike
+from harness.bench.station_sections import CameraSection
+
+
+@dataclass(frozen=True, eq=False)
+class ShapelessAnswer:
+    """The answer about an object whose shape is not known.
+
+    Attributes:
+        belief: over the size.
+        distance: from what was learnt, in units of the usual one; beyond 1 the belief is widened for it.
+    """
+
+    belief: Belief
+    distance: float
+
+    @property
+    def strange(self) -> bool:
+        """Whether the reading is unlike all that was learnt."""
+        return self.distance > 1.0
+
+
+def outline_alone(
+    outline: SeenOutline, camera: CameraSection | None, place: FloatArray, sizes: SizeRange
+) -> ShapelessAnswer:
+    """By its outline.
+
+    Args:
+        outline: of the picture.
+        camera: of the station.
+        place: ``(3,)`` m in base, where the object nominally stands.
+        sizes: asked about.
+
+    Raises:
+        FitRefused: there is no camera, or the outline is not whole.
+    """
+    if camera is None:
+        raise FitRefused("the station has no [camera]")
+    if outline.hidden.any():
+        raise FitRefused(
+            "the object's outline is cut off by the picture's border; move the camera back: without its "
+            "shape nobody knows what lies beyond"
+        )
+    features, width = features_of(outline, camera.base_from_camera.matrix, camera.focal_length, place)
+    return ShapelessAnswer(by_outline(features, width, sizes), 0.0)
+
+
+def strikes_alone(strikes: Sequence[Strike], material: Material, sizes: SizeRange) -> ShapelessAnswer:
+    """By strikes of an object that is said to be of a material.
+
+    Raises:
+        FitRefused: no strike may be used.
+    """
+    heard = response_of(strikes)
+    if heard is None:
+        raise FitRefused("nothing was heard: no strike was made, or none may be used; strike the object")
+    return ShapelessAnswer(*by_strikes(*heard, material, sizes))
+
+
+def ways_alone(ways: Sequence[GelWay], sizes: SizeRange) -> ShapelessAnswer:
+    """By the straight ways of the gel, those that met the object and those that did not.
+
+    Raises:
+        FitRefused: the gel touched nothing.
+    """
+    if all(way.normal is None for way in ways):
+        raise FitRefused("the gel touched nothing yet")
+    return ShapelessAnswer(*by_ways(ways, sizes))
+
+
+def load_networks(sound: bool, touch: bool) -> None:
+    """Read what the senses will need."""
+    for sense, asked in (("sound", sound), ("touch", touch)):
+        if asked:
+            shipped(sense)

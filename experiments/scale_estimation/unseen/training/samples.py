@@ -1,0 +1,141 @@
+"""Samples of shapes of the families: strikes and ways of the gel, made in several processes."""
+
+import sys
+import time
+from collections.abc import Callable, Generator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+
+import numpy as np
+
+from experiments.scale_estimation.unseen import contact_set
+from experiments.scale_estimation.unseen.families import FAMILIES, draw
+from experiments.scale_estimation.unseen.ringing_shape import MODES, RingingShape
+from experiments.scale_estimation.unseen.solid_grid import Solid
+from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, contact_sample
+from experiments.scale_estimation.unseen.training.strike_samples import strike_sample
+from harness.basics.arrays import AnyArray, FloatArray, IntArray
+from harness.basics.errors import MeshRefused
+from harness.basics.materials import MATERIALS
+from harness.basics.store import Store, default_folder, digest
+
+SIZES = (0.05, 0.6)
+"""M, least and greatest longest side; even in the logarithm."""
+
+_SAID_EVERY = 10.0
+"""S between lines of progress."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Readings of shapes of known size.
+
+    Attributes:
+        inputs: by their name in the graph, ``(n, ...)`` each.
+        sizes: ``(n,)`` m.
+        shapes: ``(n,)`` number of the shape that each is of.
+    """
+
+    inputs: dict[str, AnyArray]
+    sizes: FloatArray
+    shapes: IntArray
+
+    def of(self, rows: AnyArray) -> "Samples":
+        """Some of them."""
+        return Samples({k: v[rows] for k, v in self.inputs.items()}, self.sizes[rows], self.shapes[rows])
+
+
+_Row = tuple[dict[str, FloatArray], float]
+
+
+def shape_of(number: int, seed: int) -> Solid:
+    """The shapes of a seed by their number; families take turns."""
+    names = list(FAMILIES)
+    return draw(names[number % len(names)], np.random.default_rng((seed, number)))
+
+
+def draw_size(random: np.random.Generator) -> float:
+    """M, even in its logarithm."""
+    return float(np.exp(random.uniform(*np.log(SIZES))))
+
+
+def ringing_of(number: int, seed: int) -> RingingShape | None:
+    """Its modes, from the store where they were solved before; None where they cannot be solved."""
+    shape, store = shape_of(number, seed), Store(default_folder())
+    key = digest(["ringing shape", 1, MODES, shape.inside.nodes, shape.inside.cells, (seed, number)])
+    kept = store.get(key)
+    if isinstance(kept, dict):
+        return RingingShape(kept["frequencies"], kept["amplitudes"])
+    try:
+        found = RingingShape.solved(shape, np.random.default_rng((seed, number, 1)))
+    except MeshRefused:
+        return None
+    store.put(key, {"frequencies": found.frequencies, "amplitudes": found.amplitudes})
+    return found
+
+
+def strikes(seed: int, count: int, number: int) -> list[_Row]:
+    """So many samples of strikes of one shape; none where its modes cannot be solved."""
+    shape = ringing_of(number, seed)
+    random, rows = np.random.default_rng((seed, number, 2)), []
+    for _ in range(count if shape is not None else 0):
+        assert shape is not None
+        size, material = draw_size(random), str(random.choice(list(MATERIALS)))
+        bands, extras = strike_sample(shape, size, material, random)
+        rows.append(({"bands": bands, "extras": extras}, size))
+    return rows
+
+
+def contacts(seed: int, count: int, number: int) -> list[_Row]:
+    """So many explorations of one shape."""
+    shape = TouchableShape.of(shape_of(number, seed))
+    random, rows = np.random.default_rng((seed, number, 3)), []
+    for _ in range(count):
+        size = draw_size(random)
+        ways, kinds, whole = contact_set.features(contact_sample(shape, size, random))
+        rows.append(({"ways": ways, "kinds": kinds, "whole": whole}, size))
+    return rows
+
+
+MAKERS: dict[str, Callable[[int, int, int], list[_Row]]] = {"sound": strikes, "touch": contacts}
+
+
+def samples_of(sense: str, shapes: int, each: int, seed: int, processes: int) -> Samples:
+    """Samples of all shapes, in the shapes' order whatever the number of processes.
+
+    Args:
+        sense: ``"sound"`` or ``"touch"``.
+        shapes: how many.
+        each: samples of each.
+        seed: of shapes and samples.
+        processes: that share the work.
+    """
+    inputs: dict[str, list[FloatArray]] = {}
+    sizes: list[float] = []
+    numbers: list[int] = []
+    make = partial(MAKERS[sense], seed, each)
+    with closing(_mapped(make, shapes, processes, sense)) as made:
+        for number, rows in enumerate(made):
+            for one, size in rows:
+                for name, value in one.items():
+                    inputs.setdefault(name, []).append(value.astype(np.float32))
+                sizes.append(size)
+                numbers.append(number)
+    stacked: dict[str, AnyArray] = {name: np.stack(values) for name, values in inputs.items()}
+    return Samples(stacked, np.array(sizes), np.array(numbers))
+
+
+def _mapped(
+    make: Callable[[int], list[_Row]], shapes: int, processes: int, sense: str
+) -> Generator[list[_Row]]:
+    began = said = time.perf_counter()
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        for number, rows in enumerate(pool.map(make, range(shapes), chunksize=4)):
+            yield rows
+            if (now := time.perf_counter()) - said > _SAID_EVERY:
+                said = now
+                left = (now - began) / (number + 1) * (shapes - number - 1)
+                sys.stderr.write(f"{sense}: shape {number + 1} of {shapes}, {left:.0f} s left\n")
