@@ -30,9 +30,9 @@ SURE = 0.9
 """Probability of the likeliest size and those alike, below which another one stands beside it: with modes
 an octave off, a handful of peaks is matched by chance, and no interval about either size would be honest."""
 
-EVERY = 4
-"""Points of the grid of sizes from one at which the likelihood is computed to the next: a third of the
-narrowest deviation of a frequency, so that a straight line between is exact to a hundredth of a nat a peak."""
+GRID = 4.0e-3
+"""Of the logarithm, between sizes at which the likelihood is computed: a third of the narrowest deviation of
+a frequency, so that a straight line between is exact to a hundredth of a nat a peak."""
 
 DAMPING_SIGMA = 0.8
 """Of the logarithm of a material's damping, as published values differ."""
@@ -140,8 +140,7 @@ def by_sound(peaks: Peaks, materials: Sequence[MaterialGuess], nominal: float, s
             f"{len(peaks.frequencies)} peaks were heard, and {FEWEST} are needed to tell a size; strike more "
             "places"
         )
-    stated = _speed(materials[0])
-    matches = tuple(_match(peaks, guess, nominal, sizes, stated) for guess in materials)
+    matches = _matches(peaks, materials, nominal, sizes)
     _require_worth(max(one.nats for one in matches))
     _require_one(_mixed(matches, [one.belief for one in matches]))
     belief = _mixed(matches, [one.belief.widened(one.sigma) for one in matches])
@@ -159,17 +158,27 @@ def log_ringing(peaks: Peaks, material: Material) -> float:
     return float(-0.5 * (np.median(apart) / sigma) ** 2)
 
 
-def _match(peaks: Peaks, guess: MaterialGuess, nominal: float, sizes: SizeRange, stated: float) -> Match:
+def _matches(
+    peaks: Peaks, materials: Sequence[MaterialGuess], nominal: float, sizes: SizeRange
+) -> tuple[Match, ...]:
+    """One a material, all from one likelihood: a body of another material has its frequencies at another size.
+
+    So how well they match says nothing of the material: only how long the peaks ring does, and where in the
+    range of sizes it puts them.
+    """
     logs = sizes.logs - np.log(nominal)
-    few = np.linspace(logs[0], logs[-1], len(logs) // EVERY + 2)
-    likelihood = np.interp(logs, few, log_likelihood(peaks, guess.model, few))
-    return Match(
-        Belief.of(sizes, TEMPER * likelihood),
-        float(np.logaddexp.reduce(TEMPER * likelihood)) + log_ringing(peaks, guess.model.material),
-        float(np.hypot(guess.sigma, SHAPE_SIGMA)),
-        _speed(guess) / stated,
-        float(likelihood.max()) / len(peaks.frequencies),
-    )
+    speeds = np.array([_speed(guess) for guess in materials]) / _speed(materials[0])
+    slower, faster = np.log(speeds.min()), np.log(speeds.max())
+    few = np.linspace(logs[0] - faster, logs[-1] - slower, round((np.ptp(logs) + faster - slower) / GRID))
+    likelihood = log_likelihood(peaks, materials[0].model, few)
+    matches = []
+    for guess, speed in zip(materials, speeds, strict=True):
+        own = np.interp(logs - np.log(speed), few, likelihood)
+        evidence = float(np.logaddexp.reduce(TEMPER * own)) + log_ringing(peaks, guess.model.material)
+        nats = float(own.max()) / len(peaks.frequencies)
+        sigma = float(np.hypot(guess.sigma, SHAPE_SIGMA))
+        matches.append(Match(Belief.of(sizes, TEMPER * own), evidence, sigma, float(speed), nats))
+    return tuple(matches)
 
 
 def _speed(guess: MaterialGuess) -> float:
