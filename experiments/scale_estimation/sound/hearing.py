@@ -161,10 +161,10 @@ def log_ringing(peaks: Peaks, material: Material) -> float:
 def _matches(
     peaks: Peaks, materials: Sequence[MaterialGuess], nominal: float, sizes: SizeRange
 ) -> tuple[Match, ...]:
-    """One a material, all from one likelihood: a body of another material has its frequencies at another size.
+    """One a material, all from one likelihood: another material has the same frequencies at another size.
 
-    So how well they match says nothing of the material: only how long the peaks ring does, and where in the
-    range of sizes it puts them.
+    So how well they match says nothing of the material: only how long the peaks ring does, and whether the
+    size is one that was asked about.
     """
     logs = sizes.logs - np.log(nominal)
     speeds = np.array([_speed(guess) for guess in materials]) / _speed(materials[0])
@@ -188,9 +188,7 @@ def _speed(guess: MaterialGuess) -> float:
 
 def _mixed(matches: Sequence[Match], beliefs: Sequence[Belief]) -> Belief:
     """Beliefs of the matches, each weighed by its material's evidence."""
-    weighed = [
-        one.log_evidence + belief.log_density for one, belief in zip(matches, beliefs, strict=True)
-    ]
+    weighed = [one.log_evidence + belief.log_density for one, belief in zip(matches, beliefs, strict=True)]
     return Belief.of(beliefs[0].range, np.logaddexp.reduce(weighed, axis=0))
 
 
@@ -216,13 +214,14 @@ def _require_one(exact: Belief) -> None:
     sure = exact.share_about(exact.likeliest, ALIKE)
     if sure < SURE:
         raise FitRefused(
-            f"what was heard fits this object's modes at several sizes, best at {1e2 * exact.likeliest:.1f} cm "
-            f"with {100 * sure:.0f} %, and {100 * SURE:.0f} % are needed; strike more places"
+            f"what was heard fits this object's modes at several sizes, best at {1e2 * exact.likeliest:.1f} "
+            f"cm with {100 * sure:.0f} %, and {100 * SURE:.0f} % are needed; strike more places, "
+            "or say what it is made of"
         )
 
 
 def _prior(one: Match, size: Belief) -> FloatArray:
-    """``(n,)`` logarithm, not normalised: where the match should lie were the size as another sense has it."""
+    """``(n,)`` logarithm, not normalised: where the match should lie if another sense is right."""
     sigma = np.hypot(one.sigma, size.spread)
     return np.asarray(-0.5 * ((size.range.logs - np.log(size.size)) / sigma) ** 2 - np.log(sigma))
 
