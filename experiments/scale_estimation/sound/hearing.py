@@ -30,7 +30,7 @@ SURE = 0.9
 """Probability of the likeliest size and those alike, below which another one stands beside it: with modes
 an octave off, a handful of peaks is matched by chance, and no interval about either size would be honest."""
 
-GRID = 4.0e-3
+GRID = 2.5e-3
 """Of the logarithm, between sizes at which the likelihood is computed: a third of the narrowest deviation of
 a frequency, so that a straight line between is exact to a hundredth of a nat a peak."""
 
