@@ -11,6 +11,7 @@ from experiments.scale_estimation.readings import outline_of, patch_of_contact, 
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.sound.hearing import Hearing, by_sound
+from experiments.scale_estimation.sound.peaks import Peaks
 from experiments.scale_estimation.touch.patch import Patch, free_line
 from experiments.scale_estimation.touch.touch import Touch, by_touch
 from experiments.scale_estimation.unseen.answer import (
@@ -102,6 +103,7 @@ class ScaleAnswering:
         self.ways: list[GelWay] = []
         self.strikes: list[Strike] = []
         self._read = dict.fromkeys(SENSES, 0.0)
+        self._heard: tuple[int, Peaks | None] = (0, None)
 
     def load(self) -> None:
         """Make what depends on the object alone, while the arm has other things to do."""
@@ -178,6 +180,12 @@ class ScaleAnswering:
         usable = sum(not strike.fault for strike in self.strikes)
         return SizeAnswer(found, together, seconds, len(self.patches), usable)
 
+    def heard(self) -> Peaks | None:
+        """The resonances of all strikes so far; None where none was made, or none may be used."""
+        if self._heard[0] != len(self.strikes):
+            self._heard = len(self.strikes), peaks_of(self.strikes)
+        return self._heard[1]
+
     def stands_seen(self) -> tuple[SeenStand, ...]:
         """How the object may stand by the look; none where it was not seen."""
         seen = self.outline
@@ -217,7 +225,7 @@ class ScaleAnswering:
         return self.outline
 
     def _by_sound(self) -> Hearing:
-        peaks = peaks_of(self.strikes)
+        peaks = self.heard()
         if peaks is None:
             raise FitRefused(
                 "nothing was heard: no strike was made, or none rang; strike a place of the object"

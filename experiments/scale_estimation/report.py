@@ -7,7 +7,6 @@ import numpy as np
 
 from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
 from experiments.scale_estimation.envelope import placed
-from experiments.scale_estimation.readings import peaks_of
 from experiments.scale_estimation.sound.hearing import Hearing
 from experiments.scale_estimation.touch.touch import Touch
 from experiments.scale_estimation.unseen.spectrogram import FRAMES, band_levels, response_of
@@ -90,7 +89,7 @@ def _seen(answering: ScaleAnswering, outline: SeenOutline, sight: Sight | None, 
 
 
 def _heard(answering: ScaleAnswering, found: SizeAnswer, album: Album) -> PageSection:
-    peaks = peaks_of(answering.strikes)
+    peaks = answering.heard()
     if peaks is None:
         return PageSection("By sound", "No strike may be used.", None)
     hearing = found.hearing

@@ -132,6 +132,21 @@ class Belief:
         middle = float(self._shares @ logs)
         return float(np.sqrt(self._shares @ (logs - middle) ** 2))
 
+    @property
+    def likeliest(self) -> float:
+        """M, where the density is greatest, a size beyond the range thought of as rare."""
+        return float(np.exp(self.range.logs[int(np.argmax(self._weights))]))
+
+    def share_about(self, size: float, reach: float) -> float:
+        """Probability of the sizes whose logarithm is no further than ``reach`` from that of one in m."""
+        near = np.abs(self.range.logs - np.log(size)) <= reach
+        return float(self._weights[near].sum() / self._weights.sum())
+
+    @cached_property
+    def _weights(self) -> FloatArray:
+        """``(n,)`` density, not normalised, of sizes in the range and, as rare, beyond."""
+        return np.asarray(np.exp(self.log_density) * np.where(self.range.inside, 1.0, STRANGE))
+
     def doubted(self, share: float) -> "Belief":
         """The same with so much probability spread evenly over all that is searched."""
         uniform = 1.0 / (STEP * len(self.log_density))

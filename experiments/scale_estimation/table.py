@@ -14,7 +14,6 @@ from experiments.scale_estimation.baselines import (
     constant,
     random_error,
 )
-from experiments.scale_estimation.readings import peaks_of
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.touch.touch import by_touch
@@ -134,7 +133,7 @@ def _trivial(answering: ScaleAnswering) -> dict[str, Callable[[], float | None]]
     model = answering.model
 
     def first_peak() -> float | None:
-        peaks = peaks_of(answering.strikes)
+        peaks = answering.heard()
         if peaks is None:
             return None
         return by_first_peak(peaks, model.ringing(answering.accuracy), model.nominal)

@@ -9,6 +9,7 @@ import numpy as np
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.sound.peaks import Peaks, log_likelihood
+from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import Material
 from harness.sim.modal.modes import dampings
@@ -16,12 +17,22 @@ from harness.sim.modal.modes import dampings
 FEWEST = 3
 """Peaks below which a match by chance is too likely."""
 
-WORTH = 2.2
+WORTH = 1.0
 """Nats a peak over chance, below which the object's modes do not explain what was heard."""
 
-TEMPER = 0.5
+TEMPER = 0.7
 """Power of the likelihood: modes of one family are off together, so that peaks say less than their number."""
 
+ALIKE = 0.15
+"""Of the logarithm of the size: sizes no further apart are one answer, not two."""
+
+SURE = 0.9
+"""Probability of the likeliest size and those alike, below which another one stands beside it: with modes
+an octave off, a handful of peaks is matched by chance, and no interval about either size would be honest."""
+
+GRID = 2.5e-3
+"""Of the logarithm, between sizes at which the likelihood is computed: a third of the narrowest deviation of
+a frequency, so that a straight line between is exact to a hundredth of a nat a peak."""
 
 DAMPING_SIGMA = 0.8
 """Of the logarithm of a material's damping, as published values differ."""
@@ -50,20 +61,47 @@ class MaterialGuess:
 
 
 @dataclass(frozen=True, eq=False)
+class Match:
+    """The sizes at which the modes are where the peaks are, were the object of one material.
+
+    Attributes:
+        belief: over the size, were the material and the wall exactly as stated.
+        log_evidence: of the material, logarithm.
+        sigma: of the logarithm of the size, which the material and the wall leave open.
+        speed: sqrt(E / density) over that of the material stated first.
+        nats: a peak over chance at the best size.
+    """
+
+    belief: Belief
+    log_evidence: float
+    sigma: float
+    speed: float
+    nats: float
+
+
+@dataclass(frozen=True, eq=False)
 class Hearing:
     """The answer by sound.
 
     Attributes:
         belief: over the size.
-        match: the same were the material and the wall exactly as stated.
-        matched: nats a peak over chance at the best size.
+        matches: one a material; that stated first is first.
         seconds: s of the estimate.
     """
 
     belief: Belief
-    match: Belief
-    matched: float
+    matches: tuple[Match, ...]
     seconds: float
+
+    @property
+    def match(self) -> Belief:
+        """Over the size, were the stated material and the wall exactly as stated."""
+        return self.matches[0].belief
+
+    @property
+    def matched(self) -> float:
+        """Nats a peak over chance at the best size."""
+        return max(one.nats for one in self.matches)
 
     def speed(self, stated: float, size: Belief) -> dict[str, float]:
         """The material's sqrt(E / density), where another sense knows the size; m/s, with a 90 % interval.
@@ -72,8 +110,10 @@ class Hearing:
             stated: m/s, of the material as stated.
             size: by the other senses.
         """
-        value = stated * size.size / self.match.size
-        sigma = float(np.sqrt(self.match.spread**2 + size.spread**2 + SHAPE_SIGMA**2))
+        about = [(one, _about(one, size)) for one in self.matches]
+        best, match = max(about, key=lambda pair: pair[0].log_evidence + _log_overlap(pair[0], size))
+        value = stated * best.speed * size.size / match.size
+        sigma = float(np.sqrt(match.spread**2 + size.spread**2 + SHAPE_SIGMA**2))
         return {
             "value_m_per_s": value,
             "low90_m_per_s": value * float(np.exp(-NINE_TENTHS * sigma)),
@@ -92,7 +132,7 @@ def by_sound(peaks: Peaks, materials: Sequence[MaterialGuess], nominal: float, s
         sizes: asked about.
 
     Raises:
-        FitRefused: too few peaks, or modes at no size and of no material explain them.
+        FitRefused: too few peaks, modes at no size and of no material explain them, or at several sizes.
     """
     began = time.perf_counter()
     if len(peaks.frequencies) < FEWEST:
@@ -100,23 +140,11 @@ def by_sound(peaks: Peaks, materials: Sequence[MaterialGuess], nominal: float, s
             f"{len(peaks.frequencies)} peaks were heard, and {FEWEST} are needed to tell a size; strike more "
             "places"
         )
-    logs = sizes.logs - np.log(nominal)
-    likelihoods = [log_likelihood(peaks, guess.model, logs) for guess in materials]
-    matched = max(float(likelihood.max()) for likelihood in likelihoods) / len(peaks.frequencies)
-    if matched < WORTH:
-        raise FitRefused(
-            f"what was heard fits this object's modes at no size: {matched:.1f} nats a peak over chance, and "
-            f"{WORTH:g} are needed; check object and material, or strike more places"
-        )
-    density = np.full(len(logs), -np.inf)
-    for guess, likelihood in zip(materials, likelihoods, strict=True):
-        weight = float(np.logaddexp.reduce(TEMPER * likelihood)) + log_ringing(peaks, guess.model.material)
-        sigma = float(np.hypot(guess.sigma, SHAPE_SIGMA))
-        density = np.logaddexp(
-            density, weight + Belief.of(sizes, TEMPER * likelihood).widened(sigma).log_density
-        )
-    match = Belief.of(sizes, TEMPER * likelihoods[0])
-    return Hearing(Belief.of(sizes, density), match, matched, time.perf_counter() - began)
+    matches = _matches(peaks, materials, nominal, sizes)
+    _require_worth(max(one.nats for one in matches))
+    _require_one(_mixed(matches, [one.belief for one in matches]))
+    belief = _mixed(matches, [one.belief.widened(one.sigma) for one in matches])
+    return Hearing(belief, matches, time.perf_counter() - began)
 
 
 def log_ringing(peaks: Peaks, material: Material) -> float:
@@ -128,3 +156,80 @@ def log_ringing(peaks: Peaks, material: Material) -> float:
     apart = np.log(np.maximum(peaks.decays, 0.1 * expected) / expected)
     sigma = np.hypot(DAMPING_SIGMA, PEAK_DAMPING_SIGMA / np.sqrt(len(apart)))
     return float(-0.5 * (np.median(apart) / sigma) ** 2)
+
+
+def _matches(
+    peaks: Peaks, materials: Sequence[MaterialGuess], nominal: float, sizes: SizeRange
+) -> tuple[Match, ...]:
+    """One a material, all from one likelihood: another material has the same frequencies at another size.
+
+    So how well they match says nothing of the material: only how long the peaks ring does, and whether the
+    size is one that was asked about.
+    """
+    logs = sizes.logs - np.log(nominal)
+    speeds = np.array([_speed(guess) for guess in materials]) / _speed(materials[0])
+    slower, faster = np.log(speeds.min()), np.log(speeds.max())
+    few = np.linspace(logs[0] - faster, logs[-1] - slower, round((np.ptp(logs) + faster - slower) / GRID))
+    likelihood = log_likelihood(peaks, materials[0].model, few)
+    matches = []
+    for guess, speed in zip(materials, speeds, strict=True):
+        own = np.interp(logs - np.log(speed), few, likelihood)
+        evidence = float(np.logaddexp.reduce(TEMPER * own)) + log_ringing(peaks, guess.model.material)
+        nats = float(own.max()) / len(peaks.frequencies)
+        sigma = float(np.hypot(guess.sigma, SHAPE_SIGMA))
+        matches.append(Match(Belief.of(sizes, TEMPER * own), evidence, sigma, float(speed), nats))
+    return tuple(matches)
+
+
+def _speed(guess: MaterialGuess) -> float:
+    """M/s, sqrt(E / density)."""
+    return float(np.sqrt(guess.model.material.young / guess.model.material.density))
+
+
+def _mixed(matches: Sequence[Match], beliefs: Sequence[Belief]) -> Belief:
+    """Beliefs of the matches, each weighed by its material's evidence."""
+    weighed = [one.log_evidence + belief.log_density for one, belief in zip(matches, beliefs, strict=True)]
+    return Belief.of(beliefs[0].range, np.logaddexp.reduce(weighed, axis=0))
+
+
+def _require_worth(nats: float) -> None:
+    """Refuse peaks that the object's modes do not explain.
+
+    Raises:
+        FitRefused: at no size.
+    """
+    if nats < WORTH:
+        raise FitRefused(
+            f"what was heard fits this object's modes at no size: {nats:.1f} nats a peak over chance, and "
+            f"{WORTH:g} are needed; check object and material, or strike more places"
+        )
+
+
+def _require_one(exact: Belief) -> None:
+    """Refuse peaks that several sizes explain.
+
+    Raises:
+        FitRefused: one is not clearly the likeliest.
+    """
+    sure = exact.share_about(exact.likeliest, ALIKE)
+    if sure < SURE:
+        raise FitRefused(
+            f"what was heard fits this object's modes at several sizes, best at {1e2 * exact.likeliest:.1f} "
+            f"cm with {100 * sure:.0f} %, and {100 * SURE:.0f} % are needed; strike more places, "
+            "or say what it is made of"
+        )
+
+
+def _prior(one: Match, size: Belief) -> FloatArray:
+    """``(n,)`` logarithm, not normalised: where the match should lie if another sense is right."""
+    sigma = np.hypot(one.sigma, size.spread)
+    return np.asarray(-0.5 * ((size.range.logs - np.log(size.size)) / sigma) ** 2 - np.log(sigma))
+
+
+def _about(one: Match, size: Belief) -> Belief:
+    """The match near a size that another sense knows: of several that fit, the one that is meant."""
+    return Belief.of(size.range, one.belief.log_density + _prior(one, size))
+
+
+def _log_overlap(one: Match, size: Belief) -> float:
+    return float(np.logaddexp.reduce(one.belief.log_density + _prior(one, size)))

@@ -1,10 +1,12 @@
 """Size by sound: peaks of a model itself, larger or smaller, are read back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from experiments.scale_estimation.readings import peaks_of
-from experiments.scale_estimation.size import SizeRange
+from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.sound.hearing import SHAPE_SIGMA, Hearing, MaterialGuess, by_sound
 from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.sound.peaks import Peaks
@@ -47,7 +49,8 @@ def heard_size(peaks: Peaks, sigma: float = 0.03, *others: str) -> Hearing:
 
 @pytest.mark.parametrize("scale", [0.5, 0.8, 1.0, 1.3, 2.0])
 def test_a_model_s_own_peaks_give_its_size(scale: float) -> None:
-    peaks, sigma = peaks_at(scale, noise=0.005), float(np.hypot(0.03, SHAPE_SIGMA))
+    # Of an object so small only the lowest modes are in the band: all are needed to tell them apart.
+    peaks, sigma = peaks_at(scale, 1 if scale < 0.6 else 2, noise=0.005), float(np.hypot(0.03, SHAPE_SIGMA))
     found = heard_size(peaks)
     assert found.belief.size == pytest.approx(scale * NOMINAL, rel=0.01)
     low, high = found.belief.interval
@@ -63,6 +66,63 @@ def test_the_material_is_what_sound_knows_once_the_size_is_known() -> None:
     speed = heard_size(faster, 0.1).speed(5000.0, exact)
     assert speed["value_m_per_s"] == pytest.approx(5500.0, rel=0.02)
     assert speed["low90_m_per_s"] < 5500.0 < speed["high90_m_per_s"]
+
+
+def test_a_material_is_recognised_once_the_size_is_known() -> None:
+    """A plastic thing that may be ceramic: sound alone leaves both, and its size tells which."""
+    peaks, size = (
+        peaks_at(0.6, every=1, material="plastic"),
+        Belief.of(RANGE, -0.5 * ((RANGE.logs - np.log(0.6 * NOMINAL)) / 0.01) ** 2),
+    )
+    speed = heard_size(peaks, KNOWN["ceramic"].uncertainty.speed, "plastic").speed(5000.0, size)
+    assert speed["value_m_per_s"] == pytest.approx(
+        5000.0 * speed_of("plastic") / speed_of("ceramic"), rel=0.02
+    )
+    assert speed["stated_m_per_s"] == 5000.0
+
+
+def speed_of(name: str) -> float:
+    return float(np.sqrt(MATERIALS[name].young / MATERIALS[name].density))
+
+
+def test_the_order_of_the_peaks_is_nothing() -> None:
+    peaks = peaks_at(1.3, noise=0.005)
+    back = replace(
+        peaks, frequencies=peaks.frequencies[::-1], levels=peaks.levels[::-1], decays=peaks.decays[::-1]
+    )
+    one, other = heard_size(peaks).belief, heard_size(back).belief
+    assert other.log_density == pytest.approx(one.log_density, abs=1e-9)
+
+
+def test_a_drawing_twice_as_large_of_the_same_object_gives_the_same_size() -> None:
+    """Half the frequencies and a quarter of the amplitudes at twice the size are one and the same body."""
+    peaks, drawn = peaks_at(1.3, noise=0.005), model()
+    larger = RingingModel(drawn.frequencies / 2.0, drawn.amplitudes / 4.0, drawn.material)
+    found = by_sound(peaks, [MaterialGuess(larger, 0.03)], 2.0 * NOMINAL, RANGE)
+    assert found.belief.size == pytest.approx(heard_size(peaks).belief.size, rel=1e-3)
+
+
+def test_modes_an_octave_apart_are_no_answer() -> None:
+    """They lie on each other at half and twice the size."""
+    octaves = RingingModel(400.0 * 2.0 ** np.arange(7.0), np.full(7, 0.05), MATERIALS["ceramic"])
+    heard = octaves.frequencies[2:5]
+    levels = octaves.levels(np.zeros(1), DECAY)[0][2:5]
+    with pytest.raises(FitRefused, match="several sizes"):
+        by_sound(of(heard, levels), [MaterialGuess(octaves, 0.03)], NOMINAL, RANGE)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_whatever_is_heard_is_answered_within_the_range_or_refused(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    count = int(random.integers(1, 40))
+    peaks = of(random.uniform(*BAND, count), random.uniform(-120.0, 40.0, count))
+    try:
+        found = heard_size(peaks, 0.11, "glass", "plastic")
+    except FitRefused:
+        return
+    low, high = found.belief.interval
+    assert np.isfinite(found.belief.log_density[RANGE.inside]).all()
+    assert 0.99 * RANGE.low < low < found.belief.size < high < 1.01 * RANGE.high
 
 
 def test_a_material_known_by_name_alone_widens_the_answer_as_its_own_uncertainty_says() -> None:
