@@ -1,7 +1,7 @@
 """One cell of the table of sizes: a mocked run in process, answered by every method, trivial ones too."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from experiments.scale_estimation.baselines import (
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.touch.touch import by_touch
+from experiments.scale_estimation.unseen.answer import imprints_alone
 from experiments.scale_estimation.vision.outline import SeenOutline
 from harness.basics.clock import now
 from harness.basics.errors import FitRefused
@@ -30,7 +31,13 @@ from harness.experiment.truth import read_truth
 from harness.recording.run_folder import RunFiles
 
 TRIVIAL = ("random", "constant", "first peak", "outline's area", "outline's box", "contacts' box")
-UNSEEN = ("vision, shape unknown", "audio, shape unknown", "touch, shape unknown", "fused, shape unknown")
+UNSEEN = (
+    "vision, shape unknown",
+    "audio, shape unknown",
+    "imprints, no poses, shape unknown",
+    "touch, shape unknown",
+    "fused, shape unknown",
+)
 OURS = (
     *UNSEEN,
     "vision",
@@ -154,6 +161,10 @@ def _trivial(answering: ScaleAnswering) -> dict[str, Callable[[], float | None]]
 def _shapeless(answering: ScaleAnswering, true: float) -> dict[str, Any]:
     """What the same readings say where nobody knows the shape."""
     rows, beliefs, seconds = {}, [], 0.0
+    with suppress(FitRefused):
+        began = now()
+        imprints = imprints_alone(answering.patches, answering.model.sizes).belief
+        rows["imprints, no poses, shape unknown"] = _belief(imprints, true, now() - began)
     for sense, way in answering.without_shape().items():
         began = now()
         one: Any

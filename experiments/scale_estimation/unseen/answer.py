@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from experiments.scale_estimation.size import Belief, SizeRange
+from experiments.scale_estimation.touch.patch import Patch
 from experiments.scale_estimation.unseen.contact_set import GelWay
-from experiments.scale_estimation.unseen.network import by_strikes, by_ways, shipped
+from experiments.scale_estimation.unseen.network import by_imprints, by_strikes, by_ways, shipped
 from experiments.scale_estimation.unseen.regression import by_outline, features_of
 from experiments.scale_estimation.unseen.spectrogram import response_of
 from experiments.scale_estimation.vision.outline import SeenOutline
@@ -80,6 +81,17 @@ def ways_alone(ways: Sequence[GelWay], sizes: SizeRange) -> ShapelessAnswer:
     if all(way.normal is None for way in ways):
         raise FitRefused("the gel touched nothing yet")
     return ShapelessAnswer(*by_ways(ways, sizes))
+
+
+def imprints_alone(patches: Sequence[Patch], sizes: SizeRange) -> ShapelessAnswer:
+    """By the imprints in the gel, were nothing known of where the arm was.
+
+    Raises:
+        FitRefused: the gel touched nothing.
+    """
+    if not patches:
+        raise FitRefused("the gel touched nothing yet")
+    return ShapelessAnswer(*by_imprints([patch.points for patch in patches], sizes))
 
 
 def load_networks(sound: bool, touch: bool) -> None:

@@ -17,6 +17,12 @@ NUMBERS = 13
 WHOLE = 6
 """Numbers of all ways together."""
 
+IMPRINT = 4
+"""Numbers of an imprint whose place nobody knows."""
+
+_FLATTEST = 2.0e-5
+"""M, added to an imprint's extents before their logarithm is taken."""
+
 _NEAR = 0.02
 """M: within it, how far a place is from the middle is told in metres, beyond it as a direction alone."""
 
@@ -76,3 +82,22 @@ def _whole(ways: Sequence[GelWay]) -> FloatArray:
     lengths = np.array([apart, met[:, 2].max(), spread[0], spread[-1] if len(spread) > 1 else 0.0])
     counts = 0.1 * len(met), 0.1 * (len(ways) - len(met))
     return np.concatenate([np.log(np.maximum(lengths, 0.0) + _LEAST), counts])
+
+
+def imprint_features(imprints: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """``(MOST, IMPRINT)`` an imprint each, ``(MOST, 2)`` which there are, ``(1,)`` their number.
+
+    Nothing is in them of where the arm was: how long, wide and deep the places are that the gel met.
+
+    Args:
+        imprints: ``(n, 3)`` m each, places of the object's surface in any frame.
+    """
+    rows, kinds = np.zeros((MOST, IMPRINT)), np.zeros((MOST, 2))
+    taken = imprints[:MOST]
+    for k, places in enumerate(taken):
+        centred = places - places.mean(axis=0)
+        extents = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(places))
+        logs = np.log(extents + _FLATTEST) + 7.0
+        rows[k] = np.append(logs, logs[0] - logs[1])
+        kinds[k, 0] = 1.0
+    return rows, kinds, np.array([0.1 * len(taken)])

@@ -1,4 +1,4 @@
-"""Networks of sound and of touch that say how large an object is whose shape nobody knows."""
+"""Networks that say how large an object is whose shape nobody knows: by sound, touch, imprints alone."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -117,6 +117,12 @@ def by_ways(ways: Sequence[contact_set.GelWay], sizes: SizeRange) -> tuple[Belie
     return shipped("touch").belief(views, sizes)
 
 
+def by_imprints(imprints: Sequence[FloatArray], sizes: SizeRange) -> tuple[Belief, float]:
+    """What imprints without poses say, ``(n, 3)`` m each, and how far they are from the family."""
+    rows, kinds, whole = contact_set.imprint_features(imprints)
+    return shipped("imprints").belief([{"ways": rows, "kinds": kinds, "whole": whole}], sizes)
+
+
 INPUTS: Mapping[str, tuple[tuple[str, tuple[int, ...]], ...]] = {
     "sound": (
         ("bands", (spectrogram.CHANNELS, spectrogram.BANDS)),
@@ -126,6 +132,11 @@ INPUTS: Mapping[str, tuple[tuple[str, tuple[int, ...]], ...]] = {
         ("ways", (contact_set.MOST, contact_set.NUMBERS)),
         ("kinds", (contact_set.MOST, 2)),
         ("whole", (contact_set.WHOLE,)),
+    ),
+    "imprints": (
+        ("ways", (contact_set.MOST, contact_set.IMPRINT)),
+        ("kinds", (contact_set.MOST, 2)),
+        ("whole", (1,)),
     ),
 }
 """Names and shapes that each network takes."""

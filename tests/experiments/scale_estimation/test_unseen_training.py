@@ -88,4 +88,4 @@ def test_a_smoke_training_ends_in_a_graph_that_answers_as_torch_does(sense: str,
     )
     with torch.no_grad():
         wanted = module(*(torch.from_numpy(values) for values in samples.inputs.values())).numpy()
-    assert answered["logits"][:, 1] == pytest.approx(wanted, abs=1e-4)
+    assert answered["logits"][:, 1] == pytest.approx(wanted, abs=2e-2)  # kept in half precision

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from experiments.scale_estimation.touch.patch import POINTS, SHARE
 from experiments.scale_estimation.unseen.contact_set import GelWay
 from experiments.scale_estimation.unseen.solid_grid import Solid
 from harness.basics.arrays import FloatArray
@@ -24,6 +25,11 @@ GEL = 5.0e-3
 
 BEYOND = 0.02
 """M that a way aimed at the object may go on where it meets nothing."""
+
+PRESSED = (0.5e-3, 1.5e-3)
+"""M of indentation."""
+
+_IMPRINT = np.linspace(-7.0e-3, 7.0e-3, 9)
 
 SLANTS = (0.0, 0.0, 0.45, 0.9, 1.3)
 """Rad from straight down, of ways into the unknown."""
@@ -111,6 +117,25 @@ def contact_sample(shape: TouchableShape, size: float, random: np.random.Generat
         line = _into_the_unknown(standing, random) if random.random() < blind else _aimed(standing, random)
         ways.append(_made(standing, *line, off, random))
     return ways
+
+
+def imprint_sample(shape: TouchableShape, size: float, random: np.random.Generator) -> list[FloatArray]:
+    """``(n, 3)`` m each: the places that the gel met in ``FEWEST`` to ``MOST`` presses all over an object."""
+    standing = _Standing(shape, size, 0.0, np.zeros(3))
+    found: list[FloatArray] = []
+    for _ in range(int(random.integers(FEWEST, MOST + 1))):
+        end, direction = _aimed(standing, random)
+        across = frame_facing(direction, 0.0)[:, :2]
+        grid = np.stack(np.meshgrid(_IMPRINT, _IMPRINT), axis=-1).reshape(-1, 2) @ across.T
+        length = 2.0 * standing.size + 0.1
+        distances, _ = standing.met(end - length * direction + grid, direction)
+        deep = float(random.uniform(*PRESSED))
+        kept = distances < distances.min() + SHARE * deep
+        if np.isfinite(distances.min()) and kept.sum() >= POINTS:
+            places = grid[kept] + distances[kept, None] * direction
+            places = places + 0.03e-3 * random.standard_normal((len(places), 1)) * direction
+            found.append(places[random.choice(len(places), POINTS, replace=False)])
+    return found
 
 
 def _into_the_unknown(standing: _Standing, random: np.random.Generator) -> tuple[FloatArray, FloatArray]:

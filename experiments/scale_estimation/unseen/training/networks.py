@@ -1,6 +1,7 @@
 """The networks of sound and of touch in torch, and the same as graphs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 import torch
@@ -10,13 +11,13 @@ from experiments.scale_estimation.unseen import contact_set, spectrogram
 from experiments.scale_estimation.unseen.network import BINS, CODE, INPUTS
 from harness.objectfile.graph import Nodes, float_value
 
-_WIDTHS = ((24, 7), (32, 5), (32, 5))
+_WIDTHS = ((32, 9), (48, 5), (64, 5))
 """Channels and length of each convolution along the bands; each halves them."""
 
 _STRIDE = 2
-_DROPPED = 0.2
-_HIDDEN = 64
-_EACH = 48
+_DROPPED = {"sound": 0.3, "touch": 0.2}
+_HIDDEN = 128
+_EACH = 64
 """Numbers that a way of the gel becomes."""
 
 
@@ -33,7 +34,7 @@ class SoundNetwork(nn.Module):
         self.hidden = nn.Linear(channels * bands + spectrogram.EXTRAS, _HIDDEN)
         self.code = nn.Linear(_HIDDEN, CODE)
         self.last = nn.Linear(CODE, BINS)
-        self.dropped = nn.Dropout(_DROPPED)
+        self.dropped = nn.Dropout(_DROPPED["sound"])
 
     def forward(self, bands: Tensor, extras: Tensor) -> Tensor:
         """``(n, BINS)`` logits."""
@@ -60,14 +61,14 @@ class SoundNetwork(nn.Module):
 class TouchNetwork(nn.Module):
     """Two layers on every way by itself, greatest and mean over ways, two layers on those."""
 
-    def __init__(self) -> None:
+    def __init__(self, numbers: int = contact_set.NUMBERS, whole: int = contact_set.WHOLE) -> None:
         super().__init__()
-        self.first = nn.Linear(contact_set.NUMBERS, _EACH)
+        self.first = nn.Linear(numbers, _EACH)
         self.second = nn.Linear(_EACH, _EACH)
-        self.hidden = nn.Linear(3 * _EACH + contact_set.WHOLE, _HIDDEN)
+        self.hidden = nn.Linear(3 * _EACH + whole, _HIDDEN)
         self.code = nn.Linear(_HIDDEN, CODE)
         self.last = nn.Linear(CODE, BINS)
-        self.dropped = nn.Dropout(_DROPPED)
+        self.dropped = nn.Dropout(_DROPPED["touch"])
 
     def forward(self, ways: Tensor, kinds: Tensor, whole: Tensor) -> Tensor:
         """``(n, BINS)`` logits."""
@@ -102,7 +103,11 @@ class TouchNetwork(nn.Module):
 
 
 SizeModule = SoundNetwork | TouchNetwork
-MODULES: dict[str, type[SoundNetwork] | type[TouchNetwork]] = {"sound": SoundNetwork, "touch": TouchNetwork}
+MODULES: dict[str, Callable[[], SizeModule]] = {
+    "sound": SoundNetwork,
+    "touch": TouchNetwork,
+    "imprints": partial(TouchNetwork, contact_set.IMPRINT, 1),
+}
 
 
 def _written_ends(nodes: Nodes, value: str, module: SizeModule) -> tuple[str, str]:
@@ -118,7 +123,7 @@ def _linear(nodes: Nodes, value: str, layer: nn.Linear) -> str:
 
 def graph(sense: str, members: Sequence[SizeModule]) -> bytes:
     """All members in one graph: ``logits`` ``(n, members, BINS)`` and ``codes`` ``(n, members, CODE)``."""
-    nodes = Nodes("float32")
+    nodes = Nodes("float16")  # of what is kept; computed in float32
     middle = nodes.constant(np.array([1], np.int64))
     logits: list[str] = []
     codes: list[str] = []

@@ -15,7 +15,11 @@ from experiments.scale_estimation.unseen import contact_set
 from experiments.scale_estimation.unseen.families import FAMILIES, draw
 from experiments.scale_estimation.unseen.ringing_shape import MODES, RingingShape
 from experiments.scale_estimation.unseen.solid_grid import Solid
-from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, contact_sample
+from experiments.scale_estimation.unseen.training.contact_samples import (
+    TouchableShape,
+    contact_sample,
+    imprint_sample,
+)
 from experiments.scale_estimation.unseen.training.strike_samples import strike_sample
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import MeshRefused
@@ -53,8 +57,12 @@ _Row = tuple[dict[str, FloatArray], float]
 
 def shape_of(number: int, seed: int) -> Solid:
     """The shapes of a seed by their number; families take turns."""
+    return _drawn(number, np.random.default_rng((seed, number)))
+
+
+def _drawn(number: int, random: np.random.Generator) -> Solid:
     names = list(FAMILIES)
-    return draw(names[number % len(names)], np.random.default_rng((seed, number)))
+    return draw(names[number % len(names)], random)
 
 
 def draw_size(random: np.random.Generator) -> float:
@@ -64,13 +72,14 @@ def draw_size(random: np.random.Generator) -> float:
 
 def ringing_of(number: int, seed: int) -> RingingShape | None:
     """Its modes, from the store where they were solved before; None where they cannot be solved."""
-    shape, store = shape_of(number, seed), Store(default_folder())
+    random, store = np.random.default_rng((seed, number)), Store(default_folder())
+    shape = _drawn(number, random)
     key = digest(["ringing shape", 1, MODES, shape.inside.nodes, shape.inside.cells, (seed, number)])
     kept = store.get(key)
     if isinstance(kept, dict):
         return RingingShape(kept["frequencies"], kept["amplitudes"])
     try:
-        found = RingingShape.solved(shape, np.random.default_rng((seed, number, 1)))
+        found = RingingShape.solved(shape, random)
     except MeshRefused:
         return None
     store.put(key, {"frequencies": found.frequencies, "amplitudes": found.amplitudes})
@@ -100,14 +109,29 @@ def contacts(seed: int, count: int, number: int) -> list[_Row]:
     return rows
 
 
-MAKERS: dict[str, Callable[[int, int, int], list[_Row]]] = {"sound": strikes, "touch": contacts}
+def imprints(seed: int, count: int, number: int) -> list[_Row]:
+    """So many sets of imprints of one shape, of places that nobody knows."""
+    shape = TouchableShape.of(shape_of(number, seed))
+    random, rows = np.random.default_rng((seed, number, 4)), []
+    for _ in range(count):
+        size = draw_size(random)
+        ways, kinds, whole = contact_set.imprint_features(imprint_sample(shape, size, random))
+        rows.append(({"ways": ways, "kinds": kinds, "whole": whole}, size))
+    return rows
+
+
+MAKERS: dict[str, Callable[[int, int, int], list[_Row]]] = {
+    "sound": strikes,
+    "touch": contacts,
+    "imprints": imprints,
+}
 
 
 def samples_of(sense: str, shapes: int, each: int, seed: int, processes: int) -> Samples:
     """Samples of all shapes, in the shapes' order whatever the number of processes.
 
     Args:
-        sense: ``"sound"`` or ``"touch"``.
+        sense: of ``MAKERS``.
         shapes: how many.
         each: samples of each.
         seed: of shapes and samples.

@@ -25,6 +25,7 @@ HELD_OUT = (0.1, 0.1)
 
 _TAKES = {
     "sound": "spectrograms of one to three strikes over the wave number, and the stated material",
+    "imprints": "the extents of up to 16 imprints in the gel, of places that nobody knows",
     "touch": "up to 16 straight ways of the gel: ends, directions, normals of what was met",
 }
 
