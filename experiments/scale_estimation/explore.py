@@ -1,9 +1,10 @@
 """The steps of a scale estimation: a look, then contacts planned one by one on what is known by then."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from experiments.scale_estimation.model import ObjectModel
-from experiments.scale_estimation.next_contact import Explorer
+from experiments.scale_estimation.next_contact import SKIPPED, Explorer
 from experiments.scale_estimation.section import Scale
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
@@ -24,6 +25,9 @@ PLAN_KEY = "steps"
 
 SPEEDS = Speeds(approach=0.02)
 """A search may be tens of centimetres long here; at this speed the arm stops within 1.5 mm of a touch."""
+
+MOST_SKIPPED = 3
+"""Contacts in a row without a free way, each looked for anew, after which a run makes no more."""
 
 
 def steps_of(scene: SceneFile) -> int:
@@ -46,11 +50,6 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, _seed: int) -> Planned:
     steps = [{"kind": kind} for kind in _kinds(scene)]
     if not steps:
         raise WrongUse("nothing is to be read: ask for vision, for contacts, or for both")
-    if "contact" in _kinds(scene) and scene.section(Scale).shape == "unknown":
-        raise NotImplementedError(
-            "experiments.scale_estimation.explore: contacts of an object of unknown shape; look at "
-            "it alone (--sense vision)"
-        )
     model = ObjectModel(mesh, scene, station)
     bench = model.twin_around(model.nowhere)
     return Planned(steps, rehearse(bench, []), bench)
@@ -69,7 +68,12 @@ class ScalePerformer:
         self._say = helpers.say
         self._explorer = Explorer(run)
         self._press = PressPerformer(
-            self._explorer.way, SPEEDS, ask=helpers.ask, plan_key=PLAN_KEY, explores=True
+            self._explorer.way,
+            SPEEDS,
+            ask=helpers.ask,
+            plan_key=PLAN_KEY,
+            explores=True,
+            after=self._explorer.strike,
         )
 
     def steps(self, recording: Recording) -> Iterator[Step]:
@@ -81,11 +85,24 @@ class ScalePerformer:
                 return
             if planned[index]["kind"] == "look":
                 yield Step(index, "look", planned[index])
-            else:
-                yield Step(index, "press", {**planned[index], **self._explorer.plan(recording, index)})
+                continue
+            if self._explorer.skipped(recording, index) >= MOST_SKIPPED:
+                self._say(f"{MOST_SKIPPED} contacts in a row had no free way; no more are made")
+                return
+            yield self._contact(recording, planned[index], index)
+
+    def _contact(self, recording: Recording, planned: Mapping[str, Any], index: int) -> Step:
+        """The next contact; a step without readings where none has a free way: the run goes on without it."""
+        try:
+            return Step(index, "press", {**planned, **self._explorer.plan(recording, index)})
+        except WrongUse as refusal:
+            self._say(f"contact {index + 1} is left out: {refusal}")
+            return Step(index, SKIPPED, {**planned, "why": str(refusal)})
 
     def perform(self, step: Step, bench: Bench) -> Sequence[Reading]:
-        """A look or a contact."""
+        """A look, a contact, or nothing where none had a free way."""
+        if step.kind == SKIPPED:
+            return ()
         if step.kind == "look":
             return look(step.index, bench, self._ask)
         return self._press.perform(step, bench)

@@ -107,6 +107,18 @@ class ObjectModel:
         errors = StandErrors(asked.place_error, asked.support_error)
         return Stand.of(surface, self.upright, self.anchor, self.place, errors)
 
+    @property
+    def errors(self) -> CameraErrors:
+        """How well it is known where the camera is, and what it looks at."""
+        asked = self.scene.section(Scale)
+        return CameraErrors(
+            position=asked.camera_position_error,
+            rotation=asked.camera_rotation_error,
+            focal_length=asked.focal_length_error,
+            support=asked.support_error,
+            place=asked.place_error,
+        )
+
     @cached_property
     def view(self) -> View:
         """For a picture.
@@ -120,16 +132,8 @@ class ObjectModel:
                 f"the station {self.station.title!r} has no [camera]; describe it, or leave vision out"
             )
         centre = 0.5 * camera.columns, 0.5 * camera.rows
-        asked = self.scene.section(Scale)
-        errors = CameraErrors(
-            position=asked.camera_position_error,
-            rotation=asked.camera_rotation_error,
-            focal_length=asked.focal_length_error,
-            support=asked.support_error,
-            place=asked.place_error,
-        )
         matrix = camera.base_from_camera.matrix
-        return View(matrix, camera.focal_length, centre, self.corners, self.place, errors)
+        return View(matrix, camera.focal_length, centre, self.corners, self.place, self.errors)
 
     def materials(self, accuracy: Accuracy) -> list[MaterialGuess]:
         """What the object may be made of, with how surely; what the scene states first.

@@ -115,6 +115,10 @@ class Belief:
         """M, the median of the sizes in the range."""
         return float(np.exp(_quantile(self.range.logs, self._shares, 0.5)))
 
+    def below(self, probability: float) -> float:
+        """M that the size is below with so much probability, sizes beyond the range included."""
+        return float(np.exp(_quantile(self.range.logs, np.exp(self.log_density), probability)))
+
     @property
     def interval(self) -> tuple[float, float]:
         """M, the shortest interval in the logarithm that holds nine tenths of the probability."""

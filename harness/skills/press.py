@@ -4,7 +4,7 @@ Everything a step needs is in its parameters, planned and rehearsed before the f
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -20,7 +20,8 @@ from harness.bench.travel import Trajectory, travel
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
 from harness.skills.first_touch import first_touch
-from harness.skills.strike import FARTHEST, Ask, StrikeMotion, strike, strike_by_hand
+from harness.skills.search import Guard, meets
+from harness.skills.strike import FARTHEST, Ask, StrikeMotion, ready_of, strike, strike_by_hand
 from harness.twin.motion import PlannedContact
 
 FRAMES_PER_CONTACT = 3
@@ -28,6 +29,9 @@ FRAMES_PER_CONTACT = 3
 
 SETTLE = 0.3
 """s between the end of the press and the first frame: the gel creeps for about that long."""
+
+After = Callable[[Step, Sequence[Reading]], StrikeMotion | None]
+"""Plans a strike on what a contact has just read; None where none is to be made, or none is free."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +136,8 @@ class PressPerformer:
         ask: shows a person what to do, where the station has one strike; None where nobody is there.
         plan_key: where ``run.json`` keeps the planned contacts.
         explores: whether nobody knows where the object is: a search that meets nothing is a reading too,
-            and a place that was met elsewhere than planned is not struck.
+            and a place that was met elsewhere than planned is not struck as it was planned.
+        after: plans a strike where a contact without one met the object; None for no such strikes.
     """
 
     def __init__(
@@ -142,8 +147,10 @@ class PressPerformer:
         ask: Ask | None = None,
         plan_key: str = "contacts",
         explores: bool = False,
+        after: After | None = None,
     ) -> None:
         self._explores = explores
+        self._after = after
         self._met: FloatArray | None = None
         self.plan_key = plan_key
         self.way = way
@@ -164,26 +171,37 @@ class PressPerformer:
         self._travel(motion, bench)
         arm.zero_force()
         began = arm.state().time
-        met = self._touch(step, motion, arm)
+        met = self._touch(step, motion, bench)
         moved = self._press(motion, arm, began) if met else math.inf
         bench.pause(SETTLE)
         bench.mark(step.index, PRESS)
         image = self._read(bench, motion)
         history = arm.history(arm.state().time - began)
         self._line(arm, motion.base_from_stand_off, "retreat")
-        if self._explores and abs(moved) > FARTHEST:
-            return (image, *history)
-        return (image, *history, *self._strike(step, moved, bench))
+        read = (image, *history)
+        return (*read, *self._strike(step, moved, read, bench))
 
-    def _strike(self, step: Step, moved: float, bench: Bench) -> tuple[Reading, ...]:
+    def _strike(self, step: Step, moved: float, read: Sequence[Reading], bench: Bench) -> tuple[Reading, ...]:
         """The hammer where the gel was; nothing where the scene asks for no sound."""
         if bench.hammer is None:
             return ()
-        if "strike" not in step.parameters:
-            return () if self._explores else strike_by_hand(step.index, bench, self.ask)
-        motion = StrikeMotion.from_parameters(step.parameters["strike"])
+        planned = step.parameters.get("strike")
+        if planned is None and not self._explores:
+            return strike_by_hand(step.index, bench, self.ask)
+        if planned is None or (self._explores and abs(moved) > FARTHEST):
+            return self._strike_met(step, read, bench) if math.isfinite(moved) else ()
+        motion = StrikeMotion.from_parameters(planned)
         self._travel(motion, bench)
         return strike(motion, step.index, moved, bench)
+
+    def _strike_met(self, step: Step, read: Sequence[Reading], bench: Bench) -> tuple[Reading, ...]:
+        """The hammer where the gel has met an object that nobody knows: its way stops at a touch."""
+        motion = None if self._after is None else self._after(step, read)
+        if motion is None:
+            return ()
+        self._travel(motion, bench)
+        guard = Guard(self.speeds.approach, self.speeds.touch_force)
+        return (ready_of(motion, bench), *strike(motion, step.index, 0.0, bench, guard=guard))
 
     def _travel(self, motion: ContactMotion | StrikeMotion, bench: Bench) -> None:
         speeds = self.speeds
@@ -220,15 +238,15 @@ class PressPerformer:
             self._line(bench.arm, motion.base_from_stand_off, "retreat")
             raise
 
-    def _touch(self, step: Step, motion: ContactMotion, arm: Arm) -> bool:
+    def _touch(self, step: Step, motion: ContactMotion, bench: Bench) -> bool:
         over = self.speeds.overtravel if motion.overtravel is None else motion.overtravel
         travel = motion.search + over
-        if arm.move_until_contact(motion.axis, self.speeds.approach, self.speeds.touch_force, travel):
-            self._met = arm.state().base_from_flange[:3, 3]
+        if meets(bench, motion.axis, travel, Guard(self.speeds.approach, self.speeds.touch_force)):
+            self._met = bench.arm.state().base_from_flange[:3, 3]
             return True
         if self._explores:
             return False
-        self._line(arm, motion.base_from_stand_off, "retreat")
+        self._line(bench.arm, motion.base_from_stand_off, "retreat")
         raise NotTouched(
             f"contact {step.index + 1}: the gel travelled {travel * 1e3:.0f} mm and met nothing "
             f"({self.speeds.touch_force} N would have been a touch); check that the object stands where the "

@@ -20,6 +20,7 @@ from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile
 from harness.bench.station import STRIKE, Bench
 from harness.bench.station_file import Station
+from harness.skills.search import Guard, meets
 from harness.twin.bench import TwinBench
 from harness.twin.strike_motion import PlannedStrike, StrikePlanner
 
@@ -27,6 +28,9 @@ _LOG = logging.getLogger(__name__)
 
 POSE = "hammer.base_from_flange"
 """Channel of the flange's pose when the striker was fired: x, y, z in m, then the quaternion."""
+
+READY = "hammer.ready_joints"
+"""Channel of the posture, rad, that a strike planned after its contact begins and ends in."""
 
 BEFORE, AFTER = 0.02, 0.5
 """s recorded before and after the hammer touches."""
@@ -133,7 +137,12 @@ def planner(
 
 
 def strike(
-    motion: StrikeMotion, step: int, moved: float, bench: Bench, speeds: StrikeSpeeds | None = None
+    motion: StrikeMotion,
+    step: int,
+    moved: float,
+    bench: Bench,
+    speeds: StrikeSpeeds | None = None,
+    guard: Guard | None = None,
 ) -> tuple[Reading, ...]:
     """Go before the object, fire, listen, go back; the arm begins and ends where the straight way does.
 
@@ -143,6 +152,10 @@ def strike(
         moved: m along the axis by which the touched surface lies behind the planned one.
         bench: with a hammer.
         speeds: of the straight way.
+        guard: how the way to the object is followed where its shape is not known; None where it is.
+
+    Returns:
+        Nothing where the guarded way met something: nothing was struck.
 
     Raises:
         BenchFault: the surface is too far from where it was planned, or the hammer failed; the arm
@@ -163,6 +176,9 @@ def strike(
         bench.arm.set_digital_output(output, False)
 
     there = translation(moved * motion.axis) @ motion.base_from_firing
+    if guard is not None and _blocked(motion, there, bench, guard):
+        bench.arm.move_line(motion.base_from_ready, speeds.approach, speeds.acceleration)
+        return ()
     bench.arm.move_line(there, speeds.approach, speeds.acceleration)
     try:
         bench.mark(step, STRIKE)
@@ -171,6 +187,22 @@ def strike(
     finally:
         bench.arm.move_line(motion.base_from_ready, speeds.approach, speeds.acceleration)
     return (pose, *heard)
+
+
+def _blocked(motion: StrikeMotion, there: FloatArray, bench: Bench, guard: Guard) -> bool:
+    """Whether something is on the way to where the striker is fired; the arm is then before it."""
+    way = float((there[:3, 3] - motion.base_from_ready[:3, 3]) @ motion.axis)
+    bench.arm.zero_force()
+    met = meets(bench, motion.axis, way, guard)
+    if met:
+        _LOG.warning("no strike: the hammer or what carries it met something before the place to strike")
+    return met
+
+
+def ready_of(motion: StrikeMotion, bench: Bench) -> Reading:
+    """The posture that a strike begins and ends in, to be recorded where no parameter says it."""
+    ready = motion.travel[-1] if len(motion.travel) else motion.start
+    return Reading(Channel(READY, "rad", (6,), "float64"), np.array([bench.arm.state().time]), ready[None])
 
 
 def strike_by_hand(step: int, bench: Bench, ask: Ask | None) -> tuple[Reading, ...]:

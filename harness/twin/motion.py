@@ -137,11 +137,13 @@ def stand_off_outside(
     if travels is None:
         return least
     forward = base_from_gel[:3, 2] if axis is None else axis
-    for back in np.arange(least, FARTHEST, _FARTHER).tolist():
-        before = translation(-back * forward) @ base_from_gel
-        if not travels.tool_hits(before, press=False):
-            return float(back)
-    return None
+    clear = None
+    # From outside inward: a tool that is wholly inside the space touches none of its surface either.
+    for back in np.arange(least, FARTHEST, _FARTHER)[::-1].tolist():
+        if travels.tool_hits(translation(-back * forward) @ base_from_gel, press=False):
+            break
+        clear = float(back)
+    return clear
 
 
 def plan_contact(

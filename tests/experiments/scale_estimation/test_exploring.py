@@ -1,45 +1,31 @@
 """Contacts on an object of unknown size: travels keep clear of all it may be, and misses are readings."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
 
-from experiments.scale_estimation.answer import ScaleAnswering
-from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.envelope import blind_envelope, seen_envelope
-from harness.basics.arrays import FloatArray
-from harness.basics.geometry import apply
-from harness.basics.mesh import Mesh
+from experiments.scale_estimation.experiment import EXPERIMENT
+from experiments.scale_estimation.explore import MOST_SKIPPED
+from experiments.scale_estimation.next_contact import SKIPPED, Explorer
+from harness.basics.errors import WrongUse
 from harness.bench.station_file import Station
-from harness.effects.accuracy import Accuracy
+from harness.experiment.begin import begin
 from harness.recording.recording import Recording
-from harness.recording.run_folder import RunFiles
-from harness.twin.rehearsal import Segment, rehearse
-from tests.experiments.scale_estimation.runs import answered, ran, scene_of
-
-
-def answering_of(recording: Recording) -> ScaleAnswering:
-    answering = ScaleAnswering(RunFiles(recording), Accuracy.default(KNOBS))
-    for record in recording.steps():
-        answering.read(record)
-    return answering
-
-
-def outside(recording: Recording, space: Mesh) -> float:
-    """M by which the true object, as it stands in base, leaves a convex space."""
-    truth = json.loads(recording.truth_path.read_text())
-    run = RunFiles(recording)
-    nominal = float(np.ptp(run.mesh.bounds, axis=0).max())
-    size = truth["differences"]["longest_side_m"] / nominal
-    places = apply(np.array(truth["base_from_object"]), run.mesh.vertices * size)
-    low = run.scene.object.pose.position[2]
-    above = places[places[:, 2] > low + 2e-3]
-    sides = ConvexHull(space.vertices).equations
-    return float((above @ sides[:, :3].T + sides[:, 3]).max())
+from harness.recording.session import Quiet
+from harness.skills.strike import POSE, READY
+from harness.twin.rehearsal import rehearse
+from tests.experiments.scale_estimation.runs import (
+    answered,
+    answering_of,
+    outside,
+    ran,
+    scene_of,
+    travels,
+    went_on,
+)
 
 
 @pytest.mark.parametrize("mesh", ["builtin:mug", "builtin:wrench"])
@@ -56,16 +42,7 @@ def test_the_object_is_within_what_travels_avoid_however_it_was_seen(
 
 @pytest.fixture(scope="module")
 def blind(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recording:
-    return ran(tmp_path_factory.mktemp("blind") / "run", scene_of(6, camera=False), station, 31)
-
-
-def travels(recording: Recording) -> Iterator[Segment]:
-    for record in recording.steps():
-        parameters = record.step.parameters
-        here: FloatArray = np.array(parameters["start_rad"])
-        for there in np.array(parameters["travel_rad"]).reshape(-1, 6):
-            yield Segment(record.step.index, "travel", "joint", here, there)
-            here = there
+    return ran(tmp_path_factory.mktemp("blind") / "run", scene_of(6, camera=False), station, 60)
 
 
 def test_no_travel_enters_the_space_of_the_largest_object(blind: Recording) -> None:
@@ -90,3 +67,75 @@ def test_an_object_never_seen_is_found_by_touch_or_its_size_stays_open(blind: Re
     true = json.loads(blind.truth_path.read_text())["differences"]["longest_side_m"]
     assert touch["low90_m"] < true < touch["high90_m"]
     assert result["estimates"]["vision"]["size_m"] is None
+
+
+@pytest.fixture(scope="module")
+def heard(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recording:
+    scene = scene_of(4, camera=False, sound=True, mesh="builtin:bowl")
+    return ran(tmp_path_factory.mktemp("heard") / "run", scene, station, 60)
+
+
+def test_an_object_never_seen_is_struck_where_the_gel_has_just_met_it(heard: Recording) -> None:
+    """A tip that follows the gel needs nothing to be believed: the first contacts are struck already."""
+    struck = [record.step.index for record in heard.steps() if POSE in record.readings]
+    assert len(struck) == 3
+    answering = answering_of(heard)
+    assert [answering.met[index] for index in struck] == [True] * 3
+    assert sum(not strike.fault for strike in answering.strikes) >= 2
+
+
+def test_a_run_that_was_stopped_after_a_strike_goes_on_with_the_same_contacts(
+    heard: Recording, tmp_path: Path, station: Station
+) -> None:
+    """Where such a strike has left the arm is not in the step's parameters, but among its readings."""
+    scene = scene_of(4, camera=False, sound=True, mesh="builtin:bowl")
+    recording = begin(EXPERIMENT, scene, station, 60, "unplaced", tmp_path / "run").recording
+
+    class Stops(Quiet):
+        def ended(self, step: Any, seconds: float) -> None:
+            if READY in recording.step(step.index).readings:
+                raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        went_on(recording, Stops())
+    again = Recording(tmp_path / "run")
+    assert went_on(again, Quiet())
+    assert [record.step.parameters for record in again.steps()] == [
+        record.step.parameters for record in heard.steps()
+    ]
+
+
+def refuses(monkeypatch: pytest.MonkeyPatch, at: set[int]) -> None:
+    """No way is free to the contacts of these steps."""
+    plan = Explorer.plan
+
+    def planned(self: Explorer, recording: Recording, index: int) -> dict[str, Any]:
+        if index in at:
+            raise WrongUse("no free way was found")
+        return plan(self, recording, index)
+
+    monkeypatch.setattr(Explorer, "plan", planned)
+
+
+def test_a_contact_without_a_free_way_is_left_out_and_the_run_goes_on(
+    tmp_path: Path, station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refuses(monkeypatch, {1})
+    recording = ran(tmp_path / "run", scene_of(2), station)
+    steps = [record.step for record in recording.steps()]
+    assert [step.kind for step in steps] == ["look", SKIPPED, "press"]
+    assert "no free way" in steps[1].parameters["why"]
+    assert answered(recording)["estimates"]["fused"]["size_m"] > 0.0
+
+
+def test_a_run_whose_contacts_have_no_free_way_answers_with_what_was_read(
+    tmp_path: Path, station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refuses(monkeypatch, set(range(1, 11)))
+    recording = ran(tmp_path / "run", scene_of(10), station)
+    assert recording.committed == 1 + MOST_SKIPPED
+    result = answered(recording)
+    assert result["contacts"] == 0
+    assert result["estimates"]["vision"]["size_m"] == result["size_m"]
+    assert went_on(Recording(recording.folder), Quiet())
+    assert Recording(recording.folder).committed == recording.committed

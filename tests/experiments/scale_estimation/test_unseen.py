@@ -8,14 +8,12 @@ import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from experiments.scale_estimation.experiment import EXPERIMENT
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.unseen.families import FAMILIES, draw
 from experiments.scale_estimation.unseen.regression import by_outline, features_of, shipped
 from experiments.scale_estimation.unseen.training.outlines import fitted, pictures
 from harness.bench.station_file import Station
-from harness.experiment.begin import begin
 from harness.sim.solid.surface_measure import enclosed_volume
 from tests.experiments.scale_estimation.runs import answered, ran, scene_of
 from tests.experiments.scale_estimation.test_vision import FOCAL, PLACE, camera, nominal, outline_at, view_of
@@ -97,9 +95,3 @@ def test_a_run_tells_the_size_of_an_object_of_unknown_shape_by_sight_alone(
     vision = result["estimates"]["vision"]
     assert not result["shape_known"]
     assert vision["in_interval90"]
-    with pytest.raises(NotImplementedError, match="unknown shape"):
-        begin(
-            EXPERIMENT, scene_of(2).with_section(Scale(contacts=2, shape="unknown")), station, 0, "unplaced",
-            tmp_path / "other",
-        )  # fmt: skip
-    assert not (tmp_path / "other").exists()

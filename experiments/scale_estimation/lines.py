@@ -1,0 +1,94 @@
+"""Lines into what is not known: straight ways of the gel that end at a touch, or nowhere."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.scale_estimation.section import Scale
+from experiments.scale_estimation.surroundings import Surroundings
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import MotionRefused, WrongUse
+from harness.basics.geometry import frame_facing, transform
+from harness.skills.press import ContactMotion
+from harness.twin.motion import PlannedContact, plan_contact
+from harness.twin.rehearsal import rehearse
+
+LINES = 40
+"""Lines that are tried, for a way that suggests itself first and then once more for one that is searched."""
+
+SLANTS = (0.0, 0.0, 0.45, 0.9, 1.3)
+"""Rad from straight down, of lines into the unknown: a flat thing is met from above alone."""
+
+LOWEST = 6.0e-3
+"""M above the support where a line from above ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """Where a line leads.
+
+    Attributes:
+        end: ``(3,)`` m in base, of the gel's middle were nothing there; a line from above goes on down.
+        bearing: rad about the vertical, the side that a slanting line comes from; None for any.
+        above: whether it comes straight from above.
+    """
+
+    end: FloatArray
+    bearing: float | None = None
+    above: bool = False
+
+
+def lines_to(
+    aims: Iterable[Aim], here: Surroundings, support: float, random: np.random.Generator
+) -> Iterator[FloatArray]:
+    """``(4, 4)`` where the gel would end were nothing there.
+
+    Args:
+        aims: one a line.
+        here: whose gel it is.
+        support: m, height of what the object stands on.
+        random: what slants and turns are drawn from.
+    """
+    half = 0.5 * max(here.station.gel.sensor.housing)
+    for aim in aims:
+        slant = 0.0 if aim.above else random.choice(SLANTS)
+        way = random.uniform(-np.pi, np.pi) if aim.bearing is None else aim.bearing
+        inward = -np.array([np.sin(slant) * np.cos(way), np.sin(slant) * np.sin(way), np.cos(slant)])
+        lowest = support + LOWEST + half * np.sin(slant)
+        height = lowest if slant == 0.0 else max(lowest, aim.end[2])
+        end = np.array([*aim.end[:2], height])
+        yield transform(frame_facing(inward, random.uniform(0.0, 2.0 * np.pi)), end)
+
+
+def contact_along(here: Surroundings, lines: Iterable[FloatArray]) -> dict[str, Any]:
+    """The parameters of a contact along the first of these lines that has a free way.
+
+    Raises:
+        WrongUse: none has.
+    """
+    tried = list(lines)
+    press = float(np.mean(here.scene.section(Scale).depth))
+    for searched in (0, 1):
+        for base_from_gel in tried:
+            contact = _planned(here, base_from_gel, searched)
+            if contact is not None:
+                motion = ContactMotion.planned(contact, here.nothing.flange_from_gel, press, 0.0)
+                return motion.to_parameters()
+    raise WrongUse(
+        f"no free way was found on any of {len(tried)} lines to where the object should be, around all the "
+        "space that it may take; give a smaller range of sizes, or another place"
+    )
+
+
+def _planned(here: Surroundings, base_from_gel: FloatArray, searched: int) -> PlannedContact | None:
+    contact = plan_contact(here.nothing, base_from_gel, here.joints, searched=searched, travels=here.travels)
+    if contact is None:
+        return None
+    try:
+        rehearse(here.travels, contact.travels(0)).require()
+        rehearse(here.nothing, contact.lines(0, press=False)).require()
+    except MotionRefused:
+        return None
+    return contact

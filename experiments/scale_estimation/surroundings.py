@@ -1,0 +1,50 @@
+"""What the arm moves in while a contact is planned, and whether a planned motion may be made there."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
+from harness.skills.strike import StrikeMotion
+from harness.twin.bench import TwinBench
+from harness.twin.rehearsal import rehearse
+from harness.twin.strike_motion import PlannedStrike
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """The bench around an object of which too little is known.
+
+    Attributes:
+        scene: of the run.
+        station: whose arm it is.
+        travels: the bench with all the space that the object may take in its place.
+        nothing: the bench without an object.
+        joints: ``(6,)`` rad, where the arm is.
+    """
+
+    scene: SceneFile
+    station: Station
+    travels: TwinBench
+    nothing: TwinBench
+    joints: FloatArray
+
+
+def rehearsed_strike(strike: PlannedStrike, travels: TwinBench, lines: TwinBench) -> StrikeMotion:
+    """A planned strike, gone through in the twin.
+
+    Raises:
+        MotionRefused: it must not be made.
+    """
+    rehearse(travels, strike.travels(0)).require()
+    rehearse(lines, strike.lines(0)).require()
+    return StrikeMotion.planned(strike)
+
+
+def end_of(parameters: Any) -> FloatArray:
+    """``(6,)`` rad: where a contact or a strike of these parameters leaves the arm."""
+    travel = np.asarray(parameters["travel_rad"], dtype=np.float64).reshape(-1, 6)
+    return travel[-1] if len(travel) else np.asarray(parameters["start_rad"], dtype=np.float64)

@@ -1,0 +1,99 @@
+"""An object that nobody has drawn is explored: its mesh is the mocked world's alone."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from experiments.scale_estimation.envelope import margin_of
+from experiments.scale_estimation.next_contact import Explorer
+from experiments.scale_estimation.unknown_shape import unknown_space
+from experiments.scale_estimation.vision.outline import SeenOutline
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
+from harness.objects.builtin import build
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.skills.strike import POSE
+from harness.twin.rehearsal import rehearse
+from tests.experiments.scale_estimation.runs import answering_of, outside, ran, scene_of, travels, true_mesh
+
+MOST = 10
+
+
+def unknown(contacts: int, mesh: str = "builtin:mug", camera: bool = True, sound: bool = False) -> SceneFile:
+    return scene_of(contacts, camera=camera, sound=sound, mesh=mesh, shape="unknown")
+
+
+@pytest.fixture(scope="module", params=[("builtin:mug", 60), ("builtin:bowl", 61)], ids=str)
+def explored(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, station: Station
+) -> Recording:
+    mesh, seed = request.param
+    return ran(tmp_path_factory.mktemp("unknown") / "run", unknown(MOST, mesh), station, seed)
+
+
+def test_most_lines_meet_it(explored: Recording) -> None:
+    answering = answering_of(explored)
+    assert len(answering.met) == MOST
+    assert sum(answering.met) >= 6
+
+
+def test_contacts_see_both_of_its_ends_and_what_is_between(explored: Recording) -> None:
+    """Spread over more than half of the object, measured along its longest level side."""
+    places = np.array([patch.points[0] for patch in answering_of(explored).patches])
+    true = true_mesh(explored).vertices
+    assert np.ptp(places[:, :2], axis=0).max() > 0.5 * np.ptp(true[:, :2], axis=0).max()
+
+
+def test_no_travel_comes_near_the_true_object_nor_enters_the_space_it_may_take(explored: Recording) -> None:
+    model, moved = answering_of(explored).model, list(travels(explored))
+    assert len(moved) >= MOST
+    assert not rehearse(model.twin_around(true_mesh(explored)), moved).refusals
+    explorer = Explorer(RunFiles(explored))
+    explorer.plan(explored, 1)
+    space = explorer._surroundings().travels
+    assert not rehearse(space, moved).refusals
+
+
+def test_the_object_is_within_the_space_and_a_look_makes_it_small(explored: Recording) -> None:
+    answering = answering_of(explored)
+    assert isinstance(answering.outline, SeenOutline)
+    largest = answering.model.sizes.high
+    unseen = unknown_space(answering.model, None, largest)
+    seen = unknown_space(answering.model, answering.outline, largest)
+    assert outside(explored, seen) < 0.0
+    assert outside(explored, unseen) < 0.0
+    assert ConvexHull(seen.vertices).volume < 0.5 * ConvexHull(unseen.vertices).volume
+
+
+def test_the_space_of_what_was_never_seen_holds_the_largest_box_at_any_turn(explored: Recording) -> None:
+    model = answering_of(explored).model
+    space, largest = unknown_space(model, None, model.sizes.high), model.sizes.high
+    low, high = space.bounds
+    reach = largest / np.sqrt(2.0) + 3.0 * model.place_error
+    assert np.all(high[:2] - model.place[:2] >= reach)
+    assert np.all(model.place[:2] - low[:2] >= reach)
+    assert high[2] - model.place[2] >= largest + margin_of(largest)
+
+
+@pytest.mark.parametrize("camera", [True, False], ids=["seen", "never seen"])
+def test_the_mesh_of_the_scene_changes_no_plan(tmp_path: Path, station: Station, camera: bool) -> None:
+    """Another thing of the same longest side in the planner's eyes: the same first contact."""
+    recording = ran(tmp_path / "run", unknown(1, camera=camera), station, 60)
+    other, run = build("wrench"), RunFiles(recording)
+    longest = float(np.ptp(run.mesh.bounds, axis=0).max())
+    scaled = Mesh(other.vertices * (longest / np.ptp(other.bounds, axis=0).max()), other.faces)
+    object.__setattr__(run, "mesh", scaled)
+    made = recording.step(int(camera)).step.parameters
+    planned = Explorer(run).plan(recording, int(camera))
+    assert {key: made[key] for key in planned} == planned
+
+
+def test_it_is_struck_where_the_gel_has_met_it(tmp_path: Path, station: Station) -> None:
+    recording = ran(tmp_path / "run", unknown(3, "builtin:bowl", sound=True), station, 62)
+    struck = [record.step.index for record in recording.steps() if POSE in record.readings]
+    assert struck
+    assert len(answering_of(recording).strikes) == len(struck)
