@@ -184,7 +184,7 @@ class Explorer:
         """M, of an object of unknown shape: as its outline has it, within the range that was asked about."""
         high = self._model.sizes.high
         try:
-            belief = self._answering.by_outline_alone().belief
+            belief = self._answering.without_shape()["vision"]().belief
         except FitRefused:
             return high
         return min(high, belief.below(LARGEST))
