@@ -1,7 +1,7 @@
 """From a run's readings to the size of its object, by each sense and by all."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -35,6 +35,9 @@ from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 
 SENSES = ("vision", "audio", "touch")
+
+SKIPPED = "skip"
+"""Kind of a step that was not made, because no way was free."""
 
 OUTSIDE = 0.5
 """Probability beyond which a size is said to lie outside the range that was asked about."""
@@ -101,6 +104,7 @@ class ScaleAnswering:
         self.free: list[FloatArray] = []
         self.met: list[bool] = []
         self.ways: list[GelWay] = []
+        self.left_out: list[str] = []
         self.strikes: list[Strike] = []
         self._read = dict.fromkeys(SENSES, 0.0)
         self._heard: tuple[int, Peaks | None] = (0, None)
@@ -125,6 +129,9 @@ class ScaleAnswering:
     def read(self, record: StepRecord) -> None:
         """Take in a step's readings."""
         began = time.perf_counter()
+        if record.step.kind == SKIPPED:
+            self.left_out.append(str(record.step.parameters["why"]))
+            return
         try:
             outline = outline_of(record)
         except DataRefused as refusal:
@@ -213,9 +220,13 @@ class ScaleAnswering:
         material = MATERIALS[model.scene.object.material]
         return {
             "vision": lambda: outline_alone(self._seen(), model.station.camera, model.place, model.sizes),
-            "audio": lambda: strikes_alone(self.strikes, material, model.sizes),
+            "audio": lambda: strikes_alone(self._rung(), material, model.sizes),
             "touch": lambda: ways_alone(self.ways, model.sizes),
         }
+
+    def _rung(self) -> Sequence[Strike]:
+        """All strikes; none where nothing rang, as of a microphone that is off."""
+        return () if self.heard() is None else self.strikes
 
     def _seen(self) -> SeenOutline:
         if isinstance(self.outline, FitRefused):

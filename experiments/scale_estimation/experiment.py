@@ -10,7 +10,16 @@ from experiments.scale_estimation.explore import PLAN_KEY, ScalePerformer, plan,
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
-from experiments.scale_estimation.table import LOOKING, METHODS, OURS, PAPER_CM, cells, run_cell, scene_of
+from experiments.scale_estimation.table import (
+    DRAWN,
+    LOOKING,
+    METHODS,
+    OURS,
+    PAPER_CM,
+    cells,
+    run_cell,
+    scene_of,
+)
 from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Experiment, MeasuredCondition, Scored
 from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
@@ -32,7 +41,10 @@ def _sources(_scored: Scored) -> Mapping[str, Any]:
 
 MEASUREMENT = replace(
     plain_measurement(NAME, *OWN),
-    conditions=(MeasuredCondition("look", LOOKING, ("yes",), ("yes",)),),
+    conditions=(
+        MeasuredCondition("look", LOOKING, ("yes",), ("yes",)),
+        MeasuredCondition("shape", DRAWN, ("known",), ("known",)),
+    ),
     cells=cells,
     run_cell=run_cell,
     methods=METHODS,

@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from experiments.scale_estimation.answer import SKIPPED
 from experiments.scale_estimation.model import ObjectModel
-from experiments.scale_estimation.next_contact import SKIPPED, Explorer
+from experiments.scale_estimation.next_contact import Explorer
 from experiments.scale_estimation.section import Scale
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh

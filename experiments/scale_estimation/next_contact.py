@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.scale_estimation.answer import ScaleAnswering
+from experiments.scale_estimation.answer import SKIPPED, ScaleAnswering
 from experiments.scale_estimation.believed import believed
 from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.envelope import blind_envelope, seen_envelope
@@ -46,9 +46,6 @@ from harness.skills.planning import HOME
 from harness.skills.strike import POSE, READY, StrikeMotion
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import way_between
-
-SKIPPED = "skip"
-"""Kind of a step that was not made: no free way was found for it."""
 
 LARGEST = 0.999
 """Probability that an object of unknown shape is no larger than travels allow for, by its outline."""

@@ -1,6 +1,6 @@
 """A scale estimation's answer as JSON values, and in lines for people."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.scale_estimation.answer import OUTSIDE, SizeAnswer
@@ -42,7 +42,7 @@ def result_of(scored: Scored) -> dict[str, Any]:
         "estimates": estimates,
         "sqrt_young_over_density": _material(scored),
         "seconds": seconds,
-        "warnings": list(_doubts(found)),
+        "warnings": [*_left_out(scored.answering.left_out), *_doubts(found)],
     }
 
 
@@ -75,6 +75,10 @@ def _material(scored: Scored) -> dict[str, Any] | None:
     material = scored.answering.model.ringing(scored.accuracy).material
     stated = (material.young / material.density) ** 0.5
     return heard.speed(stated, other.belief)
+
+
+def _left_out(reasons: Sequence[str]) -> list[str]:
+    return [f"{len(reasons)} contacts were left out; of the last: {reasons[-1]}"] if reasons else []
 
 
 def _doubts(found: SizeAnswer) -> list[str]:

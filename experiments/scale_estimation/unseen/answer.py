@@ -68,7 +68,7 @@ def strikes_alone(strikes: Sequence[Strike], material: Material, sizes: SizeRang
     """
     heard = response_of(strikes)
     if heard is None:
-        raise FitRefused("nothing was heard: no strike was made, or none may be used; strike the object")
+        raise FitRefused("nothing was heard: no strike was made, or none rang; strike the object")
     return ShapelessAnswer(*by_strikes(*heard, material, sizes))
 
 

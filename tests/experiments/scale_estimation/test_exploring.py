@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
+from experiments.scale_estimation.answer import SKIPPED
 from experiments.scale_estimation.envelope import blind_envelope, seen_envelope
 from experiments.scale_estimation.experiment import EXPERIMENT
 from experiments.scale_estimation.explore import MOST_SKIPPED
-from experiments.scale_estimation.next_contact import SKIPPED, Explorer
+from experiments.scale_estimation.next_contact import Explorer
 from harness.basics.errors import WrongUse
 from harness.bench.station_file import Station
 from harness.experiment.begin import begin
