@@ -144,6 +144,7 @@ def spectrogram_figure(frequencies: FloatArray, levels: Mapping[str, FloatArray]
             shade = 0.25 + 0.75 * (1.0 - number / max(1, len(levels)))
             axes.plot(frequencies, level, color=ANSWER, alpha=shade, lw=1.4, label=name)
         axes.set_xscale("log")
+        plain_logarithm(axes.xaxis, (1.0, 2.0, 5.0))
         axes.set_xlabel("Hz")
         axes.set_ylabel("dB below the loudest band")
         axes.legend(loc="lower left", frameon=False, fontsize=8, title="after the strike", title_fontsize=8)
