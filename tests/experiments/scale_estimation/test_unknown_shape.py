@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.envelope import margin_of
+from experiments.scale_estimation.experiment import EXPERIMENT
 from experiments.scale_estimation.next_contact import Explorer
 from experiments.scale_estimation.unknown_shape import unknown_space
 from experiments.scale_estimation.vision.outline import SeenOutline
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
+from harness.effects.accuracy import Accuracy
+from harness.experiment.answer import finish
 from harness.objects.builtin import build
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -92,8 +96,34 @@ def test_the_mesh_of_the_scene_changes_no_plan(tmp_path: Path, station: Station,
     assert {key: made[key] for key in planned} == planned
 
 
-def test_it_is_struck_where_the_gel_has_met_it(tmp_path: Path, station: Station) -> None:
-    recording = ran(tmp_path / "run", unknown(3, "builtin:bowl", sound=True), station, 62)
-    struck = [record.step.index for record in recording.steps() if POSE in record.readings]
-    assert struck
-    assert len(answering_of(recording).strikes) == len(struck)
+@pytest.fixture(scope="module")
+def struck(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recording:
+    return ran(tmp_path_factory.mktemp("struck") / "run", unknown(3, "builtin:bowl", sound=True), station, 62)
+
+
+def test_it_is_struck_where_the_gel_has_met_it(struck: Recording) -> None:
+    made = [record.step.index for record in struck.steps() if POSE in record.readings]
+    assert made
+    assert len(answering_of(struck).strikes) == len(made)
+
+
+def test_every_sense_answers_and_none_looks_at_the_drawing(struck: Recording, tmp_path: Path) -> None:
+    accuracy = Accuracy.default(EXPERIMENT.knobs)
+    result = finish(EXPERIMENT, struck, accuracy, lambda *_: tmp_path, folder=tmp_path)
+    assert not result["shape_known"]
+    for sense in ("vision", "audio", "touch", "fused"):
+        one = result["estimates"][sense]
+        assert one["refused"] is None
+        assert 0.04 < one["low90_m"] < one["size_m"] < one["high90_m"] < 0.65
+    page = Path(result["report"]).read_text()
+    assert "household things" in page
+    assert "the model is drawn" not in page
+    run = RunFiles(struck)
+    other = build("wrench")
+    longest = float(np.ptp(run.mesh.bounds, axis=0).max())
+    scaled = Mesh(other.vertices * (longest / np.ptp(other.bounds, axis=0).max()), other.faces)
+    object.__setattr__(run, "mesh", scaled)
+    answering = ScaleAnswering(run, accuracy)
+    for record in struck.steps():
+        answering.read(record)
+    assert answering.answer().fused.size == result["size_m"]
