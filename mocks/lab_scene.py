@@ -98,6 +98,7 @@ def nominal_bench(
         camera=_camera(scene, station),
         furniture=Furniture(scene.table.height, scene.table.size, scene.support.width),
         made_scale=made,
+        drawing=None if made is None else drawn,
     )
 
 

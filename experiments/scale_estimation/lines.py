@@ -26,7 +26,7 @@ LOWEST = 6.0e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Aim:
+class LineTarget:
     """Where a line leads.
 
     Attributes:
@@ -41,7 +41,7 @@ class Aim:
 
 
 def lines_to(
-    aims: Iterable[Aim], here: Surroundings, support: float, random: np.random.Generator
+    aims: Iterable[LineTarget], here: Surroundings, support: float, random: np.random.Generator
 ) -> Iterator[FloatArray]:
     """``(4, 4)`` where the gel would end were nothing there.
 

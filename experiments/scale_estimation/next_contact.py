@@ -15,7 +15,7 @@ from experiments.scale_estimation.answer import SKIPPED, ScaleAnswering
 from experiments.scale_estimation.believed import believed
 from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.envelope import blind_envelope, seen_envelope
-from experiments.scale_estimation.lines import Aim, contact_along, lines_to
+from experiments.scale_estimation.lines import LineTarget, contact_along, lines_to
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.on_object import contact_on_object
 from experiments.scale_estimation.readings import patch_of_contact
@@ -186,7 +186,7 @@ class Explorer:
             return high
         return min(high, belief.below(LARGEST))
 
-    def _aims(self, random: np.random.Generator) -> Iterable[Aim]:
+    def _aims(self, random: np.random.Generator) -> Iterable[LineTarget]:
         model = self._model
         if self._thing is not None:
             return aims_of_seen(self._thing, float(model.place[2]), self._contacts, random)

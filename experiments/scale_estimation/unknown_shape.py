@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from scipy.spatial import HalfspaceIntersection
 
 from experiments.scale_estimation.envelope import PLACES, around, margin_of
-from experiments.scale_estimation.lines import LINES, Aim
+from experiments.scale_estimation.lines import LINES, LineTarget
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.vision.outline import SeenOutline, corners_of, directions
 from harness.basics.arrays import FloatArray
@@ -159,7 +159,7 @@ def _met(camera: CameraSection, pixel: FloatArray, normal: FloatArray, place: Fl
 
 def aims_of_seen(
     seen: SeenThing, support: float, contacts: int, random: np.random.Generator
-) -> Iterator[Aim]:
+) -> Iterator[LineTarget]:
     """Where lines lead after a look: to its middle and its ends in turn, at heights drawn anew.
 
     Args:
@@ -177,12 +177,12 @@ def aims_of_seen(
         height = support + random.uniform(0.0, 0.9) * seen.height
         bearing = None if target == 0 else float(np.arctan2(out[1], out[0])) + random.uniform(*_ASIDE)
         above = seen.lies or (k == 0 and contacts == 0)
-        yield Aim(np.array([*seen.middle[:2] + out + off, height]), bearing, above)
+        yield LineTarget(np.array([*seen.middle[:2] + out + off, height]), bearing, above)
 
 
 def aims_unseen(
     place: FloatArray, error: float, height: float, first: bool, random: np.random.Generator
-) -> Iterator[Aim]:
+) -> Iterator[LineTarget]:
     """Where lines lead without a look: to where the object should stand, and about.
 
     Args:
@@ -194,4 +194,4 @@ def aims_unseen(
     """
     for k in range(LINES):
         aside = np.zeros(2) if k == 0 and first else random.normal(0.0, error, 2)
-        yield Aim(place + np.array([*aside, random.uniform(0.0, height)]), above=first and k == 0)
+        yield LineTarget(place + np.array([*aside, random.uniform(0.0, height)]), above=first and k == 0)

@@ -20,7 +20,7 @@ from harness.bench.travel import Trajectory, travel
 from harness.recording.recording import Recording
 from harness.recording.step_file import Step
 from harness.skills.first_touch import first_touch
-from harness.skills.search import Guard, meets
+from harness.skills.search import SearchGuard, meets
 from harness.skills.strike import FARTHEST, Ask, StrikeMotion, ready_of, strike, strike_by_hand
 from harness.twin.motion import PlannedContact
 
@@ -200,7 +200,7 @@ class PressPerformer:
         if motion is None:
             return ()
         self._travel(motion, bench)
-        guard = Guard(self.speeds.approach, self.speeds.touch_force)
+        guard = SearchGuard(self.speeds.approach, self.speeds.touch_force)
         return (ready_of(motion, bench), *strike(motion, step.index, 0.0, bench, guard=guard))
 
     def _travel(self, motion: ContactMotion | StrikeMotion, bench: Bench) -> None:
@@ -241,7 +241,7 @@ class PressPerformer:
     def _touch(self, step: Step, motion: ContactMotion, bench: Bench) -> bool:
         over = self.speeds.overtravel if motion.overtravel is None else motion.overtravel
         travel = motion.search + over
-        if meets(bench, motion.axis, travel, Guard(self.speeds.approach, self.speeds.touch_force)):
+        if meets(bench, motion.axis, travel, SearchGuard(self.speeds.approach, self.speeds.touch_force)):
             self._met = bench.arm.state().base_from_flange[:3, 3]
             return True
         if self._explores:

@@ -7,7 +7,7 @@ from harness.bench.station import Bench
 
 
 @dataclass(frozen=True)
-class Guard:
+class SearchGuard:
     """How a way is followed that may end at any place.
 
     Attributes:
@@ -19,7 +19,7 @@ class Guard:
     force: float
 
 
-def meets(bench: Bench, axis: FloatArray, travel: float, guard: Guard) -> bool:
+def meets(bench: Bench, axis: FloatArray, travel: float, guard: SearchGuard) -> bool:
     """Move along an axis until something resists; a long way in pieces, as the station limits a search.
 
     Args:

@@ -20,7 +20,7 @@ from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile
 from harness.bench.station import STRIKE, Bench
 from harness.bench.station_file import Station
-from harness.skills.search import Guard, meets
+from harness.skills.search import SearchGuard, meets
 from harness.twin.bench import TwinBench
 from harness.twin.strike_motion import PlannedStrike, StrikePlanner
 
@@ -142,7 +142,7 @@ def strike(
     moved: float,
     bench: Bench,
     speeds: StrikeSpeeds | None = None,
-    guard: Guard | None = None,
+    guard: SearchGuard | None = None,
 ) -> tuple[Reading, ...]:
     """Go before the object, fire, listen, go back; the arm begins and ends where the straight way does.
 
@@ -189,7 +189,7 @@ def strike(
     return (pose, *heard)
 
 
-def _blocked(motion: StrikeMotion, there: FloatArray, bench: Bench, guard: Guard) -> bool:
+def _blocked(motion: StrikeMotion, there: FloatArray, bench: Bench, guard: SearchGuard) -> bool:
     """Whether something is on the way to where the striker is fired; the arm is then before it."""
     way = float((there[:3, 3] - motion.base_from_ready[:3, 3]) @ motion.axis)
     bench.arm.zero_force()

@@ -4,7 +4,11 @@ The volume mesh is another one than any estimator's: other surface, other elemen
 once for an object; a run's own wall and material move its nodes and fill its cells.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
 
 from harness.basics.materials import Material, material
 from harness.basics.mesh import Mesh
@@ -37,6 +41,10 @@ FIELD_LENGTH = 40e-3
 DISTANCE = 0.25
 """m from the object to the microphone."""
 
+RUNG = 1.2
+"""Between the edges, over its size, with which an object of hidden size is filled: not every size needs a
+volume mesh of its own, and filling takes longer than all else."""
+
 
 def instrument_of(world: World, scene: SceneFile, draw: GapDraw) -> SoundingObject:
     """The true object's modes and how loud each is at the microphone.
@@ -53,23 +61,57 @@ def instrument_of(world: World, scene: SceneFile, draw: GapDraw) -> SoundingObje
     wall = scene.object.wall
     solid = walled(world.nominal, None if wall is None else wall * world.made_scale)
     edge = FINER * default_edge(solid, made_of, LIMIT)
-    modes = _modes(solid, made_of, edge, SoundDraw(draw), Store(default_folder()))
+    store = Store(default_folder())
+    if world.made_scale == 1.0:
+        body = _Body(solid, edge, partial(_filled, solid, edge, store))
+    else:
+        body = _scaled_body(solid, walled(world.drawing, wall), world.made_scale, edge, store)
+    modes = _modes(body, made_of, SoundDraw(draw), store)
     return SoundingObject(
         modes, dampings(modes.frequencies, made_of), radiation(modes, DISTANCE), made_of.name
     )
 
 
-def _modes(solid: Mesh, made_of: Material, edge: float, draw: SoundDraw, store: Store) -> Modes:
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """What is solved.
+
+    Attributes:
+        solid: its surface, m.
+        edge: m, of its elements.
+        fill: makes its volume mesh.
+    """
+
+    solid: Mesh
+    edge: float
+    fill: Callable[[], Tetrahedra]
+
+
+def _scaled_body(solid: Mesh, drawn: Mesh, scale: float, edge: float, store: Store) -> _Body:
+    """An object of hidden size: its drawing filled with elements no longer than asked for, and scaled."""
+    size = drawn.diagonal
+    rung = np.floor(np.log(edge / scale / size) / np.log(RUNG))
+    own = size * float(RUNG**rung)
+
+    def fill() -> Tetrahedra:
+        inside = _filled(drawn, own, store)
+        return tetrahedra(scale * inside.nodes, inside.cells)
+
+    return _Body(solid, scale * own, fill)
+
+
+def _modes(body: _Body, made_of: Material, draw: SoundDraw, store: Store) -> Modes:
     """The modes of one run's object, kept by everything that they depend on."""
     fields = draw.material_random()
     wall, poisson, sigma = draw.wall_change, draw.poisson_change, draw.elastic_field
     # The first numbers of the stream stand for the stream; without fields all runs share their modes.
     told = [wall, poisson, sigma, FIELD_LENGTH, draw.material_random().standard_normal(4) if sigma else 0.0]
-    key = digest(["world modes", VERSION, solid.vertices, solid.faces, made_of, LIMIT, edge, *told])
+    solid = body.solid
+    key = digest(["world modes", VERSION, solid.vertices, solid.faces, made_of, LIMIT, body.edge, *told])
     kept = store.get(key)
     if isinstance(kept, Mapping):
         return from_arrays(kept)
-    drawn = _filled(solid, edge, store)
+    drawn = body.fill()
     made = perturbed(drawn, wall) if wall else drawn
     elasticity = (
         uneven(made, made_of, sigma, FIELD_LENGTH, fields, poisson)

@@ -74,6 +74,7 @@ class NominalBench:
         camera: the scene camera, None where there is none.
         furniture: around the object.
         made_scale: of the object over its drawing, in ``mesh`` already; None where its size is stated.
+        drawing: of an object whose size is hidden, as the scene names it; None where ``mesh`` is that.
     """
 
     mesh: Mesh
@@ -85,6 +86,7 @@ class NominalBench:
     camera: Camera | None = None
     furniture: Furniture = Furniture()
     made_scale: float | None = None
+    drawing: Mesh | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,8 @@ class World:
 
     Attributes:
         sensor: the gel as it was made: the make's, but for its pitch.
-        nominal: the object's drawing, on the world's own tessellation.
+        drawing: the object as the scene names it.
+        nominal: the same of the size that it was made, on the world's own tessellation.
         mesh: the true object, in its own frame; the same faces.
         made_scale: of the drawing, over the one that the scene names: other than 1 where its size is hidden.
         scale: of the true object, over that.
@@ -123,6 +126,7 @@ class World:
             raise NotImplementedError("mocks.world.world: printed markers and shadows in the gel")
         self._bench = bench
         self.made_scale = 1.0 if bench.made_scale is None else bench.made_scale
+        self.drawing = bench.mesh if bench.drawing is None else bench.drawing
         self._draw = GapDraw(gap, seed)
         self._flange_from_gel: dict[int, FloatArray] = {}
         self._grid = PictureGrid.drawn(bench.sensor, self._draw.run.pitch, self._draw.run.aspect)

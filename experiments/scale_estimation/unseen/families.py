@@ -5,13 +5,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from experiments.scale_estimation.unseen.solid_grid import Solid, SolidGrid
+from experiments.scale_estimation.unseen.solid_grid import HouseholdSolid, SolidGrid
 from experiments.scale_estimation.unseen.vessel import Cross, Vessel, add_arm, add_handle, offset, turned
 
 _Random = np.random.Generator
 
 
-def draw(family: str, random: _Random) -> Solid:
+def draw(family: str, random: _Random) -> HouseholdSolid:
     """An object of that family, standing on z = 0 about z, its longest side 1."""
     return FAMILIES[family](random).standing()
 
@@ -28,7 +28,7 @@ def _vessel(
     return grid, turned(grid, outline, offset(outline, wall), split * outline[-1][1], cross)
 
 
-def _cup(random: _Random) -> Solid:
+def _cup(random: _Random) -> HouseholdSolid:
     radius, foot = random.uniform(0.3, 0.65), random.uniform(0.6, 1.0)
     outline = [(0.0, 0.0), (radius * foot, 0.0), (radius, random.uniform(0.2, 0.9)), (radius, 1.0)]
     grid, body = _vessel(outline, radius * _wall(random))
@@ -38,25 +38,25 @@ def _cup(random: _Random) -> Solid:
     return grid.solid()
 
 
-def _bowl(random: _Random) -> Solid:
+def _bowl(random: _Random) -> HouseholdSolid:
     height, foot, bulge = random.uniform(0.4, 1.1), random.uniform(0.3, 0.7), random.uniform(0.75, 1.0)
     outline = [(0.0, 0.0), (foot, 0.0), (bulge, 0.5 * height), (1.0, height)]
     return _vessel(outline, _wall(random))[0].solid()
 
 
-def _plate(random: _Random) -> Solid:
+def _plate(random: _Random) -> HouseholdSolid:
     height, foot = random.uniform(0.05, 0.3), random.uniform(0.4, 0.8)
     outline = [(0.0, 0.0), (foot, 0.0), (1.0, height)]
     return _vessel(outline, _wall(random, 0.025, 0.08))[0].solid()
 
 
-def _tray(random: _Random) -> Solid:
+def _tray(random: _Random) -> HouseholdSolid:
     across, height, foot = random.uniform(0.4, 1.0), random.uniform(0.1, 0.6), random.uniform(0.75, 1.0)
     outline = [(0.0, 0.0), (foot, 0.0), (1.0, height)]
     return _vessel(outline, _wall(random, 0.025, 0.08), Cross(across, random.uniform(2.0, 10.0)))[0].solid()
 
 
-def _bottle(random: _Random) -> Solid:
+def _bottle(random: _Random) -> HouseholdSolid:
     radius, shoulder, neck = random.uniform(0.12, 0.35), random.uniform(0.4, 0.85), random.uniform(0.25, 0.8)
     high = 0.5 * (1.0 + shoulder)
     outline = [(0.0, 0.0), (radius, 0.0), (radius, shoulder), (neck * radius, high), (neck * radius, 1.0)]
@@ -70,19 +70,19 @@ def _grid_box(
     return SolidGrid(), np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
-def _bar(random: _Random) -> Solid:
+def _bar(random: _Random) -> HouseholdSolid:
     grid, places = _grid_box((1.0, random.uniform(0.04, 0.3), random.uniform(0.03, 0.2)), (16, 2, 2))
     grid.add_block(grid.add_nodes(places))
     return grid.solid()
 
 
-def _block(random: _Random) -> Solid:
+def _block(random: _Random) -> HouseholdSolid:
     grid, places = _grid_box((1.0, random.uniform(0.3, 1.0), random.uniform(0.2, 1.2)), (6, 6, 6))
     grid.add_block(grid.add_nodes(places))
     return grid.solid()
 
 
-def _tool(random: _Random) -> Solid:
+def _tool(random: _Random) -> HouseholdSolid:
     """A flat shaft with a wider end or two."""
     shaft = random.uniform(0.05, 0.12)
     grid, places = _grid_box((1.0, shaft, random.uniform(0.03, 0.1)), (20, 4, 2))
@@ -94,7 +94,7 @@ def _tool(random: _Random) -> Solid:
     return grid.solid()
 
 
-def _hammer(random: _Random) -> Solid:
+def _hammer(random: _Random) -> HouseholdSolid:
     """A shaft with a head across its end, lying."""
     thick, head = random.uniform(0.06, 0.14), random.uniform(0.25, 0.5)
     grid, places = _grid_box((thick, head, thick), (2, 6, 2))
@@ -111,7 +111,7 @@ def _hammer(random: _Random) -> Solid:
     return grid.solid()
 
 
-def _pan(random: _Random) -> Solid:
+def _pan(random: _Random) -> HouseholdSolid:
     height, length = random.uniform(0.15, 0.6), random.uniform(0.6, 1.8)
     outline = [(0.0, 0.0), (random.uniform(0.7, 1.0), 0.0), (1.0, height)]
     grid, body = _vessel(outline, _wall(random, 0.025, 0.08), split=0.0)
@@ -119,7 +119,7 @@ def _pan(random: _Random) -> Solid:
     return grid.solid()
 
 
-def _glass(random: _Random) -> Solid:
+def _glass(random: _Random) -> HouseholdSolid:
     rim, widest = random.uniform(0.15, 0.32), random.uniform(0.18, 0.36)
     foot, stem = random.uniform(0.15, 0.3), random.uniform(0.02, 0.04)
     low, high = random.uniform(0.2, 0.45), random.uniform(0.6, 0.8)
@@ -138,7 +138,7 @@ def _glass(random: _Random) -> Solid:
     return grid.solid()
 
 
-def _pot(random: _Random) -> Solid:
+def _pot(random: _Random) -> HouseholdSolid:
     height, belly, lid = random.uniform(0.8, 1.6), random.uniform(0.4, 0.6), random.uniform(0.3, 0.7)
     outline = [(0.0, 0.0), (0.6, 0.0), (1.0, belly * height), (lid, 0.95 * height), (lid, height)]
     grid, body = _vessel(outline, _wall(random))
@@ -148,7 +148,7 @@ def _pot(random: _Random) -> Solid:
     return grid.solid()
 
 
-def _jug(random: _Random) -> Solid:
+def _jug(random: _Random) -> HouseholdSolid:
     radius, waist = random.uniform(0.22, 0.4), random.uniform(0.6, 1.0)
     foot = radius * random.uniform(0.7, 1.0)
     outline = [(0.0, 0.0), (foot, 0.0), (radius, 0.4), (radius * waist, 0.8), (radius, 1.0)]
@@ -157,7 +157,7 @@ def _jug(random: _Random) -> Solid:
     return grid.solid()
 
 
-FAMILIES: MappingProxyType[str, Callable[[_Random], Solid]] = MappingProxyType(
+FAMILIES: MappingProxyType[str, Callable[[_Random], HouseholdSolid]] = MappingProxyType(
     {
         "cup": _cup, "bowl": _bowl, "plate": _plate, "tray": _tray, "bottle": _bottle, "bar": _bar,
         "block": _block, "tool": _tool, "hammer": _hammer, "pan": _pan, "glass": _glass, "pot": _pot,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.scale_estimation.unseen.solid_grid import Solid
+from experiments.scale_estimation.unseen.solid_grid import HouseholdSolid
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.materials import MATERIALS, Material
 from harness.sim.modal.modal import solve_modes
@@ -40,7 +40,7 @@ class RingingShape:
     amplitudes: FloatArray
 
     @classmethod
-    def solved(cls, shape: Solid, random: np.random.Generator) -> "RingingShape":
+    def solved(cls, shape: HouseholdSolid, random: np.random.Generator) -> "RingingShape":
         """From a body one long.
 
         Raises:

@@ -12,14 +12,14 @@ import numpy as np
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.mesh import Mesh
 from harness.sim.solid.modal_mesh import boundary_faces
-from harness.sim.solid.tetrahedra import Tetrahedra
+from harness.sim.solid.tetrahedra import Tetrahedra, signed_volumes, tetrahedra
 
 _FLAT = 1e-12
 """Volume, of an object one long, below which a cell is a face that a collapsed edge left over."""
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class HouseholdSolid:
     """A body.
 
     Attributes:
@@ -35,12 +35,12 @@ class Solid:
         used, numbers = np.unique(faces, return_inverse=True)
         return Mesh(self.inside.nodes[used], numbers.reshape(-1, 3))
 
-    def standing(self) -> "Solid":
+    def standing(self) -> "HouseholdSolid":
         """The same one long, the middle of its bounding box above the origin, its lowest point on z = 0."""
         nodes = self.inside.nodes
         low, high = nodes.min(axis=0), nodes.max(axis=0)
         middle = np.array([*(0.5 * (low + high))[:2], low[2]])
-        return Solid(Tetrahedra(read_only((nodes - middle) / (high - low).max()), self.inside.cells))
+        return HouseholdSolid(Tetrahedra(read_only((nodes - middle) / (high - low).max()), self.inside.cells))
 
 
 @dataclass
@@ -66,18 +66,14 @@ class SolidGrid:
         """``(a, b, c)`` numbers of the nodes of a grid of hexahedra; equal numbers are a collapsed edge."""
         self._blocks.append(numbers)
 
-    def solid(self) -> Solid:
+    def solid(self) -> HouseholdSolid:
         """All blocks together."""
         nodes = np.concatenate(self._nodes)
         cells = np.concatenate([_split(block) for block in self._blocks])
         ordered = np.sort(cells, axis=1)
         cells = cells[(ordered[:, 1:] != ordered[:, :-1]).all(axis=1)]
-        corners = nodes[cells]
-        volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
-        turned = cells[:, [0, 2, 1, 3]]
-        cells = np.where((volumes < 0.0)[:, None], turned, cells)[np.abs(volumes) > _FLAT]
-        used, numbers = np.unique(cells, return_inverse=True)
-        return Solid(Tetrahedra(read_only(nodes[used]), read_only(numbers.reshape(-1, 4))))
+        flat = np.abs(signed_volumes(nodes, cells)) <= _FLAT
+        return HouseholdSolid(tetrahedra(nodes, cells[~flat]))
 
 
 def _split(block: IntArray) -> IntArray:

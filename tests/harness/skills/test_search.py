@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.skills.search import Guard, meets
+from harness.skills.search import SearchGuard, meets
 
 LONGEST = 0.2
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -36,12 +36,12 @@ def bench(arm: Arm) -> Any:
 @pytest.mark.parametrize("surface", [0.05, 0.25, 0.39, 1.0])
 def test_a_long_way_is_searched_in_pieces_and_ends_at_the_touch(surface: float) -> None:
     arm = Arm(surface)
-    assert meets(bench(arm), DOWN, 0.45, Guard(0.02, 0.3)) == (surface < 0.45)
+    assert meets(bench(arm), DOWN, 0.45, SearchGuard(0.02, 0.3)) == (surface < 0.45)
     assert max(arm.asked) <= LONGEST
     assert arm.gone == pytest.approx(min(surface, 0.45))
 
 
 def test_a_short_way_is_one_search() -> None:
     arm = Arm(1.0)
-    assert not meets(bench(arm), DOWN, 0.1, Guard(0.02, 0.3))
+    assert not meets(bench(arm), DOWN, 0.1, SearchGuard(0.02, 0.3))
     assert arm.asked == [0.1]

@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.scale_estimation.touch.patch import POINTS, SHARE
 from experiments.scale_estimation.unseen.contact_set import GelWay
-from experiments.scale_estimation.unseen.solid_grid import Solid
+from experiments.scale_estimation.unseen.solid_grid import HouseholdSolid
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import frame_facing
@@ -47,7 +47,7 @@ class TouchableShape:
     mesh: Mesh
 
     @classmethod
-    def of(cls, shape: Solid) -> "TouchableShape":
+    def of(cls, shape: HouseholdSolid) -> "TouchableShape":
         """Its surface."""
         return cls(shape.surface)
 

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from experiments.scale_estimation.unseen.network import BINS, MIDDLES
 from experiments.scale_estimation.unseen.training.networks import MODULES, SizeModule
-from experiments.scale_estimation.unseen.training.samples import Samples
+from experiments.scale_estimation.unseen.training.samples import SizeSamples
 from harness.basics.arrays import FloatArray
 
 RATE = 2.0e-3
@@ -22,7 +22,7 @@ Augment = Callable[[dict[str, Tensor], torch.Generator], dict[str, Tensor]]
 
 
 def fitted(
-    sense: str, samples: Samples, epochs: int, seed: int, augment: Augment | None = None
+    sense: str, samples: SizeSamples, epochs: int, seed: int, augment: Augment | None = None
 ) -> SizeModule:
     """One network, its rate falling as half a cosine."""
     torch.manual_seed(seed)
@@ -66,7 +66,7 @@ def _blurred(sizes: FloatArray) -> FloatArray:
     return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
 
-def said(modules: Sequence[SizeModule], samples: Samples) -> tuple[FloatArray, FloatArray]:
+def said(modules: Sequence[SizeModule], samples: SizeSamples) -> tuple[FloatArray, FloatArray]:
     """``(n, members, BINS)`` logits and ``(n, members, CODE)`` codes."""
     given = [torch.from_numpy(np.float32(value)) for value in samples.inputs.values()]
     logits, codes = [], []

@@ -1,4 +1,4 @@
-"""Samples of shapes of the families: strikes and ways of the gel, made in several processes."""
+"""SizeSamples of shapes of the families: strikes and ways of the gel, made in several processes."""
 
 import sys
 import time
@@ -14,7 +14,7 @@ import numpy as np
 from experiments.scale_estimation.unseen import contact_set
 from experiments.scale_estimation.unseen.families import FAMILIES, draw
 from experiments.scale_estimation.unseen.ringing_shape import MODES, RingingShape
-from experiments.scale_estimation.unseen.solid_grid import Solid
+from experiments.scale_estimation.unseen.solid_grid import HouseholdSolid
 from experiments.scale_estimation.unseen.training.contact_samples import (
     TouchableShape,
     contact_sample,
@@ -34,7 +34,7 @@ _SAID_EVERY = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class SizeSamples:
     """Readings of shapes of known size.
 
     Attributes:
@@ -47,20 +47,20 @@ class Samples:
     sizes: FloatArray
     shapes: IntArray
 
-    def of(self, rows: AnyArray) -> "Samples":
+    def of(self, rows: AnyArray) -> "SizeSamples":
         """Some of them."""
-        return Samples({k: v[rows] for k, v in self.inputs.items()}, self.sizes[rows], self.shapes[rows])
+        return SizeSamples({k: v[rows] for k, v in self.inputs.items()}, self.sizes[rows], self.shapes[rows])
 
 
 _Row = tuple[dict[str, FloatArray], float]
 
 
-def shape_of(number: int, seed: int) -> Solid:
+def shape_of(number: int, seed: int) -> HouseholdSolid:
     """The shapes of a seed by their number; families take turns."""
     return _drawn(number, np.random.default_rng((seed, number)))
 
 
-def _drawn(number: int, random: np.random.Generator) -> Solid:
+def _drawn(number: int, random: np.random.Generator) -> HouseholdSolid:
     names = list(FAMILIES)
     return draw(names[number % len(names)], random)
 
@@ -127,8 +127,8 @@ MAKERS: dict[str, Callable[[int, int, int], list[_Row]]] = {
 }
 
 
-def samples_of(sense: str, shapes: int, each: int, seed: int, processes: int) -> Samples:
-    """Samples of all shapes, in the shapes' order whatever the number of processes.
+def samples_of(sense: str, shapes: int, each: int, seed: int, processes: int) -> SizeSamples:
+    """SizeSamples of all shapes, in the shapes' order whatever the number of processes.
 
     Args:
         sense: of ``MAKERS``.
@@ -149,7 +149,7 @@ def samples_of(sense: str, shapes: int, each: int, seed: int, processes: int) ->
                 sizes.append(size)
                 numbers.append(number)
     stacked: dict[str, AnyArray] = {name: np.stack(values) for name, values in inputs.items()}
-    return Samples(stacked, np.array(sizes), np.array(numbers))
+    return SizeSamples(stacked, np.array(sizes), np.array(numbers))
 
 
 def _mapped(

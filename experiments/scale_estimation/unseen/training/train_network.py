@@ -17,7 +17,7 @@ from experiments.scale_estimation.unseen.training.fit import (
     turned,
 )
 from experiments.scale_estimation.unseen.training.networks import graph
-from experiments.scale_estimation.unseen.training.samples import SIZES, Samples, samples_of
+from experiments.scale_estimation.unseen.training.samples import SIZES, SizeSamples, samples_of
 from harness.basics.arrays import FloatArray
 
 HELD_OUT = (0.1, 0.1)
@@ -79,7 +79,7 @@ def train_network(sense: str, amounts: Amounts, seed: int, processes: int) -> tu
     return graph(sense, modules), card
 
 
-def _reached(logits: FloatArray, samples: Samples, temperature: float) -> dict[str, float]:
+def _reached(logits: FloatArray, samples: SizeSamples, temperature: float) -> dict[str, float]:
     shares = densities(logits, temperature)
     error = 1e2 * np.abs(medians(shares) - samples.sizes)
     constant = 1e2 * np.abs(np.sqrt(SIZES[0] * SIZES[1]) - samples.sizes)
