@@ -23,7 +23,7 @@ class Scale(Section):
         camera_rotation_error: rad, likewise, of how it is turned.
         focal_length_error: relative.
         shape: ``"unknown"`` where the object was never drawn: the scene's mesh is then the mocked world's
-            alone, and the size is told from the outline by what household things look like.
+            alone, and the size is told by what household things look, sound and feel like.
         material: how well the object's material is known: ``"measured"``, its sqrt(E / density) to 3 %;
             ``"named"``, as well as an object said to be of it; ``"unknown"``, one of all seven.
         until: m: a run ends when half its 90 % interval is no wider, whatever contacts are left; None to
