@@ -11,6 +11,8 @@ from harness.bench.station_file import Station
 from tests.experiments.scale_estimation.test_sound import NOMINAL, model, peaks_at
 from tests.experiments.scale_estimation.test_vision import nominal, outline_at, view_of
 
+pytestmark = pytest.mark.timeout(300)  # fills a mug with elements where it is the first to
+
 RANGE = SizeRange(0.05, 0.2)
 
 
