@@ -107,7 +107,7 @@ class ScaleAnswering:
         self.left_out: list[str] = []
         self.strikes: list[Strike] = []
         self._read = dict.fromkeys(SENSES, 0.0)
-        self._heard: tuple[int, Peaks | None] = (0, None)
+        self._peaks: tuple[int, Peaks | None] = (0, None)
 
     def load(self) -> None:
         """Make what depends on the object alone, while the arm has other things to do."""
@@ -164,21 +164,22 @@ class ScaleAnswering:
         Raises:
             WrongUse: no step was read.
         """
+        return self.answered(self.with_shape() if self.shape_known else self.without_shape())
+
+    def answered(self, estimators: Mapping[str, Callable[[], Said]]) -> SizeAnswer:
+        """The same by estimators given for each sense: ``with_shape`` or ``without_shape``.
+
+        Raises:
+            WrongUse: the scene asks for no sense.
+        """
         sensors = self.run.scene.sensors
-        asked = {"vision": sensors.camera, "audio": sensors.sound, "touch": sensors.touch}
-        ways: dict[str, Callable[[], Said]] = {
-            "vision": self._by_sight,
-            "audio": self._by_sound,
-            "touch": self._by_touch,
-        }
-        if not self.shape_known:
-            ways = self.without_shape()
+        wanted = {"vision": sensors.camera, "audio": sensors.sound, "touch": sensors.touch}
         found: dict[str, Said | FitRefused] = {}
         seconds = {}
         for sense in SENSES:
-            if asked[sense]:
+            if wanted[sense]:
                 began = time.perf_counter()
-                found[sense] = self._tried(ways[sense])
+                found[sense] = self._tried(estimators[sense])
                 seconds[sense] = self._read[sense] + time.perf_counter() - began
         if not found:
             raise WrongUse("the scene asks for no sense; set sensors.camera, sensors.sound or sensors.touch")
@@ -187,11 +188,11 @@ class ScaleAnswering:
         usable = sum(not strike.fault for strike in self.strikes)
         return SizeAnswer(found, together, seconds, len(self.patches), usable)
 
-    def heard(self) -> Peaks | None:
+    def peaks(self) -> Peaks | None:
         """The resonances of all strikes so far; None where none was made, or none may be used."""
-        if self._heard[0] != len(self.strikes):
-            self._heard = len(self.strikes), peaks_of(self.strikes)
-        return self._heard[1]
+        if self._peaks[0] != len(self.strikes):
+            self._peaks = len(self.strikes), peaks_of(self.strikes)
+        return self._peaks[1]
 
     def stands_seen(self) -> tuple[SeenStand, ...]:
         """How the object may stand by the look; none where it was not seen."""
@@ -211,6 +212,10 @@ class ScaleAnswering:
         model, yaws = self.model, int(self.accuracy[YAWS.name])
         return by_sight(model.view, self._seen(), model.nominal, model.sizes, yaws)
 
+    def with_shape(self) -> dict[str, Callable[[], Said]]:
+        """How each sense answers of an object whose shape is the scene's mesh."""
+        return {"vision": self._by_sight, "audio": self._by_sound, "touch": self._by_touch}
+
     def without_shape(self) -> dict[str, Callable[[], Said]]:
         """How each sense answers of an object whose shape nobody knows.
 
@@ -220,13 +225,13 @@ class ScaleAnswering:
         material = MATERIALS[model.scene.object.material]
         return {
             "vision": lambda: outline_alone(self._seen(), model.station.camera, model.place, model.sizes),
-            "audio": lambda: strikes_alone(self._rung(), material, model.sizes),
+            "audio": lambda: strikes_alone(self._ringing_strikes(), material, model.sizes),
             "touch": lambda: ways_alone(self.ways, model.sizes),
         }
 
-    def _rung(self) -> Sequence[Strike]:
+    def _ringing_strikes(self) -> Sequence[Strike]:
         """All strikes; none where nothing rang, as of a microphone that is off."""
-        return () if self.heard() is None else self.strikes
+        return () if self.peaks() is None else self.strikes
 
     def _seen(self) -> SeenOutline:
         if isinstance(self.outline, FitRefused):
@@ -236,7 +241,7 @@ class ScaleAnswering:
         return self.outline
 
     def _by_sound(self) -> Hearing:
-        peaks = self.heard()
+        peaks = self.peaks()
         if peaks is None:
             raise FitRefused(
                 "nothing was heard: no strike was made, or none rang; strike a place of the object"

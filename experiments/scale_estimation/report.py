@@ -89,7 +89,7 @@ def _seen(answering: ScaleAnswering, outline: SeenOutline, sight: Sight | None, 
 
 
 def _heard(answering: ScaleAnswering, found: SizeAnswer, album: Album) -> PageSection:
-    peaks = answering.heard()
+    peaks = answering.peaks()
     if peaks is None:
         return PageSection("By sound", "No strike may be used.", None)
     hearing = found.hearing

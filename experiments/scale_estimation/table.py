@@ -131,7 +131,11 @@ def _rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str
     sizes = answering.model.sizes
     rows: dict[str, Any] = {"random": {"error_m": random_error(sizes, true), "seconds": 0.0}}
     if not answering.shape_known:
-        return {**rows, "constant": _value(constant(sizes), true, 0.0), **_shapeless(answering, true)}
+        return {
+            **rows,
+            "constant": _value(constant(sizes), true, 0.0),
+            **_shapeless_rows(answering, found, true),
+        }
     for name, method in _trivial(answering).items():
         began = now()
         value = method()
@@ -140,7 +144,8 @@ def _rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str
     for sense in ("vision", "audio", "touch"):
         if sense in found.by_sense:
             rows[sense] = _answered(found.by_sense[sense], answering, true, found.seconds[sense])
-    rows.update(_shapeless(answering, true))
+    without = answering.answered(answering.without_shape())
+    rows.update(_shapeless_rows(answering, without, true))
     rows.update(_pairs(answering, found, true))
     rows["fused"] = _belief(found.fused, true, sum(found.seconds.values()))
     return rows
@@ -150,7 +155,7 @@ def _trivial(answering: ScaleAnswering) -> dict[str, Callable[[], float | None]]
     model = answering.model
 
     def first_peak() -> float | None:
-        peaks = answering.heard()
+        peaks = answering.peaks()
         if peaks is None:
             return None
         return by_first_peak(peaks, model.ringing(answering.accuracy), model.nominal)
@@ -168,26 +173,16 @@ def _trivial(answering: ScaleAnswering) -> dict[str, Callable[[], float | None]]
     return methods
 
 
-def _shapeless(answering: ScaleAnswering, true: float) -> dict[str, Any]:
-    """What the same readings say where nobody knows the shape."""
-    rows, beliefs, seconds = {}, [], 0.0
+def _shapeless_rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str, Any]:
+    """What the readings say where nobody knows the shape."""
+    rows = {}
     with suppress(FitRefused):
         began = now()
         imprints = imprints_alone(answering.patches, answering.model.sizes).belief
         rows["imprints, no poses, shape unknown"] = _belief(imprints, true, now() - began)
-    for sense, way in answering.without_shape().items():
-        began = now()
-        one: Any
-        try:
-            one = way()
-            beliefs.append(one.belief)
-        except FitRefused as refusal:
-            one = refusal
-        spent = now() - began
-        seconds += spent
-        rows[f"{sense}, shape unknown"] = _answered(one, answering, true, spent)
-    together = fused(beliefs) if beliefs else Belief.ignorant(answering.model.sizes)
-    rows["fused, shape unknown"] = _belief(together, true, seconds)
+    for sense, one in found.by_sense.items():
+        rows[f"{sense}, shape unknown"] = _answered(one, answering, true, found.seconds[sense])
+    rows["fused, shape unknown"] = _belief(found.fused, true, sum(found.seconds.values()))
     return rows
 
 

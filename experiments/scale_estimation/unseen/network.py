@@ -80,11 +80,11 @@ class SizeNetwork:
         """
         shares, distances = [], []
         for one in inputs:
-            said = self.network({name: value[None].astype(np.float32) for name, value in one.items()})
-            logits = said["logits"][0].astype(np.float64) / self.temperature
+            outputs = self.network({name: value[None].astype(np.float32) for name, value in one.items()})
+            logits = outputs["logits"][0].astype(np.float64) / self.temperature
             logits = logits - logits.max(axis=1, keepdims=True)
             shares.append((np.exp(logits) / np.exp(logits).sum(axis=1, keepdims=True)).mean(axis=0))
-            distances.append(self.family.distance(said["codes"][0].astype(np.float64)))
+            distances.append(self.family.distance(outputs["codes"][0].astype(np.float64)))
         distance = float(np.mean(distances)) / self.family.usual
         strange = max(UNKNOWN_SHARE, 1.0 - 1.0 / distance**2 if distance > 1.0 else 0.0)
         log_density = np.interp(sizes.logs, MIDDLES, np.log(np.mean(shares, axis=0) + 1e-12))

@@ -58,22 +58,22 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=own_cores(), help="that make samples")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "data", help="a folder")
-    asked = parser.parse_args(arguments)
-    senses, profile = asked.only or SENSES, PROFILES[asked.profile]
+    options = parser.parse_args(arguments)
+    senses, profile = options.only or SENSES, PROFILES[options.profile]
     if find_spec("torch") is None and set(NETWORKS) & set(senses):
         sys.stderr.write("networks need torch: pip install '.[author]', or say --only outline\n")
         return 2
-    asked.out.mkdir(parents=True, exist_ok=True)
+    options.out.mkdir(parents=True, exist_ok=True)
     if "outline" in senses:
-        sys.stdout.write(train_outlines(profile.outlines, asked.seed, asked.out) + "\n")
+        sys.stdout.write(train_outlines(profile.outlines, options.seed, options.out) + "\n")
     for sense in [sense for sense in NETWORKS if sense in senses]:
         from experiments.scale_estimation.unseen.training.train_network import train_network  # needs torch
 
         began = time.perf_counter()
-        data, card = train_network(sense, profile, asked.seed, asked.processes)
-        card["profile"], card["seconds"] = asked.profile, round(time.perf_counter() - began, 1)
-        (asked.out / f"{sense}.onnx").write_bytes(data)
-        (asked.out / f"{sense}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
+        data, card = train_network(sense, profile, options.seed, options.processes)
+        card["profile"], card["seconds"] = options.profile, round(time.perf_counter() - began, 1)
+        (options.out / f"{sense}.onnx").write_bytes(data)
+        (options.out / f"{sense}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
         reached = {name: card[name] for name in ("held_out", "seconds")}
         sys.stdout.write(f"{sense}: {json.dumps(reached)}\n")
     return 0

@@ -66,17 +66,17 @@ def _blurred(sizes: FloatArray) -> FloatArray:
     return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
 
-def said(modules: Sequence[SizeModule], samples: SizeSamples) -> tuple[FloatArray, FloatArray]:
+def outputs_of(modules: Sequence[SizeModule], samples: SizeSamples) -> tuple[FloatArray, FloatArray]:
     """``(n, members, BINS)`` logits and ``(n, members, CODE)`` codes."""
     given = [torch.from_numpy(np.float32(value)) for value in samples.inputs.values()]
     logits, codes = [], []
     for module in modules:
-        kept: list[Tensor] = []
-        hook = module.last.register_forward_hook(lambda _m, taken, _g, kept=kept: kept.append(taken[0]))
+        inputs: list[Tensor] = []
+        hook = module.last.register_forward_hook(lambda _m, taken, _g, inputs=inputs: inputs.append(taken[0]))
         with torch.no_grad():
             logits.append(module(*given).numpy())
         hook.remove()
-        codes.append(kept[0].numpy())
+        codes.append(inputs[0].numpy())
     return np.stack(logits, axis=1).astype(np.float64), np.stack(codes, axis=1).astype(np.float64)
 
 

@@ -75,9 +75,9 @@ def ringing_of(number: int, seed: int) -> RingingShape | None:
     random, store = np.random.default_rng((seed, number)), Store(default_folder())
     shape = _drawn(number, random)
     key = digest(["ringing shape", 1, MODES, shape.inside.nodes, shape.inside.cells, (seed, number)])
-    kept = store.get(key)
-    if isinstance(kept, dict):
-        return RingingShape(kept["frequencies"], kept["amplitudes"])
+    stored = store.get(key)
+    if isinstance(stored, dict):
+        return RingingShape(stored["frequencies"], stored["amplitudes"])
     try:
         found = RingingShape.solved(shape, random)
     except MeshRefused:
@@ -98,32 +98,32 @@ def strikes(seed: int, count: int, number: int) -> list[_Row]:
     return rows
 
 
-def contacts(seed: int, count: int, number: int) -> list[_Row]:
-    """So many explorations of one shape."""
-    shape = TouchableShape.of(shape_of(number, seed))
-    random, rows = np.random.default_rng((seed, number, 3)), []
-    for _ in range(count):
-        size = draw_size(random)
-        ways, kinds, whole = contact_set.features(contact_sample(shape, size, random))
-        rows.append(({"ways": ways, "kinds": kinds, "whole": whole}, size))
-    return rows
+_SET_INPUTS = ("ways", "kinds", "whole")
+_Reading = Callable[[TouchableShape, float, np.random.Generator], tuple[FloatArray, ...]]
 
 
-def imprints(seed: int, count: int, number: int) -> list[_Row]:
-    """So many sets of imprints of one shape, of places that nobody knows."""
+def _explored(shape: TouchableShape, size: float, random: np.random.Generator) -> tuple[FloatArray, ...]:
+    return contact_set.features(contact_sample(shape, size, random))
+
+
+def _imprinted(shape: TouchableShape, size: float, random: np.random.Generator) -> tuple[FloatArray, ...]:
+    return contact_set.imprint_features(imprint_sample(shape, size, random))
+
+
+def presses(reading: _Reading, stream: int, seed: int, count: int, number: int) -> list[_Row]:
+    """So many sets of presses of one shape, as a network reads them; ``stream`` numbers their draws."""
     shape = TouchableShape.of(shape_of(number, seed))
-    random, rows = np.random.default_rng((seed, number, 4)), []
+    random, rows = np.random.default_rng((seed, number, stream)), []
     for _ in range(count):
         size = draw_size(random)
-        ways, kinds, whole = contact_set.imprint_features(imprint_sample(shape, size, random))
-        rows.append(({"ways": ways, "kinds": kinds, "whole": whole}, size))
+        rows.append((dict(zip(_SET_INPUTS, reading(shape, size, random), strict=True)), size))
     return rows
 
 
 MAKERS: dict[str, Callable[[int, int, int], list[_Row]]] = {
     "sound": strikes,
-    "touch": contacts,
-    "imprints": imprints,
+    "touch": partial(presses, _explored, 3),
+    "imprints": partial(presses, _imprinted, 4),
 }
 
 

@@ -12,7 +12,7 @@ from experiments.scale_estimation.unseen.training.fit import (
     fitted,
     held,
     medians,
-    said,
+    outputs_of,
     temperature_of,
     turned,
 )
@@ -58,7 +58,7 @@ def train_network(sense: str, amounts: Amounts, seed: int, processes: int) -> tu
     torch.set_num_threads(1)  # the same bits whatever the machine has
     augment = turned if sense == "touch" else None
     modules = [fitted(sense, learnt, epochs, seed + k, augment) for k in range(amounts.members)]
-    logits, codes = said(modules, width)
+    logits, codes = outputs_of(modules, width)
     temperature = temperature_of(logits, width.sizes)
     card = {
         "what": f"the longest side of an object never drawn, by {sense}",
@@ -71,10 +71,10 @@ def train_network(sense: str, amounts: Amounts, seed: int, processes: int) -> tu
             "epochs": epochs,
             "seed": seed,
         },
-        "fitted": _reached(said(modules, learnt)[0], learnt, temperature),
-        "held_out": _reached(said(modules, tested)[0], tested, temperature),
+        "fitted": _reached(outputs_of(modules, learnt)[0], learnt, temperature),
+        "held_out": _reached(outputs_of(modules, tested)[0], tested, temperature),
         "temperature": temperature,
-        "family": family_of(said(modules, learnt)[1], codes),
+        "family": family_of(outputs_of(modules, learnt)[1], codes),
     }
     return graph(sense, modules), card
 
