@@ -1,0 +1,104 @@
+"""What is known of an object of unknown shape: contacts, free space, its picture, its support.
+
+Frame ``stand``: base, shifted to where the scene nominally puts the object on its support: z up, z = 0 at the
+support, axes as base has them. Everything here and every estimate is in it, in metres.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.basics.arrays import BoolArray, FloatArray
+from harness.basics.errors import OutOfDomain
+
+
+@dataclass(frozen=True, eq=False)
+class GuardedTouch:
+    """One straight, guarded way of the gel, which ended at the object or met nothing.
+
+    Attributes:
+        stand_from_gel: ``(4, 4)`` at its end; the origin is the middle of the unpressed gel's face, z points
+            into the object.
+        way: m of it, straight along z: the sensor came from ``way`` farther back.
+        points: ``(n, 3)`` m, of the object's surface where the gel was pressed; none where it met nothing.
+        normals: ``(n, 3)`` unit, out of the object, at each point.
+        sigma: m, one standard deviation of the points along the normals, of each on its own.
+        normal_sigma: rad, one standard deviation of the normals.
+        index: the step of the run that it is.
+    """
+
+    stand_from_gel: FloatArray
+    way: float
+    points: FloatArray
+    normals: FloatArray
+    sigma: float
+    normal_sigma: float
+    index: int
+
+    @property
+    def met(self) -> bool:
+        """Whether it touched anything."""
+        return len(self.points) > 0
+
+
+@dataclass(frozen=True, eq=False)
+class SeenMask:
+    """The object's silhouette in the picture of a camera whose pose is known but for small errors.
+
+    Attributes:
+        mask: ``(rows, columns)`` bool, the object's pixels; holes through which the bench is seen are filled.
+        hidden: ``(rows, columns)`` bool, pixels of which nothing is known: something may stand before them.
+        stand_from_camera: ``(4, 4)``, OpenCV's axes: x right, y down, z forward.
+        focal_length: pixels; the optical axis is in the middle of the picture.
+        position_error: m, one standard deviation per axis of where the camera is.
+        rotation_error: rad, likewise, of how it is turned.
+        focal_length_error: relative.
+    """
+
+    mask: BoolArray
+    hidden: BoolArray
+    stand_from_camera: FloatArray
+    focal_length: float
+    position_error: float
+    rotation_error: float
+    focal_length_error: float
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeEvidence:
+    """All readings of an object's shape.
+
+    Attributes:
+        touches: every guarded way, those that met nothing too.
+        look: the silhouette; None where no camera looked, or it saw nothing.
+        housing: ``(x, y)`` m, sides of the sensor's flat housing, whose face lies ``gel_thickness`` behind the
+            gel's; what is behind that face for ``housing_depth`` is the sensor's, and free of the object.
+        gel_thickness: m.
+        housing_depth: m.
+        place_error: m, one standard deviation per axis of where on the support the object was put.
+        support_error: m, one standard deviation of the support's height.
+        largest: m, no side of the object is longer.
+    """
+
+    touches: tuple[GuardedTouch, ...]
+    look: SeenMask | None
+    housing: tuple[float, float]
+    gel_thickness: float
+    housing_depth: float
+    place_error: float
+    support_error: float
+    largest: float
+
+    def __post_init__(self) -> None:
+        for touch in self.touches:
+            finite = np.isfinite(touch.stand_from_gel).all() and np.isfinite(touch.points).all()
+            if not finite or touch.points.shape != touch.normals.shape:
+                raise OutOfDomain(
+                    f"touch {touch.index} has points of shape {touch.points.shape}, normals of shape "
+                    f"{touch.normals.shape}, not all finite; give one finite unit normal a point"
+                )
+
+    @property
+    def contacts(self) -> tuple[GuardedTouch, ...]:
+        """Those touches that met the object."""
+        return tuple(touch for touch in self.touches if touch.met)

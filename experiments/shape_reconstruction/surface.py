@@ -1,0 +1,35 @@
+"""What an estimator of shape hands on: a watertight surface that says how well each part of it is known."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.mesh import Mesh
+
+SUPPOSED, SEEN, TOUCHED = 0, 1, 2
+"""Of a vertex: neither touched nor at the border of the silhouette; seen; under a gel."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeEstimate:
+    """The surface of an object, by one estimator.
+
+    Attributes:
+        mesh: watertight, in the frame ``stand``, metres.
+        deviation: ``(vertices,)`` m, one standard deviation of the surface along its normal.
+        known_by: ``(vertices,)`` ``SUPPOSED``, ``SEEN`` or ``TOUCHED``.
+        not_bounded: names of the extents that no reading limits: ``"x"``, ``"y"``, ``"z"`` of ``stand``.
+        doubtful: indices of the touches that do not fit the rest, with m that each is off.
+        flags: short sentences that the answer must carry: ``"class unknown: mug or can"``.
+        seconds: of the estimate.
+        details: JSON values of what the estimator found beside: its kind, parameters, other hypotheses.
+    """
+
+    mesh: Mesh
+    deviation: FloatArray
+    known_by: IntArray
+    not_bounded: tuple[str, ...]
+    doubtful: Mapping[int, float]
+    flags: tuple[str, ...]
+    seconds: float
+    details: Mapping[str, object] = field(default_factory=dict)
