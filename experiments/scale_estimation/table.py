@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from experiments.scale_estimation.answer import ScaleAnswering, SizeAnswer
@@ -111,10 +112,13 @@ def scene_of(scene: SceneFile, cell: ScaleCell) -> SceneFile:
     return scene_from_json(tree, cell.name)
 
 
-def run_cell(cell: ScaleCell, scene: SceneFile, station: Station) -> dict[str, Any]:
+def run_cell(
+    cell: ScaleCell, scene: SceneFile, station: Station, recordings: Path | None = None
+) -> dict[str, Any]:
     """Perform and answer one run; the result as JSON values."""
     experiment: Experiment = named("scale-estimation")
-    with closing(perform_in_process(experiment, cell, scene_of(scene, cell), station)) as case:
+    here = scene_of(scene, cell)
+    with closing(perform_in_process(experiment, cell, here, station, recordings)) as case:
         recording = case.run.recording
         truth = read_truth(recording)
         if truth is None:

@@ -4,15 +4,14 @@ import datetime as dt
 import json
 import os
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from harness.basics.errors import TouchstoneError
 from harness.basics.whole_file import write_text_whole
+from harness.basics.worker_pool import worker_pool
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.cost.curve import Curve, Point, Sample
@@ -127,8 +126,7 @@ def _point(experiment: Experiment, setting: Setting, condition: Mapping[str, Any
 
 def workers_of(number: int) -> Any:
     """A pool of processes, as a context; None in it where this process does all."""
-    spawn = get_context("spawn")
-    return ProcessPoolExecutor(number, mp_context=spawn) if number > 1 else nullcontext(None)
+    return worker_pool(number) if number > 1 else nullcontext(None)
 
 
 def gathered(experiment: Experiment, points: Sequence[Point], title: str, notes: Sequence[str] = ()) -> Curve:

@@ -137,6 +137,15 @@ class RunCell(Protocol):
         """What was varied, by name; ``gap`` always among them."""
 
 
+class RunsCell(Protocol):
+    """Performs one run of a table in process and answers it by every method."""
+
+    def __call__(
+        self, cell: Any, scene: SceneFile, station: Station, recordings: Path | None = None
+    ) -> dict[str, Any]:
+        """The result as JSON values; the run itself is kept in, or taken from, the folder of recordings."""
+
+
 class RunCase(Protocol):
     """A performed run with its truth, to be answered at any setting."""
 
@@ -199,7 +208,7 @@ class Measurement:
     estimator: str
     conditions: tuple[MeasuredCondition, ...]
     cells: Callable[[Sequence[str], Sequence[int], Mapping[str, Sequence[str]]], Sequence[Any]]
-    run_cell: Callable[[Any, SceneFile, Station], dict[str, Any]]
+    run_cell: RunsCell
     methods: tuple[str, ...]
     performed: Perform
     settings: Callable[[bool, Mapping[str, Sequence[str]], Mapping[str, SceneFile]], Sequence[Setting]]

@@ -10,25 +10,19 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from harness.basics.errors import FitRefused, TouchstoneError
-from harness.bench.experiments import EXPERIMENTS, loaded
+from harness.bench.experiments import EXPERIMENTS
 from harness.bench.scene import SceneFile
-from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
 from harness.effects.accuracy import Accuracy, Knob, Level, Setting
-from harness.experiment.begin import begin
 from harness.experiment.experiment import Experiment, Measurement, RunCell, Say, Scored
+from harness.experiment.in_process import performed, recorded
 from harness.experiment.lookup import named
-from harness.experiment.perform import perform_on
 from harness.experiment.solving import Budgets, Solved
 from harness.experiment.subjects import object_key
 from harness.experiment.truth import read_truth
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.recording.session import Quiet
-
-IN_PROCESS = "mocks.in_process.bench:in_process_bench"
-"""The mocked bench without sockets, in simulated time."""
 
 DEFAULT = "default"
 """The method, and the setting, of every dial at its default."""
@@ -161,7 +155,7 @@ class PlainCase:
 
     cell: RunCell
     run: PlainRun
-    kept: TemporaryDirectory[str] = field(repr=False)
+    aside: TemporaryDirectory[str] | None = field(default=None, repr=False)
 
     @property
     def steps(self) -> int:
@@ -169,8 +163,9 @@ class PlainCase:
         return self.run.steps
 
     def close(self) -> None:
-        """Remove the run's folder."""
-        self.kept.cleanup()
+        """Remove the run's folder, where it is not one of recordings."""
+        if self.aside is not None:
+            self.aside.cleanup()
 
     def sample(self, setting: Setting, steps: int) -> Sample:
         """The error and the seconds of an answer from the first steps."""
@@ -234,8 +229,10 @@ class _Answers:
     name: str
     settings: Mapping[str, Setting]
 
-    def __call__(self, cell: PlainCell, scene: SceneFile, station: Station) -> dict[str, Any]:
-        with closing(perform_in_process(named(self.name), cell, scene, station)) as case:
+    def __call__(
+        self, cell: PlainCell, scene: SceneFile, station: Station, recordings: Path | None = None
+    ) -> dict[str, Any]:
+        with closing(perform_in_process(named(self.name), cell, scene, station, recordings)) as case:
             run = case.run
             found = {name: run.result(levels) for name, levels in self.settings.items()}
             return {"schema": 1, "cell": vars(cell), run.experiment.plural: run.steps, "rows": found}
@@ -276,13 +273,21 @@ class PlainPerforms:
 
 
 def perform_in_process(
-    experiment: Experiment, cell: RunCell, scene: SceneFile, station: Station
+    experiment: Experiment, cell: RunCell, scene: SceneFile, station: Station, recordings: Path | None = None
 ) -> PlainCase:
-    """Plan, rehearse and perform a run on the mocked bench in process; its folder goes with the case."""
-    kept = TemporaryDirectory(prefix="touchstone-case-")
-    gap = cell.conditions["gap"]
-    recording = begin(experiment, scene, station, cell.seed, gap, Path(kept.name) / "run").recording
-    run = RunFiles(recording)
-    context = RunContext(recording.truth_path, run.mesh, cell.seed, gap)
-    perform_on(experiment, loaded(IN_PROCESS)(run.scene, run.station, context), recording, Quiet())
-    return PlainCase(cell, PlainRun(experiment, recording, recording.committed), kept)
+    """Plan, rehearse and perform a run on the mocked bench in process.
+
+    Args:
+        experiment: which.
+        cell: of a table or a cost curve.
+        scene: on the table.
+        station: the bench.
+        recordings: folder that keeps its run, and where it lies if it was performed before; None for a run
+            whose folder goes with the case.
+    """
+    if recordings is not None:
+        recording = recorded(experiment, cell, scene, station, recordings)
+        return PlainCase(cell, PlainRun(experiment, recording, recording.committed))
+    aside = TemporaryDirectory(prefix="touchstone-case-")
+    recording = performed(experiment, cell, scene, station, Path(aside.name) / "run")
+    return PlainCase(cell, PlainRun(experiment, recording, recording.committed), aside)

@@ -2,9 +2,8 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import TouchstoneError, WrongUse
 from harness.basics.metrics import Interval, bootstrap, mean, median, share_above
 from harness.basics.whole_file import write_text_whole
+from harness.basics.worker_pool import worker_pool
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import load_station, station_path
 from harness.experiment.experiment import Experiment, Measurement, RunCell
@@ -59,6 +59,7 @@ def measure(
     scenes: Mapping[str, SceneFile],
     folder: Path,
     workers: int,
+    recordings: Path | None = None,
 ) -> Iterator[tuple[RunCell, dict[str, Any]]]:
     """Run what is not on the disk yet; yields every cell's result as it is known.
 
@@ -68,6 +69,8 @@ def measure(
         scenes: by object.
         folder: one JSON file a run.
         workers: processes; 1 for this one alone.
+        recordings: folder that keeps the runs themselves, and of which those that lie there are answered
+            and not performed; None to keep none.
     """
     folder.mkdir(parents=True, exist_ok=True)
     missing = []
@@ -78,20 +81,24 @@ def measure(
         else:
             missing.append(cell)
     trees = {name: scene.model_dump(mode="json", by_alias=True) for name, scene in scenes.items()}
-    for cell, result in _made(experiment.name, missing, trees, workers):
+    for cell, result in _made(experiment.name, missing, trees, workers, recordings):
         write_text_whole(folder / f"{cell.name}.json", json.dumps(result, allow_nan=False))
         yield cell, result
 
 
 def _made(
-    name: str, missing: Sequence[RunCell], trees: Mapping[str, dict[str, Any]], workers: int
+    name: str,
+    missing: Sequence[RunCell],
+    trees: Mapping[str, dict[str, Any]],
+    workers: int,
+    recordings: Path | None,
 ) -> Iterator[tuple[RunCell, dict[str, Any]]]:
     if workers == 1:
         for cell in missing:
-            yield cell, _run(name, cell, trees[cell.object])
+            yield cell, _run(name, cell, trees[cell.object], recordings)
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        running = {pool.submit(_run, name, cell, trees[cell.object]): cell for cell in missing}
+    with worker_pool(workers) as pool:
+        running = {pool.submit(_run, name, cell, trees[cell.object], recordings): cell for cell in missing}
         try:
             for done in as_completed(running):
                 yield running[done], done.result()
@@ -100,10 +107,10 @@ def _made(
             raise
 
 
-def _run(name: str, cell: RunCell, tree: dict[str, Any]) -> dict[str, Any]:
-    scene = scene_from_json(tree, "the table")
+def _run(name: str, cell: RunCell, tree: dict[str, Any], recordings: Path | None) -> dict[str, Any]:
+    scene, station = scene_from_json(tree, "the table"), load_station(station_path("mock"))
     try:
-        return measurement_of(named(name)).run_cell(cell, scene, load_station(station_path("mock")))
+        return measurement_of(named(name)).run_cell(cell, scene, station, recordings)
     except TouchstoneError as error:
         # A run that cannot be planned or performed is said to be so; it is no measurement.
         return {"schema": 1, "failed": f"{type(error).__name__}: {error}"}

@@ -36,14 +36,21 @@ def tables(
         Path | None,
         typer.Option(help="Folder of the runs; a stopped table resumes there. runs/tables/NAME if left out."),
     ] = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(help="Folder that keeps the runs themselves; those there are answered, not performed."),
+    ] = None,
     json: options.Json = False,
 ) -> int:
     """Error over objects, seeds and methods; stops and resumes at will.
 
     Every run is planned, rehearsed and performed on the mocked bench in process, then answered by every
-    method. Errors are in millimetres, with 90 % bootstrap intervals; gross is the share above 20 mm.
-    A refused answer counts as one without readings; beside it the mean of those answered. Region is the share
-    of runs whose 90 % region or interval holds the truth.
+    method. With --recordings each run's folder is kept too: touchstone replay reads one, and another table
+    with the same folder answers them again.
+
+    Errors are in millimetres, with 90 % bootstrap intervals; gross is the share above 20 mm. A refused answer
+    counts as one without readings; beside it the mean of those answered. Region is the share of runs
+    whose 90 % region or interval holds the truth.
 
     Try: touchstone tables contact-localization --seeds 2 --only mug
     """
@@ -75,7 +82,7 @@ def tables(
     wanted = measured.cells(only or list(scenes), range(first_seed, first_seed + seeds), chosen)
     results: dict[Any, Any] = {}
     with run_progress(len(wanted)) as advance:
-        for cell, result in measure(kind, wanted, scenes, out, workers):
+        for cell, result in measure(kind, wanted, scenes, out, workers, recordings):
             results[cell] = result
             if "failed" in result:
                 warn(f"{cell.name}: {result['failed']}")

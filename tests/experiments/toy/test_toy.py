@@ -6,14 +6,17 @@ from typing import Any
 
 import pytest
 
+from harness.basics.errors import WrongUse
 from harness.bench.experiments import EXPERIMENTS, ExperimentRow
 from harness.bench.scene import scene_from_options
+from harness.bench.station_file import load_station, station_path
 from harness.cli import invoke
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import curve_path, save
 from harness.cost.provenance import code, machine
 from harness.effects.scene_object import known_object
 from harness.experiment.lookup import named
+from harness.experiment.plain import PlainCell, perform_in_process
 from harness.experiment.subjects import object_key
 from harness.experiment.tables import measurement_of
 from tests.experiments.toy.experiment import CLAIMED, STRIDE
@@ -73,6 +76,33 @@ def test_it_has_a_table_and_a_cost_curve(tmp_path: Path, capsys: pytest.CaptureF
     ((condition),) = cost["conditions"]
     assert condition["condition"] == {"gap": "none", "presses": 2}
     assert len(condition["settings"]) == 2
+
+
+def test_its_table_reproduces_from_its_recordings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    runs = tmp_path / "recordings"
+    one = ["--only", "mug", "--seeds", "1", "--gap", "none", "--workers", "1", "--recordings", str(runs)]
+    first = said(capsys, "tables", "toy", *one, "--out", str(tmp_path / "first"))
+    (recorded,) = runs.glob("*/run.json")
+    before = recorded.stat().st_mtime_ns
+    again = said(capsys, "tables", "toy", *one, "--out", str(tmp_path / "again"))
+    assert without_seconds(again["rows"]) == without_seconds(first["rows"])
+    assert recorded.stat().st_mtime_ns == before
+    replayed = said(capsys, "replay", str(recorded.parent))
+    (answer,) = (tmp_path / "first").glob("*.json")
+    assert replayed["height_m"] == json.loads(answer.read_text())["rows"]["default"]["height_m"]
+
+
+def test_recordings_of_another_scene_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cell, station = PlainCell("mug", "none", 3), load_station(station_path("mock"))
+    scene = scene_from_options("builtin:mug")
+    perform_in_process(named("toy"), cell, scene, station, tmp_path).close()
+    bowl = scene_from_options("builtin:bowl")
+    with pytest.raises(WrongUse, match="differs in object"):
+        perform_in_process(named("toy"), cell, bowl, station, tmp_path)
+
+
+def without_seconds(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [{key: value for key, value in row.items() if key != "seconds"} for row in rows]
 
 
 def save_a_curve() -> None:

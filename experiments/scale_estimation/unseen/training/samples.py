@@ -3,11 +3,9 @@
 import sys
 import time
 from collections.abc import Callable, Generator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 
 import numpy as np
 
@@ -25,6 +23,7 @@ from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.materials import MATERIALS
 from harness.basics.store import Store, default_folder, digest
+from harness.basics.worker_pool import worker_pool
 
 SIZES = (0.05, 0.6)
 """M, least and greatest longest side; even in the logarithm."""
@@ -156,7 +155,7 @@ def _mapped(
     make: Callable[[int], list[_Row]], shapes: int, processes: int, sense: str
 ) -> Generator[list[_Row]]:
     began = said = time.perf_counter()
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with worker_pool(processes) as pool:
         for number, rows in enumerate(pool.map(make, range(shapes), chunksize=4)):
             yield rows
             if (now := time.perf_counter()) - said > _SAID_EVERY:

@@ -1,0 +1,30 @@
+"""Worker processes that end with whoever started them, however that ends."""
+
+import os
+import threading
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+PERIOD = 0.5
+"""S between two looks at the parent: a killed program's workers compute no longer than this."""
+
+
+def worker_pool(workers: int) -> ProcessPoolExecutor:
+    """A pool of fresh processes that each end themselves when their parent is gone.
+
+    Args:
+        workers: how many.
+    """
+    spawn = get_context("spawn")  # threads of compiled kernels do not survive a fork
+    return ProcessPoolExecutor(workers, mp_context=spawn, initializer=_watch, initargs=(os.getpid(),))
+
+
+def _watch(parent: int) -> None:
+    threading.Thread(target=_end_without, args=(parent,), daemon=True).start()
+
+
+def _end_without(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(PERIOD)
+    os._exit(1)  # nobody is left to take a result
