@@ -22,6 +22,7 @@ from experiments.scale_estimation.unseen.answer import (
     ways_alone,
 )
 from experiments.scale_estimation.unseen.contact_set import GelWay
+from experiments.scale_estimation.unseen.pool import pooled
 from experiments.scale_estimation.vision.outline import SeenOutline
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
@@ -164,14 +165,15 @@ class ScaleAnswering:
         Raises:
             WrongUse: no step was read.
         """
-        return self.answered(self.with_shape() if self.shape_known else self.without_shape())
+        return self.answered(self.shape_known)
 
-    def answered(self, estimators: Mapping[str, Callable[[], Said]]) -> SizeAnswer:
-        """The same by estimators given for each sense: ``with_shape`` or ``without_shape``.
+    def answered(self, shape_known: bool) -> SizeAnswer:
+        """The same with the shape, or without it whatever the scene says.
 
         Raises:
             WrongUse: the scene asks for no sense.
         """
+        estimators = self.with_shape() if shape_known else self.without_shape()
         sensors = self.run.scene.sensors
         wanted = {"vision": sensors.camera, "audio": sensors.sound, "touch": sensors.touch}
         found: dict[str, Said | FitRefused] = {}
@@ -183,8 +185,11 @@ class ScaleAnswering:
                 seconds[sense] = self._read[sense] + time.perf_counter() - began
         if not found:
             raise WrongUse("the scene asks for no sense; set sensors.camera, sensors.sound or sensors.touch")
-        beliefs = [one.belief for one in found.values() if not isinstance(one, FitRefused)]
-        together = fused(beliefs) if beliefs else Belief.ignorant(self.model.sizes)
+        beliefs = {s: one.belief for s, one in found.items() if not isinstance(one, FitRefused)}
+        if not beliefs:
+            together = Belief.ignorant(self.model.sizes)
+        else:
+            together = fused(list(beliefs.values())) if shape_known else pooled(beliefs)
         usable = sum(not strike.fault for strike in self.strikes)
         return SizeAnswer(found, together, seconds, len(self.patches), usable)
 

@@ -148,7 +148,7 @@ def _rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str
     for sense in ("vision", "audio", "touch"):
         if sense in found.by_sense:
             rows[sense] = _answered(found.by_sense[sense], answering, true, found.seconds[sense])
-    without = answering.answered(answering.without_shape())
+    without = answering.answered(shape_known=False)
     rows.update(_shapeless_rows(answering, without, true))
     rows.update(_pairs(answering, found, true))
     rows["fused"] = _belief(found.fused, true, sum(found.seconds.values()))

@@ -15,10 +15,15 @@ from pathlib import Path
 from types import MappingProxyType
 
 from experiments.scale_estimation.unseen.training.outlines import train_outlines
+from experiments.scale_estimation.unseen.training.powers import train_powers
 from harness.basics.cores import own_cores
 
 NETWORKS = ("sound", "touch", "imprints")
-SENSES = ("outline", *NETWORKS)
+SENSES = ("outline", *NETWORKS, "powers")
+
+
+POOLED_EACH = 3
+"""Readings by all senses of each shape."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,7 @@ class Profile:
         shapes: whose strikes and contacts are learnt.
         strikes: samples of strikes of each.
         contacts: explorations of each.
+        pooled: shapes that all senses read, for the powers of their pool.
         epochs: of sound, of touch and imprints.
         members: networks of each sense.
     """
@@ -38,14 +44,15 @@ class Profile:
     shapes: int
     strikes: int
     contacts: int
+    pooled: int
     epochs: tuple[int, int]
     members: int = 3
 
 
 PROFILES = MappingProxyType(
     {
-        "smoke": Profile(260, 26, 4, 8, (2, 2)),
-        "standard": Profile(1300, 520, 40, 48, (30, 60)),
+        "smoke": Profile(260, 26, 4, 8, 26, (2, 2)),
+        "standard": Profile(1300, 520, 40, 48, 260, (30, 60)),
     }
 )
 
@@ -76,6 +83,10 @@ def main(arguments: list[str] | None = None) -> int:
         (options.out / f"{sense}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
         reached = {name: card[name] for name in ("held_out", "seconds")}
         sys.stdout.write(f"{sense}: {json.dumps(reached)}\n")
+    if "powers" in senses:  # of the networks that came with the program
+        found = train_powers(profile.pooled, POOLED_EACH, options.seed, options.processes)
+        (options.out / "powers.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        sys.stdout.write(f"powers: {json.dumps(found)}\n")
     return 0
 
 

@@ -49,6 +49,7 @@ def test_the_truth_changes_no_estimate(touched: Recording, tmp_path: Path) -> No
     assert after["estimates"]["fused"]["error_m"] is None
 
 
+@pytest.mark.slow  # the same with strikes is tested in test_exploring.py
 def test_a_run_that_was_stopped_goes_on_with_the_same_contacts(
     touched: Recording, tmp_path: Path, station: Station
 ) -> None:

@@ -43,6 +43,7 @@ def test_the_outline_s_box_is_foreshortened_and_knows_no_model() -> None:
     assert doubled == pytest.approx(2.0, rel=0.15)
 
 
+@pytest.mark.slow  # a whole run with strikes; runs and methods are tested each by themselves
 def test_a_cell_is_answered_by_every_method_and_a_refusal_claims_no_more_than_the_range(
     station: Station,
 ) -> None:

@@ -27,6 +27,7 @@ def body_of(drawn: Mesh, scale: float, store: Store) -> Tetrahedra:
     return instrument._scaled_body(solid, drawn, scale, 5.0e-3 * scale**0.5, store).fill()
 
 
+@pytest.mark.slow  # what it compares is exact but for the filling
 def test_it_rings_as_one_that_was_filled_at_its_own_size(drawn: Mesh, tmp_path: Path) -> None:
     scale = 1.6
     scaled = solve_modes(body_of(drawn, scale, Store(tmp_path)), CERAMIC, 40e3)

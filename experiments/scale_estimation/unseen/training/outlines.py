@@ -34,7 +34,7 @@ def pictures(shapes: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray
         corners = hull_of(draw(names[shape % len(names)], random).inside.nodes)
         for _ in range(PICTURES):
             size = float(np.exp(random.uniform(*np.log(SIZES))))
-            row, mean = _picture(corners, size, random)
+            row, mean = picture(corners, size, random)
             rows.append(row)
             targets.append(np.log(size / mean))
             sizes.append(size)
@@ -42,7 +42,7 @@ def pictures(shapes: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray
     return np.array(rows), np.array(targets), np.array(sizes), np.array(numbers)
 
 
-def _picture(corners: FloatArray, size: float, random: np.random.Generator) -> tuple[FloatArray, float]:
+def picture(corners: FloatArray, size: float, random: np.random.Generator) -> tuple[FloatArray, float]:
     """One look by a camera that is a little off from where it is said to be."""
     camera = _camera(random)
     view = View(camera, _FOCAL, (320.0, 240.0), corners, _PLACE)
