@@ -7,6 +7,7 @@ from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.touch.patch import Patch
 from experiments.scale_estimation.unseen.contact_set import GelWay
 from experiments.scale_estimation.unseen.network import by_imprints, by_strikes, by_ways, shipped
+from experiments.scale_estimation.unseen.real_shapes import shape_sigma
 from experiments.scale_estimation.unseen.regression import by_outline, features_of
 from experiments.scale_estimation.unseen.spectrogram import response_of
 from experiments.scale_estimation.vision.outline import SeenOutline
@@ -57,7 +58,7 @@ def outline_alone(
             "shape nobody knows what lies beyond"
         )
     features, width = features_of(outline, camera.base_from_camera.matrix, camera.focal_length, place)
-    return ShapelessAnswer(by_outline(features, width, sizes), 0.0)
+    return ShapelessAnswer(by_outline(features, width, sizes).widened(shape_sigma("vision")), 0.0)
 
 
 def strikes_alone(strikes: Sequence[Strike], material: Material, sizes: SizeRange) -> ShapelessAnswer:
@@ -80,7 +81,8 @@ def ways_alone(ways: Sequence[GelWay], sizes: SizeRange) -> ShapelessAnswer:
     """
     if all(way.normal is None for way in ways):
         raise FitRefused("the gel touched nothing yet")
-    return ShapelessAnswer(*by_ways(ways, sizes))
+    belief, distance = by_ways(ways, sizes)
+    return ShapelessAnswer(belief.widened(shape_sigma("touch")), distance)
 
 
 def imprints_alone(patches: Sequence[Patch], sizes: SizeRange) -> ShapelessAnswer:

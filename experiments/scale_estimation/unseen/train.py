@@ -15,15 +15,11 @@ from pathlib import Path
 from types import MappingProxyType
 
 from experiments.scale_estimation.unseen.training.outlines import train_outlines
-from experiments.scale_estimation.unseen.training.powers import train_powers
+from experiments.scale_estimation.unseen.training.real_shapes import train_real_shapes
 from harness.basics.cores import own_cores
 
 NETWORKS = ("sound", "touch", "imprints")
-SENSES = ("outline", *NETWORKS, "powers")
-
-
-POOLED_EACH = 3
-"""Readings by all senses of each shape."""
+SENSES = ("outline", *NETWORKS, "real-shapes")
 
 
 @dataclass(frozen=True)
@@ -35,7 +31,6 @@ class Profile:
         shapes: whose strikes and contacts are learnt.
         strikes: samples of strikes of each.
         contacts: explorations of each.
-        pooled: shapes that all senses read, for the powers of their pool.
         epochs: of sound, of touch and imprints.
         members: networks of each sense.
     """
@@ -44,15 +39,14 @@ class Profile:
     shapes: int
     strikes: int
     contacts: int
-    pooled: int
     epochs: tuple[int, int]
     members: int = 3
 
 
 PROFILES = MappingProxyType(
     {
-        "smoke": Profile(260, 26, 4, 8, 26, (2, 2)),
-        "standard": Profile(1300, 520, 40, 48, 260, (30, 60)),
+        "smoke": Profile(260, 26, 4, 8, (2, 2)),
+        "standard": Profile(1300, 520, 40, 48, (30, 60)),
     }
 )
 
@@ -64,6 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", choices=SENSES, action="append", help="again for more than one")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=own_cores(), help="that make samples")
+    parser.add_argument("--meshes", type=Path, help="folder of scanned things, for real-shapes")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "data", help="a folder")
     options = parser.parse_args(arguments)
     senses, profile = options.only or SENSES, PROFILES[options.profile]
@@ -83,10 +78,10 @@ def main(arguments: list[str] | None = None) -> int:
         (options.out / f"{sense}.json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
         reached = {name: card[name] for name in ("held_out", "seconds")}
         sys.stdout.write(f"{sense}: {json.dumps(reached)}\n")
-    if "powers" in senses:  # of the networks that came with the program
-        found = train_powers(profile.pooled, POOLED_EACH, options.seed, options.processes)
-        (options.out / "powers.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-        sys.stdout.write(f"powers: {json.dumps(found)}\n")
+    if "real-shapes" in senses and options.meshes is not None:
+        widths = train_real_shapes(options.meshes, options.seed)
+        (options.out / "real_shapes.json").write_text(json.dumps(widths, indent=1) + "\n", encoding="utf-8")
+        sys.stdout.write(f"real shapes: {json.dumps(widths)}\n")
     return 0
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
@@ -51,8 +50,6 @@ class SizeSamples:
         """Some of them."""
         return SizeSamples({k: v[rows] for k, v in self.inputs.items()}, self.sizes[rows], self.shapes[rows])
 
-
-Row = TypeVar("Row")
 
 _Row = tuple[dict[str, FloatArray], float]
 
@@ -143,7 +140,7 @@ def samples_of(sense: str, shapes: int, each: int, seed: int, processes: int) ->
     sizes: list[float] = []
     numbers: list[int] = []
     make = partial(MAKERS[sense], seed, each)
-    with closing(mapped(make, shapes, processes, sense)) as made:
+    with closing(_mapped(make, shapes, processes, sense)) as made:
         for number, rows in enumerate(made):
             for one, size in rows:
                 for name, value in one.items():
@@ -154,15 +151,9 @@ def samples_of(sense: str, shapes: int, each: int, seed: int, processes: int) ->
     return SizeSamples(stacked, np.array(sizes), np.array(numbers))
 
 
-def mapped(make: Callable[[int], list[Row]], shapes: int, processes: int, sense: str) -> Generator[list[Row]]:
-    """The rows of every shape, in the shapes' order, with progress on standard error.
-
-    Args:
-        make: of a shape's number.
-        shapes: how many.
-        processes: that share the work.
-        sense: what progress calls it.
-    """
+def _mapped(
+    make: Callable[[int], list[_Row]], shapes: int, processes: int, sense: str
+) -> Generator[list[_Row]]:
     began = said = time.perf_counter()
     with worker_pool(processes) as pool:
         for number, rows in enumerate(pool.map(make, range(shapes), chunksize=4)):
