@@ -16,6 +16,9 @@ from harness.objectfile.runtime import Network
 _GREATEST = 100.0
 """Of any number that a network takes."""
 
+_GREATEST_LOG = 50.0
+"""Of a size in m, up or down: far beyond any object, and still a number."""
+
 _TRAIN = "python -m experiments.scale_estimation.unseen.train --profile paper --to FOLDER"
 
 
@@ -45,10 +48,13 @@ class PaperNetwork:
             for tensor in self.network.inputs
         }
         logs = self.network(stacked)["log_size"].astype(np.float64)
-        found = float(np.exp(logs.mean()))
-        if not 0.0 < found < np.inf:
-            raise DataRefused(f"{self.network.name} gives a size of {found} m; train it again: {_TRAIN}")
-        return found
+        mean = float(logs.mean())
+        if not abs(mean) < _GREATEST_LOG:
+            raise DataRefused(
+                f"{self.network.name} gives {mean:g} for the logarithm of a size in m, and only numbers "
+                f"within {_GREATEST_LOG:g} are sizes; train it again: {_TRAIN}"
+            )
+        return float(np.exp(mean))
 
 
 def paper_networks(folder: Path) -> dict[str, PaperNetwork]:
