@@ -62,7 +62,7 @@ def blob(top: int, left: int, rows: int = 480, columns: int = 640) -> tuple[Byte
 def ringing(rate: float, loudness: float = 1.0) -> FloatArray:
     """``(t,)`` Pa/(N s): two modes, 1 and 3.5 kHz."""
     modes = np.array([1000.0, 3500.0]), np.array([60.0, 90.0]), loudness * np.array([[1.0, 0.5]])
-    return np.asarray(synthesize(*modes, 0.3, rate).sound)[0]
+    return np.asarray(synthesize(*modes, 0.3, rate).sound[0])
 
 
 def test_a_crop_does_not_depend_on_where_the_object_is_or_what_is_behind_it() -> None:

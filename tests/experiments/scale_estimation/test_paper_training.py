@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def one_thread() -> None:
     torch.set_num_threads(1)
 
 
-def drawn(sense: str, count: int) -> list["torch.Tensor"]:
+def drawn(sense: str, count: int) -> list[Any]:
     """Inputs of a network; of imprints, sequences of other lengths."""
     torch.manual_seed(4)
     given = [torch.randn((count, *shape)) for _, shape in INPUTS[sense]]
@@ -80,7 +81,7 @@ def test_what_follows_the_last_imprint_changes_nothing() -> None:
 def test_a_fit_finds_a_size_that_the_inputs_hold() -> None:
     random = np.random.default_rng(1)
     logs = random.uniform(np.log(0.05), np.log(0.6), 256)
-    imprints = np.float32(random.standard_normal((256, STEPS, 4)))
+    imprints = random.standard_normal((256, STEPS, 4)).astype(np.float32)
     imprints[:, :3, 0] = (logs - USUAL)[:, None]
     last = np.zeros((256, STEPS), np.float32)
     last[:, 2] = 1.0
