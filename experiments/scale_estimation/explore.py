@@ -46,8 +46,13 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, _seed: int) -> Planned:
     """A look where there is a camera, then so many contacts; each is planned once those before are read.
 
     Raises:
-        WrongUse: nothing is to be read, or strikes are asked for and no contacts.
+        WrongUse: nothing is to be read, or the scene names networks that only a table uses.
     """
+    if scene.section(Scale).paper_networks is not None:
+        raise WrongUse(
+            "[scale] paper_networks adds rows to a table and is not used by a run; leave it out of the "
+            "scene, or measure with: touchstone tables scale-estimation --set paper_networks=FOLDER"
+        )
     steps = [{"kind": kind} for kind in _kinds(scene)]
     if not steps:
         raise WrongUse("nothing is to be read: ask for vision, for contacts, or for both")

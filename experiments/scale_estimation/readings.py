@@ -25,10 +25,15 @@ def outline_of(record: StepRecord) -> SeenOutline | None:
     Raises:
         DataRefused: the object is not seen.
     """
+    pictures = pictures_of(record)
+    return None if pictures is None else read_outline(mask_by_background(*pictures))
+
+
+def pictures_of(record: StepRecord) -> tuple[ByteArray, ByteArray] | None:
+    """``(rows, columns, 3)`` RGB with the object and without it; None where the step was no look."""
     if IMAGE not in record.readings or BARE_IMAGE not in record.readings:
         return None
-    live, bare = (_median(record.readings[name].values) for name in (IMAGE, BARE_IMAGE))
-    return read_outline(mask_by_background(live, bare))
+    return _median(record.readings[IMAGE].values), _median(record.readings[BARE_IMAGE].values)
 
 
 def patch_of_contact(seen: Observation, calibration: TactileCalibration, pitch: float) -> Patch | None:

@@ -15,11 +15,15 @@ from experiments.scale_estimation.baselines import (
     constant,
     random_error,
 )
+from experiments.scale_estimation.readings import pictures_of
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.touch.touch import by_touch
 from experiments.scale_estimation.unseen.answer import imprints_alone
+from experiments.scale_estimation.unseen.paper.network import PaperNetwork, paper_networks
+from experiments.scale_estimation.unseen.paper.rows import PAPER_ROWS, PaperReadings, paper_sizes
 from experiments.scale_estimation.vision.outline import SeenOutline
+from harness.basics.arrays import ByteArray
 from harness.basics.clock import now
 from harness.basics.errors import DataRefused, FitRefused
 from harness.bench.scene import SceneFile, scene_from_json
@@ -49,7 +53,7 @@ OURS = (
     "audio + touch",
     "fused",
 )
-METHODS = (*TRIVIAL, *OURS)
+METHODS = (*TRIVIAL, *PAPER_ROWS.values(), *OURS)
 
 GROSS = 0.1
 """Of the size: an error beyond is a failure."""
@@ -108,15 +112,22 @@ def scene_of(scene: SceneFile, cell: ScaleCell) -> SceneFile:
     tree = scene.model_dump(mode="json", by_alias=True)
     tree["object"]["scale"] = "hidden"
     tree["sensors"].update(camera=cell.look == "yes", sound=True, touch=True)
-    tree.setdefault(Scale.table, {})["shape"] = cell.shape
+    # The paper's networks answer a run and change nothing of it: recordings do not depend on them.
+    tree.setdefault(Scale.table, {}).update(shape=cell.shape, paper_networks=None)
     return scene_from_json(tree, cell.name)
 
 
 def run_cell(
     cell: ScaleCell, scene: SceneFile, station: Station, recordings: Path | None = None
 ) -> dict[str, Any]:
-    """Perform and answer one run; the result as JSON values."""
+    """Perform and answer one run; the result as JSON values.
+
+    Raises:
+        DataRefused: nothing was read, or ``[scale] paper_networks`` has no network that may be run.
+    """
     experiment: Experiment = named("scale-estimation")
+    stated = scene.section(Scale).paper_networks
+    networks = {} if stated is None else paper_networks(Path(stated))
     here = scene_of(scene, cell)
     with closing(perform_in_process(experiment, cell, here, station, recordings)) as case:
         recording = case.run.recording
@@ -124,10 +135,13 @@ def run_cell(
         if truth is None:
             raise DataRefused("no instrument read anything in this run: no way to the object was free")
         answering = ScaleAnswering(RunFiles(recording), Accuracy.default(experiment.knobs))
+        pictures = None
         for record in recording.steps():
             answering.read(record)
+            pictures = pictures_of(record) or pictures
         true = float(truth.differences["longest_side_m"])
         rows = _rows(answering, answering.answer(), true)
+        rows.update(_paper_rows(networks, answering, pictures, true))
         return {"schema": 1, "cell": vars(cell), "steps": recording.committed, "size_m": true, "rows": rows}
 
 
@@ -190,6 +204,25 @@ def _shapeless_rows(answering: ScaleAnswering, found: SizeAnswer, true: float) -
     return rows
 
 
+def _paper_rows(
+    networks: Mapping[str, PaperNetwork],
+    answering: ScaleAnswering,
+    pictures: tuple[ByteArray, ByteArray] | None,
+    true: float,
+) -> dict[str, Any]:
+    """What the paper's networks answer from the same readings."""
+    camera = answering.model.station.camera
+    focal_px = 0.0 if camera is None else camera.focal_length
+    readings = PaperReadings(pictures, focal_px, answering.strikes, answering.patches)
+    rows = {}
+    for name, (size, seconds) in paper_sizes(networks, readings).items():
+        if isinstance(size, FitRefused):
+            rows[name] = _refused(size, answering, true, seconds)
+        else:
+            rows[name] = _value(size, true, seconds)
+    return rows
+
+
 def _pairs(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[str, Any]:
     """What some of the readings say together."""
     model, rows = answering.model, {}
@@ -218,11 +251,14 @@ def _pairs(answering: ScaleAnswering, found: SizeAnswer, true: float) -> dict[st
 
 
 def _answered(one: Any, answering: ScaleAnswering, true: float, seconds: float) -> dict[str, Any]:
-    """A sense's row; a refusal counts as the middle of the range, and claims no more than the range."""
-    if not isinstance(one, FitRefused):
-        return _belief(one.belief, true, seconds)
-    sizes = answering.model.sizes
-    return {**_value(constant(sizes), true, seconds), "refused": str(one)}
+    if isinstance(one, FitRefused):
+        return _refused(one, answering, true, seconds)
+    return _belief(one.belief, true, seconds)
+
+
+def _refused(why: FitRefused, answering: ScaleAnswering, true: float, seconds: float) -> dict[str, Any]:
+    """A refusal counts as the middle of the range, and claims no more than the range."""
+    return {**_value(constant(answering.model.sizes), true, seconds), "refused": str(why)}
 
 
 def _belief(belief: Belief, true: float, seconds: float) -> dict[str, Any]:

@@ -53,6 +53,25 @@ def resolve(
     return _with(found, tables)
 
 
+def with_assignments(
+    scenes: Mapping[str, SceneFile], section: type[Section] | None, assignments: Sequence[str]
+) -> dict[str, SceneFile]:
+    """Scenes by name, with keys of an experiment's table changed in all of them.
+
+    Args:
+        scenes: by name.
+        section: the model of the table; None where the experiment has none.
+        assignments: ``KEY=VALUE`` each.
+
+    Raises:
+        WrongUse: a key that the table does not have, or a value that the scene does not allow.
+    """
+    if section is None and assignments:
+        raise WrongUse(f"--set {assignments[0]}: this experiment has no table in a scene; leave it out")
+    tables = {} if section is None else {section.table: _asked(section, {}, assignments)}
+    return {name: _with(scene, tables) for name, scene in scenes.items()}
+
+
 _SENSORS = {"vision": "camera", "audio": "sound", "touch": "touch"}
 """By the sense that reads them."""
 

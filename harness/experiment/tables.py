@@ -22,6 +22,9 @@ from harness.experiment.lookup import named
 Results = Mapping[Any, Mapping[str, Any]]
 """What every cell of a table came to; a cell is as ``harness.experiment.experiment.RunCell``."""
 
+KEYS = "scene.keys.json"
+"""In a table's folder: what ``--set`` changed in the scene of every run there."""
+
 Key = tuple[tuple[str, str], ...]
 """Conditions by name."""
 
@@ -114,6 +117,29 @@ def _run(name: str, cell: RunCell, tree: dict[str, Any], recordings: Path | None
     except TouchstoneError as error:
         # A run that cannot be planned or performed is said to be so; it is no measurement.
         return {"schema": 1, "failed": f"{type(error).__name__}: {error}"}
+
+
+def require_same_keys(folder: Path, assignments: Sequence[str]) -> None:
+    """Refuse a folder whose runs were made with other keys of the scene; note the keys of a new one.
+
+    Args:
+        folder: of a table's runs; made if it is not there.
+        assignments: ``KEY=VALUE`` each, of every scene of the table.
+
+    Raises:
+        WrongUse: runs are there, and their scenes had other keys.
+    """
+    noted, wanted = folder / KEYS, sorted(assignments)
+    if folder.is_dir() and any(folder.glob("*.json")):
+        there = json.loads(noted.read_text(encoding="utf-8")) if noted.exists() else []
+        if there != wanted:
+            raise WrongUse(
+                f"the runs in {folder} were made with --set {', '.join(there) or 'nothing'}, and --set "
+                f"{', '.join(wanted) or 'nothing'} is asked for now; give another folder with --out"
+            )
+    elif wanted:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text_whole(noted, json.dumps(wanted))
 
 
 def measurement_of(experiment: Experiment) -> Measurement:

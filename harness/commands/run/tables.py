@@ -31,6 +31,14 @@ def tables(
     sound: Annotated[
         bool | None, typer.Option(help="Whether every place is struck too, with the rows that hear it.")
     ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="A key of the experiment's table in every scene, as contacts=4; again for more.",
+            metavar="KEY=VALUE",
+        ),
+    ] = None,
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 2,
     out: Annotated[
         Path | None,
@@ -57,9 +65,10 @@ def tables(
     from harness.basics.errors import WrongUse
     from harness.basics.toml_file import nearest
     from harness.bench.gap import load_gap
+    from harness.commands.scenes import with_assignments
     from harness.experiment.lookup import named
     from harness.experiment.subjects import objects
-    from harness.experiment.tables import by_object, key_of, measure, measurement_of, rows
+    from harness.experiment.tables import by_object, key_of, measure, measurement_of, require_same_keys, rows
 
     kind = named(context.info_name or "")
     measured = measurement_of(kind)
@@ -71,6 +80,8 @@ def tables(
     for name in only or []:
         if name not in scenes:
             raise WrongUse(f"no object {name!r} in this table; {nearest(name, scenes)}")
+    scenes = with_assignments(scenes, kind.section, set_ or [])
+    require_same_keys(out, set_ or [])
     for name in gap or []:
         load_gap(name)
     sense = None if sound is None else ["both" if sound else "touch"]

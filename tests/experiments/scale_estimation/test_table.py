@@ -1,13 +1,18 @@
 """The table's trivial rows: what they say of a model's own readings."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from experiments.scale_estimation.baselines import by_area, by_box, by_first_peak, constant, random_error
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.table import METHODS, ScaleCell, run_cell
+from experiments.scale_estimation.table import METHODS, ScaleCell, run_cell, scene_of
+from experiments.scale_estimation.unseen.paper.inputs import INPUTS
+from experiments.scale_estimation.unseen.paper.rows import PAPER_ROWS
 from harness.bench.scene import scene_from_json
 from harness.bench.station_file import Station
+from tests.experiments.scale_estimation.test_paper_networks import write_means
 from tests.experiments.scale_estimation.test_sound import NOMINAL, model, peaks_at
 from tests.experiments.scale_estimation.test_vision import nominal, outline_at, view_of
 
@@ -45,15 +50,18 @@ def test_the_outline_s_box_is_foreshortened_and_knows_no_model() -> None:
 
 @pytest.mark.slow  # a whole run with strikes; runs and methods are tested each by themselves
 def test_a_cell_is_answered_by_every_method_and_a_refusal_claims_no_more_than_the_range(
-    station: Station,
+    station: Station, tmp_path: Path
 ) -> None:
-    tree = {"schema": 1, "object": {"mesh": "builtin:mug"}, "scale": {"contacts": 3, "strikes": 1}}
+    write_means(tmp_path, *INPUTS)
+    asked = {"contacts": 3, "strikes": 1, "paper_networks": str(tmp_path)}
+    tree = {"schema": 1, "object": {"mesh": "builtin:mug"}, "scale": asked}
     cell = ScaleCell("mug", "unplaced", 3, "yes")
     result = run_cell(cell, scene_from_json(tree, "the test"), station)
     rows, true = result["rows"], result["size_m"]
     assert result["steps"] == 4
     assert set(rows) <= set(METHODS)
     assert {"random", "constant", "outline's area", "outline's box", "vision", "touch", "fused"} <= set(rows)
+    assert set(PAPER_ROWS.values()) <= set(rows)
     for row in rows.values():
         if "size_m" in row:
             assert row["error_m"] == pytest.approx(abs(row["size_m"] - true))
@@ -62,3 +70,11 @@ def test_a_cell_is_answered_by_every_method_and_a_refusal_claims_no_more_than_th
             assert row["size_m"] == pytest.approx(rows["constant"]["size_m"])
             assert "in_region90" not in row
     assert rows["vision"]["error_m"] < rows["constant"]["error_m"]
+
+
+def test_networks_that_answer_a_run_are_no_part_of_it() -> None:
+    cell = ScaleCell("mug", "unplaced", 3, "yes")
+    tree = {"schema": 1, "object": {"mesh": "builtin:mug"}}
+    plain = scene_of(scene_from_json(tree, "the test"), cell)
+    named = scene_of(scene_from_json({**tree, "scale": {"paper_networks": "somewhere"}}, "the test"), cell)
+    assert plain == named

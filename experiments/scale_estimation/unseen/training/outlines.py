@@ -20,8 +20,12 @@ SIZES = (0.05, 0.6)
 PIXELS = 0.3
 """Deviation of an outline's reach."""
 
-_PLACE = np.array([-0.42, 0.0, 0.25])
-_PUT = 20.0e-3
+PLACE = np.array([-0.42, 0.0, 0.25])
+"""M in base, where objects stand."""
+
+PUT = 20.0e-3
+"""M, deviation per axis of where an object was put."""
+
 _FOCAL = 600.0
 
 
@@ -44,10 +48,10 @@ def pictures(shapes: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray
 
 def picture(corners: FloatArray, size: float, random: np.random.Generator) -> tuple[FloatArray, float]:
     """One look by a camera that is a little off from where it is said to be."""
-    camera = _camera(random)
-    view = View(camera, _FOCAL, (320.0, 240.0), corners, _PLACE)
-    errors = CameraErrors(place=_PUT)
-    sigmas = View(camera, _FOCAL, (320.0, 240.0), corners, _PLACE, errors).sigmas
+    camera = drawn_camera(random)
+    view = View(camera, _FOCAL, (320.0, 240.0), corners, PLACE)
+    errors = CameraErrors(place=PUT)
+    sigmas = View(camera, _FOCAL, (320.0, 240.0), corners, PLACE, errors).sigmas
     unknowns = np.where(
         np.isinf(sigmas), 0.0, np.where(np.isinf(sigmas), 1.0, sigmas) * random.standard_normal(14)
     )
@@ -55,14 +59,14 @@ def picture(corners: FloatArray, size: float, random: np.random.Generator) -> tu
     extents = (view.project(unknowns[None], corners)[0] @ directions().T).max(axis=0)
     extents = extents + PIXELS * random.standard_normal(len(extents))
     seen = SeenOutline(extents, np.zeros(len(extents), bool))
-    return features_of(seen, camera, _FOCAL, _PLACE)
+    return features_of(seen, camera, _FOCAL, PLACE)
 
 
-def _camera(random: np.random.Generator) -> FloatArray:
+def drawn_camera(random: np.random.Generator) -> FloatArray:
     """``(4, 4)``, looking at where the object stands."""
     elevation, turn = random.uniform(0.2, 1.0), random.uniform(0.0, 2.0 * np.pi)
     back = np.array([np.cos(elevation) * np.cos(turn), np.cos(elevation) * np.sin(turn), np.sin(elevation)])
-    eye = _PLACE + random.uniform(0.9, 1.8) * back
+    eye = PLACE + random.uniform(0.9, 1.8) * back
     right = np.cross(-back, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     return transform(np.stack([right, np.cross(-back, right), -back], axis=1), eye)

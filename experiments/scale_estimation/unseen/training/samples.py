@@ -1,4 +1,4 @@
-"""SizeSamples of shapes of the families: strikes and ways of the gel, made in several processes."""
+"""Samples of shapes of the families: strikes and ways of the gel, made in several processes."""
 
 import sys
 import time
@@ -51,7 +51,8 @@ class SizeSamples:
         return SizeSamples({k: v[rows] for k, v in self.inputs.items()}, self.sizes[rows], self.shapes[rows])
 
 
-_Row = tuple[dict[str, FloatArray], float]
+SampleRow = tuple[dict[str, FloatArray], float]
+"""Inputs by name, and the size in m."""
 
 
 def shape_of(number: int, seed: int) -> HouseholdSolid:
@@ -85,7 +86,7 @@ def ringing_of(number: int, seed: int) -> RingingShape | None:
     return found
 
 
-def strikes(seed: int, count: int, number: int) -> list[_Row]:
+def strikes(seed: int, count: int, number: int) -> list[SampleRow]:
     """So many samples of strikes of one shape; none where its modes cannot be solved."""
     shape = ringing_of(number, seed)
     random, rows = np.random.default_rng((seed, number, 2)), []
@@ -109,7 +110,7 @@ def _imprinted(shape: TouchableShape, size: float, random: np.random.Generator) 
     return contact_set.imprint_features(imprint_sample(shape, size, random))
 
 
-def presses(reading: _Reading, stream: int, seed: int, count: int, number: int) -> list[_Row]:
+def presses(reading: _Reading, stream: int, seed: int, count: int, number: int) -> list[SampleRow]:
     """So many sets of presses of one shape, as a network reads them; ``stream`` numbers their draws."""
     shape = TouchableShape.of(shape_of(number, seed))
     random, rows = np.random.default_rng((seed, number, stream)), []
@@ -119,7 +120,7 @@ def presses(reading: _Reading, stream: int, seed: int, count: int, number: int) 
     return rows
 
 
-MAKERS: dict[str, Callable[[int, int, int], list[_Row]]] = {
+MAKERS: dict[str, Callable[[int, int, int], list[SampleRow]]] = {
     "sound": strikes,
     "touch": partial(presses, _explored, 3),
     "imprints": partial(presses, _imprinted, 4),
@@ -136,10 +137,21 @@ def samples_of(sense: str, shapes: int, each: int, seed: int, processes: int) ->
         seed: of shapes and samples.
         processes: that share the work.
     """
+    return gathered(partial(MAKERS[sense], seed, each), shapes, processes, sense)
+
+
+def gathered(make: Callable[[int], list[SampleRow]], shapes: int, processes: int, sense: str) -> SizeSamples:
+    """The rows of all shapes by their number, in the shapes' order whatever the number of processes.
+
+    Args:
+        make: the rows of one shape; can be pickled.
+        shapes: how many.
+        processes: that share the work.
+        sense: for lines of progress.
+    """
     inputs: dict[str, list[FloatArray]] = {}
     sizes: list[float] = []
     numbers: list[int] = []
-    make = partial(MAKERS[sense], seed, each)
     with closing(_mapped(make, shapes, processes, sense)) as made:
         for number, rows in enumerate(made):
             for one, size in rows:
@@ -152,8 +164,8 @@ def samples_of(sense: str, shapes: int, each: int, seed: int, processes: int) ->
 
 
 def _mapped(
-    make: Callable[[int], list[_Row]], shapes: int, processes: int, sense: str
-) -> Generator[list[_Row]]:
+    make: Callable[[int], list[SampleRow]], shapes: int, processes: int, sense: str
+) -> Generator[list[SampleRow]]:
     began = said = time.perf_counter()
     with worker_pool(processes) as pool:
         for number, rows in enumerate(pool.map(make, range(shapes), chunksize=4)):

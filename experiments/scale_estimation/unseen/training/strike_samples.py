@@ -34,6 +34,14 @@ def strike_sample(
     shape: RingingShape, size: float, material: str, random: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
     """The features of ``STRIKES`` strikes at random places of an object, as ``features`` gives them."""
+    responses, band = strike_responses(shape, size, material, random)
+    return features(responses, RATE, band, MATERIALS[material])
+
+
+def strike_responses(
+    shape: RingingShape, size: float, material: str, random: np.random.Generator
+) -> tuple[FloatArray, tuple[float, float]]:
+    """``(k, t)`` Pa/(N s) of up to ``STRIKES`` strikes at ``RATE``, and the band in Hz that they excited."""
     made_of = MATERIALS[material]
     highest = float(np.exp(random.uniform(*np.log(EXCITED))))
     seeming = size * float(np.exp(SPEED_ERROR * random.standard_normal()))
@@ -49,8 +57,7 @@ def strike_sample(
         responses = synthesize(frequencies, decays, struck, settings.duration, RATE).sound
     else:
         responses = np.zeros((count, round(settings.duration * RATE)))
-    band = settings.lowest, highest
-    return features(in_a_room(np.asarray(responses), random), RATE, band, made_of)
+    return in_a_room(np.asarray(responses), random), (settings.lowest, highest)
 
 
 def in_a_room(responses: FloatArray, random: np.random.Generator) -> FloatArray:

@@ -1,0 +1,1 @@
+"""How the paper's own networks are trained; all but the samples needs torch."""

@@ -1,0 +1,153 @@
+"""Samples that the paper's networks learn from: pictures, single strikes and imprints of the same shapes."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from experiments.scale_estimation.unseen.paper.inputs import FIELD, SIDE, sequence_of, spectrogram_of
+from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, imprint_sample
+from experiments.scale_estimation.unseen.training.outlines import PLACE, PUT, drawn_camera
+from experiments.scale_estimation.unseen.training.samples import SampleRow, draw_size, ringing_of, shape_of
+from experiments.scale_estimation.unseen.training.strike_samples import RATE, strike_responses
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused
+from harness.basics.geometry import apply, inverse, transform
+from harness.basics.materials import MATERIALS
+from harness.basics.mesh import Mesh
+from harness.picture.pinhole import DirectionalLight, Pinhole
+from harness.picture.srgb import linear_from_srgb, srgb_from_linear
+from harness.sim.light.appearance import NO_TEXTURE, Appearance, smooth_normals
+from harness.sim.light.direct_image import LitObject
+
+_STREAMS = {"picture": 11, "spectrogram": 12, "imprints": 13}
+"""Number each sense's draws apart from one another and from those of the networks that ship."""
+
+_RAYS = 2
+"""Along each side of a pixel."""
+
+_BRIGHTNESS = (0.4, 1.1)
+"""Of the lamp and of the rest of the room's light: white that faces the light has 1."""
+
+_FILL = (0.05, 0.4)
+
+_SLANT = 1.0
+"""Rad, deviation of the lamp from the line of sight."""
+
+_COLOUR = (0.3, 0.95)
+"""Of the albedo in sRGB, 1 for white."""
+
+
+def pictures(seed: int, count: int, number: int) -> list[SampleRow]:
+    """So many crops of one shape: sizes, places, cameras, lamps and albedos drawn anew for each."""
+    mesh = shape_of(number, seed).surface
+    lit, random = _white(mesh), np.random.default_rng((seed, number, _STREAMS["picture"]))
+    rows: list[SampleRow] = []
+    for _ in range(count):
+        size = draw_size(random)
+        rows.append(({"crop": _crop(lit, mesh, size, random)}, size))
+    return rows
+
+
+def single_strikes(seed: int, count: int, number: int) -> list[SampleRow]:
+    """The spectrograms of strikes of so many draws of one shape; none where its modes cannot be solved."""
+    shape = ringing_of(number, seed)
+    random, rows = np.random.default_rng((seed, number, _STREAMS["spectrogram"])), []
+    for _ in range(count if shape is not None else 0):
+        assert shape is not None
+        size, material = draw_size(random), str(random.choice(list(MATERIALS)))
+        responses, band = strike_responses(shape, size, material, random)
+        for response in responses:
+            try:
+                rows.append(({"spectrogram": spectrogram_of(response, RATE, band)}, size))
+            except FitRefused:  # so is a strike at a bench that excites no mode
+                continue
+    return rows
+
+
+def imprint_sequences(seed: int, count: int, number: int) -> list[SampleRow]:
+    """So many sequences of imprints of one shape; those whose presses met nothing are left out."""
+    shape = TouchableShape.of(shape_of(number, seed))
+    random, rows = np.random.default_rng((seed, number, _STREAMS["imprints"])), []
+    for _ in range(count):
+        size = draw_size(random)
+        found = imprint_sample(shape, size, random)
+        if found:
+            rows.append((dict(zip(("imprints", "last"), sequence_of(found), strict=True)), size))
+    return rows
+
+
+PAPER_MAKERS: dict[str, Callable[[int, int, int], list[SampleRow]]] = {
+    "picture": pictures,
+    "spectrogram": single_strikes,
+    "imprints": imprint_sequences,
+}
+
+
+def paper_maker(sense: str, seed: int, count: int) -> Callable[[int], list[SampleRow]]:
+    """The rows of one shape by its number."""
+    return partial(PAPER_MAKERS[sense], seed, count)
+
+
+def _white(mesh: Mesh) -> LitObject:
+    """A shape one long that reflects all light; matt, so that its colour is a factor."""
+    count = len(mesh.faces)
+    tints, places = np.ones((count, 3, 3)), np.zeros((count, 3, 2))
+    return LitObject(Appearance(mesh, smooth_normals(mesh), tints, places, np.full(count, NO_TEXTURE)))
+
+
+def _crop(lit: LitObject, mesh: Mesh, size: float, random: np.random.Generator) -> FloatArray:
+    """``(3, SIDE, SIDE)`` as ``crop_of`` makes them, drawn at that size."""
+    yaw = random.uniform(0.0, 2.0 * np.pi)
+    turn = np.array([[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
+    base_from_object = transform(turn, PLACE + np.append(PUT * random.standard_normal(2), 0.0))
+    camera = crop_camera(mesh, size, base_from_object, drawn_camera(random))
+    lamps = _lamps(camera, random)
+    image = lit.render(camera, lamps, _RAYS, shadow=bool(random.random() < 0.5)).image
+    albedo = linear_from_srgb(_colour(random))
+    covered = np.maximum(image.alpha, 1e-9)[..., None]
+    shades = srgb_from_linear(np.clip(image.colour * albedo / covered, 0.0, 1.0))
+    return np.asarray((shades * image.alpha[..., None]).transpose(2, 0, 1))
+
+
+def crop_camera(
+    mesh: Mesh, size: float, base_from_object: FloatArray, base_from_camera: FloatArray
+) -> Pinhole:
+    """A camera of the bench, cut to a crop about the object, in the frame of its shape.
+
+    Args:
+        mesh: of the shape, one long.
+        size: m, of the object.
+        base_from_object: ``(4, 4)``, where it stands.
+        base_from_camera: ``(4, 4)``; x right, y down, z forward.
+    """
+    object_from_camera = inverse(base_from_object) @ base_from_camera
+    object_from_camera[:3, 3] /= size
+    corners = apply(inverse(object_from_camera), mesh.vertices)
+    focal = SIDE / FIELD
+    seen = focal * corners[:, :2] / corners[:, 2:]
+    x, y = 0.5 * (SIDE - seen.min(axis=0) - seen.max(axis=0))
+    return Pinhole(SIDE, SIDE, focal, (float(x), float(y)), object_from_camera)
+
+
+def _lamps(camera: Pinhole, random: np.random.Generator) -> list[DirectionalLight]:
+    """A lamp about the line of sight, and weaker light along it and from above."""
+    back = -camera.forward
+    aside = back + np.tan(min(abs(_SLANT * random.standard_normal()), 1.4)) * _across(back, random)
+    strengths = np.pi * np.array([random.uniform(*_BRIGHTNESS), *random.uniform(*_FILL, 2)])
+    return [
+        DirectionalLight(direction, float(strength))
+        for direction, strength in zip((aside, back, np.array([0.0, 0.0, 1.0])), strengths, strict=True)
+    ]
+
+
+def _across(direction: FloatArray, random: np.random.Generator) -> FloatArray:
+    """``(3,)`` unit, perpendicular."""
+    drawn = np.cross(direction, random.standard_normal(3))
+    return np.asarray(drawn / np.linalg.norm(drawn))
+
+
+def _colour(random: np.random.Generator) -> FloatArray:
+    """``(3,)`` sRGB, most of them pale."""
+    grey = random.uniform(*_COLOUR)
+    return np.asarray(np.clip(grey + 0.12 * random.standard_normal(3), 0.05, 1.0))

@@ -1,0 +1,104 @@
+"""ResNet-18 (He et al., Deep residual learning for image recognition, CVPR 2016, table 1), one number out."""
+
+from itertools import pairwise
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from harness.objectfile.graph import Nodes
+
+STAGES = (64, 128, 256, 512)
+"""Channels of each stage's two blocks; every stage but the first halves the picture."""
+
+_FIRST = 7
+_EACH = 2
+
+
+class ResidualBlock(nn.Module):
+    """Two convolutions of 3 x 3, and what came in added to what they give."""
+
+    def __init__(self, before: int, channels: int, stride: int) -> None:
+        super().__init__()
+        self.first = _convolution(before, channels, 3, stride)
+        self.second = _convolution(channels, channels, 3, 1)
+        changes = stride != 1 or before != channels
+        self.shortcut = _convolution(before, channels, 1, stride) if changes else None
+
+    def forward(self, given: Tensor) -> Tensor:
+        """``(n, channels, rows / stride, columns / stride)``."""
+        along = given if self.shortcut is None else self.shortcut(given)
+        return torch.relu(self.second(torch.relu(self.first(given))) + along)
+
+    def write(self, nodes: Nodes, given: str) -> str:
+        """The same in a graph."""
+        along = given if self.shortcut is None else _written(nodes, given, self.shortcut)
+        inner = nodes.add("Relu", _written(nodes, given, self.first))
+        return nodes.add("Relu", nodes.add("Add", _written(nodes, inner, self.second), along))
+
+
+class ResNet18(nn.Module):
+    """The published layers; the last gives the logarithm of a size in m.
+
+    Args:
+        channels: of the picture.
+        usual: logarithm of the size that it begins at.
+    """
+
+    def __init__(self, channels: int, usual: float) -> None:
+        super().__init__()
+        self.first = _convolution(channels, STAGES[0], _FIRST, 2)
+        self.pool = nn.MaxPool2d(3, 2, 1)
+        blocks = []
+        for stage, (before, width) in enumerate(pairwise((STAGES[0], *STAGES))):
+            for number in range(_EACH):
+                stride = 2 if stage > 0 and number == 0 else 1
+                blocks.append(ResidualBlock(before if number == 0 else width, width, stride))
+        self.blocks = nn.ModuleList(blocks)
+        self.last = nn.Linear(STAGES[-1], 1)
+        nn.init.constant_(self.last.bias, usual)
+
+    def forward(self, picture: Tensor) -> Tensor:
+        """``(n, 1)`` of ``(n, channels, rows, columns)``."""
+        found = self.pool(torch.relu(self.first(picture)))
+        for block in self.blocks:
+            found = block(found)
+        return torch.as_tensor(self.last(found.mean(dim=(2, 3))))
+
+    def write(self, nodes: Nodes, picture: str) -> str:
+        """The same in a graph."""
+        found = nodes.add("Relu", _written(nodes, picture, self.first))
+        found = nodes.add("MaxPool", found, kernel_shape=[3, 3], strides=[2, 2], pads=[1, 1, 1, 1])
+        for block in self.blocks:
+            found = block.write(nodes, found)
+        mean = nodes.add("ReduceMean", found, axes=[2, 3], keepdims=0)
+        return written_linear(nodes, mean, self.last)
+
+
+def written_linear(nodes: Nodes, value: str, layer: nn.Linear) -> str:
+    """A linear layer in a graph."""
+    weight = nodes.weight(layer.weight.detach().numpy().T, "a layer")
+    return nodes.add("Gemm", value, weight, nodes.weight(layer.bias.detach().numpy(), "a bias"))
+
+
+def _convolution(before: int, channels: int, side: int, stride: int) -> nn.Sequential:
+    """A convolution and its batch's normalisation, begun as He et al. 2015 (Delving deep) begin them."""
+    convolution = nn.Conv2d(before, channels, side, stride, side // 2, bias=False)
+    nn.init.kaiming_normal_(convolution.weight, mode="fan_out", nonlinearity="relu")
+    return nn.Sequential(convolution, nn.BatchNorm2d(channels))
+
+
+def _written(nodes: Nodes, value: str, layer: nn.Sequential) -> str:
+    """Both as one convolution: at inference a normalisation is a factor and a shift of each channel."""
+    convolution, normalisation = layer[0], layer[1]
+    assert isinstance(convolution, nn.Conv2d)
+    assert isinstance(normalisation, nn.BatchNorm2d)
+    mean, variance = normalisation.running_mean, normalisation.running_var
+    assert mean is not None
+    assert variance is not None
+    factor = (normalisation.weight / torch.sqrt(variance + normalisation.eps)).detach().numpy()
+    weight = nodes.weight(convolution.weight.detach().numpy() * factor[:, None, None, None], "a convolution")
+    shift = normalisation.bias.detach().numpy() - factor * mean.numpy()
+    bias = nodes.weight(np.asarray(shift), "a convolution")
+    half, stride = convolution.kernel_size[0] // 2, convolution.stride[0]
+    return nodes.add("Conv", value, weight, bias, strides=[stride] * 2, pads=[half] * 4)
