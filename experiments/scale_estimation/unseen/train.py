@@ -86,7 +86,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _widen(options: argparse.Namespace, folder: Path) -> None:
-    """How much wider answers about scanned things are, written; of the networks that came with the program."""
+    """Write how much wider answers about scanned things are, by the networks that came with the program."""
     if options.meshes is None:
         sys.stdout.write("real shapes: left out; add --meshes FOLDER of scanned things\n")
         return
