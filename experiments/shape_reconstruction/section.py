@@ -31,7 +31,8 @@ class ShapeRun(Section):
         focal_length_error: relative.
         contact_error: m, one standard deviation of a contact's points along their normals: the arm's and
             the gel's places, beside the errors that the gel's picture has.
-        contact_tilt_error: rad, one standard deviation of a contact's normals: the gel's mounting and colours.
+        contact_tilt_error: rad, one standard deviation of a contact's normals: how the gel is mounted, and
+            what its colours say.
         until: m: a run ends when the mean deviation that the estimate claims is no greater, whatever presses
             are left; None to make them all.
         seed: of where and how deep the presses are; a run may say another.
