@@ -1,58 +1,68 @@
-"""The steps of a shape reconstruction: a look, then presses."""
+"""The steps of a shape reconstruction: a look, then presses chosen one by one, or planned on the drawing."""
 
-from collections.abc import Iterator, Sequence
-from functools import partial
+import numpy as np
 
+from experiments.shape_reconstruction.explorer import DrawnContacts, ShapeExplorer
+from experiments.shape_reconstruction.methods import METHODS, QUICK
 from experiments.shape_reconstruction.section import ShapeRun
+from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
-from harness.bench.reading import Reading
 from harness.bench.scene import SceneFile
-from harness.bench.station import Bench
 from harness.bench.station_file import Station
 from harness.experiment.experiment import Helpers, Planned
-from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.recording.step_file import Step
-from harness.skills.look import look
+from harness.skills.exploring.exploration import Exploration, NextContact, kinds
+from harness.skills.exploring.surroundings import nowhere
 from harness.skills.planning import ContactRequest, plan_run
-from harness.skills.press import PressPerformer
 from harness.skills.sites import PressLimits
-from harness.twin.bench_of import way_between
+from harness.twin.bench_of import twin_of
+from harness.twin.rehearsal import rehearse
 
-PLAN_KEY = "steps"
+
+def steps_of(scene: SceneFile) -> int:
+    """How many steps a run of a scene has, if it is not surer before."""
+    return int(scene.sensors.camera) + _presses(scene)
+
+
+def _presses(scene: SceneFile) -> int:
+    return scene.section(ShapeRun).presses if scene.sensors.touch else 0
 
 
 def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
-    """A look where there is a camera, then presses on the drawing."""
-    asked = scene.section(ShapeRun)
-    limits = PressLimits(tilt=asked.tilt, depth=asked.depth)
-    made = plan_run(scene, station, mesh, seed, ContactRequest(asked.presses, "spread", limits))
-    looks = [{"kind": "look"}] if scene.sensors.camera else []
-    presses = [{"kind": "press", **parameters} for parameters in made.parameters()]
-    return Planned([*looks, *presses], made.rehearsal, made.bench)
+    """A look where there is a camera, then so many presses.
+
+    Those planned on the drawing are rehearsed here; all others are planned and rehearsed one by one, once
+    those before are read.
+
+    Raises:
+        WrongUse: nothing is to be read; or the scene says where the mesh file's origin is, which says
+            nothing of where an unknown object touches its support.
+    """
+    if steps_of(scene) == 0:
+        raise WrongUse("nothing is to be read: ask for vision, for presses, or for both")
+    if scene.object.pose.anchor != "bottom":
+        raise WrongUse(
+            'an unknown object stands where its bottom is: set object.pose.anchor = "bottom", and its '
+            "position to where its middle should be on the support"
+        )
+    asked, looks = scene.section(ShapeRun), scene.sensors.camera
+    if asked.choose != "planned" or _presses(scene) == 0:
+        place = np.array(scene.object.pose.position)
+        bench = twin_of(scene, station, nowhere(place), np.eye(4))
+        return Planned(kinds(looks, _presses(scene)), rehearse(bench, []), bench)
+    wanted = ContactRequest(_presses(scene), "spread", PressLimits(tilt=asked.tilt, depth=asked.depth))
+    made = plan_run(scene, station, mesh, seed, wanted)
+    presses = [{"kind": "contact", **parameters} for parameters in made.parameters()]
+    return Planned([*kinds(looks, 0), *presses], made.rehearsal, made.bench)
 
 
-class ShapePerformer:
+def performer(run: RunFiles, helpers: Helpers) -> Exploration:
     """Looks, then presses.
 
     Args:
         run: the folder.
         helpers: what a step may use beside the bench.
     """
-
-    def __init__(self, run: RunFiles, helpers: Helpers) -> None:
-        self._run, self._ask = run, helpers.ask
-        way = partial(way_between, helpers.twin)
-        self._press = PressPerformer(way, ask=helpers.ask, plan_key=PLAN_KEY, explores=True)
-
-    def steps(self, recording: Recording) -> Iterator[Step]:
-        """Those that are not on the disk."""
-        planned = recording.header.plan[PLAN_KEY]
-        for index in range(recording.committed, len(planned)):
-            yield Step(index, planned[index]["kind"], planned[index])
-
-    def perform(self, step: Step, bench: Bench) -> Sequence[Reading]:
-        """A look, or a press."""
-        if step.kind == "look":
-            return look(step.index, bench, self._ask)
-        return self._press.perform(step, bench)
+    drawn = run.scene.section(ShapeRun).choose == "planned"
+    explorer: NextContact = DrawnContacts(helpers.twin) if drawn else ShapeExplorer(run, METHODS[QUICK])
+    return Exploration(explorer, helpers.ask, helpers.say, "the shape is known as well as was asked")

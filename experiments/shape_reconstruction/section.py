@@ -20,8 +20,7 @@ class ShapeRun(Section):
             ``"farthest"``: far from what was touched and passed so far. ``"active"``: where the estimates of
             the shape differ most. ``"planned"``: to places drawn on the object's mesh, as a benchmark of
             touches anywhere; the object is then no unknown one to the arm.
-        depth: m, from and to: how far to press on after the first touch, uniform; of all but ``"planned"``
-            ways, the mean.
+        depth: m, from and to: how far to press on after the first touch, uniform.
         tilt: rad, the greatest angle of the tool from the surface's normal, of ``"planned"`` ways.
         largest: m: no side of the object is longer.
         place_error: m, one standard deviation, per axis, of where on its support the object was put.
