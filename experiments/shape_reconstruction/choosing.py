@@ -13,7 +13,7 @@ from harness.basics.faces.ray_mesh import RayMesh
 
 Chooser = Callable[[ShapeEvidence, ShapeEstimate | None, FloatArray], FloatArray]
 """Of evidence, an estimate (None where there is none yet) and ``(n, 4, 4)`` ``stand_from_gel`` at the ends of
-lines, drawn at random, that the gel would follow along its z: ``(n,)`` scores, the greatest is tried first."""
+lines, drawn at random, that the gel would follow along its z: ``(n,)`` scores; the greatest goes first."""
 
 BEHIND = 0.3
 """M before a line's end from where on it is looked for the estimate's surface."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import binary_erosion, gaussian_filter
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 
@@ -17,7 +17,10 @@ TOUCHED = 0.12e-3
 """M of indentation below which nothing was touched."""
 
 _SMOOTH = 2.0
-"""Pixels, one standard deviation of the smoothing that slopes are taken of."""
+"""Pixels, one standard deviation of the window that slopes are averaged over."""
+
+_BORDER = 1.0e-3
+"""What a slope counts for that is taken across the border of what was touched; one inside counts for 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +62,14 @@ def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> Con
 
 
 def _slopes(heights: FloatArray, core: BoolArray, pitch: float) -> FloatArray:
-    """``(rows, columns, 2)`` of the indentation along x and y, by what was touched alone."""
-    weight = gaussian_filter(core.astype(np.float64), _SMOOTH)
-    smooth = gaussian_filter(np.where(core, heights, 0.0), _SMOOTH) / np.maximum(weight, 1e-9)
-    down, right = np.gradient(np.where(weight > 1e-3, smooth, 0.0), pitch)
-    return np.stack([right, down], axis=2)
+    """``(rows, columns, 2)`` of the indentation along x and y, by what was touched alone.
+
+    Slopes are averaged, not heights: at a border the average of heights leans inward.
+    """
+    weight = np.where(binary_erosion(core, border_value=1), 1.0, _BORDER) * core
+    total = np.maximum(gaussian_filter(weight, _SMOOTH), np.finfo(np.float64).tiny)
+    down, right = np.gradient(heights, pitch)
+    return np.stack([gaussian_filter(weight * slope, _SMOOTH) / total for slope in (right, down)], axis=2)
 
 
 def _spread(core: BoolArray, count: int) -> tuple[IntArray, IntArray]:

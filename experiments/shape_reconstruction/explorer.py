@@ -1,6 +1,6 @@
 """Where the next press of a shape reconstruction goes: along a free line into what is not known."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cached_property, partial
 from typing import Any
 
@@ -155,12 +155,12 @@ class ShapeExplorer:
         random = np.random.default_rng((recording.header.seed, index))
         here = Surroundings(self._run.scene, self._run.station, self.travels, self._nothing, self._joints)
         estimate = None if self._asked.choose == "random" else self._estimate()
-        lines = np.array([*self._towards_surface(estimate, random), *self._blind(here, random)])
-        scores = CHOOSERS[self._asked.choose](
-            self._readings.evidence(), estimate, translation(-self.place) @ lines
-        )
+        lines = np.concatenate([self._towards_surface(estimate, random), self._blind(here, random)])
+        scores = CHOOSERS[self._asked.choose](self._readings.evidence(), estimate, lines)
         best = np.argsort(-scores, kind="stable")[:LINES]
-        return contact_along(here, lines[best], float(random.uniform(*self._asked.depth)))
+        return contact_along(
+            here, translation(self.place) @ lines[best], float(random.uniform(*self._asked.depth))
+        )
 
     def _take_in(self, recording: Recording, index: int) -> None:
         for k in range(self._read, index):
@@ -177,19 +177,19 @@ class ShapeExplorer:
         except FitRefused:
             return None
 
-    def _towards_surface(
-        self, estimate: ShapeEstimate | None, random: np.random.Generator
-    ) -> Iterable[FloatArray]:
+    def _towards_surface(self, estimate: ShapeEstimate | None, random: np.random.Generator) -> FloatArray:
+        """``(n, 4, 4)`` in ``stand``."""
         if estimate is None:
-            return ()
-        housing = self._run.station.gel.sensor.housing
-        return lines_at_surface(estimate, self.place, housing, DRAWN, random)
+            return np.zeros((0, 4, 4))
+        return lines_at_surface(estimate, self._run.station.gel.sensor.housing, DRAWN, random)
 
-    def _blind(self, here: Surroundings, random: np.random.Generator) -> Iterable[FloatArray]:
+    def _blind(self, here: Surroundings, random: np.random.Generator) -> FloatArray:
+        """``(n, 4, 4)`` in ``stand``: to what was seen, or to where the object should be."""
         look, thing = self._readings.look, self.thing
         if look is not None and thing is not None:
             aims = aims_at_mask(look, thing, self.place, LINES, random)
         else:
             first = not self._readings.touches
             aims = aims_unseen(self.place, self._asked.place_error, UP_TO, first, random)
-        return lines_to(aims, here, float(self.place[2]), random)
+        lines = lines_to(aims, here, float(self.place[2]), random)
+        return np.asarray(translation(-self.place) @ np.array(list(lines)))

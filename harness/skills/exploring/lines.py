@@ -81,7 +81,7 @@ def contact_along(here: Surroundings, lines: Iterable[FloatArray], press: float)
                 return motion.to_parameters()
     raise WrongUse(
         f"no free way was found on any of {len(tried)} lines to where the object should be, around all the "
-        "space that it may take; give a smaller range of sizes, or another place"
+        "space that it may take; say that it is smaller, where that is known, or give another place"
     )
 
 
