@@ -1,6 +1,7 @@
 """An estimated surface as files for viewers: PLY with what is known of each vertex, OBJ and GLB."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -19,7 +20,7 @@ def write_surface(estimate: ShapeEstimate, folder: Path, stem: str) -> None:
         folder: exists.
         stem: name of the files without their ending.
     """
-    known = {
+    known: dict[str, Any] = {
         "deviation": estimate.deviation.astype(np.float32),
         "known_by": estimate.known_by.astype(np.uint8),
     }
@@ -27,7 +28,7 @@ def write_surface(estimate: ShapeEstimate, folder: Path, stem: str) -> None:
         estimate.mesh.vertices, estimate.mesh.faces, process=False, vertex_attributes=known
     )
     for kind in FORMATS:
-        written = mesh.export(file_type=kind)
         part = folder / f".{stem}.{kind}"
-        part.write_bytes(written.encode() if isinstance(written, str) else written)
+        with part.open("wb") as stream:
+            mesh.export(stream, file_type=kind)
         part.replace(folder / f"{stem}.{kind}")

@@ -1,6 +1,7 @@
 """What is written of a surface is read back."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ def test_every_file_has_the_surface_in_metres(tmp_path: Path, kind: str) -> None
     deviation = np.linspace(1e-3, 5e-3, count)
     known_by = np.arange(count) % 3
     write_surface(ShapeEstimate(mesh, deviation, known_by, (), {}, (), 0.0), tmp_path, "shape")
-    found = trimesh.load(tmp_path / f"shape.{kind}", force="mesh", process=False)
+    found: Any = trimesh.load(tmp_path / f"shape.{kind}", force="mesh", process=False)
     assert found.vertices[found.faces] == pytest.approx(mesh.corners, abs=1e-7)
     if kind == "ply":
         attributes = found.metadata["_ply_raw"]["vertex"]["data"]

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.experiment import EXPERIMENT
 from experiments.shape_reconstruction.explorer import ShapeExplorer
 from experiments.shape_reconstruction.methods import METHODS, QUICK
@@ -35,8 +36,14 @@ def touched(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recor
     return ran(tmp_path_factory.mktemp("shape") / "run", scene_of(3, "farthest"), station)
 
 
-def test_contacts_are_on_the_true_surface_and_face_out_of_it(touched: Recording) -> None:
-    evidence = evidence_of(RunFiles(touched), touched.steps())
+@pytest.fixture(scope="module")
+def evidence(touched: Recording) -> ShapeEvidence:
+    return evidence_of(RunFiles(touched), touched.steps())
+
+
+def test_contacts_are_on_the_true_surface_and_face_out_of_it(
+    touched: Recording, evidence: ShapeEvidence
+) -> None:
     assert len(evidence.touches) == 3
     assert evidence.contacts
     for touch in evidence.contacts:
@@ -48,8 +55,7 @@ def test_contacts_are_on_the_true_surface_and_face_out_of_it(touched: Recording)
     assert 500 < evidence.look.mask.sum() < 10_000
 
 
-def test_presses_lead_to_places_far_from_each_other(touched: Recording) -> None:
-    evidence = evidence_of(RunFiles(touched), touched.steps())
+def test_presses_lead_to_places_far_from_each_other(evidence: ShapeEvidence) -> None:
     ends = np.array([touch.stand_from_gel[:3, 3] for touch in evidence.touches])
     apart = np.linalg.norm(ends[:, None] - ends[None], axis=2)[np.triu_indices(3, 1)]
     assert apart.min() > 0.02
