@@ -107,7 +107,21 @@ class ShapeAnswering:
         began = time.perf_counter()
         found: ShapeEstimate | FitRefused
         try:
-            found = METHODS[str(self.accuracy[METHOD.name])](evidence)
+            found = METHODS[str(self.accuracy[METHOD.name])](known(evidence))
         except FitRefused as refusal:
             found = refusal
         return found, time.perf_counter() - began
+
+
+def known(evidence: ShapeEvidence) -> ShapeEvidence:
+    """The same evidence.
+
+    Raises:
+        FitRefused: it is of nothing: no silhouette, and no contact.
+    """
+    if evidence.look is None and not evidence.contacts:
+        raise FitRefused(
+            f"the object was not seen, and {len(evidence.touches)} ways of the gel met nothing; check where "
+            "it stands and where the camera looks, or press again"
+        )
+    return evidence

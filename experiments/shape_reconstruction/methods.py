@@ -1,26 +1,26 @@
 """Estimators of shape by their names: levels of the dial ``shape.method``."""
 
 from collections.abc import Callable, Mapping
-
-import numpy as np
+from functools import partial
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.surface import SUPPOSED, ShapeEstimate
-from harness.basics.errors import FitRefused
-from harness.basics.mesh_hull import closed_hull
+from experiments.shape_reconstruction.family.estimate import family_estimate
+from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.hull import hull_estimate
+from experiments.shape_reconstruction.surface import ShapeEstimate
 
 Method = Callable[[ShapeEvidence], ShapeEstimate]
 
+METHODS: Mapping[str, Method] = {
+    "hull": hull_estimate,
+    "family-coarse": partial(family_estimate, settings=LEVELS["coarse"]),
+    "family": family_estimate,
+    "family-fine": partial(family_estimate, settings=LEVELS["fine"]),
+}
+"""From cheap to dear."""
 
-def _hull(evidence: ShapeEvidence) -> ShapeEstimate:
-    if not evidence.contacts:
-        raise FitRefused("no contacts")
-    points = np.concatenate([touch.points for touch in evidence.contacts])
-    mesh = closed_hull(np.concatenate([points, points * [1.0, 1.0, 0.0]]))
-    n = len(mesh.vertices)
-    return ShapeEstimate(mesh, np.full(n, 5e-3), np.full(n, SUPPOSED), (), {}, (), 0.0)
+QUICK, BEST = "hull", "family"
+"""Where the arm waits for the next press, and where nobody chooses."""
 
-
-METHODS: Mapping[str, Method] = {"hull": _hull}
-QUICK = "hull"
-BEST = "hull"
+TABLED = ("hull", "family")
+"""Methods in the table of shapes."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from experiments.shape_reconstruction.dials import OWN
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.methods import METHODS
+from experiments.shape_reconstruction.methods import METHODS, TABLED
 from experiments.shape_reconstruction.metric import published_chamfer, shape_error
 from experiments.shape_reconstruction.readings import evidence_of
 from experiments.shape_reconstruction.result import true_surface
@@ -35,7 +35,7 @@ PICTURED = ("T", "V", "TV")
 
 METHODS_OF_TABLE = tuple(
     f"{method}, {senses}{'' if senses == 'V' else count}"
-    for method in METHODS
+    for method in TABLED
     for senses in PICTURED
     for count in (PRESSES if senses != "V" else (0,))
 )
