@@ -3,7 +3,7 @@
 import numpy as np
 
 from experiments.shape_reconstruction.explorer import DrawnContacts, ShapeExplorer
-from experiments.shape_reconstruction.methods import METHODS, QUICK
+from experiments.shape_reconstruction.methods import METHODS, QUICK, TELLING
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
@@ -63,6 +63,12 @@ def performer(run: RunFiles, helpers: Helpers) -> Exploration:
         run: the folder.
         helpers: what a step may use beside the bench.
     """
-    drawn = run.scene.section(ShapeRun).choose == "planned"
-    explorer: NextContact = DrawnContacts(helpers.twin) if drawn else ShapeExplorer(run, METHODS[QUICK])
-    return Exploration(explorer, helpers.ask, helpers.say, "the shape is known as well as was asked")
+    enough = "the shape is known as well as was asked"
+    return Exploration(_explorer(run, helpers), helpers.ask, helpers.say, enough)
+
+
+def _explorer(run: RunFiles, helpers: Helpers) -> NextContact:
+    choose = run.scene.section(ShapeRun).choose
+    if choose == "planned":
+        return DrawnContacts(helpers.twin)
+    return ShapeExplorer(run, METHODS[TELLING if choose == "active" else QUICK])

@@ -19,8 +19,8 @@ METHODS: Mapping[str, Method] = {
 }
 """From cheap to dear."""
 
-QUICK, BEST = "hull", "family"
-"""Where the arm waits for the next press, and where nobody chooses."""
+QUICK, TELLING, BEST = "hull", "family-coarse", "family"
+"""While the arm waits for the next press; where that goes by which shapes are likely; where nobody chooses."""
 
 TABLED = ("hull", "family")
 """Methods in the table of shapes."""
