@@ -20,7 +20,7 @@ METHODS: Mapping[str, Method] = {
 """From cheap to dear."""
 
 QUICK, TELLING, BEST = "hull", "family-coarse", "family"
-"""While the arm waits for the next press; where that goes by which shapes are likely; where nobody chooses."""
+"""While the arm waits for the next press; where that goes by which shapes are likely; by default."""
 
 TABLED = ("hull", "family")
 """Methods in the table of shapes."""
