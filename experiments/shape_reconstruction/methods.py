@@ -22,5 +22,5 @@ METHODS: Mapping[str, Method] = {
 QUICK, TELLING, BEST = "hull", "family-coarse", "family"
 """While the arm waits for the next press; where that goes by which shapes are likely; by default."""
 
-TABLED = ("hull", "family")
-"""Methods in the table of shapes."""
+TABLED: Mapping[str, tuple[str, ...]] = {"hull": ("T",), "family": ("T", "V", "TV")}
+"""Methods in the table of shapes, from touch alone, the picture alone, and both."""

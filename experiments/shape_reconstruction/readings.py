@@ -99,7 +99,7 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
 
 
 def _way(run: RunFiles, record: StepRecord, base_from_gel: FloatArray) -> float:
-    """M from the stand-off to where the gel ended."""
+    """M from the stand-off to where the gel ended; the arm's noise makes no way shorter than none."""
     stand_off = np.asarray(record.step.parameters["base_from_stand_off"]) @ run.station.flange_from_gel
     return max(0.0, float(stand_off[:3, 2] @ (base_from_gel[:3, 3] - stand_off[:3, 3])))
 

@@ -30,13 +30,10 @@ CHOICES = ("planned", "random", "farthest")
 PRESSES = (8, 16, 32)
 """Of each run, the first so many are answered from; the last is how many are made."""
 
-PICTURED = ("T", "V", "TV")
-"""Touch alone, the picture alone, both."""
-
 METHODS_OF_TABLE = tuple(
     f"{method}, {senses}{'' if senses == 'V' else count}"
-    for method in TABLED
-    for senses in PICTURED
+    for method, given in TABLED.items()
+    for senses in given
     for count in (PRESSES if senses != "V" else (0,))
 )
 
