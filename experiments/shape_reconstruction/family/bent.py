@@ -41,11 +41,9 @@ def bent_distance(q: FloatArray, x: float, y: float, z: float) -> float:
     if abs(q[_BEND]) > 1e-3:
         radius = q[_LENGTH] / q[_BEND]
         # Polar coordinates about the arc's centre, which is at (0, radius).
-        turn = np.arctan2(x * np.sign(radius), (radius - y) * np.sign(radius))
-        along, aside = (
-            turn * radius * np.sign(radius),
-            (abs(radius) - np.hypot(x, radius - y)) * np.sign(radius),
-        )
+        side = np.sign(radius)
+        along = np.arctan2(x * side, (radius - y) * side) * abs(radius)
+        aside = abs(radius) - np.hypot(x, radius - y)
     beyond = max(abs(along) - half, 0.0)
     at = (min(max(along, -half), half) / q[_LENGTH] + 0.5) * (GIRTH_KNOTS - 1)
     k = min(int(at), GIRTH_KNOTS - 2)
@@ -57,5 +55,5 @@ def bent_distance(q: FloatArray, x: float, y: float, z: float) -> float:
     first = np.sqrt((wide / girth) ** 2 + (up / (girth * flat)) ** 2)
     second = np.sqrt((wide / girth**2) ** 2 + (up / (girth * flat) ** 2) ** 2)
     if second < 1e-9:
-        return -girth * min(1.0, flat)
+        return float(-girth * min(1.0, flat))
     return float(first * (first - 1.0) / second / np.sqrt(1.0 + slope * slope))

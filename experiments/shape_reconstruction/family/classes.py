@@ -1,10 +1,11 @@
 """Classes of household things, and shapes drawn from each: the family's prior.
 
-Sizes are what such things are sold in, rounded outward: tableware by makers' lists (mugs of 0.2 to 0.5 l, plates of
-150 to 300 mm, bowls of 100 to 260 mm, stemmed glasses of 130 to 260 mm), cans by the American can sizes (202 to
-603, that is 54 to 157 mm across), bottles and jugs by their litres (0.2 to 2.5), pans by hob sizes (140 to 300 mm),
-spanners by DIN 3113 (8 to 32 mm across flats, 100 to 350 mm long, heads 2.0 to 2.4 times the flats), packets and
-boards by kitchen shelves (20 to 350 mm). None is of an object that the bench's tables are made of.
+Sizes are what such things are sold in, rounded outward: tableware by makers' lists (mugs of 0.2 to 0.5 l,
+plates of 150 to 300 mm, bowls of 100 to 260 mm, stemmed glasses of 130 to 260 mm), cans by the American can
+sizes (202 to 603, that is 54 to 157 mm across), bottles and jugs by their litres (0.2 to 2.5), pans by hob
+sizes (140 to 300 mm), spanners by DIN 3113 (8 to 32 mm across flats, 100 to 350 mm long, heads 2.0 to 2.4
+times the flats), packets and boards by kitchen shelves (20 to 350 mm). None is of an object of the bench's
+tables.
 """
 
 from collections.abc import Callable
@@ -21,10 +22,8 @@ from experiments.shape_reconstruction.family.layout import (
     DISC,
     KNOTS,
     LOOP,
-    NO_LIMB,
     PLAIN,
     RING,
-    ROUND,
     SLOT,
     SUPER,
     TOOL,
@@ -58,6 +57,21 @@ def draw_shape(name: str, random: _Random) -> FamilyShape:
     theta = np.zeros(layout.SIZE)
     CLASSES[name](random, code, theta)
     return FamilyShape(name, code, theta)
+
+
+def add_loop(shape: FamilyShape, random: _Random) -> FamilyShape:
+    """The same turned body with a handle that is drawn."""
+    code, theta = shape.code.copy(), shape.theta.copy()
+    _loop(random, code, theta, float(np.exp(theta[layout.HEIGHT])))
+    return FamilyShape(shape.name, code, theta)
+
+
+def add_spout(shape: FamilyShape, random: _Random) -> FamilyShape:
+    """The same turned body with a spout that is drawn."""
+    code, theta = shape.code.copy(), shape.theta.copy()
+    widest = float(np.exp(theta[layout.RADII : layout.RADII + KNOTS].max()))
+    _spout(random, code, theta, 2.0 * widest)
+    return FamilyShape(shape.name, code, theta)
 
 
 def _between(random: _Random, low: float, high: float) -> float:
@@ -137,7 +151,7 @@ def _mug(random: _Random, code: IntArray, theta: FloatArray) -> None:
     _loop(random, code, theta, float(np.exp(theta[layout.HEIGHT])))
 
 
-def _dish(random: _Random, radius: float, height: float, foot: float) -> tuple[FloatArray, FloatArray]:
+def _dish(random: _Random, radius: float, foot: float) -> tuple[FloatArray, FloatArray]:
     """Radii and shares of the height along a curve that leaves the foot outward and ends upright or not."""
     turn = 0.5 * np.pi * _EVEN * random.uniform(0.5, 1.0)
     out, up = np.sin(turn) / np.sin(turn[-1]), (1.0 - np.cos(turn)) / (1.0 - np.cos(turn[-1]))
@@ -147,7 +161,7 @@ def _dish(random: _Random, radius: float, height: float, foot: float) -> tuple[F
 def _bowl(random: _Random, code: IntArray, theta: FloatArray) -> None:
     radius = _between(random, 50.0, 130.0)
     height = radius * random.uniform(0.45, 1.1)
-    radii, shares = _dish(random, radius, height, random.uniform(0.3, 0.65))
+    radii, shares = _dish(random, radius, random.uniform(0.3, 0.65))
     wall = _between(random, 2.0, 7.0)
     _turn(random, code, theta, height, radii, shares, wall, wall * random.uniform(1.0, 2.5))
 
@@ -155,7 +169,7 @@ def _bowl(random: _Random, code: IntArray, theta: FloatArray) -> None:
 def _plate(random: _Random, code: IntArray, theta: FloatArray) -> None:
     radius = _between(random, 70.0, 160.0)
     height = radius * random.uniform(0.12, 0.35)
-    radii, shares = _dish(random, radius, height, random.uniform(0.4, 0.75))
+    radii, shares = _dish(random, radius, random.uniform(0.4, 0.75))
     wall = _between(random, 2.5, 6.0)
     _turn(random, code, theta, height, radii, shares, wall, wall * random.uniform(1.0, 2.0))
 
@@ -290,7 +304,7 @@ def _spanner(random: _Random, code: IntArray, theta: FloatArray) -> None:
     flats = _between(random, 8.0, 34.0)
     length = flats * random.uniform(7.5, 13.0)
     ends = [(SLOT, RING), (SLOT, SLOT), (RING, RING), (SLOT, PLAIN)][random.integers(4)]
-    _tool(random, code, theta, length, ends)
+    _tool(code, theta, length, ends)
     for end, slot, hole in ((ends[0], layout.HEAD_A, layout.HOLE_A), (ends[1], layout.HEAD_B, layout.HOLE_B)):
         theta[slot] = np.log(flats * (random.uniform(1.0, 1.2) if end == SLOT else random.uniform(0.7, 0.95)))
         theta[hole] = np.log(0.5 * flats)
@@ -301,7 +315,7 @@ def _spanner(random: _Random, code: IntArray, theta: FloatArray) -> None:
     theta[layout.SLOT_TURN] = np.radians(random.choice([0.0, 15.0, -15.0]))
 
 
-def _tool(random: _Random, code: IntArray, theta: FloatArray, length: float, ends: tuple[int, int]) -> None:
+def _tool(code: IntArray, theta: FloatArray, length: float, ends: tuple[int, int]) -> None:
     code[layout.KIND], code[layout.END_A], code[layout.END_B] = TOOL, ends[0], ends[1]
     theta[layout.LENGTH] = np.log(length)
     theta[layout.HOLE_A] = theta[layout.HOLE_B] = np.log(6.0 * _MM)
@@ -313,7 +327,7 @@ def _utensil(random: _Random, code: IntArray, theta: FloatArray) -> None:
     length, half = _between(random, 70.0, 330.0), 0.5 * _between(random, 6.0, 45.0)
     kinds = (PLAIN, DISC, RING)
     ends = (int(random.choice(kinds)), int(random.choice((PLAIN, PLAIN, DISC))))
-    _tool(random, code, theta, length, ends)
+    _tool(code, theta, length, ends)
     theta[layout.SHAFT_A] = np.log(half)
     theta[layout.SHAFT_B] = np.log(half * random.uniform(0.5, 1.6))
     theta[layout.SHAFT_THICK] = np.log(0.5 * _between(random, 3.0, 30.0))
@@ -344,5 +358,3 @@ CLASSES: MappingProxyType[str, Callable[[_Random, IntArray, FloatArray], None]] 
     }
 )  # fmt: skip
 """How each class draws a shape's code and vector."""
-
-__all__ = ["CLASSES", "NO_LIMB", "ROUND", "FamilyShape", "draw_shape"]

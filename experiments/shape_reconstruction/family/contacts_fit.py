@@ -23,6 +23,9 @@ STRANGE = 16.0
 ALONE = 5.0
 """By how many times it exceeds the median contact's: where all are off, the shape is, not the contacts."""
 
+LEAST_OFF = 0.8e-3
+"""M that a doubtful contact is off at least: normals at edges differ without being wrong."""
+
 _PROBE = 0.5e-3
 
 
@@ -58,7 +61,8 @@ def contact_fit(shape: FamilyShape, seen: Observed) -> ContactFit:
     if count:
         squares = (out.values[: len(seen.points)] * seen.sigma[seen.touch]) ** 2
         off = np.sqrt(np.bincount(seen.touch, squares, count) / np.bincount(seen.touch, minlength=count))
-    doubtful = (sums > STRANGE) & (sums > ALONE * np.median(sums)) if count else np.zeros(0, bool)
+    strange = (sums > STRANGE) & (off > LEAST_OFF)
+    doubtful = strange & (sums > ALONE * np.median(sums)) if count else strange
     by_contacts = float(np.where(sums <= 12.0, 0.5 * sums, np.sqrt(12.0 * sums) - 6.0).sum())
     return ContactFit(sums, off, doubtful, cost - by_contacts)
 

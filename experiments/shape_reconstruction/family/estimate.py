@@ -1,4 +1,4 @@
-"""The shape of an object by the family: which household shapes the readings allow, and the surface between."""
+"""The shape of an object by the family: household shapes that the readings allow, and the surface between."""
 
 import time
 
@@ -47,8 +47,8 @@ def family_estimate(evidence: ShapeEvidence, settings: FamilySettings | None = N
     sighted = evidence.look is not None and bool(evidence.look.mask.any())
     if not sighted and not evidence.contacts:
         raise OutOfDomain(
-            f"{len(evidence.touches)} touches met nothing and no silhouette was seen; a shape needs one contact "
-            "or one silhouette: press at the object, or take its picture"
+            f"{len(evidence.touches)} touches met nothing and no silhouette was seen; a shape needs one "
+            "contact or one silhouette: press at the object, or take its picture"
         )
     search = Search(evidence, settings)
     mixture = mixture_of(search.found(), sighted, bool(evidence.contacts), settings.seed)
@@ -81,7 +81,7 @@ def _warped(mesh: Mesh, shape: FamilyShape, evidence: ShapeEvidence, fit: Contac
 
 
 def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh) -> FloatArray:
-    """``(vertices,)`` m: spread of the hypotheses and of shapes about them, the warp, and the readings' noise."""
+    """``(vertices,)`` m: spread of the hypotheses and about them, the warp, and the readings' noise."""
     total = np.zeros(len(plain.vertices))
     for one, weight, about in zip(mixture.hypotheses, mixture.weights, mixture.about, strict=True):
         shapes = (one.shape, *about)
@@ -100,7 +100,7 @@ def _flags(mixture: Mixture, fit: ContactFit, doubtful: dict[int, float]) -> tup
         flags.append(f"class unknown: {' or '.join(rivals)}")
     if fit.typical > OUTSIDE:
         flags.append(
-            f"outside the family: its contacts are {np.median(fit.off) * 1e3:.1f} mm off the nearest household shape"
+            f"outside the family: contacts are {np.median(fit.off) * 1e3:.1f} mm off the nearest such shape"
         )
     if doubtful:
         flags.append(f"contacts that do not fit the rest: {', '.join(str(index) for index in doubtful)}")

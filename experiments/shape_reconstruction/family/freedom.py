@@ -118,16 +118,26 @@ def _basis_of(code: tuple[int, ...], sighted: bool, touched: bool) -> FloatArray
         slots += [layout.CAMERA_RIGHT, layout.CAMERA_DOWN, layout.CAMERA_SCALE, layout.OUTLINE]
     if touched:
         slots += [layout.GEL, layout.GEL + 1, layout.GEL + 2]
-    return np.eye(layout.SIZE)[np.sort(slots)]
+    return np.asarray(np.eye(layout.SIZE)[np.sort(slots)])
 
 
 def basis_of(code: IntArray, sighted: bool, touched: bool) -> FloatArray:
     """``(n, SIZE)`` every number that is free, by itself."""
-    return _basis_of(tuple(int(part) for part in code), sighted, touched)
+    return _basis_of(_key(code), sighted, touched)
 
 
 def stand_basis(code: IntArray) -> FloatArray:
-    """``(n, SIZE)`` directions of place, turn, size and proportions: how a draw is first laid on the readings."""
+    """``(n, SIZE)`` directions of place, turn, size and proportions, along which a draw is laid down."""
+    return _stand_basis(_key(code))
+
+
+def _key(code: IntArray) -> tuple[int, ...]:
+    return tuple(int(part) for part in code)
+
+
+@lru_cache(maxsize=256)
+def _stand_basis(key: tuple[int, ...]) -> FloatArray:
+    code = np.array(key)
     kind = int(code[layout.KIND])
     rows = [_along(layout.X), _along(layout.Y), _along(*_SIZES[kind])]
     rows.append(_along({TURNED: layout.HEIGHT, TOOL: layout.LENGTH, BENT: layout.ARC}[kind]))
@@ -159,6 +169,12 @@ def bench_rows(place: float, support: float, pixel: float, shift: float, scale: 
 
 def shape_rows(code: IntArray) -> FloatArray:
     """``(n, SIZE)`` of a prior: each free number by itself, and the section's second differences."""
+    return _shape_rows(_key(code))
+
+
+@lru_cache(maxsize=256)
+def _shape_rows(key: tuple[int, ...]) -> FloatArray:
+    code = np.array(key)
     rows = [_along(slot) / sigma for slot, sigma in deviations(code).items()]
     first, count = {
         TURNED: (layout.RADII, layout.KNOTS), TOOL: (0, 0), BENT: (layout.GIRTHS, layout.GIRTH_KNOTS)
@@ -170,8 +186,13 @@ def shape_rows(code: IntArray) -> FloatArray:
 
 def stand_rows(code: IntArray) -> FloatArray:
     """``(n, SIZE)`` of the prior while a draw is laid on the readings: its size and proportions."""
-    basis = stand_basis(code)
-    # Projections on the directions of size and height; place has its own rows, a turn is as likely as another.
+    return _stand_rows(_key(code))
+
+
+@lru_cache(maxsize=256)
+def _stand_rows(key: tuple[int, ...]) -> FloatArray:
+    # One length stands for the size, as all scale together; a place has its own rows, any turn is as likely.
+    code = np.array(key)
     kind = int(code[layout.KIND])
     anchor = {TURNED: layout.RADII, TOOL: layout.SHAFT_A, BENT: layout.GIRTHS + 2}[kind]
     tall = {TURNED: layout.HEIGHT, TOOL: layout.LENGTH, BENT: layout.ARC}[kind]
@@ -180,5 +201,4 @@ def stand_rows(code: IntArray) -> FloatArray:
         rows += [(_along(slot) - _along(anchor)) / 0.3 for slot in (layout.CORE_X, layout.CORE_Y)]
     if code[layout.LIMB] == BAR:
         rows.append((_along(layout.LIMB_REACH) - _along(anchor)) / 0.3)
-    assert len(rows) <= len(basis)
     return np.array(rows)

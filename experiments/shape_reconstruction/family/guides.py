@@ -82,7 +82,7 @@ def _by_touch(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArr
 
 
 def _axis(places: FloatArray, normals: FloatArray) -> FloatArray | None:
-    """``(2,)`` m: the point that most of the contacts' level normal lines pass; None where they are parallel."""
+    """``(2,)`` m: the point that most level normal lines pass; None where they are parallel."""
     if len(places) < 3:
         return None
     level = normals[:, :2] / np.linalg.norm(normals[:, :2], axis=1, keepdims=True)

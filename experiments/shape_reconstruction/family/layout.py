@@ -1,7 +1,7 @@
 """Where each number of a shape is kept: one vector for every kind, so that one fit serves all of them.
 
-Lengths are logarithms of metres unless said, angles radians. The first numbers are the pose and what the bench
-is uncertain of; they mean the same for every kind. The rest is the kind's own.
+Lengths are logarithms of metres unless said, angles radians. The first numbers are the pose and what the
+bench is uncertain of; they mean the same for every kind. The rest is the kind's own.
 """
 
 # Pose in the frame ``stand``, and nuisances, of every kind.

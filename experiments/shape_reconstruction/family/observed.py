@@ -104,7 +104,7 @@ def _free_places(evidence: ShapeEvidence, coarse: bool) -> FloatArray:
 
 def _of_touch(evidence: ShapeEvidence, touch: GuardedTouch, coarse: bool) -> FloatArray:
     across = 3 if coarse else _ACROSS
-    depths = [0.0, 15.0e-3, 45.0e-3] if coarse else [d for d in _LAYERS if d <= evidence.housing_depth]
+    depths = [0.0, 25.0e-3] if coarse else [d for d in _LAYERS if d <= evidence.housing_depth]
     layers = [-evidence.gel_thickness - depth for depth in depths]
     boxes = [_plate(evidence.housing, across, z) for z in layers]
     if not touch.met:

@@ -1,4 +1,4 @@
-"""A draw of the prior laid where the readings are: place, size and turn are theirs, the shape is the prior's."""
+"""A draw of the prior laid where the readings are: place, size and turn are theirs, the shape the prior's."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.freedom import has_yaw, sizes_of
 from experiments.shape_reconstruction.family.guides import Guides, long_way
 from experiments.shape_reconstruction.family.layout import BENT, CORED, KNOTS, LOOP, SUPER, TOOL, TURNED
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import FloatArray, IntArray
 
 _Random = np.random.Generator
 
@@ -45,7 +45,7 @@ def _is_long(shape: FamilyShape) -> bool:
     return bool(shape.code[layout.KIND] != TURNED)
 
 
-def _size(code: FloatArray, theta: FloatArray) -> tuple[float, float]:
+def _size(code: IntArray, theta: FloatArray) -> tuple[float, float]:
     """M: half the width and the height of a shape, roughly."""
     kind = int(code[layout.KIND])
     if kind == TOOL:

@@ -34,7 +34,7 @@ def nearest_along(
         enough: whether any place inside will do: the ray needs only to meet the shape.
 
     Returns:
-        M: the least distance found (where the ray misses the ball, that of its place nearest to it), and where.
+        M: the least distance found, and where; of a ray that misses the ball, at its place nearest to it.
     """
     along = to_middle[0] * direction[0] + to_middle[1] * direction[1] + to_middle[2] * direction[2]
     square = to_middle[0] ** 2 + to_middle[1] ** 2 + to_middle[2] ** 2 - along * along

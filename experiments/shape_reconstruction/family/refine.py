@@ -83,7 +83,7 @@ def refine(
         damped = curvature.copy()
         for i in range(len(damped)):
             damped[i, i] += damping * curvature[i, i] + 1e-9
-        step = _bounded(np.linalg.solve(damped, -slope))
+        step = _bounded(np.linalg.solve(damped, -slope).astype(np.float64))
         moved = best + step @ basis
         now = total_cost(code, moved, seen, prior, robust, trial, q)
         if now < cost:

@@ -1,7 +1,7 @@
 """How a shape of the family disagrees with the readings: weighted residuals, and the cost they add up to.
 
 One likelihood for touch, sight and both: what was not read has no rows. Rows: of each contact its points and
-its normal, every free place, every ray. A contact counts as a whole, so that a slipped one loses all its weight.
+its normal, every free place, every ray. A contact counts as a whole: one that slipped loses all its weight.
 """
 
 from typing import NamedTuple

@@ -10,20 +10,20 @@ class FamilySettings:
     Attributes:
         draws: shapes drawn from the prior, spread evenly over the classes.
         yaws: turns that each draw is tried at.
-        aligning: rounds in which each draw finds its place, turn and size.
         starts: of them that are refined.
         refining: rounds of each.
+        changed: hypotheses of which parts are then put on, taken off or exchanged.
         finals: hypotheses that are refined to the end.
         finishing: rounds of each of those.
         pitch: m, of the grid that the surface is taken from.
         seed: of the draws.
     """
 
-    draws: int = 1200
-    yaws: int = 6
-    aligning: int = 4
-    starts: int = 48
+    draws: int = 1260
+    yaws: int = 4
+    starts: int = 36
     refining: int = 7
+    changed: int = 4
     finals: int = 10
     finishing: int = 14
     pitch: float = 2.5e-3
@@ -31,8 +31,10 @@ class FamilySettings:
 
 
 LEVELS = {
-    "coarse": FamilySettings(draws=400, yaws=4, starts=20, finals=5, finishing=8, pitch=4.0e-3),
+    "coarse": FamilySettings(draws=420, starts=16, changed=2, finals=5, finishing=8, pitch=4.0e-3),
     "default": FamilySettings(),
-    "fine": replace(FamilySettings(), draws=4000, yaws=8, starts=120, finals=20, finishing=20, pitch=2.0e-3),
+    "fine": replace(
+        FamilySettings(), draws=4200, yaws=8, starts=100, changed=10, finals=20, finishing=20, pitch=2.0e-3
+    ),
 }
 """By name, the cheapest first."""

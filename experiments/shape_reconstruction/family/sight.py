@@ -18,9 +18,9 @@ OUTLINE_SIGMA = 0.5
 OUTLINE_WORTH = 60.0
 """Independent readings that all grazing rays together count as at most: neighbours err alike."""
 
-_GRAZING = (48, 120)
-_MEETING = (24, 60)
-_PASSING = ((2.0, 16, 70), (4.0, 16, 60), (9.0, 14, 50), (20.0, 12, 40), (45.0, 8, 30), (90.0, 6, 20))
+_GRAZING = (36, 120)
+_MEETING = (12, 60)
+_PASSING = ((2.0, 14, 70), (4.0, 12, 60), (9.0, 10, 50), (20.0, 8, 40), (45.0, 5, 30), (90.0, 3, 20))
 """Pixels from the mask, and how many rays there: for ranking, and for fitting."""
 
 _SMOOTH = 0.8
@@ -82,7 +82,7 @@ def _rays(look: SeenMask, places: FloatArray, kinds: IntArray, worth: FloatArray
     directions = directions_of(look, places)
     rows, columns = np.nonzero(look.mask)
     middle = directions_of(look, np.array([[columns.mean() + 0.5, rows.mean() + 0.5]]))[0]
-    # Down to the support, where the middle of the mask looks; no farther than a few metres where it never does.
+    # Down to the support, where the middle of the mask looks; a few metres where it never does.
     away = min(eye[2] / max(-middle[2], 0.05), 5.0) if eye[2] > 0.0 else 1.0
     return SightRays(
         eye=eye,

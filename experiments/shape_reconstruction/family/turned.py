@@ -1,7 +1,7 @@
 """Signed distance of a turned body: vessels, bottles, trays, boxes, with a handle and a spout or without.
 
-A section (radius, height) is swept round an axis, a rectangle or a superellipse. Distances are exact near smooth
-parts of the surface, and never greater than the true one by more than a plan's eccentricity.
+A section (radius, height) is swept round an axis, a rectangle or a superellipse. Distances are exact near
+smooth parts of the surface; outside of an edge they are those to its nearer side.
 """
 
 import numpy as np
@@ -175,12 +175,12 @@ def _corner(u: float, v: float) -> float:
     """Distance from a quarter plane's corner, of what is beyond its two sides by ``u`` and ``v``."""
     if u > 0.0 and v > 0.0:
         return float(np.sqrt(u * u + v * v))
-    return max(u, v)
+    return float(max(u, v))
 
 
 @compiled_fast
 def _from_section(q: FloatArray, rho: float, z: float, stretch: float) -> float:
-    """Distance from the side; the pieces next to the height first, others only as far as they can be nearer."""
+    """Distance from the side; pieces next to the height first, others only as far as they can be nearer."""
     last = KNOTS - 2
     k = 0
     while k < last and z > q[_Z + k + 1]:
@@ -211,7 +211,7 @@ def _from_section(q: FloatArray, rho: float, z: float, stretch: float) -> float:
     gap = np.sqrt(best)
     if stretch != 1.0 and gap > 1e-12:
         gap = best / np.sqrt((dr * stretch) ** 2 + dz * dz)
-    return -gap if rho < edge else gap
+    return float(-gap if rho < edge else gap)
 
 
 @compiled_fast
@@ -249,7 +249,7 @@ def _ellipse(u: float, v: float, a: float, b: float) -> float:
     first = np.sqrt(s + t)
     second = np.sqrt(s / (a * a) + t / (b * b))
     if second < 1e-9:
-        return -min(a, b)
+        return float(-min(a, b))
     return float(first * (first - 1.0) / second)
 
 
