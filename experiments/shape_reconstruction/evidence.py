@@ -71,8 +71,8 @@ class ShapeEvidence:
     Attributes:
         touches: every guarded way, those that met nothing too.
         look: the silhouette; None where no camera looked, or it saw nothing.
-        housing: ``(x, y)`` m, sides of the sensor's flat housing, whose face lies ``gel_thickness`` behind the
-            gel's; what is behind that face for ``housing_depth`` is the sensor's, and free of the object.
+        housing: ``(x, y)`` m, sides of the sensor's flat housing, whose face lies ``gel_thickness`` behind
+            the gel's; what is behind that face for ``housing_depth`` is the sensor's, and free of the object.
         gel_thickness: m.
         housing_depth: m.
         place_error: m, one standard deviation per axis of where on the support the object was put.
