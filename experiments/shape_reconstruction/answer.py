@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from experiments.shape_reconstruction.dials import METHOD
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.methods import METHODS
+from experiments.shape_reconstruction.methods import estimated
 from experiments.shape_reconstruction.readings import ShapeReadings
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, WrongUse
@@ -107,21 +107,7 @@ class ShapeAnswering:
         began = time.perf_counter()
         found: ShapeEstimate | FitRefused
         try:
-            found = METHODS[str(self.accuracy[METHOD.name])](known(evidence))
+            found = estimated(str(self.accuracy[METHOD.name]), evidence)
         except FitRefused as refusal:
             found = refusal
         return found, time.perf_counter() - began
-
-
-def known(evidence: ShapeEvidence) -> ShapeEvidence:
-    """The same evidence.
-
-    Raises:
-        FitRefused: it is of nothing: no silhouette, and no contact.
-    """
-    if evidence.look is None and not evidence.contacts:
-        raise FitRefused(
-            f"the object was not seen, and {len(evidence.touches)} ways of the gel met nothing; check where "
-            "it stands and where the camera looks, or press again"
-        )
-    return evidence

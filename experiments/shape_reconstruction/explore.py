@@ -3,7 +3,7 @@
 import numpy as np
 
 from experiments.shape_reconstruction.explorer import DrawnContacts, ShapeExplorer
-from experiments.shape_reconstruction.methods import METHODS, QUICK, TELLING
+from experiments.shape_reconstruction.methods import QUICK, TELLING
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
@@ -71,4 +71,4 @@ def _explorer(run: RunFiles, helpers: Helpers) -> NextContact:
     choose = run.scene.section(ShapeRun).choose
     if choose == "planned":
         return DrawnContacts(helpers.twin)
-    return ShapeExplorer(run, METHODS[TELLING if choose == "active" else QUICK])
+    return ShapeExplorer(run, TELLING if choose == "active" else QUICK)

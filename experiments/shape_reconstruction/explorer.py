@@ -1,14 +1,13 @@
 """Where the next press of a shape reconstruction goes: along a free line into what is not known."""
 
-from collections.abc import Callable
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from experiments.shape_reconstruction.choosing import CHOOSERS
-from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.lines import aims_at_mask, lines_at_surface
+from experiments.shape_reconstruction.methods import estimated
 from experiments.shape_reconstruction.readings import ShapeReadings
 from experiments.shape_reconstruction.section import ShapeRun
 from experiments.shape_reconstruction.surface import ShapeEstimate
@@ -69,11 +68,11 @@ class ShapeExplorer:
 
     Args:
         run: the folder.
-        estimate: of the shape, by what is known; raises ``FitRefused`` where that is too little.
+        method: by which the shape is estimated meanwhile.
     """
 
-    def __init__(self, run: RunFiles, estimate: Callable[[ShapeEvidence], ShapeEstimate]) -> None:
-        self._run, self._estimator = run, estimate
+    def __init__(self, run: RunFiles, method: str) -> None:
+        self._run, self._method = run, method
         self._asked = run.scene.section(ShapeRun)
         self._readings = ShapeReadings(run)
         self._read, self._skipped = 0, 0
@@ -173,7 +172,7 @@ class ShapeExplorer:
 
     def _estimate(self) -> ShapeEstimate | None:
         try:
-            return self._estimator(self._readings.evidence())
+            return estimated(self._method, self._readings.evidence())
         except FitRefused:
             return None
 

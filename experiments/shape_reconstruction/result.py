@@ -8,7 +8,7 @@ import numpy as np
 
 from experiments.shape_reconstruction.answer import SENSES, ShapeAnswer
 from experiments.shape_reconstruction.dials import METHOD
-from experiments.shape_reconstruction.files import write_surface
+from experiments.shape_reconstruction.files import write_estimate
 from experiments.shape_reconstruction.metric import published_chamfer, shape_error
 from experiments.shape_reconstruction.readings import base_from_stand
 from experiments.shape_reconstruction.section import ShapeRun
@@ -101,7 +101,7 @@ def write_files(scored: Scored, folder: Path) -> None:
     answer: ShapeAnswer = scored.found
     for sense, one in answer.by_sense.items():
         if isinstance(one, ShapeEstimate):
-            write_surface(one, folder, stem_of(sense))
+            write_estimate(one, folder, stem_of(sense))
 
 
 def _warnings(scored: Scored, answer: ShapeAnswer) -> list[str]:

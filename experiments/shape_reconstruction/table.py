@@ -7,7 +7,7 @@ from typing import Any
 
 from experiments.shape_reconstruction.dials import OWN
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.methods import METHODS, TABLED
+from experiments.shape_reconstruction.methods import TABLED, estimated
 from experiments.shape_reconstruction.metric import published_chamfer, shape_error
 from experiments.shape_reconstruction.readings import evidence_of
 from experiments.shape_reconstruction.result import true_surface
@@ -114,10 +114,9 @@ def _parts(evidence: ShapeEvidence) -> Iterator[tuple[str, ShapeEvidence]]:
 
 def _row(name: str, evidence: ShapeEvidence, truth: Mesh) -> dict[str, Any]:
     """An answer's errors; what is refused counts as far off as the object is large, and says why."""
-    method = METHODS[name.partition(",")[0]]
     began = now()
     try:
-        found = method(evidence)
+        found = estimated(name.partition(",")[0], evidence)
     except FitRefused as refusal:
         size = truth.diagonal
         return {"error_m": size, "seconds": now() - began, "gross": True, "refused": str(refusal)}

@@ -39,7 +39,11 @@ class ContactSamples:
     def of(self, rows: IntArray) -> "ContactSamples":
         """Some of them."""
         return ContactSamples(
-            self.points[rows], self.normals[rows], self.sigmas[rows], self.normal_sigmas[rows], self.touches[rows]
+            self.points[rows],
+            self.normals[rows],
+            self.sigmas[rows],
+            self.normal_sigmas[rows],
+            self.touches[rows],
         )
 
 

@@ -21,7 +21,7 @@ _CONTACT_BEYOND = 0.7
 
 
 def sensor_depth(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
-    """``(n,)`` m that ``(n, 3)`` points are inside some place where the sensor's housing has been; else below 0."""
+    """``(n,)`` m that ``(n, 3)`` points are deep in what the sensor's housing passed; below 0 beside it."""
     deepest = np.full(len(points), -np.inf)
     for touch in evidence.touches:
         np.maximum(deepest, _depth_in_housing(evidence, touch, points), out=deepest)
@@ -57,10 +57,14 @@ class Silhouette:
         known = look.mask | look.hidden
         outside = ndimage.distance_transform_edt(~known) - ndimage.distance_transform_edt(known)
         unshifted = cls(look, np.asarray(outside - np.sign(outside) * 0.5), np.zeros(2))
-        return unshifted if len(contacts) == 0 else cls(look, unshifted.outside, _best_shift(unshifted, contacts))
+        return (
+            unshifted
+            if len(contacts) == 0
+            else cls(look, unshifted.outside, _best_shift(unshifted, contacts))
+        )
 
     def pixels(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """``(n, 2)`` x and y in the picture, pixels from its corner, and ``(n,)`` m in front of the camera."""
+        """``(n, 2)`` x and y in the picture, pixels from its corner, and ``(n,)`` m before the camera."""
         in_camera = apply(inverse(self.look.stand_from_camera), points)
         depth = np.maximum(in_camera[:, 2], 1e-6)
         middle = 0.5 * np.array(self.look.mask.shape[::-1])
@@ -94,7 +98,9 @@ def _best_shift(silhouette: Silhouette, contacts: FloatArray) -> FloatArray:
     steps = np.arange(-SHIFTS * sigma, SHIFTS * sigma + _STEP, _STEP)
     shifts = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
     at = (pixels[None] + shifts[:, None])[..., ::-1].reshape(-1, 2).T - 0.5
-    outside = ndimage.map_coordinates(silhouette.outside, at, order=1, mode="nearest").reshape(len(shifts), -1)
+    outside = ndimage.map_coordinates(silhouette.outside, at, order=1, mode="nearest").reshape(
+        len(shifts), -1
+    )
     beyond = (np.maximum(outside, 0.0) / _CONTACT_BEYOND) ** 2
     cost = beyond.sum(axis=1) + ((shifts / sigma) ** 2).sum(axis=1)
     return np.asarray(shifts[int(cost.argmin())])

@@ -13,8 +13,11 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from harness.basics.arrays import FloatArray
 from harness.basics.compiled import compiled
 
-_AMPLITUDES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-"""Of the covariance, over that whose gradients are as long as unit normals; the likeliest is taken."""
+UNIT = 1.0 / 18.0
+"""Amplitude at which gradients are as long as unit normals: of each component a variance of a third."""
+
+_AMPLITUDES = (0.3, 1.0, 3.0, 10.0)
+"""Over ``UNIT``, of which the likeliest is taken."""
 
 _JITTER = 1e-10
 
@@ -85,13 +88,16 @@ class ThinPlateField:
         return np.ascontiguousarray((points - self.centre) / self.reach)
 
 
-def fitted(data: SurfaceData, low: FloatArray, high: FloatArray) -> ThinPlateField:
-    """The field of the likeliest roughness.
+def fitted(
+    data: SurfaceData, low: FloatArray, high: FloatArray, amplitude: float | None = None
+) -> ThinPlateField:
+    """The field of a roughness, or of the likeliest.
 
     Args:
         data: one place or more.
         low: ``(3,)`` m, of the box in which the field will be read.
         high: ``(3,)`` m.
+        amplitude: of the covariance; None for the likeliest of a few.
     """
     corners = np.concatenate([data.points, low[None], high[None]])
     centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
@@ -99,13 +105,16 @@ def fitted(data: SurfaceData, low: FloatArray, high: FloatArray) -> ThinPlateFie
     local = np.ascontiguousarray((data.points - centre) / reach)
     prior = _cross(local, local, gradients=True)
     observed = np.column_stack([data.values / reach, data.normals]).ravel()
-    noise = np.column_stack([data.sigmas / reach, np.repeat(data.normal_sigmas[:, None], 3, axis=1)]).ravel() ** 2
+    noise = (
+        np.column_stack([data.sigmas / reach, np.repeat(data.normal_sigmas[:, None], 3, axis=1)]).ravel() ** 2
+    )
     kept = np.isfinite(noise)
     noise[~kept], observed[~kept] = 1.0, 0.0
-    prior[~kept], prior[:, ~kept] = 0.0, 0.0
-    best = max((_likelihood(prior, noise, observed, a / 18.0) for a in _AMPLITUDES), key=lambda one: one[0])
-    _, amplitude, factor, weights = best
-    return ThinPlateField(centre, reach, data, weights.reshape(-1, 4), factor, amplitude)
+    prior[~kept], prior[:, ~kept] = 0.0, 0.0  # what is not observed weighs nothing
+    tried = [a * UNIT for a in _AMPLITUDES] if amplitude is None else [amplitude]
+    best = max((_likelihood(prior, noise, observed, one) for one in tried), key=lambda found: found[0])
+    _, chosen, factor, weights = best
+    return ThinPlateField(centre, reach, data, weights.reshape(-1, 4), factor, chosen)
 
 
 def _likelihood(
@@ -122,7 +131,7 @@ def _likelihood(
 
 
 def _cross(at: FloatArray, of: FloatArray, gradients: bool = False) -> FloatArray:
-    """Covariances of values at ``(m, 3)`` places, and of their gradients if asked, with all data of ``(n, 3)``.
+    """Covariances of values at ``(m, 3)`` places, and of gradients if asked, with all data of ``(n, 3)``.
 
     ``(m, 4 n)``, or ``(4 m, 4 n)``: of each place the value, then the three components of the gradient.
     """

@@ -32,13 +32,13 @@ def isosurface(field: FloatArray, origin: FloatArray, pitch: float) -> Mesh:
     """
     if field.ndim != 3 or not np.isfinite(field).all() or not (np.isfinite(pitch) and pitch > 0.0):
         raise OutOfDomain(
-            f"a field of shape {field.shape} with {np.count_nonzero(~np.isfinite(field))} numbers not finite, "
-            f"at a pitch of {pitch:g} m, has no surface; give three finite axes and a pitch above 0"
+            f"a field of shape {field.shape} with {np.count_nonzero(~np.isfinite(field))} numbers not "
+            f"finite, at a pitch of {pitch:g} m, has no surface; give three finite axes and a pitch above 0"
         )
     if not (field < 0.0).any():
         raise OutOfDomain(
-            f"no corner of a grid of {field.shape} corners is inside (the least value is {field.min():.3g} m); "
-            "use a finer grid, or check that readings bound a body"
+            f"no corner of a grid of {field.shape} corners is inside (the least value is {field.min():.3g} "
+            "m); use a finer grid, or check that readings bound a body"
         )
     cells = np.pad(np.asarray(field, np.float64) / pitch, 1, constant_values=1.0)
     cells = np.where(np.abs(cells) < _NUDGE, _NUDGE, cells)

@@ -1,5 +1,6 @@
 """A run of shape reconstruction in process: a look, presses along chosen lines, an answer from the folder."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,10 @@ import pytest
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.experiment import EXPERIMENT
 from experiments.shape_reconstruction.explorer import ShapeExplorer
-from experiments.shape_reconstruction.methods import METHODS, QUICK
+from experiments.shape_reconstruction.methods import QUICK, estimated
 from experiments.shape_reconstruction.readings import evidence_of
 from experiments.shape_reconstruction.section import ShapeRun
-from harness.basics.errors import WrongUse
+from harness.basics.errors import FitRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.scene import scene_from_json
 from harness.bench.station_file import Station
@@ -88,13 +89,13 @@ def test_the_mesh_of_the_scene_changes_no_plan(touched: Recording) -> None:
     run, other = RunFiles(touched), build("wrench")
     object.__setattr__(run, "mesh", Mesh(other.vertices, other.faces))
     made = touched.step(1).step.parameters
-    planned = ShapeExplorer(run, METHODS[QUICK]).plan(touched, 1)
+    planned = ShapeExplorer(run, QUICK).plan(touched, 1)
     assert {key: made[key] for key in planned} == planned
 
 
 def test_no_travel_enters_the_space_that_the_object_may_take(touched: Recording) -> None:
     run = RunFiles(touched)
-    explorer = ShapeExplorer(run, METHODS[QUICK])
+    explorer = ShapeExplorer(run, QUICK)
     explorer.plan(touched, 1)
     true = read_true_surface(touched)
     assert true is not None
@@ -224,7 +225,15 @@ def test_a_run_ends_when_the_shape_is_known_as_well_as_was_asked(
     run = RunFiles(touched)
     asked = run.scene.section(ShapeRun).model_copy(update={"until": 0.5})
     object.__setattr__(run, "scene", run.scene.with_section(asked))
-    assert ShapeExplorer(run, METHODS[QUICK]).is_sure(touched, 2)
+    assert ShapeExplorer(run, QUICK).is_sure(touched, 2)
     never = run.scene.section(ShapeRun).model_copy(update={"until": 1e-9})
     object.__setattr__(run, "scene", run.scene.with_section(never))
-    assert not ShapeExplorer(run, METHODS[QUICK]).is_sure(touched, 2)
+    assert not ShapeExplorer(run, QUICK).is_sure(touched, 2)
+
+
+def test_readings_of_nothing_are_refused_with_what_to_do_next(blind: Recording) -> None:
+    evidence = evidence_of(RunFiles(blind), blind.steps())
+    missed = tuple(touch for touch in evidence.touches if not touch.met)
+    for method in ("box", "rbf", "family"):
+        with pytest.raises(FitRefused, match=f"{len(missed)} ways of the gel met nothing; check where"):
+            estimated(method, replace(evidence, touches=missed))

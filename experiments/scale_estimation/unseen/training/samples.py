@@ -12,9 +12,7 @@ from multiprocessing import get_context
 import numpy as np
 
 from experiments.scale_estimation.unseen import contact_set
-from experiments.scale_estimation.unseen.families import FAMILIES, draw
 from experiments.scale_estimation.unseen.ringing_shape import MODES, RingingShape
-from experiments.scale_estimation.unseen.solid_grid import HouseholdSolid
 from experiments.scale_estimation.unseen.training.contact_samples import (
     TouchableShape,
     contact_sample,
@@ -25,6 +23,8 @@ from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.materials import MATERIALS
 from harness.basics.store import Store, default_folder, digest
+from harness.sim.solid.household.families import FAMILIES, draw
+from harness.sim.solid.household.solid_grid import HouseholdSolid
 
 SIZES = (0.05, 0.6)
 """M, least and greatest longest side; even in the logarithm."""
