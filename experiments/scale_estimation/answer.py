@@ -23,22 +23,20 @@ from experiments.scale_estimation.unseen.answer import (
 )
 from experiments.scale_estimation.unseen.contact_set import GelWay
 from experiments.scale_estimation.unseen.real_shapes import fused_alone
-from experiments.scale_estimation.vision.outline import SeenOutline
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, MeshRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
+from harness.picture.outline import SeenOutline
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import observe_step
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
+from harness.skills.exploring.exploration import SKIPPED
 
 SENSES = ("vision", "audio", "touch")
-
-SKIPPED = "skip"
-"""Kind of a step that was not made, because no way was free."""
 
 OUTSIDE = 0.5
 """Probability beyond which a size is said to lie outside the range that was asked about."""

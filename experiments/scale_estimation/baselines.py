@@ -8,8 +8,8 @@ from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.sound.peaks import Peaks
 from experiments.scale_estimation.touch.patch import Patch
 from experiments.scale_estimation.vision.fit import View
-from experiments.scale_estimation.vision.outline import SeenOutline, directions
 from harness.basics.arrays import FloatArray
+from harness.picture.outline import SeenOutline, directions
 
 _TURNS = 8
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.dials import KNOBS, OWN
-from experiments.scale_estimation.explore import PLAN_KEY, ScalePerformer, plan, steps_of
+from experiments.scale_estimation.explore import performer, plan, steps_of
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
@@ -24,6 +24,7 @@ from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Experiment, MeasuredCondition, Scored
 from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
 from harness.recording.run_folder import RunFiles
+from harness.skills.exploring.exploration import PLAN_KEY
 
 NAME = "scale-estimation"
 
@@ -61,7 +62,7 @@ EXPERIMENT = Experiment(
     section=Scale,
     knobs=KNOBS,
     plan=plan,
-    performer=ScalePerformer,
+    performer=performer,
     answering=_answering,
     result=result_of,
     lines=lines_of,

@@ -10,18 +10,20 @@ from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.sound.hearing import MaterialGuess
 from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.touch.fit import Stand, StandErrors
-from experiments.scale_estimation.vision.fit import CameraErrors, View
-from experiments.scale_estimation.vision.outline import hull_of
+from experiments.scale_estimation.vision.fit import View
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import KNOWN, MATERIALS
 from harness.basics.mesh import Mesh
-from harness.basics.mesh_hull import closed_hull
+from harness.basics.mesh_hull import hull_of
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy, Level
 from harness.experiment.object_modes import object_modes
+from harness.picture.camera_errors import CameraErrors
 from harness.sim.solid.surface_samples import sample_surface
+from harness.skills.exploring.surroundings import nowhere
+from harness.skills.exploring.unknown_space import UnknownStand
 from harness.twin.bench import TwinBench
 from harness.twin.bench_of import twin_of
 
@@ -88,12 +90,7 @@ class ObjectModel:
     @property
     def nowhere(self) -> Mesh:
         """A mark of 2 mm on the support, in base: stands for an object of which nothing is known."""
-        low = np.array([-1.0e-3, -1.0e-3, 0.0])
-        ends = np.array([low, low + 2.0e-3]) + self.place
-        corners = np.array(
-            [[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-        )
-        return closed_hull(corners)
+        return nowhere(self.place)
 
     def twin_around(self, mesh_in_base: Mesh, has_object: bool = True) -> TwinBench:
         """The bench with this in the object's place, m in base."""
@@ -118,6 +115,11 @@ class ObjectModel:
             support=asked.support_error,
             place=asked.place_error,
         )
+
+    @property
+    def unknown_stand(self) -> UnknownStand:
+        """The same of an object whose shape nobody knows."""
+        return UnknownStand(self.place, self.errors, self.station.camera)
 
     @cached_property
     def view(self) -> View:

@@ -11,37 +11,38 @@ from typing import Any
 
 import numpy as np
 
-from experiments.scale_estimation.answer import SKIPPED, ScaleAnswering
+from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.believed import believed
 from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.envelope import blind_envelope, seen_envelope
-from experiments.scale_estimation.lines import LineTarget, contact_along, lines_to
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.on_object import contact_on_object
 from experiments.scale_estimation.readings import patch_of_contact
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.strike_met import strike_met
-from experiments.scale_estimation.surroundings import Surroundings, end_of
 from experiments.scale_estimation.touch.patch import Patch
-from experiments.scale_estimation.unknown_shape import (
-    SeenThing,
-    aims_of_seen,
-    aims_unseen,
-    seen_thing,
-    unknown_space,
-)
-from experiments.scale_estimation.vision.outline import SeenOutline
 from experiments.scale_estimation.vision.vision import SeenStand
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, MotionRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.reading import Reading
 from harness.effects.accuracy import Accuracy
+from harness.picture.outline import SeenOutline
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import observe_step
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step, StepRecord
+from harness.skills.exploring.exploration import SKIPPED
+from harness.skills.exploring.lines import LineTarget, contact_along, lines_to
+from harness.skills.exploring.surroundings import Surroundings, end_of
+from harness.skills.exploring.unknown_space import (
+    SeenThing,
+    aims_of_seen,
+    aims_unseen,
+    seen_thing,
+    unknown_space,
+)
 from harness.skills.planning import HOME
 from harness.skills.strike import POSE, READY, StrikeMotion
 from harness.twin.bench import TwinBench
@@ -115,7 +116,8 @@ class Explorer:
             with suppress(WrongUse, MotionRefused):
                 return contact_on_object(here, self._model, self._answering.patches, stand, random, strikes)
         aims, support = self._aims(random), float(self._model.place[2])
-        return contact_along(here, lines_to(aims, here, support, random))
+        press = float(np.mean(self._asked.depth))
+        return contact_along(here, lines_to(aims, here, support, random), press)
 
     def strike(self, step: Step, read: Sequence[Reading]) -> StrikeMotion | None:
         """A strike where a contact has just met the object; None where none is left, or none is free.
@@ -147,7 +149,7 @@ class Explorer:
         if self._drawn and not self._seen:
             self._seen = self._answering.stands_seen()
         elif not self._drawn and self._thing is None:
-            self._thing = seen_thing(self._model, outline)
+            self._thing = seen_thing(self._model.unknown_stand, outline)
 
     def _take_in_step(self, record: StepRecord) -> None:
         self._answering.read(record)
@@ -174,7 +176,7 @@ class Explorer:
         model, outline = self._model, self._answering.outline
         if not self._drawn:
             seen = outline if isinstance(outline, SeenOutline) else None
-            return unknown_space(model, seen, self._largest())
+            return unknown_space(model.unknown_stand, seen, self._largest())
         return seen_envelope(model, self._seen) if self._seen else blind_envelope(model)
 
     def _largest(self) -> float:

@@ -8,12 +8,12 @@ import numpy as np
 
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.section import Scale
-from experiments.scale_estimation.surroundings import Surroundings, rehearsed_strike
 from experiments.scale_estimation.touch.fit import DISTANCE_SIGMA, UNKNOWNS, TouchProblem
 from experiments.scale_estimation.touch.patch import Patch
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.sim.gel.height_map import RasterMesh
+from harness.skills.exploring.surroundings import Surroundings, rehearsed_strike
 from harness.skills.planning import Itinerary
 from harness.skills.press import ContactMotion
 from harness.skills.sites import PressLimits, Site, plan_sites

@@ -6,10 +6,10 @@ import numpy as np
 
 from experiments.scale_estimation.sound.peaks import Peaks
 from experiments.scale_estimation.touch.patch import Patch, patch_of
-from experiments.scale_estimation.vision.outline import SeenOutline, read_outline
 from harness.basics.arrays import ByteArray
 from harness.bench.acquisition import Strike
 from harness.picture.object_mask import mask_by_background
+from harness.picture.outline import SeenOutline, read_outline
 from harness.recording.observation import Observation
 from harness.recording.step_file import StepRecord
 from harness.sim.optics.inverse import invert

@@ -10,15 +10,16 @@ from experiments.scale_estimation.envelope import placed
 from experiments.scale_estimation.sound.hearing import Hearing
 from experiments.scale_estimation.touch.touch import Touch
 from experiments.scale_estimation.unseen.spectrogram import FRAMES, band_levels, response_of
-from experiments.scale_estimation.vision.outline import SeenOutline, corners_of, hull_of
 from experiments.scale_estimation.vision.vision import Sight
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import MATERIALS
+from harness.basics.mesh_hull import hull_of
 from harness.bench.device import Health
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.experiment.lookup import named
+from harness.picture.outline import SeenOutline, corners_of
 from harness.report.figures.figures import Album
 from harness.report.figures.size import (
     Resonances,

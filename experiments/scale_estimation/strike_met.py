@@ -3,13 +3,13 @@
 import numpy as np
 
 from experiments.scale_estimation.model import ObjectModel
-from experiments.scale_estimation.surroundings import Surroundings, rehearsed_strike
 from experiments.scale_estimation.touch.patch import Patch
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import MotionRefused
 from harness.basics.geometry import apply, transform
 from harness.basics.mesh import Mesh
 from harness.basics.mesh_hull import closed_hull
+from harness.skills.exploring.surroundings import Surroundings, rehearsed_strike
 from harness.skills.strike import StrikeMotion, planner
 
 STEEPEST = float(np.radians(45.0))

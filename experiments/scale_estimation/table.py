@@ -22,7 +22,6 @@ from experiments.scale_estimation.touch.touch import by_touch
 from experiments.scale_estimation.unseen.answer import imprints_alone
 from experiments.scale_estimation.unseen.paper.network import PaperNetwork, paper_networks
 from experiments.scale_estimation.unseen.paper.rows import PAPER_ROWS, PaperReadings, paper_sizes
-from experiments.scale_estimation.vision.outline import SeenOutline
 from harness.basics.arrays import ByteArray
 from harness.basics.clock import now
 from harness.basics.errors import DataRefused, FitRefused
@@ -33,6 +32,7 @@ from harness.experiment.experiment import Experiment
 from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
+from harness.picture.outline import SeenOutline
 from harness.recording.run_folder import RunFiles
 
 TRIVIAL = ("random", "constant", "first peak", "outline's area", "outline's box", "contacts' box")

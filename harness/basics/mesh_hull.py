@@ -1,10 +1,18 @@
-"""The convex hull of points as a closed mesh."""
+"""The convex hull of points: those that span it, and the hull as a closed mesh."""
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
+
+
+def hull_of(points: FloatArray) -> FloatArray:
+    """``(m, d)`` those of ``(n, d)`` points that span their convex hull; all of a flat set."""
+    try:
+        return points[ConvexHull(points).vertices]
+    except QhullError:
+        return np.unique(points, axis=0)
 
 
 def closed_hull(points: FloatArray) -> Mesh:

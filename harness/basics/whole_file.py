@@ -15,9 +15,14 @@ def sync_folder(folder: Path) -> None:
 
 def write_text_whole(path: Path, text: str) -> None:
     """Write a text file aside, flush it, rename it: readers see the old one or the new one."""
+    write_bytes_whole(path, text.encode("utf-8"))
+
+
+def write_bytes_whole(path: Path, data: bytes) -> None:
+    """The same of a file's bytes."""
     part = path.with_name(f".{path.name}.part")
-    with part.open("w", encoding="utf-8") as stream:
-        stream.write(text)
+    with part.open("wb") as stream:
+        stream.write(data)
         stream.flush()
         os.fsync(stream.fileno())
     part.replace(path)

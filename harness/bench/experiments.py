@@ -41,6 +41,12 @@ EXPERIMENTS: dict[str, ExperimentRow] = {
         section="scale",
         model="experiments.scale_estimation.section:Scale",
     ),
+    "shape-reconstruction": ExperimentRow(
+        about="What does an object never seen look like?",
+        value="experiments.shape_reconstruction.experiment:EXPERIMENT",
+        section="shape",
+        model="experiments.shape_reconstruction.section:ShapeRun",
+    ),
     "calibrate-taxim": ExperimentRow(
         about="How does a tactile camera's gel turn slope into colour?", command="calibrate taxim"
     ),

@@ -126,6 +126,9 @@ def write_answer(
     result = {**common(experiment, scored), **scored.result, **(more or {})}
     result["warnings"] = [*scored.warnings, *result.get("warnings", ())]
     result["answered_after_s"] = None if since is None else now() - since
+    if experiment.files is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        experiment.files(scored, folder)
     _write(folder / RESULT, result)
     publish(result)
     return WrittenAnswer(scored, result)

@@ -271,6 +271,8 @@ class Experiment(Procedure):
         sources: what the answer gives the comparison, by name.
         gives: the names of those sources; what else a scene observes is refused before anything moves.
         report: writes the page of a scored run; None for the plain page of every experiment.
+        files: writes what the answer is beside its JSON values into the folder of ``result.json``, where the
+            result names it; None for nothing.
         budgets: answers to a budget or an error; None where it cannot.
         measurement: for tables and cost; None where it has none.
     """
@@ -283,6 +285,7 @@ class Experiment(Procedure):
     sources: Callable[[Scored], Mapping[str, Any]]
     gives: tuple[str, ...]
     report: Callable[[Scored, Any, Mapping[str, Health] | None, Path], Path] | None = None
+    files: Callable[[Scored, Path], None] | None = None
     budgets: Budgets | None = None
     measurement: Measurement | None = None
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from harness.basics.arrays import FloatArray
+from harness.basics.mesh import Mesh
 from harness.recording.recording import Recording
 
 
@@ -32,3 +33,12 @@ def read_truth(recording: Recording) -> Truth | None:
     written = json.loads(path.read_text(encoding="utf-8"))
     points = {c["step"]: np.array(c["point_in_object_m"]) for c in written["contacts"]}
     return Truth(points, written["differences"])
+
+
+def read_true_surface(recording: Recording) -> Mesh | None:
+    """The true object of a mocked run as it stands, in base; None where nothing says it."""
+    path = recording.truth_path.with_suffix(".npz")
+    if not path.exists():
+        return None
+    with np.load(path, allow_pickle=False) as archive:
+        return Mesh(archive["vertices"], archive["faces"])

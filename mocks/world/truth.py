@@ -4,7 +4,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from harness.basics.arrays import FloatArray
+from harness.basics.geometry import apply
 from harness.basics.whole_file import write_text_whole
 from harness.bench.station import STRIKE
 from mocks.world.world import World
@@ -18,7 +21,8 @@ SCHEMA = 1
 class TruthFile:
     """``truth.json``: what the world knows, and where each contact really was.
 
-    A step that is performed again, after a resume, replaces what was written of it.
+    A step that is performed again, after a resume, replaces what was written of it. Beside it ``truth.npz``
+    has the true surface as it stands: ``vertices``, m in base, and ``faces``.
 
     Args:
         path: of the file; contacts already in it are kept if it is of the same world.
@@ -41,6 +45,7 @@ class TruthFile:
             },
         }
         self._contacts: dict[int, dict[str, Any]] = self._resumed()
+        self._has_surface = False
 
     def append(self, base_from_flange: FloatArray, step: int, sample: int) -> None:
         """Write where the press or the strike of ``step`` is, with the flange reported at this pose."""
@@ -63,8 +68,17 @@ class TruthFile:
         self._write()
 
     def _write(self) -> None:
+        if not self._has_surface:
+            self._write_surface()
         contacts = [self._contacts[index] for index in sorted(self._contacts)]
         write_text_whole(self._path, json.dumps({**self._head, "contacts": contacts}, indent=1) + "\n")
+
+    def _write_surface(self) -> None:
+        world, path = self._world, self._path.with_suffix(".npz")
+        part = path.with_name(f".{path.name}")
+        np.savez(part, vertices=apply(world.base_from_object, world.mesh.vertices), faces=world.mesh.faces)
+        part.replace(path)
+        self._has_surface = True
 
     def _strike(self, sound: "WorldSound", base_from_flange: FloatArray, step: int) -> dict[str, Any]:
         aim = sound.aim(base_from_flange, step, STRIKE)

@@ -27,7 +27,7 @@ from harness.experiment.lookup import named, names
 from harness.objectfile.description import Description
 from harness.recording.recording import SCHEMA, RunHeader
 from tests.docs.model_tables import dataclass_keys, keys, markdown, nested, summary, table
-from tests.docs.result_keys import ASKED, COMMON, ESTIMATE, LOCALIZATION
+from tests.docs.result_keys import ASKED, COMMON, ESTIMATE, LOCALIZATION, SHAPE, SHAPE_ESTIMATE
 
 FOLDER = Path(__file__).parents[2] / "docs" / "reference"
 NOTE = "Generated from the code by `make reference`; do not edit."
@@ -113,6 +113,8 @@ def _result() -> list[str]:
         ("Every experiment", {**COMMON, **ASKED}),
         ("Contact localization", LOCALIZATION),
         ("One estimate of contact localization", ESTIMATE),
+        ("Shape reconstruction", SHAPE),
+        ("One estimate of shape reconstruction", SHAPE_ESTIMATE),
     ):
         rows = [(f"`{key}`", meaning) for key, meaning in keys_of.items()]
         lines += [f"## {heading}", "", *table(("key", "meaning"), rows), ""]

@@ -52,3 +52,37 @@ ESTIMATE = {
     "seconds_by_stage": "s by stage",
 }
 """Of one estimate of contact localization."""
+
+SHAPE = {
+    "error_m": "m, Chamfer-L1 of the fused surface from the truth, samples to surface; null without a truth",
+    "deviation_m": "m, mean of the standard deviations of the fused surface's vertices",
+    "extents_m": "m, sides of the fused surface's box along the axes of base",
+    "method": "the estimator",
+    "choose": "what chose where the presses led",
+    "presses": "how many guarded ways the gel has followed, those that met nothing too",
+    "contacts": "how many of them met the object",
+    "estimates": "by sense (`vision`, `touch`, `fused`): an estimate, or `refused` with the reason",
+    "seconds": "s that the answers took, the reading of the pictures included",
+}
+"""Of shape reconstruction, beside the common ones."""
+
+SHAPE_ESTIMATE = {
+    "chamfer_m": "m, half the sum of the mean distances from samples of each surface to the other; null "
+    "without a truth",
+    "chamfer_points_m": "m, the published form: from 10,000 points to 10,000 points",
+    "accuracy_m": "m, mean distance from the estimate to the truth",
+    "completeness_m": "m, mean distance from the truth to the estimate",
+    "f_score": "0 to 1, at 5 mm",
+    "deviation_m": "m, mean of the vertices' standard deviations",
+    "extents_m": "m, sides of the box along the axes of base",
+    "touched": "share of the vertices that were under a gel",
+    "seen": "share of the vertices at the border of the silhouette",
+    "not_bounded": "names of the axes along which no reading bounds the object",
+    "doubtful_m": "m that a touch is off what all others say, by its step",
+    "flags": "sentences that the answer carries",
+    "details": "what the estimator found beside",
+    "mesh": "file of the surface beside `result.json`, each vertex with its `deviation` and `known_by`",
+    "seconds": "s of this estimate",
+    "refused": "why there is none; else null",
+}
+"""Of one estimate of shape reconstruction."""

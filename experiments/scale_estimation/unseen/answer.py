@@ -10,12 +10,12 @@ from experiments.scale_estimation.unseen.network import by_imprints, by_strikes,
 from experiments.scale_estimation.unseen.real_shapes import shape_sigma
 from experiments.scale_estimation.unseen.regression import by_outline, features_of
 from experiments.scale_estimation.unseen.spectrogram import response_of
-from experiments.scale_estimation.vision.outline import SeenOutline
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import Material
 from harness.bench.acquisition import Strike
 from harness.bench.station_sections import CameraSection
+from harness.picture.outline import SeenOutline
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from experiments.scale_estimation.size import Belief, SizeRange
-from experiments.scale_estimation.vision.outline import DIRECTIONS, SeenOutline
 from harness.basics.arrays import FloatArray
+from harness.picture.outline import DIRECTIONS, SeenOutline
 
 WEIGHTS = "data/outline_regression.npz"
 """In this package; written by ``python -m experiments.scale_estimation.unseen.train``."""

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.scale_estimation.unseen.solid_grid import HouseholdSolid
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.materials import MATERIALS, Material
 from harness.sim.modal.modal import solve_modes
 from harness.sim.modal.modes import dampings
+from harness.sim.solid.household.solid_grid import HouseholdSolid
 from harness.sim.solid.tetrahedra import Tetrahedra
 from harness.sim.sound.modal_radiation import radiation
 

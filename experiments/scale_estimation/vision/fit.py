@@ -5,8 +5,10 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from experiments.scale_estimation.vision.outline import SeenOutline, directions, hull_of
 from harness.basics.arrays import FloatArray, read_only
+from harness.basics.mesh_hull import hull_of
+from harness.picture.camera_errors import CameraErrors
+from harness.picture.outline import SeenOutline, directions
 
 PIXEL_SIGMA = 0.4
 """Pixels, of where a mask's outermost pixel leaves the outline, and a model's shape it."""
@@ -21,27 +23,6 @@ _NUDGE = 1.0e-6
 
 _AROUND = 600
 """Directions, five degrees apart: a corner between two stands out by less than a thousandth of the size."""
-
-
-@dataclass(frozen=True)
-class CameraErrors:
-    """How well the scene camera and the support are known: standard deviations.
-
-    Attributes:
-        position: m, per axis.
-        rotation: rad, per axis.
-        focal_length: relative.
-        support: m, of the height on which the object stands.
-        tilt: rad, per axis, of the object's own stand.
-        place: m, per axis of the plane, of where it is put.
-    """
-
-    position: float = 2.0e-3
-    rotation: float = float(np.radians(0.2))
-    focal_length: float = 5.0e-3
-    support: float = 1.0e-3
-    tilt: float = float(np.radians(0.5))
-    place: float = 0.1
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from scipy.interpolate import PchipInterpolator
 
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.vision.fit import OutlineFit, OutlineProblem, View
-from experiments.scale_estimation.vision.outline import SeenOutline
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
+from harness.picture.outline import SeenOutline
 
 MISFIT = 0.9
 """Pixels rms between the outlines beyond which the picture is not of this object."""

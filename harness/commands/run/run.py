@@ -54,6 +54,9 @@ def run(
         ),
     ] = None,
     contacts: Annotated[int | None, typer.Option(help="How many contacts.", min=1, max=100)] = None,
+    presses: Annotated[
+        int | None, typer.Option(help="How many presses of an object of unknown shape.", min=0, max=100)
+    ] = None,
     spacing: Annotated[
         Spacing | None, typer.Option(help="close: within 25 mm of the last; spread: over the object.")
     ] = None,
@@ -119,6 +122,7 @@ def run(
             out=out,
             set=set_,
             contacts=contacts,
+            presses=presses,
             spacing=spacing,
             yaw=yaw,
             sense=sense,
@@ -131,7 +135,7 @@ def run(
         accuracy = chosen_levels(kind.knobs, level or [])
     else:
         accuracy = chosen_levels(kind.knobs, level or [])
-        keys: dict[str, Any] = {"contacts": contacts, "spacing": spacing, "yaw": yaw}
+        keys: dict[str, Any] = {"contacts": contacts, "presses": presses, "spacing": spacing, "yaw": yaw}
         if ends_run and kind.error_key is not None:
             keys[kind.error_key] = error
         wanted = resolve(

@@ -15,7 +15,6 @@ from experiments.scale_estimation.baselines import by_box
 from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.size import Belief
 from experiments.scale_estimation.table import ScaleCell, scene_of
-from experiments.scale_estimation.vision.outline import SeenOutline
 from harness.basics.errors import FitRefused
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import Station, load_station, station_path
@@ -24,6 +23,7 @@ from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
 from harness.experiment.subjects import objects
 from harness.experiment.truth import read_truth
+from harness.picture.outline import SeenOutline
 from harness.recording.run_folder import RunFiles
 from tests.support.real_data import find_shared_data
 

@@ -6,16 +6,15 @@ from typing import Any
 
 import pytest
 
-from experiments.scale_estimation.answer import SKIPPED
 from experiments.scale_estimation.envelope import blind_envelope, seen_envelope
 from experiments.scale_estimation.experiment import EXPERIMENT
-from experiments.scale_estimation.explore import MOST_SKIPPED
 from experiments.scale_estimation.next_contact import Explorer
 from harness.basics.errors import WrongUse
 from harness.bench.station_file import Station
 from harness.experiment.begin import begin
 from harness.recording.recording import Recording
 from harness.recording.session import Quiet
+from harness.skills.exploring.exploration import MOST_SKIPPED, SKIPPED
 from harness.skills.strike import POSE, READY
 from harness.twin.rehearsal import rehearse
 from tests.experiments.scale_estimation.runs import (

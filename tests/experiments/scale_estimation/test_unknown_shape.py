@@ -7,19 +7,19 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from experiments.scale_estimation.answer import ScaleAnswering
-from experiments.scale_estimation.envelope import margin_of
 from experiments.scale_estimation.experiment import EXPERIMENT
 from experiments.scale_estimation.next_contact import Explorer
-from experiments.scale_estimation.unknown_shape import unknown_space
-from experiments.scale_estimation.vision.outline import SeenOutline
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import finish
 from harness.objects.builtin import build
+from harness.picture.outline import SeenOutline
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
+from harness.skills.exploring.envelope import margin_of
+from harness.skills.exploring.unknown_space import unknown_space
 from harness.skills.strike import POSE
 from harness.twin.rehearsal import rehearse
 from tests.experiments.scale_estimation.runs import answering_of, outside, ran, scene_of, travels, true_mesh
@@ -68,8 +68,8 @@ def test_the_object_is_within_the_space_and_a_look_makes_it_small(explored: Reco
     answering = answering_of(explored)
     assert isinstance(answering.outline, SeenOutline)
     largest = answering.model.sizes.high
-    unseen = unknown_space(answering.model, None, largest)
-    seen = unknown_space(answering.model, answering.outline, largest)
+    unseen = unknown_space(answering.model.unknown_stand, None, largest)
+    seen = unknown_space(answering.model.unknown_stand, answering.outline, largest)
     assert outside(explored, seen) < 0.0
     assert outside(explored, unseen) < 0.0
     assert ConvexHull(seen.vertices).volume < 0.5 * ConvexHull(unseen.vertices).volume
@@ -77,7 +77,7 @@ def test_the_object_is_within_the_space_and_a_look_makes_it_small(explored: Reco
 
 def test_the_space_of_what_was_never_seen_holds_the_largest_box_at_any_turn(explored: Recording) -> None:
     model = answering_of(explored).model
-    space, largest = unknown_space(model, None, model.sizes.high), model.sizes.high
+    space, largest = unknown_space(model.unknown_stand, None, model.sizes.high), model.sizes.high
     low, high = space.bounds
     reach = largest / np.sqrt(2.0) + 3.0 * model.place_error
     assert np.all(high[:2] - model.place[:2] >= reach)

@@ -10,10 +10,10 @@ from scipy.sparse.csgraph import connected_components
 
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.unseen.families import FAMILIES, draw
 from experiments.scale_estimation.unseen.regression import by_outline, features_of, shipped
 from experiments.scale_estimation.unseen.training.outlines import fitted, pictures
 from harness.bench.station_file import Station
+from harness.sim.solid.household.families import FAMILIES, draw
 from harness.sim.solid.surface_measure import enclosed_volume
 from tests.experiments.scale_estimation.runs import answered, ran, scene_of
 from tests.experiments.scale_estimation.test_vision import FOCAL, PLACE, camera, nominal, outline_at, view_of

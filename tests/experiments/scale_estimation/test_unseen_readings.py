@@ -7,13 +7,13 @@ from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.unseen.answer import strikes_alone, ways_alone
 from experiments.scale_estimation.unseen.contact_set import MOST, GelWay
 from experiments.scale_estimation.unseen.contact_set import features as features_of_ways
-from experiments.scale_estimation.unseen.families import draw
 from experiments.scale_estimation.unseen.network import YAWS, by_strikes, by_ways, shipped
 from experiments.scale_estimation.unseen.spectrogram import BANDS, features
 from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, contact_sample
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import MATERIALS
+from harness.sim.solid.household.families import draw
 from harness.sim.sound.synthesis import synthesize
 
 RANGE = SizeRange(0.05, 0.6)

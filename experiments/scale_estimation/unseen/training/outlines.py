@@ -4,12 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.scale_estimation.unseen.families import FAMILIES, draw
 from experiments.scale_estimation.unseen.regression import WEIGHTS, Regression, features_of, products
-from experiments.scale_estimation.vision.fit import CameraErrors, View
-from experiments.scale_estimation.vision.outline import SeenOutline, directions, hull_of
+from experiments.scale_estimation.vision.fit import View
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import transform
+from harness.basics.mesh_hull import hull_of
+from harness.picture.camera_errors import CameraErrors
+from harness.picture.outline import SeenOutline, directions
+from harness.sim.solid.household.families import FAMILIES, draw
 
 PICTURES = 6
 """Of each shape: other sizes, turns and cameras."""

@@ -14,11 +14,11 @@ from experiments.scale_estimation.unseen.regression import by_outline
 from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, contact_sample
 from experiments.scale_estimation.unseen.training.outlines import picture
 from experiments.scale_estimation.unseen.training.samples import SIZES, draw_size
-from experiments.scale_estimation.vision.outline import hull_of
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.mesh import Mesh
 from harness.experiment.subjects import REAL
+from harness.basics.mesh_hull import hull_of
 from harness.sim.solid.mesh_read import read_mesh
 
 READINGS = 8

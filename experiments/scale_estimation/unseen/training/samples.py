@@ -10,9 +10,7 @@ from functools import partial
 import numpy as np
 
 from experiments.scale_estimation.unseen import contact_set
-from experiments.scale_estimation.unseen.families import FAMILIES, draw
 from experiments.scale_estimation.unseen.ringing_shape import MODES, RingingShape
-from experiments.scale_estimation.unseen.solid_grid import HouseholdSolid
 from experiments.scale_estimation.unseen.training.contact_samples import (
     TouchableShape,
     contact_sample,
@@ -24,6 +22,8 @@ from harness.basics.errors import MeshRefused
 from harness.basics.materials import MATERIALS
 from harness.basics.store import Store, default_folder, digest
 from harness.basics.worker_pool import worker_pool
+from harness.sim.solid.household.families import FAMILIES, draw
+from harness.sim.solid.household.solid_grid import HouseholdSolid
 
 SIZES = (0.05, 0.6)
 """M, least and greatest longest side; even in the logarithm."""

@@ -5,7 +5,6 @@ from typing import Any, Protocol
 import numpy as np
 import torch
 
-from experiments.scale_estimation.unseen.families import FAMILIES
 from experiments.scale_estimation.unseen.training.fit import (
     densities,
     family_of,
@@ -19,6 +18,7 @@ from experiments.scale_estimation.unseen.training.fit import (
 from experiments.scale_estimation.unseen.training.networks import graph
 from experiments.scale_estimation.unseen.training.samples import SIZES, SizeSamples, samples_of
 from harness.basics.arrays import FloatArray
+from harness.sim.solid.household.families import FAMILIES
 
 HELD_OUT = (0.1, 0.1)
 """Shares of the shapes that the width is found on, and that all is tested on."""

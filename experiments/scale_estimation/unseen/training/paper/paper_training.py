@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import torch
 
-from experiments.scale_estimation.unseen.families import FAMILIES
 from experiments.scale_estimation.unseen.paper.inputs import FRAMES, HOP, LINES, SIDE, STEPS, WINDOW
 from experiments.scale_estimation.unseen.training.paper.paper_fit import (
     MODULES,
@@ -19,6 +18,7 @@ from experiments.scale_estimation.unseen.training.paper.paper_samples import pap
 from experiments.scale_estimation.unseen.training.samples import SIZES, SizeSamples, gathered
 from experiments.scale_estimation.unseen.training.train_network import HELD_OUT
 from harness.basics.arrays import FloatArray
+from harness.sim.solid.household.families import FAMILIES
 
 _TAKES = {
     "picture": f"one RGB crop of {SIDE} x {SIDE} pixels about the object, what is behind it black; the "

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.scale_estimation.section import Scale
-from experiments.scale_estimation.surroundings import Surroundings
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import MotionRefused, WrongUse
 from harness.basics.geometry import frame_facing, transform
+from harness.skills.exploring.surroundings import Surroundings
 from harness.skills.press import ContactMotion
 from harness.twin.motion import PlannedContact, plan_contact
 from harness.twin.rehearsal import rehearse
@@ -62,14 +61,18 @@ def lines_to(
         yield transform(frame_facing(inward, random.uniform(0.0, 2.0 * np.pi)), end)
 
 
-def contact_along(here: Surroundings, lines: Iterable[FloatArray]) -> dict[str, Any]:
+def contact_along(here: Surroundings, lines: Iterable[FloatArray], press: float) -> dict[str, Any]:
     """The parameters of a contact along the first of these lines that has a free way.
+
+    Args:
+        here: where the arm moves.
+        lines: ``(4, 4)`` each in base, where the gel would end were nothing there.
+        press: m to press on after the first touch.
 
     Raises:
         WrongUse: none has.
     """
     tried = list(lines)
-    press = float(np.mean(here.scene.section(Scale).depth))
     for searched in (0, 1):
         for base_from_gel in tried:
             contact = _planned(here, base_from_gel, searched)
@@ -78,7 +81,7 @@ def contact_along(here: Surroundings, lines: Iterable[FloatArray]) -> dict[str, 
                 return motion.to_parameters()
     raise WrongUse(
         f"no free way was found on any of {len(tried)} lines to where the object should be, around all the "
-        "space that it may take; give a smaller range of sizes, or another place"
+        "space that it may take; say that it is smaller, where that is known, or give another place"
     )
 
 

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from experiments.scale_estimation.envelope import around
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
+from harness.skills.exploring.envelope import around
 
 SUPPORT = 0.25
 ROUNDOFF = 1e-12

@@ -5,10 +5,10 @@ from functools import cache
 
 import numpy as np
 from scipy import ndimage
-from scipy.spatial import ConvexHull, QhullError
 
 from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.basics.errors import DataRefused
+from harness.basics.mesh_hull import hull_of
 
 DIRECTIONS = 72
 """In which the outline is read: one every five degrees."""
@@ -75,14 +75,6 @@ def read_outline(mask: BoolArray, in_front: BoolArray | None = None) -> SeenOutl
         )
     hidden = (reach > extents + 0.5) | cut
     return SeenOutline(read_only(extents + OUTSIDE), read_only(hidden))
-
-
-def hull_of(points: FloatArray) -> FloatArray:
-    """``(m, d)`` those of ``(n, d)`` points that span their convex hull; all of a flat set."""
-    try:
-        return points[ConvexHull(points).vertices]
-    except QhullError:
-        return np.unique(points, axis=0)
 
 
 def corners_of(outline: SeenOutline) -> FloatArray:

@@ -1,6 +1,6 @@
 """An object of unknown shape: the space that it may take, and where lines to it lead.
 
-Nothing of the scene's mesh is used but the range of sizes. Without a look the object is anywhere in an
+Nothing is known of it but how large it may be. Without a look the object is anywhere in an
 upright cylinder; a look adds that no part of it is beside its outline.
 """
 
@@ -11,13 +11,13 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial import HalfspaceIntersection
 
-from experiments.scale_estimation.envelope import PLACES, around, margin_of
-from experiments.scale_estimation.lines import LINES, LineTarget
-from experiments.scale_estimation.model import ObjectModel
-from experiments.scale_estimation.vision.outline import SeenOutline, corners_of, directions
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
 from harness.bench.station_sections import CameraSection
+from harness.picture.camera_errors import CameraErrors
+from harness.picture.outline import SeenOutline, corners_of, directions
+from harness.skills.exploring.envelope import PLACES, around, margin_of
+from harness.skills.exploring.lines import LINES, LineTarget
 
 SIDES = 24
 """Of the upright prism that stands for the cylinder, and holds it."""
@@ -38,6 +38,27 @@ _LEAST = 1.0e-3
 _ASIDE = (-0.8, 0.8)
 _A_TARGET = 5
 """Lines to one target before the next is tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnknownStand:
+    """Where an object of unknown shape was put, and what looks at it.
+
+    Attributes:
+        place: ``(3,)`` m in base, nominally: its middle, on the support.
+        errors: of that, and of the camera.
+        camera: of the station; None without.
+    """
+
+    place: FloatArray
+    errors: CameraErrors
+    camera: CameraSection | None = None
+
+    @property
+    def looking(self) -> CameraSection:
+        """The camera; there is an outline, so there is one."""
+        assert self.camera is not None
+        return self.camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,45 +84,38 @@ class SeenThing:
         return not self.off.any()
 
 
-def camera_of(model: ObjectModel) -> CameraSection:
-    """The station's; there is an outline, so there is one."""
-    camera = model.station.camera
-    assert camera is not None
-    return camera
-
-
-def unknown_space(model: ObjectModel, outline: SeenOutline | None, largest: float) -> Mesh:
+def unknown_space(stand: UnknownStand, outline: SeenOutline | None, largest: float) -> Mesh:
     """All that an object of unknown shape may take, in base.
 
     Args:
-        model: says its place and how well that and the camera are known.
+        stand: where it was put.
         outline: of the picture; None without a look.
         largest: m, its longest side at most.
     """
-    sides = _prism(model, largest)
-    seen = sides if outline is None else np.concatenate([sides, _cone(model, outline)])
+    sides = _prism(stand, largest)
+    seen = sides if outline is None else np.concatenate([sides, _cone(stand, outline)])
     corners = _corners_between(seen)
     if corners is None:  # it was seen where it cannot be: the look is not believed
         corners = _corners_between(sides)
     assert corners is not None
-    return around(corners, 0.0, margin_of(largest), float(model.place[2]))
+    return around(corners, 0.0, margin_of(largest), float(stand.place[2]))
 
 
-def _prism(model: ObjectModel, largest: float) -> FloatArray:
+def _prism(stand: UnknownStand, largest: float) -> FloatArray:
     """``(n, 4)`` half-spaces ``normal . place + offset <= 0``: the box of any yaw, where it may be put."""
-    reach = largest / np.sqrt(2.0) + PLACES * model.place_error
+    reach = largest / np.sqrt(2.0) + PLACES * stand.errors.place
     turns = np.arange(SIDES) * 2.0 * np.pi / SIDES
     normals = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(SIDES)])
-    around_place = np.column_stack([normals, -normals @ model.place - reach])
-    high = PLACES * model.errors.support
-    top = np.array([0.0, 0.0, 1.0, -(model.place[2] + largest + high)])
-    bottom = np.array([0.0, 0.0, -1.0, model.place[2] - high])
+    around_place = np.column_stack([normals, -normals @ stand.place - reach])
+    high = PLACES * stand.errors.support
+    top = np.array([0.0, 0.0, 1.0, -(stand.place[2] + largest + high)])
+    bottom = np.array([0.0, 0.0, -1.0, stand.place[2] - high])
     return np.concatenate([around_place, top[None], bottom[None]])
 
 
-def _cone(model: ObjectModel, outline: SeenOutline) -> FloatArray:
+def _cone(stand: UnknownStand, outline: SeenOutline) -> FloatArray:
     """``(n, 4)`` half-spaces through the camera: the object is on the inner side of each."""
-    camera, errors = camera_of(model), model.errors
+    camera, errors = stand.looking, stand.errors
     pose, focal = camera.base_from_camera.matrix, camera.focal_length
     towards, centre = directions(), _centre(camera)
     off_axis = float(np.linalg.norm(corners_of(outline) - centre, axis=1).max())
@@ -126,17 +140,17 @@ def _corners_between(sides: FloatArray) -> FloatArray | None:
     return np.asarray(HalfspaceIntersection(sides, inner[:3]).intersections)
 
 
-def seen_thing(model: ObjectModel, outline: SeenOutline) -> SeenThing:
+def seen_thing(stand: UnknownStand, outline: SeenOutline) -> SeenThing:
     """Where an outline's middle and its ends are: at the distance of the support, or of the nominal place."""
-    camera, support = camera_of(model), float(model.place[2])
-    level = (model.place - camera.base_from_camera.matrix[:3, 3]) * [1.0, 1.0, 0.0]
+    camera, support = stand.looking, float(stand.place[2])
+    level = (stand.place - camera.base_from_camera.matrix[:3, 3]) * [1.0, 1.0, 0.0]
     sight = level / np.linalg.norm(level)
     centre = 2.0 * (outline.extents[:, None] * directions()).mean(axis=0)  # Steiner's point of the outline
-    middle, *ends = (_met(camera, pixel, sight, model.place) for pixel in (centre, *_chord(outline)))
+    middle, *ends = (_met(camera, pixel, sight, stand.place) for pixel in (centre, *_chord(outline)))
     tall = float(middle[2]) - support
-    off = model.place_error * sight[:2]
+    off = stand.errors.place * sight[:2]
     if tall < FLAT * 0.5 * np.linalg.norm(ends[1] - ends[0]):
-        above = np.array([*model.place[:2], support + LYING])
+        above = np.array([*stand.place[:2], support + LYING])
         up = np.array([0.0, 0.0, 1.0])
         middle, *ends = (_met(camera, pixel, up, above) for pixel in (centre, *_chord(outline)))
         off = np.zeros(2)

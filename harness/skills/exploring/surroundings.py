@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from harness.basics.arrays import FloatArray
+from harness.basics.mesh import Mesh
+from harness.basics.mesh_hull import closed_hull
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.skills.strike import StrikeMotion
@@ -31,6 +33,18 @@ class Surroundings:
     travels: TwinBench
     nothing: TwinBench
     joints: FloatArray
+
+
+def nowhere(place: FloatArray) -> Mesh:
+    """A mark of 2 mm on the support, in base: stands for an object of which nothing is known.
+
+    Args:
+        place: ``(3,)`` m in base: where the object nominally stands.
+    """
+    low = np.array([-1.0e-3, -1.0e-3, 0.0])
+    ends = np.array([low, low + 2.0e-3]) + place
+    corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    return closed_hull(corners)
 
 
 def rehearsed_strike(strike: PlannedStrike, travels: TwinBench, lines: TwinBench) -> StrikeMotion:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.scale_estimation.unseen.solid_grid import SolidGrid
 from harness.basics.arrays import FloatArray, IntArray
+from harness.sim.solid.household.solid_grid import SolidGrid
 
 AROUND = 24
 """Cells about the axis."""

@@ -5,8 +5,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from experiments.scale_estimation.unseen.solid_grid import HouseholdSolid, SolidGrid
-from experiments.scale_estimation.unseen.vessel import Cross, Vessel, add_arm, add_handle, offset, turned
+from harness.sim.solid.household.solid_grid import HouseholdSolid, SolidGrid
+from harness.sim.solid.household.vessel import Cross, Vessel, add_arm, add_handle, offset, turned
 
 _Random = np.random.Generator
 

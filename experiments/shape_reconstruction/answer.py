@@ -1,0 +1,113 @@
+"""From a run's readings to the shape of its object: by the picture, by touch, and by both."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from experiments.shape_reconstruction.dials import METHOD
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.methods import estimated
+from experiments.shape_reconstruction.readings import ShapeReadings
+from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.errors import FitRefused, WrongUse
+from harness.effects.accuracy import Accuracy
+from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import StepRecord
+from harness.skills.exploring.exploration import SKIPPED
+
+SENSES = ("vision", "touch", "fused")
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeAnswer:
+    """What a run says of a shape.
+
+    Attributes:
+        evidence: that it is made of.
+        by_sense: the surface by each sense that the scene asks for and by all, or why there is none.
+        seconds: s of each, the reading of its steps included.
+    """
+
+    evidence: ShapeEvidence
+    by_sense: Mapping[str, ShapeEstimate | FitRefused]
+    seconds: Mapping[str, float]
+
+    @property
+    def fused(self) -> ShapeEstimate:
+        """By all readings; there is none without it."""
+        found = self.by_sense["fused"]
+        assert not isinstance(found, FitRefused)
+        return found
+
+
+@dataclass(eq=False)
+class ShapeAnswering:
+    """Readings to answer: each step's pictures are read once.
+
+    Args:
+        run: the folder.
+        accuracy: says by which method.
+    """
+
+    run: RunFiles
+    accuracy: Accuracy
+    readings: ShapeReadings = field(init=False)
+    left_out: list[str] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        self.readings = ShapeReadings(self.run)
+        self._read = {"vision": 0.0, "touch": 0.0}
+
+    def read(self, record: StepRecord) -> None:
+        """Take in a step's readings."""
+        if record.step.kind == SKIPPED:
+            self.left_out.append(str(record.step.parameters["why"]))
+            return
+        began = time.perf_counter()
+        self.readings.read(record)
+        self._read["vision" if record.step.kind == "look" else "touch"] += time.perf_counter() - began
+
+    def answer(self) -> ShapeAnswer:
+        """By each sense that the scene asks for, and by all.
+
+        Raises:
+            WrongUse: the scene asks for no sense.
+            FitRefused: all readings together say too little.
+        """
+        evidence = self.readings.evidence()
+        given = self._given(evidence)
+        found: dict[str, ShapeEstimate | FitRefused] = {}
+        seconds: dict[str, float] = {}
+        for sense, one in given.items():
+            found[sense], took = self._tried(one)
+            seconds[sense] = self._read[sense] + took
+        if len(given) == 1:
+            (only,) = given
+            found["fused"], seconds["fused"] = found[only], seconds[only]
+        else:
+            found["fused"], took = self._tried(evidence)
+            seconds["fused"] = sum(self._read.values()) + took
+        refusal = found["fused"]
+        if isinstance(refusal, FitRefused):
+            raise refusal
+        return ShapeAnswer(evidence, found, seconds)
+
+    def _given(self, evidence: ShapeEvidence) -> dict[str, ShapeEvidence]:
+        """What each sense that the scene asks for has read."""
+        sensors, given = self.run.scene.sensors, {}
+        if sensors.camera:
+            given["vision"] = replace(evidence, touches=())
+        if sensors.touch:
+            given["touch"] = replace(evidence, look=None)
+        if not given:
+            raise WrongUse("the scene asks for no sense; set sensors.camera or sensors.touch")
+        return given
+
+    def _tried(self, evidence: ShapeEvidence) -> tuple[ShapeEstimate | FitRefused, float]:
+        began = time.perf_counter()
+        found: ShapeEstimate | FitRefused
+        try:
+            found = estimated(str(self.accuracy[METHOD.name]), evidence)
+        except FitRefused as refusal:
+            found = refusal
+        return found, time.perf_counter() - began

@@ -1,0 +1,83 @@
+"""From the height map of one press to points of the object's surface with normals, in the gel's frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_erosion, gaussian_filter
+
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
+
+POINTS = 40
+"""Points of a press, spread over what was touched."""
+
+SHARE = 0.5
+"""Of the deepest indentation: what lies deeper is the object's own surface, not gel that hangs from it."""
+
+TOUCHED = 0.12e-3
+"""M of indentation below which nothing was touched."""
+
+_SMOOTH = 2.0
+"""Pixels, one standard deviation of the window that slopes are averaged over."""
+
+_BORDER = 1.0e-3
+"""What a slope counts for that is taken across the border of what was touched; one inside counts for 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPoints:
+    """What the gel touched, in its own frame: z out of the sensor, towards the object.
+
+    Attributes:
+        points: ``(n, 3)`` m.
+        normals: ``(n, 3)`` unit, out of the object.
+        error: m, one standard deviation of the points' heights by the picture alone.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    error: float
+
+
+def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> ContactPoints | None:
+    """Points spread over what a press touched; None where it touched nothing.
+
+    Args:
+        heights: ``(rows, columns)`` m of indentation.
+        errors: ``(rows, columns)`` m, one standard deviation of them.
+        pitch: m of gel that a pixel shows.
+    """
+    deepest = float(heights.max())
+    if not deepest > TOUCHED:
+        return None
+    core = heights >= SHARE * deepest
+    rows, columns = _spread(core, POINTS)
+    count = np.array(heights.shape)
+    across = (columns - 0.5 * (count[1] - 1)) * pitch
+    along = (rows - 0.5 * (count[0] - 1)) * pitch
+    points = np.column_stack([across, along, -heights[rows, columns]])
+    slopes = _slopes(heights, core, pitch)[rows, columns]
+    normals = np.column_stack([-slopes, -np.ones(len(slopes))])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return ContactPoints(points, normals, float(np.median(errors[rows, columns])))
+
+
+def _slopes(heights: FloatArray, core: BoolArray, pitch: float) -> FloatArray:
+    """``(rows, columns, 2)`` of the indentation along x and y, by what was touched alone.
+
+    Slopes are averaged, not heights: at a border the average of heights leans inward.
+    """
+    weight = np.where(binary_erosion(core, border_value=1), 1.0, _BORDER) * core
+    total = np.maximum(gaussian_filter(weight, _SMOOTH), np.finfo(np.float64).tiny)
+    down, right = np.gradient(heights, pitch)
+    return np.stack([gaussian_filter(weight * slope, _SMOOTH) / total for slope in (right, down)], axis=2)
+
+
+def _spread(core: BoolArray, count: int) -> tuple[IntArray, IntArray]:
+    """Rows and columns of pixels far from each other: each the farthest from those before."""
+    places = np.argwhere(core)
+    chosen = [int(np.linalg.norm(places - places.mean(axis=0), axis=1).argmin())]
+    apart = np.linalg.norm(places - places[chosen[0]], axis=1)
+    while len(chosen) < min(count, len(places)):
+        chosen.append(int(apart.argmax()))
+        apart = np.minimum(apart, np.linalg.norm(places - places[chosen[-1]], axis=1))
+    return places[chosen, 0], places[chosen, 1]

@@ -1,0 +1,106 @@
+"""Where the object is not: behind the gel's face at each touch, along its way, beside the silhouette."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import apply, inverse
+
+CLEARANCE = 1.5e-3
+"""M inside a sensor's housing that the object may seem to be: errors of pose and of the housing's shape."""
+
+SHIFTS = 3.0
+"""Standard deviations of the camera that its picture is shifted by at most."""
+
+_STEP = 0.5
+_CONTACT_BEYOND = 0.7
+"""Pixels, one standard deviation of how far a place of the object seems to be beside its silhouette."""
+
+
+def sensor_depth(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
+    """``(n,)`` m that ``(n, 3)`` points are deep in what the sensor's housing passed; below 0 beside it."""
+    deepest = np.full(len(points), -np.inf)
+    for touch in evidence.touches:
+        np.maximum(deepest, _depth_in_housing(evidence, touch, points), out=deepest)
+    return deepest
+
+
+def _depth_in_housing(evidence: ShapeEvidence, touch: GuardedTouch, points: FloatArray) -> FloatArray:
+    """The housing and all the places it came through: one box, since its way is straight along its axis."""
+    in_gel = apply(inverse(touch.stand_from_gel), points)
+    beside = 0.5 * np.array(evidence.housing) - np.abs(in_gel[:, :2])
+    before = -evidence.gel_thickness - in_gel[:, 2]
+    behind = in_gel[:, 2] + evidence.gel_thickness + evidence.housing_depth + touch.way
+    return np.asarray(np.minimum(np.minimum(beside.min(axis=1), before), behind))
+
+
+@dataclass(frozen=True, eq=False)
+class Silhouette:
+    """A mask as a signed distance in its picture, shifted to where the contacts want it.
+
+    Attributes:
+        look: the picture's.
+        outside: ``(rows, columns)`` pixels from the border of mask and hidden pixels; below 0 within.
+        shift: ``(2,)`` pixels, x and y, by which places project farther than the camera's pose says.
+    """
+
+    look: SeenMask
+    outside: FloatArray
+    shift: FloatArray
+
+    @classmethod
+    def of(cls, look: SeenMask, contacts: FloatArray) -> "Silhouette":
+        """From a picture and ``(n, 3)`` m of places that must be within it."""
+        known = look.mask | look.hidden
+        outside = ndimage.distance_transform_edt(~known) - ndimage.distance_transform_edt(known)
+        unshifted = cls(look, np.asarray(outside - np.sign(outside) * 0.5), np.zeros(2))
+        return (
+            unshifted
+            if len(contacts) == 0
+            else cls(look, unshifted.outside, _best_shift(unshifted, contacts))
+        )
+
+    def pixels(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """``(n, 2)`` x and y in the picture, pixels from its corner, and ``(n,)`` m before the camera."""
+        in_camera = apply(inverse(self.look.stand_from_camera), points)
+        depth = np.maximum(in_camera[:, 2], 1e-6)
+        middle = 0.5 * np.array(self.look.mask.shape[::-1])
+        return self.look.focal_length * in_camera[:, :2] / depth[:, None] + middle + self.shift, depth
+
+    def outside_pixels(self, points: FloatArray) -> FloatArray:
+        """``(n,)`` pixels that each point appears beside the silhouette; below 0 within it."""
+        return self._read(self.pixels(points)[0])
+
+    def outside_metres(self, points: FloatArray) -> FloatArray:
+        """The same in m at each point's own depth."""
+        pixels, depth = self.pixels(points)
+        return self._read(pixels) * depth / self.look.focal_length
+
+    def _read(self, pixels: FloatArray) -> FloatArray:
+        """Linear between pixels' middles; beyond the picture as at its border."""
+        at = pixels[:, ::-1].T - 0.5
+        return np.asarray(ndimage.map_coordinates(self.outside, at, order=1, mode="nearest"))
+
+
+def shift_sigma(look: SeenMask, depth: float) -> float:
+    """Pixels, one standard deviation of where a place at ``depth`` m appears, by the camera's errors."""
+    turned = look.focal_length * look.rotation_error
+    return float(np.hypot(turned, look.focal_length * look.position_error / depth))
+
+
+def _best_shift(silhouette: Silhouette, contacts: FloatArray) -> FloatArray:
+    """The least that brings the contacts within the silhouette, weighed against the camera's errors."""
+    pixels, depth = silhouette.pixels(contacts)
+    sigma = max(shift_sigma(silhouette.look, float(depth.mean())), 1e-3)
+    steps = np.arange(-SHIFTS * sigma, SHIFTS * sigma + _STEP, _STEP)
+    shifts = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    at = (pixels[None] + shifts[:, None])[..., ::-1].reshape(-1, 2).T - 0.5
+    outside = ndimage.map_coordinates(silhouette.outside, at, order=1, mode="nearest").reshape(
+        len(shifts), -1
+    )
+    beyond = (np.maximum(outside, 0.0) / _CONTACT_BEYOND) ** 2
+    cost = beyond.sum(axis=1) + ((shifts / sigma) ** 2).sum(axis=1)
+    return np.asarray(shifts[int(cost.argmin())])

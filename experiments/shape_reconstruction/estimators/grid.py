@@ -1,0 +1,52 @@
+"""A box of cells that holds all the space in which an object may be."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.basics.faces.isosurface import isosurface
+from harness.basics.mesh import Mesh
+
+MOST_CORNERS = 200_000
+"""Of a grid: beyond it the cells are made larger."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Corners of cubic cells.
+
+    Attributes:
+        origin: ``(3,)`` m in ``stand``, of the first corner.
+        pitch: m between corners.
+        shape: corners along x, y, z.
+    """
+
+    origin: FloatArray
+    pitch: float
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def over(cls, low: FloatArray, high: FloatArray, pitch: float) -> "Grid":
+        """The grid from one corner of a box to the other, coarser where ``MOST_CORNERS`` demand it."""
+        sides = np.maximum(high - low, pitch)
+        pitch = max(pitch, float((sides.prod() / MOST_CORNERS) ** (1.0 / 3.0)))
+        count = np.ceil(sides / pitch).astype(int) + 1
+        middle = 0.5 * (low + high)
+        origin = middle - 0.5 * pitch * (count - 1)
+        origin[2] = low[2]  # the support is a plane of corners
+        return cls(origin, pitch, (int(count[0]), int(count[1]), int(count[2])))
+
+    @property
+    def points(self) -> FloatArray:
+        """``(n, 3)`` m, all corners, the last axis fastest."""
+        axes = [self.origin[axis] + self.pitch * np.arange(self.shape[axis]) for axis in range(3)]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+    def surface(self, field: FloatArray) -> Mesh:
+        """The closed surface around where ``(n,)`` m of the corners are below zero.
+
+        Raises:
+            OutOfDomain: as ``isosurface``.
+        """
+        return isosurface(field.reshape(self.shape), self.origin, self.pitch)

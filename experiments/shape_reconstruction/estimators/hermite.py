@@ -1,0 +1,211 @@
+"""The surface through all contacts with their normals: what a body of no kind in particular would be."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+
+from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples, all_samples, thinned
+from experiments.shape_reconstruction.estimators.free_space import CLEARANCE, Silhouette, sensor_depth
+from experiments.shape_reconstruction.estimators.grid import Grid
+from experiments.shape_reconstruction.estimators.knowledge import (
+    beyond_deviation,
+    known_by,
+    limited_sides,
+    not_bounded,
+)
+from experiments.shape_reconstruction.estimators.leave_out import doubtful_touches
+from experiments.shape_reconstruction.estimators.picture import silhouette_of
+from experiments.shape_reconstruction.estimators.revolution import Revolution, find_revolution
+from experiments.shape_reconstruction.estimators.silhouette_rim import rim_data
+from experiments.shape_reconstruction.estimators.thin_plate import SurfaceData, ThinPlateField, fitted
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.arrays import FloatArray
+from harness.basics.mesh import Mesh
+
+PITCH = 4.0e-3
+"""M between corners of the grid on which the surface is found."""
+
+MARGIN = 10.0e-3
+"""M beyond the contacts that the object may reach."""
+
+SLOPE = 0.15
+"""M beyond the hull of the contacts for every m from the nearest of them: the object reaches no farther."""
+
+FOOT = 0.6
+"""Of the contacts' width that of the object at its support is, within the hull."""
+
+READING = 0.7e-3
+"""M, one standard deviation of any part of the surface at least: errors that all contacts share."""
+
+_HULL = 2.0e-3
+_SILHOUETTE = 1.0e-3
+_NORMAL = 0.1
+_COPY_SIGMA, _COPY_NORMAL, _COPIES = 2.0e-3, 0.2, 120
+_SOME = 1200
+_NEAR = 2.0 * PITCH
+
+
+@dataclass(frozen=True, eq=False)
+class _Bounds:
+    """Where the object is at most: not beyond the hull of ``(n, 3)`` m of its places, nor in free space."""
+
+    evidence: ShapeEvidence
+    places: FloatArray
+    silhouette: Silhouette | None
+
+    def beyond(self, points: FloatArray) -> FloatArray:
+        """``(n,)`` m that points are outside; below 0 within."""
+        outside = np.maximum(sensor_depth(self.evidence, points) - CLEARANCE, -points[:, 2])
+        near = cKDTree(self.places).query(points)[0]
+        outside = np.maximum(outside, _outside_hull(self._hull_points, points) - _HULL - SLOPE * near)
+        if self.silhouette is not None:
+            outside = np.maximum(outside, self.silhouette.outside_metres(points) - _SILHOUETTE)
+        return outside
+
+    @property
+    def _hull_points(self) -> FloatArray:
+        middle = self.places.mean(axis=0)
+        foot = (middle + FOOT * (self.places - middle)) * np.array([1.0, 1.0, 0.0])
+        return np.concatenate([self.places, foot])
+
+
+def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate:
+    """The zero of a thin-plate field through the contacts, cut by all that is known to be free.
+
+    Args:
+        evidence: one contact or more.
+        symmetric: whether contacts that agree on an axis are turned about it where nothing was touched.
+
+    Raises:
+        FitRefused: no touch met the object.
+        OutOfDomain: nothing is left of it: contacts and free space contradict each other.
+    """
+    start = time.perf_counter()
+    whole = all_samples(evidence)
+    samples = thinned(whole)
+    silhouette = silhouette_of(evidence, samples.points)
+    axis = find_revolution(samples) if symmetric else None
+    data = _contact_data(samples)
+    low, high = _box(data.points, evidence.largest)
+    by_contacts = field = fitted(data, low, high)
+    doubtful = doubtful_touches(evidence, by_contacts)
+    if axis is not None:
+        data = data.joined(_copies(axis, samples, evidence, silhouette))
+        low, high = _box(data.points, evidence.largest)
+        field = fitted(data, low, high, by_contacts.amplitude)
+    bounds = _Bounds(evidence, data.points, silhouette)
+    if silhouette is not None:
+        rim = rim_data(silhouette, _cut(field, bounds), data.points, low, high)
+        field = fitted(data.joined(rim), low, high, by_contacts.amplitude)
+    grid = Grid.over(low, high, PITCH)
+    mesh = grid.surface(_cut(field, bounds)(grid.points))
+    return _finished(_Fit(evidence, whole, silhouette, field, axis, doubtful), mesh, start)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """What the answer is made of."""
+
+    evidence: ShapeEvidence
+    samples: ContactSamples
+    silhouette: Silhouette | None
+    field: ThinPlateField
+    axis: Revolution | None
+    doubtful: dict[int, float]
+
+
+def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
+    known = known_by(mesh, fit.samples, fit.silhouette)
+    sides = limited_sides(mesh, fit.samples, fit.silhouette)
+    beyond = beyond_deviation(mesh, known, sides, fit.evidence.largest)
+    round_ = "supposed to be round about a vertical axis, as its contacts are"
+    return ShapeEstimate(
+        mesh=mesh,
+        deviation=np.sqrt(_deviations(fit.field, mesh) ** 2 + READING**2 + beyond**2),
+        known_by=known,
+        not_bounded=not_bounded(sides),
+        doubtful=fit.doubtful,
+        flags=() if fit.axis is None else (round_,),
+        seconds=time.perf_counter() - start,
+        details={
+            "estimator": "rbf",
+            "contacts": len(fit.evidence.contacts),
+            "amplitude": fit.field.amplitude,
+            "axis_m": None if fit.axis is None else [float(value) for value in fit.axis.centre],
+        },
+    )
+
+
+def _contact_data(samples: ContactSamples) -> SurfaceData:
+    count = len(samples.points)
+    return SurfaceData(
+        samples.points,
+        np.zeros(count),
+        samples.sigmas,
+        samples.normals,
+        np.maximum(samples.normal_sigmas, _NORMAL),
+    )
+
+
+def _copies(
+    axis: Revolution, samples: ContactSamples, evidence: ShapeEvidence, silhouette: Silhouette | None
+) -> SurfaceData:
+    """Places supposed by turning, where neither the sensor nor the picture says that nothing is."""
+    places, normals = axis.copies(samples)
+    free = sensor_depth(evidence, places) > CLEARANCE
+    if silhouette is not None:
+        free |= silhouette.outside_metres(places) > 2.0 * _SILHOUETTE
+    places, normals = places[~free], normals[~free]
+    some = np.random.default_rng(0).permutation(len(places))[:_COPIES]
+    count = len(some)
+    return SurfaceData(
+        places[some],
+        np.zeros(count),
+        np.full(count, _COPY_SIGMA),
+        normals[some],
+        np.full(count, _COPY_NORMAL),
+    )
+
+
+def _box(points: FloatArray, largest: float) -> tuple[FloatArray, FloatArray]:
+    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    low[2] = 0.0
+    high[2] = max(high[2], 2.0 * PITCH)
+    return low, np.minimum(high, low + largest + 2.0 * MARGIN)
+
+
+def _cut(field: ThinPlateField, bounds: _Bounds) -> Callable[[FloatArray], FloatArray]:
+    """The field, and what bounds it where it might be inside."""
+
+    def cut(points: FloatArray) -> FloatArray:
+        values = field.values(points)
+        near = values < _NEAR
+        values[near] = np.maximum(values[near], bounds.beyond(points[near]))
+        return values
+
+    return cut
+
+
+def _outside_hull(of: FloatArray, points: FloatArray) -> FloatArray:
+    """``(n,)`` m beyond the farthest side of the convex hull; far below 0 for all where it is flat."""
+    try:
+        sides = ConvexHull(of).equations
+    except QhullError:
+        return np.full(len(points), -1.0)
+    beyond = np.full(len(points), -np.inf)
+    for side in sides:
+        np.maximum(beyond, points @ side[:3] + side[3], out=beyond)
+    return beyond
+
+
+def _deviations(field: ThinPlateField, mesh: Mesh) -> FloatArray:
+    """``(vertices,)`` m: of some vertices, the others as the nearest three of them."""
+    some = np.random.default_rng(0).permutation(len(mesh.vertices))[:_SOME]
+    found = field.deviations(mesh.vertices[some])
+    apart, near = cKDTree(mesh.vertices[some]).query(mesh.vertices, k=[1, 2, 3])
+    share = 1.0 / (apart + 1e-6)
+    return np.asarray((share * found[near]).sum(axis=1) / share.sum(axis=1))

@@ -1,0 +1,44 @@
+"""Shape reconstruction as an experiment: what does an object never seen look like?"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from experiments.shape_reconstruction.answer import ShapeAnswering
+from experiments.shape_reconstruction.dials import KNOBS, OWN
+from experiments.shape_reconstruction.explore import performer, plan, steps_of
+from experiments.shape_reconstruction.report import write
+from experiments.shape_reconstruction.result import lines_of, result_of, write_files
+from experiments.shape_reconstruction.section import ShapeRun
+from experiments.shape_reconstruction.table import MEASUREMENT, NAME
+from harness.experiment.experiment import Experiment, Scored
+from harness.experiment.plain import plain_budgets
+from harness.skills.exploring.exploration import PLAN_KEY
+
+
+def _sources(_scored: Scored) -> Mapping[str, Any]:
+    """Nothing: readings are simulated on an object that is known."""
+    return {}
+
+
+EXPERIMENT = Experiment(
+    name=NAME,
+    title="Shape reconstruction",
+    step="step",
+    section=ShapeRun,
+    knobs=KNOBS,
+    plan=plan,
+    performer=performer,
+    answering=ShapeAnswering,
+    result=result_of,
+    lines=lines_of,
+    sources=_sources,
+    gives=(),
+    report=write,
+    files=write_files,
+    measurement=MEASUREMENT,
+    plan_key=PLAN_KEY,
+    observe=(),
+    assumed={"sensors": {"camera": True, "touch": True}},
+    error_key="until",
+    budgets=plain_budgets(NAME, steps_of, *OWN),
+)

@@ -1,0 +1,74 @@
+"""The steps of a shape reconstruction: a look, then presses chosen one by one, or planned on the drawing."""
+
+import numpy as np
+
+from experiments.shape_reconstruction.explorer import DrawnContacts, ShapeExplorer
+from experiments.shape_reconstruction.methods import QUICK, TELLING
+from experiments.shape_reconstruction.section import ShapeRun
+from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station
+from harness.experiment.experiment import Helpers, Planned
+from harness.recording.run_folder import RunFiles
+from harness.skills.exploring.exploration import Exploration, NextContact, kinds
+from harness.skills.exploring.surroundings import nowhere
+from harness.skills.planning import ContactRequest, plan_run
+from harness.skills.sites import PressLimits
+from harness.twin.bench_of import twin_of
+from harness.twin.rehearsal import rehearse
+
+
+def steps_of(scene: SceneFile) -> int:
+    """How many steps a run of a scene has, if it is not surer before."""
+    return int(scene.sensors.camera) + _presses(scene)
+
+
+def _presses(scene: SceneFile) -> int:
+    return scene.section(ShapeRun).presses if scene.sensors.touch else 0
+
+
+def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
+    """A look where there is a camera, then so many presses.
+
+    Those planned on the drawing are rehearsed here; all others are planned and rehearsed one by one, once
+    those before are read.
+
+    Raises:
+        WrongUse: nothing is to be read; or the scene says where the mesh file's origin is, which says
+            nothing of where an unknown object touches its support.
+    """
+    if steps_of(scene) == 0:
+        raise WrongUse("nothing is to be read: ask for vision, for presses, or for both")
+    if scene.object.pose.anchor != "bottom":
+        raise WrongUse(
+            'an unknown object stands where its bottom is: set object.pose.anchor = "bottom", and its '
+            "position to where its middle should be on the support"
+        )
+    asked, looks = scene.section(ShapeRun), scene.sensors.camera
+    if asked.choose != "planned" or _presses(scene) == 0:
+        place = np.array(scene.object.pose.position)
+        bench = twin_of(scene, station, nowhere(place), np.eye(4))
+        return Planned(kinds(looks, _presses(scene)), rehearse(bench, []), bench)
+    wanted = ContactRequest(_presses(scene), "spread", PressLimits(tilt=asked.tilt, depth=asked.depth))
+    made = plan_run(scene, station, mesh, seed, wanted)
+    presses = [{"kind": "contact", **parameters} for parameters in made.parameters()]
+    return Planned([*kinds(looks, 0), *presses], made.rehearsal, made.bench)
+
+
+def performer(run: RunFiles, helpers: Helpers) -> Exploration:
+    """Looks, then presses.
+
+    Args:
+        run: the folder.
+        helpers: what a step may use beside the bench.
+    """
+    enough = "the shape is known as well as was asked"
+    return Exploration(_explorer(run, helpers), helpers.ask, helpers.say, enough)
+
+
+def _explorer(run: RunFiles, helpers: Helpers) -> NextContact:
+    choose = run.scene.section(ShapeRun).choose
+    if choose == "planned":
+        return DrawnContacts(helpers.twin)
+    return ShapeExplorer(run, TELLING if choose == "active" else QUICK)

@@ -1,0 +1,194 @@
+"""Where the next press of a shape reconstruction goes: along a free line into what is not known."""
+
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from experiments.shape_reconstruction.choosing import CHOOSERS
+from experiments.shape_reconstruction.lines import aims_at_mask, lines_at_surface
+from experiments.shape_reconstruction.methods import estimated
+from experiments.shape_reconstruction.readings import ShapeReadings
+from experiments.shape_reconstruction.section import ShapeRun
+from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import DataRefused, FitRefused
+from harness.basics.geometry import translation
+from harness.basics.mesh import Mesh
+from harness.picture.camera_errors import CameraErrors
+from harness.picture.outline import SeenOutline, read_outline
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.skills.exploring.exploration import SKIPPED
+from harness.skills.exploring.lines import LINES, contact_along, lines_to
+from harness.skills.exploring.surroundings import Surroundings, end_of, nowhere
+from harness.skills.exploring.unknown_space import (
+    SeenThing,
+    UnknownStand,
+    aims_unseen,
+    seen_thing,
+    unknown_space,
+)
+from harness.skills.planning import HOME
+from harness.twin.bench import TwinBench
+from harness.twin.bench_of import twin_of, way_between
+
+DRAWN = 160
+"""Places drawn on the estimate's surface; of their lines the best ``LINES`` are tried."""
+
+UP_TO = 0.06
+"""M above the support, up to which lines end where nothing was seen."""
+
+
+class DrawnContacts:
+    """Contacts that were planned on the drawing before anything moved.
+
+    Args:
+        twin: of the bench, the object as it is drawn.
+    """
+
+    def __init__(self, twin: TwinBench) -> None:
+        self.way = partial(way_between, twin)
+
+    def is_sure(self, _recording: Recording, _index: int) -> bool:
+        """All are made."""
+        return False
+
+    def skipped(self, _recording: Recording, _index: int) -> int:
+        """None is left out."""
+        return 0
+
+    def plan(self, _recording: Recording, _index: int) -> dict[str, Any]:
+        """Nothing is added to what was planned."""
+        return {}
+
+
+class ShapeExplorer:
+    """Plans a run's presses one at a time.
+
+    Args:
+        run: the folder.
+        method: by which the shape is estimated meanwhile.
+    """
+
+    def __init__(self, run: RunFiles, method: str) -> None:
+        self._run, self._method = run, method
+        self._asked = run.scene.section(ShapeRun)
+        self._readings = ShapeReadings(run)
+        self._read, self._skipped = 0, 0
+        self._joints: FloatArray = HOME
+
+    @cached_property
+    def place(self) -> FloatArray:
+        """``(3,)`` m in base: the frame ``stand``."""
+        return np.array(self._run.scene.object.pose.position)
+
+    @cached_property
+    def stand(self) -> UnknownStand:
+        """Where the object was put, and what looks at it."""
+        asked = self._asked
+        errors = CameraErrors(
+            position=asked.camera_position_error,
+            rotation=asked.camera_rotation_error,
+            focal_length=asked.focal_length_error,
+            support=asked.support_error,
+            place=asked.place_error,
+        )
+        return UnknownStand(self.place, errors, self._run.station.camera)
+
+    @cached_property
+    def outline(self) -> SeenOutline | None:
+        """Of the silhouette; None where the object was not seen, or not whole. Read once all looks are."""
+        look = self._readings.look
+        try:
+            return None if look is None else read_outline(look.mask, look.hidden)
+        except DataRefused:
+            return None
+
+    @cached_property
+    def thing(self) -> SeenThing | None:
+        """Where the object is by the look; None where it was not seen."""
+        return None if self.outline is None else seen_thing(self.stand, self.outline)
+
+    @cached_property
+    def travels(self) -> TwinBench:
+        """The bench with all the space that the object may take in its place."""
+        return self._twin(unknown_space(self.stand, self.outline, self._asked.largest))
+
+    @cached_property
+    def _nothing(self) -> TwinBench:
+        return self._twin(nowhere(self.place), has_object=False)
+
+    def _twin(self, mesh_in_base: Mesh, has_object: bool = True) -> TwinBench:
+        return twin_of(self._run.scene, self._run.station, mesh_in_base, np.eye(4), has_object)
+
+    def way(self, here: FloatArray, planned: FloatArray) -> FloatArray:
+        """A way around all that the object may take, from where the arm is to the end of a travel."""
+        return way_between(self.travels, here, planned)
+
+    def is_sure(self, recording: Recording, index: int) -> bool:
+        """Whether the steps before one tell the shape as well as the scene asks."""
+        until = self._asked.until
+        if until is None or index == 0:
+            return False
+        self._take_in(recording, index)
+        found = self._estimate()
+        return found is not None and not found.not_bounded and bool(found.deviation.mean() <= until)
+
+    def skipped(self, recording: Recording, index: int) -> int:
+        """How many steps right before one were not made."""
+        self._take_in(recording, index)
+        return self._skipped
+
+    def plan(self, recording: Recording, index: int) -> dict[str, Any]:
+        """The parameters of a press along the best of some lines that has a free way.
+
+        Args:
+            recording: that holds all steps before it.
+            index: of its step.
+
+        Raises:
+            WrongUse: no free way was found along any of them; nothing was moved.
+        """
+        self._take_in(recording, index)
+        random = np.random.default_rng((recording.header.seed, index))
+        here = Surroundings(self._run.scene, self._run.station, self.travels, self._nothing, self._joints)
+        estimate = None if self._asked.choose == "random" else self._estimate()
+        lines = np.concatenate([self._towards_surface(estimate, random), self._blind(here, random)])
+        scores = CHOOSERS[self._asked.choose](self._readings.evidence(), estimate, lines)
+        best = np.argsort(-scores, kind="stable")[:LINES]
+        return contact_along(
+            here, translation(self.place) @ lines[best], float(random.uniform(*self._asked.depth))
+        )
+
+    def _take_in(self, recording: Recording, index: int) -> None:
+        for k in range(self._read, index):
+            record = recording.step(k)
+            self._readings.read(record)
+            self._skipped = self._skipped + 1 if record.step.kind == SKIPPED else 0
+            if record.step.kind == "press":
+                self._joints = end_of(record.step.parameters)
+        self._read = index
+
+    def _estimate(self) -> ShapeEstimate | None:
+        try:
+            return estimated(self._method, self._readings.evidence())
+        except FitRefused:
+            return None
+
+    def _towards_surface(self, estimate: ShapeEstimate | None, random: np.random.Generator) -> FloatArray:
+        """``(n, 4, 4)`` in ``stand``."""
+        if estimate is None:
+            return np.zeros((0, 4, 4))
+        return lines_at_surface(estimate, self._run.station.gel.sensor.housing, DRAWN, random)
+
+    def _blind(self, here: Surroundings, random: np.random.Generator) -> FloatArray:
+        """``(n, 4, 4)`` in ``stand``: to what was seen, or to where the object should be."""
+        look, thing = self._readings.look, self.thing
+        if look is not None and thing is not None:
+            aims = aims_at_mask(look, thing, self.place, LINES, random)
+        else:
+            first = not self._readings.touches
+            aims = aims_unseen(self.place, self._asked.place_error, UP_TO, first, random)
+        lines = lines_to(aims, here, float(self.place[2]), random)
+        return np.asarray(translation(-self.place) @ np.array(list(lines)))

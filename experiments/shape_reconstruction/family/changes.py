@@ -1,0 +1,85 @@
+"""Shapes next to a hypothesis: with a part put on, taken off or exchanged, or turned to its look-alike."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from experiments.shape_reconstruction.family import layout
+from experiments.shape_reconstruction.family.classes import FamilyShape, add_loop, add_spout
+from experiments.shape_reconstruction.family.freedom import has_yaw
+from experiments.shape_reconstruction.family.layout import (
+    CORED,
+    DISC,
+    LOOP,
+    NO_LIMB,
+    PLAIN,
+    RING,
+    ROUND,
+    SLOT,
+    SUPER,
+    TOOL,
+    TURNED,
+)
+from harness.basics.arrays import FloatArray
+
+_Random = np.random.Generator
+
+_QUARTERS = 4
+
+
+def changes(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
+    """Shapes that differ from one by one part or by a turn."""
+    if has_yaw(shape.code):
+        yield _turned(shape, np.pi)
+    if shape.code[layout.KIND] == TURNED:
+        yield from _of_vessel(shape, random)
+    elif shape.code[layout.KIND] == TOOL:
+        yield from _of_tool(shape)
+
+
+def _of_vessel(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
+    code = shape.code
+    yield _coded(shape, layout.HOLLOW, 1 - int(code[layout.HOLLOW]))
+    if code[layout.LIMB] != NO_LIMB:
+        yield _coded(shape, layout.LIMB, NO_LIMB)
+        yield _turned(shape, 0.5 * np.pi)
+        yield _turned(shape, -0.5 * np.pi)
+    if code[layout.LIMB] != LOOP:
+        first = random.uniform(0.0, 2.0 * np.pi)
+        for quarter in range(_QUARTERS):
+            yield _turned(add_loop(shape, random), first + 2.0 * np.pi * quarter / _QUARTERS)
+    if code[layout.SPOUT] != 0:
+        yield _coded(shape, layout.SPOUT, 0)
+    elif code[layout.LIMB] == LOOP:
+        yield add_spout(shape, random)
+    if code[layout.PLAN] == ROUND:
+        yield _oval(shape)
+    elif code[layout.PLAN] == SUPER:
+        yield _coded(shape, layout.PLAN, ROUND)
+    elif code[layout.PLAN] == CORED:
+        yield _turned(shape, 0.5 * np.pi)
+
+
+def _of_tool(shape: FamilyShape) -> Iterator[FamilyShape]:
+    for end in (layout.END_A, layout.END_B):
+        for kind in (PLAIN, DISC, RING, SLOT):
+            if shape.code[end] != kind:
+                yield _coded(shape, end, kind)
+
+
+def _turned(shape: FamilyShape, by: float) -> FamilyShape:
+    theta = shape.theta.copy()
+    theta[layout.YAW] += by
+    return FamilyShape(shape.name, shape.code, theta)
+
+
+def _oval(shape: FamilyShape) -> FamilyShape:
+    theta: FloatArray = shape.theta.copy()
+    theta[layout.ACROSS], theta[layout.POWER] = np.log(0.9), np.log(2.2)
+    return _coded(FamilyShape(shape.name, shape.code, theta), layout.PLAN, SUPER)
+
+
+def _coded(shape: FamilyShape, slot: int, value: int) -> FamilyShape:
+    code = shape.code.copy()
+    code[slot] = value
+    return FamilyShape(shape.name, code, shape.theta)

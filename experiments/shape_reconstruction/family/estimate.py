@@ -1,0 +1,127 @@
+"""The shape of an object by the family: household shapes that the readings allow, and the surface between."""
+
+import time
+
+import numpy as np
+
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.family.classes import FamilyShape
+from experiments.shape_reconstruction.family.contacts_fit import ContactFit, contact_fit, moved_points
+from experiments.shape_reconstruction.family.distance import distances
+from experiments.shape_reconstruction.family.field import median_surface
+from experiments.shape_reconstruction.family.known import known_by, not_bounded
+from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
+from experiments.shape_reconstruction.family.search import Search
+from experiments.shape_reconstruction.family.settings import FamilySettings
+from experiments.shape_reconstruction.family.warp import displacement
+from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import OutOfDomain
+from harness.basics.mesh import Mesh
+
+NOISE = 0.6e-3
+"""M: deviation of a surface that all hypotheses agree about."""
+
+WIDER = 1.4
+"""Factor on the hypotheses' spread: few of them are kept, and their costs are of one likelihood."""
+
+OUTSIDE = 6.0
+"""A contact's typical sum of squares, of some five numbers, above which the object is of no class."""
+
+RIVAL = 0.2
+"""Weight of a second class above which the class is unknown."""
+
+
+def family_estimate(evidence: ShapeEvidence, settings: FamilySettings | None = None) -> ShapeEstimate:
+    """The median surface of the household shapes that the readings allow, moved to its contacts.
+
+    Args:
+        evidence: one contact or a silhouette at least.
+        settings: how much is searched; the default level where not given.
+
+    Raises:
+        OutOfDomain: nothing was touched or seen.
+    """
+    began = time.perf_counter()
+    settings = settings or FamilySettings()
+    sighted = evidence.look is not None and bool(evidence.look.mask.any())
+    if not sighted and not evidence.contacts:
+        raise OutOfDomain(
+            f"{len(evidence.touches)} touches met nothing and no silhouette was seen; a shape needs one "
+            "contact or one silhouette: press at the object, or take its picture"
+        )
+    search = Search(evidence, settings)
+    mixture = mixture_of(search.found(), sighted, bool(evidence.contacts), settings.seed)
+    fit = contact_fit(mixture.best.shape, search.full)
+    plain = median_surface(mixture, settings.pitch)
+    mesh = _warped(plain, mixture.best.shape, evidence, fit)
+    doubtful = {
+        touch.index: float(off)
+        for touch, off, bad in zip(evidence.contacts, fit.off, fit.doubtful, strict=True)
+        if bad
+    }
+    return ShapeEstimate(
+        mesh=mesh,
+        deviation=_deviation(plain, mixture, mesh),
+        known_by=known_by(mesh.vertices, evidence),
+        not_bounded=not_bounded(evidence),
+        doubtful=doubtful,
+        flags=_flags(mixture, fit, doubtful),
+        seconds=time.perf_counter() - began,
+        details=_details(mixture, fit),
+    )
+
+
+def _warped(mesh: Mesh, shape: FamilyShape, evidence: ShapeEvidence, fit: ContactFit) -> Mesh:
+    places, offsets = moved_points(shape, evidence, ~fit.doubtful)
+    # Points of one contact err together: each counts as a part of it.
+    sigma = np.full(len(places), 1.6e-3)
+    moved = mesh.vertices + displacement(places - offsets, offsets, sigma, mesh.vertices)
+    return Mesh(moved, mesh.faces)
+
+
+def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh) -> FloatArray:
+    """``(vertices,)`` m: spread of the hypotheses and about them, the warp, and the readings' noise."""
+    total = np.zeros(len(plain.vertices))
+    for one, weight, about in zip(mixture.hypotheses, mixture.weights, mixture.about, strict=True):
+        shapes = (one.shape, *about)
+        for shape in shapes:
+            gap = distances(shape.code, shape.theta, plain.vertices)
+            total += weight / len(shapes) * gap**2
+    moved = np.sum((mesh.vertices - plain.vertices) ** 2, axis=1)
+    return np.asarray(np.sqrt(WIDER**2 * total + 0.25 * moved + NOISE**2))
+
+
+def _flags(mixture: Mixture, fit: ContactFit, doubtful: dict[int, float]) -> tuple[str, ...]:
+    flags = []
+    classes = mixture.by_class()
+    rivals = [name for name, weight in classes.items() if weight >= RIVAL]
+    if len(rivals) > 1:
+        flags.append(f"class unknown: {' or '.join(rivals)}")
+    if fit.typical > OUTSIDE:
+        flags.append(
+            f"outside the family: contacts are {np.median(fit.off) * 1e3:.1f} mm off the nearest such shape"
+        )
+    if doubtful:
+        flags.append(f"contacts that do not fit the rest: {', '.join(str(index) for index in doubtful)}")
+    return tuple(flags)
+
+
+def _details(mixture: Mixture, fit: ContactFit) -> dict[str, object]:
+    return {
+        "kind": "family",
+        "classes": mixture.by_class(),
+        "cost": mixture.best.cost,
+        "contact_cost": fit.typical,
+        "other_cost": fit.others,
+        "hypotheses": [
+            {
+                "class": one.shape.name,
+                "weight": float(weight),
+                "cost": one.cost,
+                "code": one.shape.code.tolist(),
+                "numbers": one.shape.theta.tolist(),
+            }
+            for one, weight in zip(mixture.hypotheses, mixture.weights, strict=True)
+        ],
+    }

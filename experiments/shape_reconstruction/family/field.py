@@ -1,0 +1,103 @@
+"""The mixture's median surface: signed distances of its shapes on a grid, evaluated near surfaces only."""
+
+import numpy as np
+
+from experiments.shape_reconstruction.family.classes import FamilyShape
+from experiments.shape_reconstruction.family.distance import BOX, PREPARED, distance, prepare
+from experiments.shape_reconstruction.family.posterior import Mixture
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.compiled import compiled
+from harness.basics.faces.isosurface import isosurface
+from harness.basics.mesh import Mesh
+
+BLOCK = 4
+"""Cells a side that are filled at once where no surface is near."""
+
+_STEEP = 1.4
+"""Greatest slope of a distance: of a superellipse, beside its corners."""
+
+_MOST = 160
+"""Cells along a side: larger bodies are sampled more coarsely."""
+
+_WEIGHT = 0.03
+"""Below it a hypothesis does not move the median."""
+
+
+def median_surface(mixture: Mixture, pitch: float) -> Mesh:
+    """The surface that half of the belief is inside of.
+
+    Args:
+        mixture: of shapes in ``stand``.
+        pitch: m of the grid, coarser where the body is larger than 160 cells.
+    """
+    pairs = zip(mixture.hypotheses, mixture.weights, strict=True)
+    shapes = [(one.shape, float(weight)) for one, weight in pairs if weight >= _WEIGHT]
+    low, high = _box([shape for shape, _ in shapes])
+    cell = max(pitch, float((high - low).max()) / _MOST)
+    counts = np.ceil((high - low) / cell).astype(np.int64) + 1
+    fields = np.stack([grid_distances(shape, low, cell, counts) for shape, _ in shapes])
+    weights = np.array([weight for _, weight in shapes])
+    return isosurface(_weighted_median(fields, weights / weights.sum()), low, cell)
+
+
+def grid_distances(shape: FamilyShape, origin: FloatArray, cell: float, counts: IntArray) -> FloatArray:
+    """``counts`` m: signed distances, right near the surface and of the right sign elsewhere."""
+    return np.asarray(_fill(shape.code, shape.theta, origin, cell, counts))
+
+
+def _box(shapes: list[FamilyShape]) -> tuple[FloatArray, FloatArray]:
+    corners = np.concatenate([corners_of(shape) for shape in shapes])
+    return corners.min(axis=0) - 4e-3, corners.max(axis=0) + 4e-3
+
+
+def corners_of(shape: FamilyShape) -> FloatArray:
+    """``(8, 3)`` m: corners of a shape's own box, in ``stand``; its leaning aside."""
+    q = np.empty(PREPARED)
+    prepare(shape.code, shape.theta, q)
+    low, high = q[BOX : BOX + 3], q[BOX + 3 : BOX + 6]
+    x, y, z = np.meshgrid(*zip(low, high, strict=True))
+    return np.column_stack(
+        [
+            q[0] + q[3] * x.ravel() - q[4] * y.ravel(),
+            q[1] + q[4] * x.ravel() + q[3] * y.ravel(),
+            q[2] + z.ravel(),
+        ]
+    )
+
+
+def _weighted_median(fields: FloatArray, weights: FloatArray) -> FloatArray:
+    if len(fields) == 1 or weights.max() > 0.5:
+        return np.asarray(fields[int(weights.argmax())])
+    order = np.argsort(fields, axis=0)
+    below = np.cumsum(weights[order], axis=0)
+    first = np.argmax(below >= 0.5, axis=0)
+    which = np.take_along_axis(order, first[None], axis=0)
+    return np.asarray(np.take_along_axis(fields, which, axis=0)[0])
+
+
+@compiled
+def _fill(code: IntArray, theta: FloatArray, origin: FloatArray, cell: float, counts: IntArray) -> FloatArray:
+    q = np.empty(PREPARED)
+    prepare(code, theta, q)
+    out = np.empty((counts[0], counts[1], counts[2]))
+    reach = _STEEP * np.sqrt(3.0) * 0.5 * BLOCK * cell + cell
+    for i in range(0, counts[0], BLOCK):
+        for j in range(0, counts[1], BLOCK):
+            for k in range(0, counts[2], BLOCK):
+                half = 0.5 * (BLOCK - 1)
+                x, y, z = (
+                    origin[0] + (i + half) * cell,
+                    origin[1] + (j + half) * cell,
+                    origin[2] + (k + half) * cell,
+                )
+                middle = distance(code, q, False, x, y, z)
+                near = abs(middle) < reach
+                for a in range(i, min(i + BLOCK, counts[0])):
+                    for b in range(j, min(j + BLOCK, counts[1])):
+                        for c in range(k, min(k + BLOCK, counts[2])):
+                            if near:
+                                x, y, z = origin[0] + a * cell, origin[1] + b * cell, origin[2] + c * cell
+                                out[a, b, c] = distance(code, q, False, x, y, z)
+                            else:
+                                out[a, b, c] = middle
+    return out

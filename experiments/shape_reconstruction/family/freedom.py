@@ -1,0 +1,204 @@
+"""Which numbers of a shape may move, how far each is from its draw, and directions that move many at once."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from experiments.shape_reconstruction.family import layout
+from experiments.shape_reconstruction.family.layout import (
+    BAR,
+    BENT,
+    CORED,
+    LOOP,
+    NO_LIMB,
+    PLAIN,
+    ROUND,
+    SUPER,
+    TOOL,
+    TURNED,
+)
+from harness.basics.arrays import FloatArray, IntArray
+
+TILT = float(np.radians(0.8))
+"""Rad per axis that an object on its support leans by."""
+
+GEL_OFF = (0.6e-3, 0.6e-3, 0.4e-3)
+"""M in the gel's frame by which a calibrated gel is off its believed place, all through a run."""
+
+OUTLINE_BIAS, OUTLINE_OFF = -0.15, 0.3
+"""Pixels by which masks reach beyond objects: a pixel counts where the object covers about a third of it."""
+
+_DEVIATIONS = {
+    TURNED: {
+        layout.HEIGHT: 0.3, layout.WARP: 0.15, layout.WALL: 0.35, layout.FLOOR: 0.4,
+        **{layout.RADII + k: 0.35 for k in range(layout.KNOTS)},
+    },
+    TOOL: {
+        layout.LENGTH: 0.35, layout.SHAFT_A: 0.3, layout.SHAFT_B: 0.3, layout.SHAFT_THICK: 0.35,
+    },
+    BENT: {
+        layout.ARC: 0.35, layout.BEND: 0.5, layout.FLAT: 0.15,
+        **{layout.GIRTHS + k: 0.35 for k in range(layout.GIRTH_KNOTS)},
+    },
+}  # fmt: skip
+_LIMB = {
+    layout.LIMB_AT: 0.12, layout.LIMB_REACH: 0.3, layout.LIMB_SLANT: 0.15, layout.LIMB_THICK: 0.25,
+    layout.LIMB_WIDE: 0.25,
+}  # fmt: skip
+_LOOP = {layout.LIMB_HALF: 0.25, layout.LIMB_CORNER: 0.7}
+_SPOUT = {
+    layout.SPOUT_AT: 0.12, layout.SPOUT_REACH: 0.3, layout.SPOUT_RISE: 0.4, layout.SPOUT_ROOT: 0.25,
+    layout.SPOUT_TIP: 0.25,
+}  # fmt: skip
+_SMOOTH = 0.10
+"""Second difference of a section's deviation from its draw."""
+
+_SIZES = {
+    TURNED: (
+        layout.HEIGHT, *range(layout.RADII, layout.RADII + layout.KNOTS), layout.WALL, layout.FLOOR,
+        layout.CORE_X, layout.CORE_Y, layout.LIMB_HALF, layout.LIMB_REACH, layout.LIMB_THICK,
+        layout.LIMB_WIDE, layout.SPOUT_REACH, layout.SPOUT_ROOT, layout.SPOUT_TIP,
+    ),
+    TOOL: tuple(
+        range(layout.LENGTH, layout.SLOT_TURN)
+    ),
+    BENT: (layout.ARC, *range(layout.GIRTHS, layout.GIRTHS + layout.GIRTH_KNOTS)),
+}  # fmt: skip
+
+
+def deviations(code: IntArray) -> dict[int, float]:
+    """One standard deviation of each of the kind's own numbers that are free, from its draw."""
+    kind = int(code[layout.KIND])
+    free = dict(_DEVIATIONS[kind])
+    if kind == TURNED:
+        if code[layout.HOLLOW] == 0:
+            del free[layout.WALL], free[layout.FLOOR]
+        if code[layout.PLAN] == CORED:
+            free |= {layout.CORE_X: 0.35, layout.CORE_Y: 0.35}
+        if code[layout.PLAN] == SUPER:
+            free |= {layout.ACROSS: 0.25, layout.POWER: 0.3}
+        if code[layout.LIMB] != NO_LIMB:
+            free |= _LIMB
+        if code[layout.LIMB] == LOOP:
+            free |= _LOOP
+        if code[layout.SPOUT] != 0:
+            free |= _SPOUT
+    if kind == TOOL:
+        for end, head, hole in (
+            (layout.END_A, layout.HEAD_A, layout.HOLE_A),
+            (layout.END_B, layout.HEAD_B, layout.HOLE_B),
+        ):
+            if code[end] != PLAIN:
+                free |= {head: 0.25, layout.HEAD_THICK: 0.3}
+            if code[end] > layout.DISC:
+                free[hole] = 0.25
+        if layout.SLOT in (code[layout.END_A], code[layout.END_B]):
+            free[layout.SLOT_TURN] = 0.2
+    return free
+
+
+def sizes_of(code: IntArray) -> tuple[int, ...]:
+    """Slots of all the kind's lengths: they scale together."""
+    return _SIZES[int(code[layout.KIND])]
+
+
+def has_yaw(code: IntArray) -> bool:
+    """Whether a turn about the vertical changes the shape."""
+    plain = code[layout.PLAN] == ROUND and code[layout.LIMB] == NO_LIMB and code[layout.SPOUT] == 0
+    return bool(code[layout.KIND] != TURNED or not plain)
+
+
+@lru_cache(maxsize=256)
+def _basis_of(code: tuple[int, ...], sighted: bool, touched: bool) -> FloatArray:
+    coded = np.array(code)
+    slots = [layout.X, layout.Y, layout.LIFT, layout.TILT_X, layout.TILT_Y, *deviations(coded)]
+    if has_yaw(coded):
+        slots.append(layout.YAW)
+    if sighted:
+        slots += [layout.CAMERA_RIGHT, layout.CAMERA_DOWN, layout.CAMERA_SCALE, layout.OUTLINE]
+    if touched:
+        slots += [layout.GEL, layout.GEL + 1, layout.GEL + 2]
+    return np.asarray(np.eye(layout.SIZE)[np.sort(slots)])
+
+
+def basis_of(code: IntArray, sighted: bool, touched: bool) -> FloatArray:
+    """``(n, SIZE)`` every number that is free, by itself."""
+    return _basis_of(_key(code), sighted, touched)
+
+
+def stand_basis(code: IntArray) -> FloatArray:
+    """``(n, SIZE)`` directions of place, turn, size and proportions, along which a draw is laid down."""
+    return _stand_basis(_key(code))
+
+
+def _key(code: IntArray) -> tuple[int, ...]:
+    return tuple(int(part) for part in code)
+
+
+@lru_cache(maxsize=256)
+def _stand_basis(key: tuple[int, ...]) -> FloatArray:
+    code = np.array(key)
+    kind = int(code[layout.KIND])
+    rows = [_along(layout.X), _along(layout.Y), _along(*_SIZES[kind])]
+    rows.append(_along({TURNED: layout.HEIGHT, TOOL: layout.LENGTH, BENT: layout.ARC}[kind]))
+    if has_yaw(code):
+        rows.append(_along(layout.YAW))
+    if code[layout.PLAN] == CORED and kind == TURNED:
+        rows += [_along(layout.CORE_X), _along(layout.CORE_Y)]
+    if code[layout.LIMB] == BAR:
+        rows.append(_along(layout.LIMB_REACH))
+    return np.array(rows)
+
+
+def _along(*slots: int) -> FloatArray:
+    row = np.zeros(layout.SIZE)
+    row[list(slots)] = 1.0
+    return row
+
+
+def bench_rows(place: float, support: float, pixel: float, shift: float, scale: float) -> FloatArray:
+    """``(n, SIZE)`` of a prior: place, support, leaning, camera and gel, in their standard deviations."""
+    sigmas = {
+        layout.X: place, layout.Y: place, layout.LIFT: support, layout.TILT_X: TILT, layout.TILT_Y: TILT,
+        layout.CAMERA_RIGHT: shift, layout.CAMERA_DOWN: shift, layout.CAMERA_SCALE: scale,
+        layout.OUTLINE: OUTLINE_OFF * pixel,
+        layout.GEL: GEL_OFF[0], layout.GEL + 1: GEL_OFF[1], layout.GEL + 2: GEL_OFF[2],
+    }  # fmt: skip
+    return np.array([_along(slot) / sigma for slot, sigma in sigmas.items()])
+
+
+def shape_rows(code: IntArray) -> FloatArray:
+    """``(n, SIZE)`` of a prior: each free number by itself, and the section's second differences."""
+    return _shape_rows(_key(code))
+
+
+@lru_cache(maxsize=256)
+def _shape_rows(key: tuple[int, ...]) -> FloatArray:
+    code = np.array(key)
+    rows = [_along(slot) / sigma for slot, sigma in deviations(code).items()]
+    first, count = {
+        TURNED: (layout.RADII, layout.KNOTS), TOOL: (0, 0), BENT: (layout.GIRTHS, layout.GIRTH_KNOTS)
+    }[int(code[layout.KIND])]  # fmt: skip
+    for k in range(first, first + count - 2):
+        rows.append((_along(k) - 2.0 * _along(k + 1) + _along(k + 2)) / _SMOOTH)
+    return np.array(rows)
+
+
+def stand_rows(code: IntArray) -> FloatArray:
+    """``(n, SIZE)`` of the prior while a draw is laid on the readings: its size and proportions."""
+    return _stand_rows(_key(code))
+
+
+@lru_cache(maxsize=256)
+def _stand_rows(key: tuple[int, ...]) -> FloatArray:
+    # One length stands for the size, as all scale together; a place has its own rows, any turn is as likely.
+    code = np.array(key)
+    kind = int(code[layout.KIND])
+    anchor = {TURNED: layout.RADII, TOOL: layout.SHAFT_A, BENT: layout.GIRTHS + 2}[kind]
+    tall = {TURNED: layout.HEIGHT, TOOL: layout.LENGTH, BENT: layout.ARC}[kind]
+    rows = [_along(anchor) / 0.4, (_along(tall) - _along(anchor)) / 0.25]
+    if code[layout.PLAN] == CORED and kind == TURNED:
+        rows += [(_along(slot) - _along(anchor)) / 0.3 for slot in (layout.CORE_X, layout.CORE_Y)]
+    if code[layout.LIMB] == BAR:
+        rows.append((_along(layout.LIMB_REACH) - _along(anchor)) / 0.3)
+    return np.array(rows)

@@ -1,0 +1,121 @@
+"""The readings of an object as arrays that a shape is compared with: points, free places, rays of sight."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
+from experiments.shape_reconstruction.family.sight import SightRays, no_rays, sight_rays
+from experiments.shape_reconstruction.family.spread import farthest_points
+from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.geometry import apply
+
+POINTS_A_TOUCH = 6
+"""Points of a contact that are fitted: they span it, and more say the same again."""
+
+WORTH = 3.0
+"""Independent points that a contact counts as: its height and its two slopes."""
+
+MODEL = 0.7e-3
+"""M by which the nearest shape of the family is off a real surface, one standard deviation."""
+
+NORMAL_STEP = 2.0e-3
+"""M over which a shape's normal is taken: the mean over a contact."""
+
+_LAYERS = (0.0, 8.0e-3, 20.0e-3, 40.0e-3, 70.0e-3, 110.0e-3)
+_ACROSS = 5
+_WAY_STEP = 8.0e-3
+
+
+class Observed(NamedTuple):
+    """What the compiled residuals read.
+
+    Attributes:
+        points: ``(n, 3)`` m of the surface.
+        touch: ``(n,)`` which contact each is of.
+        sigma: ``(contacts,)`` m of each contact's points.
+        worth: ``(contacts,)`` weight of each point's squared residual.
+        middles: ``(contacts, 3)`` m, where the normals are taken.
+        normals: ``(contacts, 3)`` unit, outward.
+        normal_sigma: ``(contacts,)``.
+        gel: ``(contacts, 3, 3)`` rotations, stand from gel.
+        free: ``(k, 3)`` m where the sensor was, so that the object is not.
+        place: ``(2,)`` reciprocal of m: of x and y.
+        support: m, one standard deviation of its height.
+        largest: m, no side is longer.
+        rays: of the picture; none without one.
+    """
+
+    points: FloatArray
+    touch: IntArray
+    sigma: FloatArray
+    worth: FloatArray
+    middles: FloatArray
+    normals: FloatArray
+    normal_sigma: FloatArray
+    gel: FloatArray
+    free: FloatArray
+    place: float
+    support: float
+    largest: float
+    rays: SightRays
+
+
+def observe(evidence: ShapeEvidence, coarse: bool = False) -> Observed:
+    """The arrays of some evidence; ``coarse`` takes fewer of all, for ranking many shapes."""
+    contacts = evidence.contacts
+    per_touch = 3 if coarse else POINTS_A_TOUCH
+    chosen = [farthest_points(touch.points, per_touch) for touch in contacts]
+    points = [touch.points[rows] for touch, rows in zip(contacts, chosen, strict=True)]
+    sigma = np.array([np.hypot(touch.sigma, MODEL) for touch in contacts])
+    return Observed(
+        points=_stacked(points, 3),
+        touch=np.repeat(np.arange(len(contacts)), [len(rows) for rows in points]).astype(np.int64),
+        sigma=sigma,
+        worth=np.array([min(WORTH, len(rows)) / len(rows) for rows in points]),
+        middles=_stacked([touch.points.mean(axis=0)[None] for touch in contacts], 3),
+        normals=_stacked([_mean_normal(touch)[None] for touch in contacts], 3),
+        normal_sigma=np.array([np.hypot(touch.normal_sigma, np.radians(6.0)) for touch in contacts]),
+        gel=np.array([touch.stand_from_gel[:3, :3] for touch in contacts]).reshape(-1, 3, 3),
+        free=_free_places(evidence, coarse),
+        place=evidence.place_error,
+        support=evidence.support_error,
+        largest=evidence.largest,
+        rays=no_rays() if evidence.look is None else sight_rays(evidence.look, coarse),
+    )
+
+
+def _stacked(parts: list[FloatArray], columns: int) -> FloatArray:
+    return read_only(np.concatenate([np.empty((0, columns)), *parts]))
+
+
+def _mean_normal(touch: GuardedTouch) -> FloatArray:
+    total = touch.normals.sum(axis=0)
+    length = float(np.linalg.norm(total))
+    return np.asarray(total / length if length > 0.0 else -touch.stand_from_gel[:3, 2])
+
+
+def _free_places(evidence: ShapeEvidence, coarse: bool) -> FloatArray:
+    """``(k, 3)`` m inside the housing and, of a miss, before the gel, above the support."""
+    places = [_of_touch(evidence, touch, coarse) for touch in evidence.touches]
+    free = _stacked(places, 3)
+    return np.ascontiguousarray(free[free[:, 2] > 0.0])
+
+
+def _of_touch(evidence: ShapeEvidence, touch: GuardedTouch, coarse: bool) -> FloatArray:
+    across = 3 if coarse else _ACROSS
+    depths = [0.0, 25.0e-3] if coarse else [d for d in _LAYERS if d <= evidence.housing_depth]
+    layers = [-evidence.gel_thickness - depth for depth in depths]
+    boxes = [_plate(evidence.housing, across, z) for z in layers]
+    if not touch.met:
+        # The gel itself went all this way and touched nothing.
+        half = tuple(0.6 * side for side in evidence.housing)
+        steps = np.arange(0.0, max(touch.way, _WAY_STEP), _WAY_STEP * (2 if coarse else 1))
+        boxes += [_plate((half[0], half[1]), 3, -step) for step in steps]
+    return apply(touch.stand_from_gel, np.concatenate(boxes))
+
+
+def _plate(sides: tuple[float, float], across: int, z: float) -> FloatArray:
+    share = np.linspace(-0.5, 0.5, across)
+    x, y = np.meshgrid(share * sides[0], share * sides[1])
+    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z)])

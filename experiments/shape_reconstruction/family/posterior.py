@@ -1,0 +1,94 @@
+"""How much each hypothesis is believed, and shapes drawn from the uncertainty about each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.shape_reconstruction.family import layout
+from experiments.shape_reconstruction.family.classes import FamilyShape
+from experiments.shape_reconstruction.family.freedom import basis_of
+from experiments.shape_reconstruction.family.search import Hypothesis
+from harness.basics.arrays import FloatArray
+
+TEMPERATURE = 3.0
+"""By which costs are divided: residuals of one reading, and of neighbours, err together."""
+
+LEAST = 0.01
+"""Weight of a hypothesis, of the greatest, below which it is left out."""
+
+SAMPLES = 4
+"""Shapes drawn about each hypothesis."""
+
+_LONGEST = 2.5
+"""Standard deviations of a prior that a drawn number is off its hypothesis at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """What the readings leave.
+
+    Attributes:
+        hypotheses: by weight, the greatest first.
+        weights: ``(n,)``, their sum 1.
+        about: ``SAMPLES`` shapes drawn about each, in their order.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    weights: FloatArray
+    about: tuple[tuple[FamilyShape, ...], ...]
+
+    @property
+    def best(self) -> Hypothesis:
+        """The one of greatest weight."""
+        return self.hypotheses[0]
+
+    def by_class(self) -> dict[str, float]:
+        """Weight of every class among them, the greatest first."""
+        totals: dict[str, float] = {}
+        for one, weight in zip(self.hypotheses, self.weights, strict=True):
+            totals[one.shape.name] = totals.get(one.shape.name, 0.0) + float(weight)
+        return dict(sorted(totals.items(), key=lambda item: -item[1]))
+
+
+def mixture_of(found: list[Hypothesis], sighted: bool, touched: bool, seed: int) -> Mixture:
+    """Weights by cost and by how much of its prior each hypothesis had to give up (Laplace)."""
+    scores = np.array([_log_weight(one, sighted, touched) for one in found])
+    weights = np.exp(scores - scores.max())
+    order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] >= LEAST]
+    kept = weights[order] / weights[order].sum()
+    random = np.random.default_rng(seed)
+    about = tuple(_drawn(found[i], sighted, touched, random) for i in order)
+    return Mixture(tuple(found[i] for i in order), kept, about)
+
+
+def _log_weight(one: Hypothesis, sighted: bool, touched: bool) -> float:
+    prior = _prior_precision(one, sighted, touched)
+    _, narrow = np.linalg.slogdet(one.curvature / TEMPERATURE + prior * (1.0 - 1.0 / TEMPERATURE))
+    _, wide = np.linalg.slogdet(prior)
+    return float(-one.cost / TEMPERATURE - 0.5 * (narrow - wide))
+
+
+def _prior_precision(one: Hypothesis, sighted: bool, touched: bool) -> FloatArray:
+    basis = basis_of(one.shape.code, sighted, touched)
+    along = one.prior.rows @ basis.T
+    precision = along.T @ along
+    # A turn is as likely as any other: the deviation of a uniform density over all of them.
+    turn = np.flatnonzero(basis[:, layout.YAW])
+    precision[turn, turn] += 3.0 / np.pi**2
+    return np.asarray(precision)
+
+
+def _drawn(
+    one: Hypothesis, sighted: bool, touched: bool, random: np.random.Generator
+) -> tuple[FamilyShape, ...]:
+    basis = basis_of(one.shape.code, sighted, touched)
+    prior = _prior_precision(one, sighted, touched)
+    precision = one.curvature / TEMPERATURE + prior
+    values, vectors = np.linalg.eigh(0.5 * (precision + precision.T))
+    spread = vectors / np.sqrt(np.maximum(values, 1e-6))
+    steps = random.standard_normal((SAMPLES, len(values))) @ spread.T
+    most = _LONGEST / np.sqrt(np.diag(prior))
+    steps = np.clip(steps, -most, most)
+    return tuple(
+        FamilyShape(one.shape.name, one.shape.code, one.shape.theta + step @ basis) for step in steps
+    )

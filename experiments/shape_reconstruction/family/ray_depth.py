@@ -1,0 +1,83 @@
+"""How near a ray of sight passes to a shape."""
+
+import numpy as np
+
+from experiments.shape_reconstruction.family.distance import BOX, distance
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.compiled import compiled
+
+LEAST_STEP = 2.5e-3
+_MOST = 120
+_BEYOND = 10.0e-3
+"""M above and below the shape at which a ray is still followed: it may pass its rim."""
+
+
+@compiled
+def nearest_along(
+    code: IntArray,
+    q: FloatArray,
+    origin: FloatArray,
+    direction: FloatArray,
+    radius: float,
+    to_middle: FloatArray,
+    enough: bool,
+) -> tuple[float, float]:
+    """Least signed distance along a ray, and how far along it is.
+
+    Args:
+        code: of the shape.
+        q: its prepared numbers.
+        origin: ``(3,)`` m.
+        direction: ``(3,)`` unit.
+        radius: m of a ball that holds the shape.
+        to_middle: ``(3,)`` m from the origin to the ball's middle.
+        enough: whether any place inside will do: the ray needs only to meet the shape.
+
+    Returns:
+        M: the least distance found, and where; of a ray that misses the ball, at its place nearest to it.
+    """
+    along = to_middle[0] * direction[0] + to_middle[1] * direction[1] + to_middle[2] * direction[2]
+    square = to_middle[0] ** 2 + to_middle[1] ** 2 + to_middle[2] ** 2 - along * along
+    half = np.sqrt(max(radius * radius - square, 0.0))
+    t, end = _between_levels(q, origin, direction, along - half, along + half)
+    if t >= end:
+        d = distance(
+            code,
+            q,
+            True,
+            origin[0] + along * direction[0],
+            origin[1] + along * direction[1],
+            origin[2] + along * direction[2],
+        )
+        return d, along
+    best, where = np.inf, along
+    for _ in range(_MOST):
+        d = distance(
+            code,
+            q,
+            True,
+            origin[0] + t * direction[0],
+            origin[1] + t * direction[1],
+            origin[2] + t * direction[2],
+        )
+        if d < best:
+            best, where = d, t
+            if enough and d < 0.0:
+                break
+        t += max(abs(d), LEAST_STEP)
+        if t > end:
+            break
+    return best, where
+
+
+@compiled
+def _between_levels(
+    q: FloatArray, origin: FloatArray, direction: FloatArray, first: float, last: float
+) -> tuple[float, float]:
+    """The part of a ray that is neither far above nor far below the shape."""
+    steep = direction[2]
+    if abs(steep) < 0.05:
+        return first, last
+    a = (q[2] + q[BOX + 2] - _BEYOND - origin[2]) / steep
+    b = (q[2] + q[BOX + 5] + _BEYOND - origin[2]) / steep
+    return max(first, min(a, b)), min(last, max(a, b))

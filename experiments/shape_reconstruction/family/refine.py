@@ -1,0 +1,133 @@
+"""Levenberg-Marquardt on a shape's vector, along any directions of it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from experiments.shape_reconstruction.family.observed import Observed
+from experiments.shape_reconstruction.family.residuals import (
+    Rows,
+    active_rows,
+    evaluate,
+    frozen,
+    prepared_room,
+    rows_for,
+)
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.compiled import compiled
+
+_NUDGE = 1.0e-5
+"""Of every direction: m, rad or logarithm."""
+
+_SETTLED = 1.0e-3
+"""Of the cost: a round that gains less is the last."""
+
+_HOPELESS = 1.0e6
+_MOST = 0.6
+"""Longest step of a logarithm or an angle: beyond it the model's slope says nothing."""
+
+
+class Prior(NamedTuple):
+    """A normal density about a vector.
+
+    Attributes:
+        middle: ``(SIZE,)``.
+        rows: ``(k, SIZE)``: ``rows @ (theta - middle)`` are independent, of unit deviation.
+    """
+
+    middle: FloatArray
+    rows: FloatArray
+
+
+@compiled
+def total_cost(
+    code: IntArray, theta: FloatArray, seen: Observed, prior: Prior, robust: bool, out: Rows, q: FloatArray
+) -> float:
+    """Half the sum of squares of readings and prior; very large where the shape is no number."""
+    off = prior.rows @ (theta - prior.middle)
+    cost = evaluate(code, theta, seen, robust, out, q) + 0.5 * np.dot(off, off)
+    return cost if np.isfinite(cost) else _HOPELESS
+
+
+@compiled
+def refine(
+    code: IntArray,
+    theta: FloatArray,
+    seen: Observed,
+    prior: Prior,
+    basis: FloatArray,
+    robust: bool,
+    rounds: int,
+) -> tuple[FloatArray, float, FloatArray]:
+    """The vector of least cost near one, along the directions of ``basis``.
+
+    Args:
+        code: of the shape.
+        theta: ``(SIZE,)`` to begin at.
+        seen: readings.
+        prior: of the vector.
+        basis: ``(n, SIZE)`` directions that it may move along.
+        robust: whether contacts that do not fit are let go.
+        rounds: at most.
+
+    Returns:
+        The vector, its cost, and ``(n, n)`` the curvature of the cost along the directions.
+    """
+    best = theta.copy()
+    out, trial, q = rows_for(seen), rows_for(seen), prepared_room()
+    cost = total_cost(code, best, seen, prior, robust, out, q)
+    damping = 1e-2
+    along = prior.rows @ basis.T
+    curvature, slope = _normal_equations(code, best, seen, prior, basis, along, out, q)
+    for _ in range(rounds):
+        damped = curvature.copy()
+        for i in range(len(damped)):
+            damped[i, i] += damping * curvature[i, i] + 1e-9
+        step = _bounded(np.linalg.solve(damped, -slope).astype(np.float64))
+        moved = best + step @ basis
+        now = total_cost(code, moved, seen, prior, robust, trial, q)
+        if now < cost:
+            gain = cost - now
+            best, cost = moved, now
+            out, trial = trial, out
+            damping = max(0.2 * damping, 1e-6)
+            curvature, slope = _normal_equations(code, best, seen, prior, basis, along, out, q)
+            if gain < _SETTLED * cost:
+                break
+        else:
+            damping *= 8.0
+            if damping > 1e5:
+                break
+    return best, cost, curvature
+
+
+@compiled
+def _bounded(step: FloatArray) -> FloatArray:
+    longest = np.abs(step).max()
+    return step * (_MOST / longest) if longest > _MOST else step
+
+
+@compiled
+def _normal_equations(
+    code: IntArray,
+    theta: FloatArray,
+    seen: Observed,
+    prior: Prior,
+    basis: FloatArray,
+    along: FloatArray,
+    out: Rows,
+    q: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Gauss-Newton's curvature and slope along the directions."""
+    rows = active_rows(seen, out.values)
+    base, here = np.empty(len(rows)), np.empty(len(rows))
+    frozen(code, theta, seen, rows, out.along, q, base)
+    slopes = np.empty((len(basis), len(rows)))
+    root = np.sqrt(out.weights[rows])
+    for i in range(len(basis)):
+        frozen(code, theta + _NUDGE * basis[i], seen, rows, out.along, q, here)
+        slopes[i] = (here - base) / _NUDGE * root
+    off = prior.rows @ (theta - prior.middle)
+    curvature = slopes @ slopes.T + along.T @ along
+    slope = slopes @ (out.values[rows] * root) + along.T @ off
+    return curvature, slope

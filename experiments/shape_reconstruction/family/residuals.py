@@ -1,0 +1,281 @@
+"""How a shape of the family disagrees with the readings: weighted residuals, and the cost they add up to.
+
+One likelihood for touch, sight and both: what was not read has no rows. Rows: of each contact its points and
+its normal, every free place, every ray. A contact counts as a whole: one that slipped loses all its weight.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from experiments.shape_reconstruction.family.distance import PREPARED, ball, distance, inside_depth, prepare
+from experiments.shape_reconstruction.family.layout import (
+    CAMERA_DOWN,
+    CAMERA_RIGHT,
+    CAMERA_SCALE,
+    GEL,
+    OUTLINE,
+)
+from experiments.shape_reconstruction.family.observed import Observed
+from experiments.shape_reconstruction.family.ray_depth import nearest_along
+from experiments.shape_reconstruction.family.sight import GRAZE, MEET, PASS
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.compiled import compiled
+
+FREE_SIGMA = 1.0e-3
+"""M by which the sensor's housing may seem to be inside the object."""
+
+RAY_MODEL = 0.5e-3
+"""M by which the outline of the nearest shape is off a real one."""
+
+PIXELS = 0.5
+"""Of an outline's deviation: one standard deviation of where a mask ends."""
+
+NORMAL_STEP = 1.2e-3
+"""M between the places of which a shape's normal is taken."""
+
+SLIPPED = 12.0
+"""A contact's sum of squares at which it has half its weight."""
+
+_BEND = 3.0
+"""Standard deviations beyond which a ray or a free place costs in proportion, not its square."""
+
+
+class Rows(NamedTuple):
+    """Residuals in units of their standard deviations, and what they cost.
+
+    Attributes:
+        values: ``(rows,)``.
+        weights: ``(rows,)`` by which a squared residual counts at this shape: worth times robustness.
+        along: ``(rays,)`` m along each ray where the shape is nearest.
+    """
+
+    values: FloatArray
+    weights: FloatArray
+    along: FloatArray
+
+
+@compiled
+def row_count(seen: Observed) -> int:
+    """Rows of all readings: points, three to a normal, free places, rays."""
+    return int(len(seen.points) + 3 * len(seen.middles) + len(seen.free) + len(seen.rays.kinds))
+
+
+@compiled
+def evaluate(
+    code: IntArray, theta: FloatArray, seen: Observed, robust: bool, out: Rows, q: FloatArray
+) -> float:
+    """Fill in the rows of a shape; returns half the sum of what they cost.
+
+    ``robust`` lets go of contacts that do not fit; without it they pull with at most a constant force.
+    """
+    prepare(code, theta, q)
+    n, m, k = len(seen.points), len(seen.middles), len(seen.free)
+    for i in range(n):
+        out.values[i] = _point(code, theta, seen, q, i)
+    for j in range(m):
+        _normal(code, theta, seen, q, j, out.values[n + 3 * j : n + 3 * j + 3])
+    cost = _weigh_contacts(seen, robust, out)
+    first = n + 3 * m
+    for i in range(k):
+        out.values[first + i] = _free(code, seen, q, i)
+        cost += _weigh(first + i, 1.0, out)
+    return cost + _evaluate_rays(code, theta, seen, out, q, first + k)
+
+
+@compiled
+def _evaluate_rays(
+    code: IntArray, theta: FloatArray, seen: Observed, out: Rows, q: FloatArray, first: int
+) -> float:
+    rays, cost = seen.rays, 0.0
+    origin, towards, to_middle = np.empty(3), np.empty(3), np.empty(3)
+    radius = ball(q, to_middle)
+    for a in range(3):
+        origin[a] = rays.eye[a] + theta[CAMERA_RIGHT] * rays.right[a] + theta[CAMERA_DOWN] * rays.down[a]
+        to_middle[a] -= origin[a]
+    for i in range(len(rays.kinds)):
+        _turned_ray(theta, seen, i, towards)
+        d, out.along[i] = nearest_along(code, q, origin, towards, radius, to_middle, rays.kinds[i] == MEET)
+        out.values[first + i] = _sighted(theta, seen, i, d)
+        cost += _weigh(first + i, rays.worth[i], out)
+    return cost
+
+
+@compiled
+def _turned_ray(theta: FloatArray, seen: Observed, i: int, towards: FloatArray) -> None:
+    """A ray's direction, were the picture's scale off by what the shape's vector says."""
+    rays = seen.rays
+    scale = theta[CAMERA_SCALE]
+    for a in range(3):
+        towards[a] = rays.directions[i, a] + scale * (rays.directions[i, a] - rays.middle[a])
+
+
+@compiled
+def _sighted(theta: FloatArray, seen: Observed, i: int, d: float) -> float:
+    """A ray's residual where it passes the shape at ``d`` m."""
+    rays = seen.rays
+    sigma = np.hypot(PIXELS * rays.pixel, RAY_MODEL)
+    if rays.kinds[i] == GRAZE:
+        return float((d - theta[OUTLINE]) / sigma)
+    if rays.kinds[i] == PASS:
+        return float(min(d, 0.0) / sigma)
+    return float(max(d, 0.0) / sigma)
+
+
+@compiled
+def _point(code: IntArray, theta: FloatArray, seen: Observed, q: FloatArray, i: int) -> float:
+    j = seen.touch[i]
+    x, y, z = _moved(theta, seen, j, seen.points[i])
+    return float(distance(code, q, False, x, y, z) / seen.sigma[j])
+
+
+@compiled
+def _moved(theta: FloatArray, seen: Observed, j: int, point: FloatArray) -> tuple[float, float, float]:
+    """Where a place of contact ``j`` is, were the gel off by what the shape's vector says."""
+    r = seen.gel[j]
+    a, b, c = theta[GEL], theta[GEL + 1], theta[GEL + 2]
+    x = point[0] + r[0, 0] * a + r[0, 1] * b + r[0, 2] * c
+    y = point[1] + r[1, 0] * a + r[1, 1] * b + r[1, 2] * c
+    z = point[2] + r[2, 0] * a + r[2, 1] * b + r[2, 2] * c
+    return x, y, z
+
+
+@compiled
+def _normal(
+    code: IntArray, theta: FloatArray, seen: Observed, q: FloatArray, j: int, out: FloatArray
+) -> None:
+    """The gradient just outside a contact less its normal; four places give it."""
+    x, y, z = _moved(theta, seen, j, seen.middles[j])
+    h = NORMAL_STEP
+    n = seen.normals[j]
+    x, y, z = x + h * n[0], y + h * n[1], z + h * n[2]
+    a = distance(code, q, False, x + h, y - h, z - h)
+    b = distance(code, q, False, x - h, y - h, z + h)
+    c = distance(code, q, False, x - h, y + h, z - h)
+    d = distance(code, q, False, x + h, y + h, z + h)
+    scale = 0.25 / h
+    out[0] = ((a - b - c + d) * scale - n[0]) / seen.normal_sigma[j]
+    out[1] = ((-a - b + c + d) * scale - n[1]) / seen.normal_sigma[j]
+    out[2] = ((-a + b - c + d) * scale - n[2]) / seen.normal_sigma[j]
+
+
+@compiled
+def _free(code: IntArray, seen: Observed, q: FloatArray, i: int) -> float:
+    p = seen.free[i]
+    return float(inside_depth(code, q, p[0], p[1], p[2]) / FREE_SIGMA)
+
+
+@compiled
+def _weigh(row: int, worth: float, out: Rows) -> float:
+    size = abs(out.values[row])
+    if size <= _BEND:
+        out.weights[row] = worth
+        return float(0.5 * worth * size * size)
+    out.weights[row] = worth * _BEND / size
+    return float(worth * _BEND * (size - 0.5 * _BEND))
+
+
+@compiled
+def _weigh_contacts(seen: Observed, robust: bool, out: Rows) -> float:
+    sums = contact_sums(seen, out.values)
+    cost = 0.0
+    n = len(seen.points)
+    factor = np.empty(len(sums))
+    for j in range(len(sums)):
+        s = sums[j]
+        if robust:
+            cost += 0.5 * SLIPPED * np.log(1.0 + s / SLIPPED)
+            factor[j] = SLIPPED / (SLIPPED + s)
+        elif s <= SLIPPED:
+            cost += 0.5 * s
+            factor[j] = 1.0
+        else:
+            cost += np.sqrt(SLIPPED * s) - 0.5 * SLIPPED
+            factor[j] = np.sqrt(SLIPPED / s)
+        out.weights[n + 3 * j : n + 3 * j + 3] = factor[j]
+    for i in range(n):
+        out.weights[i] = factor[seen.touch[i]] * seen.worth[seen.touch[i]]
+    return cost
+
+
+@compiled
+def contact_sums(seen: Observed, values: FloatArray) -> FloatArray:
+    """``(contacts,)`` sums of the squared residuals of each contact, as independent as they are."""
+    sums = np.zeros(len(seen.middles))
+    n = len(seen.points)
+    for i in range(n):
+        sums[seen.touch[i]] += seen.worth[seen.touch[i]] * values[i] ** 2
+    for j in range(len(sums)):
+        for a in range(3):
+            sums[j] += values[n + 3 * j + a] ** 2
+    return sums
+
+
+@compiled
+def frozen(
+    code: IntArray,
+    theta: FloatArray,
+    seen: Observed,
+    active: IntArray,
+    along: FloatArray,
+    q: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Fill in the residuals of some rows with the rays' nearest places held: what derivatives are taken of.
+
+    A ray's least distance changes as that at its nearest place does (the envelope theorem).
+    """
+    prepare(code, theta, q)
+    n, m, k = len(seen.points), len(seen.middles), len(seen.free)
+    first, rays = n + 3 * m, seen.rays
+    towards, triple, last = np.empty(3), np.empty(3), -1
+    for row in range(len(active)):
+        i = active[row]
+        if i < n:
+            out[row] = _point(code, theta, seen, q, i)
+        elif i < first:
+            j = (i - n) // 3
+            if j != last:
+                _normal(code, theta, seen, q, j, triple)
+                last = j
+            out[row] = triple[(i - n) % 3]
+        elif i < first + k:
+            out[row] = _free(code, seen, q, i - first)
+        else:
+            i -= first + k
+            _turned_ray(theta, seen, i, towards)
+            t = along[i]
+            x, y, z = (
+                rays.eye[0] + theta[CAMERA_RIGHT] * rays.right[0] + theta[CAMERA_DOWN] * rays.down[0],
+                rays.eye[1] + theta[CAMERA_RIGHT] * rays.right[1] + theta[CAMERA_DOWN] * rays.down[1],
+                rays.eye[2] + theta[CAMERA_RIGHT] * rays.right[2] + theta[CAMERA_DOWN] * rays.down[2],
+            )
+            d = distance(code, q, True, x + t * towards[0], y + t * towards[1], z + t * towards[2])
+            out[row] = _sighted(theta, seen, i, d)
+
+
+@compiled
+def active_rows(seen: Observed, values: FloatArray) -> IntArray:
+    """Rows that pull: all of contacts and grazing rays, and of the others those that are violated."""
+    first = len(seen.points) + 3 * len(seen.middles)
+    rays = first + len(seen.free)
+    found = np.empty(len(values), np.int64)
+    count = 0
+    for i in range(len(values)):
+        if i < first or values[i] != 0.0 or (i >= rays and seen.rays.kinds[i - rays] == GRAZE):
+            found[count] = i
+            count += 1
+    return found[:count]
+
+
+@compiled
+def rows_for(seen: Observed) -> Rows:
+    """Room for the rows of some readings."""
+    count = row_count(seen)
+    return Rows(np.zeros(count), np.zeros(count), np.zeros(len(seen.rays.kinds)))
+
+
+@compiled
+def prepared_room() -> FloatArray:
+    """Room for a shape's prepared numbers."""
+    return np.empty(PREPARED)

@@ -1,0 +1,185 @@
+"""From draws of the prior to shapes that the readings allow: many are laid, some refined, few finished."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.family import layout
+from experiments.shape_reconstruction.family.changes import changes
+from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, draw_shape
+from experiments.shape_reconstruction.family.freedom import (
+    OUTLINE_BIAS,
+    basis_of,
+    bench_rows,
+    shape_rows,
+    stand_basis,
+    stand_rows,
+)
+from experiments.shape_reconstruction.family.guides import Guides, guides_of
+from experiments.shape_reconstruction.family.observed import Observed, observe
+from experiments.shape_reconstruction.family.proposals import lay
+from experiments.shape_reconstruction.family.refine import Prior, refine, total_cost
+from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
+from experiments.shape_reconstruction.family.settings import FamilySettings
+from harness.basics.arrays import FloatArray
+
+_Random = np.random.Generator
+
+LAYING = ((1, 0.4), (2, 0.5), (3, 1.0))
+"""Rounds in which draws find their place, turn and size; the share of each class that goes on after them."""
+
+CHANGING = 5
+"""Rounds in which a changed shape finds its numbers."""
+
+ALIKE = 1.5e-3
+"""M by which two shapes of one code differ at most to be one hypothesis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A shape that the readings may be of.
+
+    Attributes:
+        shape: in the frame ``stand``.
+        prior: that its numbers are refined under.
+        cost: half the sum of squares of readings and prior.
+        curvature: ``(n, n)`` of the cost along its free numbers.
+    """
+
+    shape: FamilyShape
+    prior: Prior
+    cost: float
+    curvature: FloatArray
+
+
+class Search:
+    """One search through the family.
+
+    Attributes:
+        settings: how much is searched.
+        guides: what the readings propose.
+        coarse: a part of the readings, for ranking.
+        full: all of them.
+    """
+
+    def __init__(self, evidence: ShapeEvidence, settings: FamilySettings) -> None:
+        """Read the evidence into arrays."""
+        self.settings = settings
+        self.guides: Guides = guides_of(evidence)
+        self.coarse: Observed = observe(evidence, coarse=True)
+        self.full: Observed = observe(evidence)
+        self._place_error = evidence.place_error
+        rays = self.full.rays
+        self._bench = bench_rows(
+            evidence.place_error, evidence.support_error, rays.pixel, rays.position_sigma, rays.scale_sigma
+        )
+        self._bench_middle = np.zeros(layout.SIZE)
+        self._bench_middle[layout.OUTLINE] = OUTLINE_BIAS * rays.pixel
+
+    def found(self, seeds: Iterable[Hypothesis] = ()) -> list[Hypothesis]:
+        """Hypotheses of least cost, the best first.
+
+        Args:
+            seeds: of other searches, to begin at as well.
+        """
+        settings = self.settings
+        begun = [*_stratified(self.laid(), settings.starts), *seeds]
+        started = _ranked(self.refined(one, settings.refining) for one in begun)
+        random = np.random.default_rng(settings.seed + 1)
+        changed = [
+            self.refined(self._under_prior(shape), CHANGING)
+            for one in started[: settings.changed]
+            for shape in changes(one.shape, random)
+        ]
+        last = _distinct(_ranked([*started, *changed]), settings.finals)
+        return _ranked(self.refined(one, settings.finishing, robust=True) for one in last)
+
+    def laid(self) -> list[Hypothesis]:
+        """Draws in their best place, turn and size; of every class those that fit best."""
+        random = np.random.default_rng(self.settings.seed)
+        each = -(-self.settings.draws // len(CLASSES))
+        return [one for name in CLASSES for one in self._laid_of(name, each, random)]
+
+    def _laid_of(self, name: str, count: int, random: _Random) -> list[Hypothesis]:
+        draws = [self._at_best_turn(draw_shape(name, random), random) for _ in range(count)]
+        for rounds, share in LAYING:
+            draws = _ranked(self._stood(one, rounds) for one in draws)
+            draws = draws[: max(int(share * len(draws)), 1)]
+        return [self._under_prior(one.shape, one.cost) for one in draws]
+
+    def _at_best_turn(self, shape: FamilyShape, random: _Random) -> Hypothesis:
+        tried = lay(shape, self.guides, random, self._place_error, self.settings.yaws)
+        tried[:, layout.OUTLINE] = self._bench_middle[layout.OUTLINE]
+        middle = self._middle(tried[0])
+        prior = Prior(middle, np.concatenate([self._bench, stand_rows(shape.code)]))
+        best = tried[0]
+        if len(tried) > 1:
+            out, q = rows_for(self.coarse), prepared_room()
+            costs = [total_cost(shape.code, one, self.coarse, prior, False, out, q) for one in tried]
+            best = tried[int(np.argmin(costs))]
+        return Hypothesis(FamilyShape(shape.name, shape.code, best), prior, np.inf, np.empty((0, 0)))
+
+    def _stood(self, one: Hypothesis, rounds: int) -> Hypothesis:
+        """Moved, turned and scaled to fit the coarse readings better."""
+        shape = one.shape
+        theta, cost, curvature = refine(
+            shape.code, shape.theta, self.coarse, one.prior, stand_basis(shape.code), False, rounds
+        )
+        return Hypothesis(FamilyShape(shape.name, shape.code, theta), one.prior, cost, curvature)
+
+    def _under_prior(self, shape: FamilyShape, cost: float = np.inf) -> Hypothesis:
+        """A shape whose own numbers are believed as they are, give or take what such shapes differ by."""
+        rows = np.concatenate([self._bench, shape_rows(shape.code)])
+        return Hypothesis(shape, Prior(self._middle(shape.theta), rows), cost, np.empty((0, 0)))
+
+    def _middle(self, theta: FloatArray) -> FloatArray:
+        middle = theta.copy()
+        middle[: layout.POSE_END] = self._bench_middle[: layout.POSE_END]
+        return middle
+
+    def refined(self, one: Hypothesis, rounds: int, robust: bool = False) -> Hypothesis:
+        """All its free numbers fitted to all readings."""
+        code = one.shape.code
+        basis = basis_of(code, self.guides.sighted, self.guides.touched)
+        theta, cost, curvature = refine(code, one.shape.theta, self.full, one.prior, basis, robust, rounds)
+        return Hypothesis(FamilyShape(one.shape.name, code, theta), one.prior, cost, curvature)
+
+
+def _by_cost(one: Hypothesis) -> float:
+    return one.cost
+
+
+def _ranked(hypotheses: Iterable[Hypothesis]) -> list[Hypothesis]:
+    return sorted(hypotheses, key=_by_cost)
+
+
+def _stratified(laid: list[Hypothesis], count: int) -> list[Hypothesis]:
+    """The best of every class, to half the count, then the best of all."""
+    ranked = _ranked(laid)
+    first = {one.shape.name: one for one in reversed(ranked)}
+    chosen = _ranked(first.values())[: max(count // 2, 1)]
+    taken = {id(one) for one in chosen}
+    rest = [one for one in ranked if id(one) not in taken]
+    return chosen + rest[: count - len(chosen)]
+
+
+def _distinct(ranked: list[Hypothesis], count: int) -> list[Hypothesis]:
+    """The best, each of its code or of numbers of its own."""
+    chosen: list[Hypothesis] = []
+    for one in ranked:
+        if len(chosen) == count:
+            break
+        if not any(_alike(one.shape, other.shape) for other in chosen):
+            chosen.append(one)
+    return chosen
+
+
+def _alike(a: FamilyShape, b: FamilyShape) -> bool:
+    if not np.array_equal(a.code, b.code):
+        return False
+    place = np.abs(a.theta[: layout.Y + 1] - b.theta[: layout.Y + 1]).max()
+    # A difference of logarithms, of a length of 50 mm.
+    own = np.abs(a.theta[layout.POSE_END :] - b.theta[layout.POSE_END :]).max() * 50e-3
+    return bool(max(place, own) < ALIKE)

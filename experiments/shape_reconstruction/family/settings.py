@@ -1,0 +1,40 @@
+"""How much is searched, and how far the readings are believed: the dial of the family's estimate."""
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class FamilySettings:
+    """Work and scales of a fit.
+
+    Attributes:
+        draws: shapes drawn from the prior, spread evenly over the classes.
+        yaws: turns that each draw is tried at.
+        starts: of them that are refined.
+        refining: rounds of each.
+        changed: hypotheses of which parts are then put on, taken off or exchanged.
+        finals: hypotheses that are refined to the end.
+        finishing: rounds of each of those.
+        pitch: m, of the grid that the surface is taken from.
+        seed: of the draws.
+    """
+
+    draws: int = 1260
+    yaws: int = 4
+    starts: int = 36
+    refining: int = 7
+    changed: int = 4
+    finals: int = 10
+    finishing: int = 14
+    pitch: float = 2.5e-3
+    seed: int = 0
+
+
+LEVELS = {
+    "coarse": FamilySettings(draws=420, starts=16, changed=2, finals=5, finishing=8, pitch=4.0e-3),
+    "default": FamilySettings(),
+    "fine": replace(
+        FamilySettings(), draws=4200, yaws=8, starts=100, changed=10, finals=20, finishing=20, pitch=2.0e-3
+    ),
+}
+"""By name, the cheapest first."""

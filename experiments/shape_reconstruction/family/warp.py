@@ -1,0 +1,40 @@
+"""What the family cannot bend to: contacts that are off its surface move the surface near them."""
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from harness.basics.arrays import FloatArray
+
+LENGTH = 15.0e-3
+"""M over which a displacement dies away."""
+
+AMPLITUDE = 3.0e-3
+"""M: one standard deviation of a displacement where nothing was read."""
+
+
+def displacement(
+    places: FloatArray, offsets: FloatArray, sigma: FloatArray, queries: FloatArray
+) -> FloatArray:
+    """The mean of a Gaussian process of displacements, squared-exponential, each axis by itself.
+
+    A surface is moved by vectors, not along its normals by amounts, so that both sides of a wall go together.
+
+    Args:
+        places: ``(n, 3)`` m.
+        offsets: ``(n, 3)`` m that the surface is displaced by there.
+        sigma: ``(n,)`` m, one standard deviation of those, greater than zero.
+        queries: ``(m, 3)`` m.
+
+    Returns:
+        ``(m, 3)`` m; zero far from all places.
+    """
+    if len(places) == 0:
+        return np.zeros_like(queries)
+    covariance = _kernel(places, places) + np.diag(sigma**2)
+    weights = cho_solve(cho_factor(covariance, lower=True), offsets)
+    return np.asarray(_kernel(queries, places) @ weights)
+
+
+def _kernel(a: FloatArray, b: FloatArray) -> FloatArray:
+    squares = np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1) - 2.0 * a @ b.T
+    return np.asarray(AMPLITUDE**2 * np.exp(-0.5 * np.maximum(squares, 0.0) / LENGTH**2))

@@ -1,0 +1,89 @@
+"""The trained network that came with the program, and its answer to touches."""
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from experiments.shape_reconstruction.estimators.contact_samples import all_samples
+from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.pcn.point_frame import GIVEN, TAKEN, PointFrame, taken
+from harness.basics.arrays import FloatArray
+from harness.objectfile.entries import Domain, Input, Tensor
+from harness.objectfile.runtime import Network
+
+_GREATEST = 30.0
+"""Of any number that the network takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class TouchCompletion:
+    """A trained network.
+
+    Attributes:
+        network: that runs it.
+        card: where it comes from and what it reaches on shapes held out.
+    """
+
+    network: Network
+    card: Mapping[str, object]
+
+    def completed(self, points: FloatArray) -> FloatArray:
+        """``(GIVEN, 3)`` m all over the object of which ``(n, 3)`` m in ``stand`` were touched.
+
+        Raises:
+            OutOfDomain: too few places for a frame.
+        """
+        frame = PointFrame.of(points)
+        inputs = frame.inward(taken(points))[None].astype(np.float32)
+        found = self.network({"touched": inputs})["completed"][0]
+        return frame.outward(found.astype(np.float64))
+
+
+def by_completion(evidence: ShapeEvidence) -> PointEstimate:
+    """Points all over the object, by the network that was shipped; it looks at no picture.
+
+    Raises:
+        FitRefused: no touch met the object.
+        OutOfDomain: touches in one place, at the support.
+    """
+    start = time.perf_counter()
+    points = shipped().completed(all_samples(evidence).points)
+    return PointEstimate(points, time.perf_counter() - start, {"estimator": "pcn"})
+
+
+@cache
+def shipped() -> TouchCompletion:
+    """The network in the program's own folder."""
+    folder = files(__package__) / "data"
+    return opened((folder / "completion.onnx").read_bytes(), (folder / "completion.json").read_text())
+
+
+def opened(data: bytes, card: str) -> TouchCompletion:
+    """A network from its file's bytes and its card.
+
+    Raises:
+        DataRefused: the graph must not be run, or is another one.
+    """
+    touched = Input(
+        name="touched",
+        dtype="float32",
+        shape=("n", TAKEN, 3),
+        unit="1",
+        meaning="touched places over how far they reach",
+        domain=Domain(low=(-_GREATEST,), high=(_GREATEST,)),
+        normaliser="in the graph",
+    )
+    completed = Tensor(
+        name="completed",
+        dtype="float32",
+        shape=("n", GIVEN, 3),
+        unit="1",
+        meaning="places all over the object in the same frame",
+    )
+    return TouchCompletion(Network(data, "completion.onnx", [touched], [completed]), json.loads(card))

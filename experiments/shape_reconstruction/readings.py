@@ -1,0 +1,133 @@
+"""From the recorded steps of a run to what they say of an unknown shape."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from experiments.shape_reconstruction.contact_points import contact_points
+from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
+from experiments.shape_reconstruction.section import ShapeRun
+from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.geometry import apply, translation
+from harness.picture.object_mask import mask_by_background
+from harness.picture.square_pixels import aspect_stated
+from harness.recording.observation import observe_step
+from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import StepRecord
+from harness.sim.optics.inverse import invert
+from harness.skills.look import BARE_IMAGE, IMAGE
+
+LEAST_PIXELS = 12
+"""That an object must cover to be seen."""
+
+HOUSING_DEPTH = 0.12
+"""M behind the face of the sensor's housing that are the sensor's."""
+
+
+@dataclass(eq=False)
+class ShapeReadings:
+    """What the steps read so far say; each step is read once.
+
+    Args:
+        run: the folder.
+    """
+
+    run: RunFiles
+    touches: list[GuardedTouch] = field(default_factory=list, init=False)
+    look: SeenMask | None = field(default=None, init=False)
+
+    def read(self, record: StepRecord) -> None:
+        """Take in a step: a look, a press, or one that was not made."""
+        if IMAGE in record.readings and BARE_IMAGE in record.readings:
+            self.look = seen_mask(self.run, record)
+        elif "gel.image" in record.readings:
+            self.touches.append(guarded_touch(self.run, record))
+
+    def evidence(self) -> ShapeEvidence:
+        """All of it."""
+        asked, sensor = self.run.scene.section(ShapeRun), self.run.station.gel.sensor
+        return ShapeEvidence(
+            touches=tuple(self.touches),
+            look=self.look,
+            housing=sensor.housing,
+            gel_thickness=sensor.gel_thickness,
+            housing_depth=HOUSING_DEPTH,
+            place_error=asked.place_error,
+            support_error=asked.support_error,
+            largest=asked.largest,
+        )
+
+
+def evidence_of(run: RunFiles, records: Iterable[StepRecord]) -> ShapeEvidence:
+    """What these steps of a run say."""
+    readings = ShapeReadings(run)
+    for record in records:
+        readings.read(record)
+    return readings.evidence()
+
+
+def base_from_stand(run: RunFiles) -> FloatArray:
+    """``(4, 4)``: the frame of all evidence, where the scene nominally puts the object on its support."""
+    return translation(np.array(run.scene.object.pose.position))
+
+
+def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
+    """One way of the gel.
+
+    Raises:
+        RecordingDamaged: the step has no pictures or no poses.
+    """
+    calibration, asked = run.calibration, run.scene.section(ShapeRun)
+    aspect = aspect_stated(calibration.header.made_from)
+    seen = observe_step(record, run.station.flange_from_gel, aspect=aspect)
+    mean = np.rint(seen.images.mean(axis=0)).astype(np.uint8)
+    read = invert(mean[None], calibration)
+    found = contact_points(read.height[0], read.error[0], run.station.gel.sensor.pitch)
+    stand_from_gel = seen.base_from_gel.copy()
+    stand_from_gel[:3, 3] -= base_from_stand(run)[:3, 3]
+    nothing = np.zeros((0, 3))
+    return GuardedTouch(
+        stand_from_gel=read_only(stand_from_gel),
+        way=_way(run, record, seen.base_from_gel),
+        points=read_only(nothing if found is None else apply(stand_from_gel, found.points)),
+        normals=read_only(nothing if found is None else found.normals @ stand_from_gel[:3, :3].T),
+        sigma=float(np.hypot(asked.contact_error, 0.0 if found is None else found.error)),
+        normal_sigma=asked.contact_tilt_error,
+        index=record.step.index,
+    )
+
+
+def _way(run: RunFiles, record: StepRecord, base_from_gel: FloatArray) -> float:
+    """M from the stand-off to where the gel ended; the arm's noise makes no way shorter than none."""
+    stand_off = np.asarray(record.step.parameters["base_from_stand_off"]) @ run.station.flange_from_gel
+    return max(0.0, float(stand_off[:3, 2] @ (base_from_gel[:3, 3] - stand_off[:3, 3])))
+
+
+def seen_mask(run: RunFiles, record: StepRecord) -> SeenMask | None:
+    """The object's silhouette; None where the camera did not see it.
+
+    Raises:
+        DataRefused: the two pictures are of two sizes.
+    """
+    camera, asked = run.station.camera, run.scene.section(ShapeRun)
+    assert camera is not None  # there are its pictures
+    live, bare = (_median(record.readings[name].values) for name in (IMAGE, BARE_IMAGE))
+    mask = mask_by_background(live, bare)
+    if mask.sum() < LEAST_PIXELS:
+        return None
+    stand_from_camera = camera.base_from_camera.matrix.copy()
+    stand_from_camera[:3, 3] -= base_from_stand(run)[:3, 3]
+    return SeenMask(
+        mask=mask,
+        hidden=read_only(np.zeros(mask.shape, np.bool_)),
+        stand_from_camera=read_only(stand_from_camera),
+        focal_length=camera.focal_length,
+        position_error=asked.camera_position_error,
+        rotation_error=asked.camera_rotation_error,
+        focal_length_error=asked.focal_length_error,
+    )
+
+
+def _median(frames: ByteArray) -> ByteArray:
+    return np.asarray(np.median(frames, axis=0)).astype(np.uint8)

@@ -1,0 +1,99 @@
+"""A mesh prepared for many questions of how far places are from it, wherever they are."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.compiled import compiled
+from harness.basics.faces.face_grid import FaceGrid, build_face_grid
+from harness.basics.faces.nearest_kernels import nearest_on_triangle
+from harness.basics.mesh import Mesh
+
+_SLACK = 1.0 + 1e-9
+"""By which the nearest corner's distance is widened: the corner itself must be found again."""
+
+
+@dataclass(frozen=True, eq=False)
+class NearestSurface:
+    """The exact nearest place of a mesh to any point; sorted on first use.
+
+    Attributes:
+        mesh: m, one face or more, all corners finite.
+    """
+
+    mesh: Mesh
+
+    def places(self, points: FloatArray) -> tuple[FloatArray, IntArray]:
+        """``(n, 3)`` m nearest places to ``(n, 3)`` finite points, and ``(n,)`` the faces that they are on.
+
+        Raises:
+            MeshRefused: a mesh without faces, or with a corner that is not finite.
+        """
+        grid = self._grid
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        reach = np.asarray(self._corners.query(points)[0]) * _SLACK + np.finfo(float).tiny
+        lists = (grid.origin, grid.cell, grid.shape, grid.starts, grid.faces)
+        return _nearest_faces(points, reach, self.mesh.corners, *lists)
+
+    def distances(self, points: FloatArray) -> FloatArray:
+        """``(n,)`` m from ``(n, 3)`` finite points."""
+        return np.asarray(np.linalg.norm(self.places(points)[0] - points, axis=1))
+
+    @cached_property
+    def _grid(self) -> FaceGrid:
+        return build_face_grid(self.mesh)
+
+    @cached_property
+    def _corners(self) -> cKDTree:
+        return cKDTree(self.mesh.vertices[np.unique(self.mesh.faces)])
+
+
+@compiled
+def _nearest_faces(
+    points: FloatArray,
+    reach: FloatArray,
+    corners: FloatArray,
+    origin: FloatArray,
+    cell: float,
+    shape: IntArray,
+    starts: IntArray,
+    faces: IntArray,
+) -> tuple[FloatArray, IntArray]:
+    """Places and faces; cells that are farther than the best so far are passed over."""
+    places, found = points.copy(), np.full(len(points), -1, np.int64)
+    low, high, here = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3)
+    for n in range(len(points)):
+        best = reach[n] ** 2
+        for axis in range(3):
+            first = np.floor((points[n, axis] - reach[n] - origin[axis]) / cell)
+            last = np.floor((points[n, axis] + reach[n] - origin[axis]) / cell)
+            low[axis] = int(min(max(first, 0.0), shape[axis] - 1.0))
+            high[axis] = int(min(max(last, 0.0), shape[axis] - 1.0))
+        for i in range(low[0], high[0] + 1):
+            x = _beyond(points[n, 0] - origin[0], i * cell, cell)
+            for j in range(low[1], high[1] + 1):
+                xy = x + _beyond(points[n, 1] - origin[1], j * cell, cell)
+                if xy > best:
+                    continue
+                for k in range(low[2], high[2] + 1):
+                    c = (i * shape[1] + j) * shape[2] + k
+                    if starts[c] == starts[c + 1]:
+                        continue
+                    if xy + _beyond(points[n, 2] - origin[2], k * cell, cell) > best:
+                        continue
+                    for at in range(starts[c], starts[c + 1]):
+                        gap = nearest_on_triangle(points[n], corners[faces[at]], here)
+                        if gap <= best:
+                            best, found[n] = gap, faces[at]
+                            places[n] = here
+    return places, found
+
+
+@compiled
+def _beyond(place: float, start: float, length: float) -> float:
+    """Square of how far a place is outside of a stretch, a rounding less."""
+    outside = max(start - place, place - start - length) - 1e-9 * length
+    return max(outside, 0.0) ** 2

@@ -1,0 +1,76 @@
+"""Runs of shape reconstruction in process, for tests."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.shape_reconstruction.experiment import EXPERIMENT
+from experiments.shape_reconstruction.methods import QUICK
+from experiments.shape_reconstruction.result import true_surface
+from harness.basics.faces.nearest_surface import NearestSurface
+from harness.bench.experiments import loaded
+from harness.bench.scene import SceneFile, scene_from_json
+from harness.bench.station import RunContext
+from harness.bench.station_file import Station
+from harness.effects.accuracy import Accuracy
+from harness.experiment.answer import score
+from harness.experiment.begin import begin
+from harness.experiment.perform import perform_on
+from harness.experiment.in_process import IN_PROCESS
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.recording.session import Quiet
+
+QUICKLY = Accuracy.default(EXPERIMENT.knobs).with_({"shape.method": QUICK})
+
+
+def scene_of(
+    presses: int, choose: str, camera: bool = True, mesh: str = "builtin:mug", **more: Any
+) -> SceneFile:
+    """A built-in object; the mug where none is named."""
+    return scene_from_json(
+        {
+            "schema": 1,
+            "object": {"mesh": mesh},
+            "sensors": {"camera": camera, "touch": presses > 0},
+            "shape": {"presses": presses, "choose": choose, **more},
+        },
+        "the scene",
+    )
+
+
+def ran(folder: Path, scene: SceneFile, station: Station, seed: int = 0, gap: str = "default") -> Recording:
+    """Planned and performed to its end."""
+    recording = begin(EXPERIMENT, scene, station, seed, gap, folder).recording
+    assert went_on(recording, Quiet())
+    return recording
+
+
+def went_on(recording: Recording, progress: Quiet) -> bool:
+    """Whether what was left of it is complete now."""
+    run, mock = RunFiles(recording), recording.header.mock
+    assert mock is not None
+    context = RunContext(recording.truth_path, run.mesh, recording.header.seed, mock["gap"])
+    bench = loaded(IN_PROCESS)(run.scene, run.station, context)
+    return perform_on(EXPERIMENT, bench, recording, progress).complete
+
+
+def answered(recording: Recording) -> dict[str, Any]:
+    """Its result, by the quickest method, without what its seconds are."""
+    found: dict[str, Any] = timeless(EXPERIMENT.result(score(EXPERIMENT, recording, QUICKLY)))
+    return found
+
+
+def timeless(result: Any) -> Any:
+    """JSON values without those that are named seconds."""
+    if not isinstance(result, dict):
+        return result
+    return {key: timeless(value) for key, value in result.items() if key != "seconds"}
+
+
+def off_truth(recording: Recording, points: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    """M, root mean square distance of ``(n, 3)`` places in ``stand`` from the true surface."""
+    truth = true_surface(RunFiles(recording))
+    assert truth is not None
+    return float(np.sqrt(np.mean(NearestSurface(truth).distances(points) ** 2)))

@@ -1,0 +1,176 @@
+"""Estimators that learn nothing: laws that any answer obeys, and the cases in which it must not be sure."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from experiments.shape_reconstruction.estimators.contact_samples import all_samples, thinned
+from experiments.shape_reconstruction.estimators.free_space import CLEARANCE, Silhouette, sensor_depth
+from experiments.shape_reconstruction.estimators.hermite import by_hermite
+from experiments.shape_reconstruction.estimators.plain_bodies import by_box, by_hull, by_visual_hull
+from experiments.shape_reconstruction.estimators.point_answer import by_raw_points
+from experiments.shape_reconstruction.estimators.revolution import find_revolution
+from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
+from experiments.shape_reconstruction.metric import points_error, shape_error
+from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused
+from harness.basics.geometry import apply, rotation_about, transform
+from harness.basics.mesh import Mesh
+from harness.objects.builtin import build
+from tests.experiments.shape_reconstruction.touched import evidence_of, look_at, presses, touch_of
+
+MUG = build("mug", 5e-3)
+TOUCHES = presses(MUG, 32, seed=3)
+LOOK = look_at(MUG)
+BOTH = evidence_of(TOUCHES, LOOK)
+BY_TOUCH = {"rbf": by_hermite, "box": by_box, "hull": by_hull}
+
+Estimator = Callable[[ShapeEvidence], ShapeEstimate]
+
+
+def require_whole(estimate: ShapeEstimate) -> None:
+    mesh = estimate.mesh
+    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    assert body.is_watertight
+    assert body.volume > 0.0
+    assert np.isfinite(mesh.vertices).all()
+    assert np.isfinite(estimate.deviation).all()
+    assert (estimate.deviation > 0.0).all()
+    assert len(estimate.deviation) == len(estimate.known_by) == len(mesh.vertices)
+    assert set(np.unique(estimate.known_by)) <= {SUPPOSED, SEEN, TOUCHED}
+
+
+def moved(touch: GuardedTouch, pose: FloatArray) -> GuardedTouch:
+    return replace(
+        touch,
+        stand_from_gel=pose @ touch.stand_from_gel,
+        points=apply(pose, touch.points),
+        normals=touch.normals @ pose[:3, :3].T,
+    )
+
+
+@pytest.mark.parametrize("name", BY_TOUCH)
+@pytest.mark.parametrize("count", [1, 4, 32])
+@pytest.mark.parametrize("seen", [False, True])
+def test_every_answer_is_a_closed_body_that_says_how_well_it_is_known(
+    name: str, count: int, seen: bool
+) -> None:
+    touches = presses(MUG, 2, seed=5)[:1] if count == 1 else TOUCHES[:count]
+    evidence = evidence_of(touches, LOOK if seen else None)
+    try:
+        require_whole(BY_TOUCH[name](evidence))
+    except FitRefused as refused:
+        assert (name, count) == ("hull", 1)  # a flat patch spans no body, and that is said
+        assert "one plane" in str(refused)
+
+
+def test_the_surface_through_contacts_is_near_them_and_better_than_plainer_answers() -> None:
+    evidence = evidence_of(TOUCHES)
+    ours = shape_error(by_hermite(evidence).mesh, MUG, samples=4000)
+    for plainer in (by_box, by_hull):
+        assert ours.chamfer < shape_error(plainer(evidence).mesh, MUG, samples=4000).chamfer
+    assert ours.chamfer < points_error(by_raw_points(evidence).points, MUG, 4000).chamfer
+    at_contacts = shape_error(MUG, by_hermite(evidence).mesh, samples=4000)
+    assert at_contacts.chamfer == pytest.approx(ours.chamfer, abs=1e-9)
+
+
+def test_more_contacts_are_better_and_touched_places_are_known_best() -> None:
+    few, many = by_hermite(evidence_of(TOUCHES[:6])), by_hermite(evidence_of(TOUCHES))
+    errors = [shape_error(one.mesh, MUG, samples=4000).chamfer for one in (few, many)]
+    assert errors[1] < errors[0]
+    touched = many.known_by == TOUCHED
+    assert np.median(many.deviation[touched]) < np.median(many.deviation[~touched])
+    assert (few.known_by == TOUCHED).mean() < touched.mean()
+
+
+@pytest.mark.parametrize("name", BY_TOUCH)
+def test_the_answer_turns_and_moves_with_the_readings(name: str) -> None:
+    pose = transform(rotation_about(np.array([0.0, 0.0, 1.0]), 0.7), np.array([0.02, -0.01, 0.0]))
+    turned = evidence_of(tuple(moved(touch, pose) for touch in TOUCHES))
+    one, other = BY_TOUCH[name](evidence_of(TOUCHES)), BY_TOUCH[name](turned)
+    back = Mesh(apply(np.linalg.inv(pose), other.mesh.vertices), other.mesh.faces)
+    assert shape_error(one.mesh, back, samples=3000).chamfer < 1.5e-3  # a fraction of the grid's pitch
+
+
+def test_the_order_of_touches_changes_little_and_single_precision_nothing() -> None:
+    one = by_hermite(BOTH).mesh
+    again = by_hermite(replace(BOTH, touches=TOUCHES[::-1])).mesh
+    assert shape_error(one, again, samples=3000).chamfer < 1.0e-3
+    rounded = tuple(
+        replace(touch, points=touch.points.astype(np.float32).astype(np.float64)) for touch in TOUCHES
+    )
+    same = by_hermite(replace(BOTH, touches=rounded)).mesh
+    assert shape_error(one, same, samples=3000).chamfer < 0.2e-3
+
+
+@pytest.mark.parametrize("name", ["rbf"])
+def test_nothing_of_the_answer_is_where_the_sensor_was_or_beside_the_silhouette(name: str) -> None:
+    missed = touch_of(np.zeros((1, 3)), np.array([0.0, 0.0, 1.0]), np.zeros((1, 3)), 99)
+    pose = transform(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 0.05]))
+    missed = replace(missed, stand_from_gel=pose, points=np.zeros((0, 3)), normals=np.zeros((0, 3)))
+    evidence = replace(BOTH, touches=(*TOUCHES, missed))
+    mesh = BY_TOUCH[name](evidence).mesh
+    assert float(sensor_depth(evidence, mesh.vertices).max()) < CLEARANCE + 2.0e-3
+    silhouette = Silhouette.of(LOOK, all_samples(evidence).points)
+    assert float(silhouette.outside_metres(mesh.vertices).max()) < 3.5e-3
+
+
+def test_presses_all_in_one_place_bound_nothing_and_say_so() -> None:
+    site = TOUCHES[0]
+    here = [t for t in presses(MUG, 200, 7) if np.linalg.norm(t.points.mean(0) - site.points.mean(0)) < 0.012]
+    answer = by_hermite(evidence_of(tuple(here[:6])))
+    require_whole(answer)
+    assert len(answer.not_bounded) >= 2
+    supposed = answer.known_by == SUPPOSED
+    assert float(answer.deviation[supposed].max()) > 0.03
+    assert by_hermite(evidence_of(TOUCHES)).not_bounded == ()
+
+
+def test_a_blank_picture_is_no_picture() -> None:
+    blank = replace(LOOK, mask=np.zeros_like(LOOK.mask))
+    with_it, without = by_hermite(evidence_of(TOUCHES[:8], blank)), by_hermite(evidence_of(TOUCHES[:8]))
+    assert with_it.mesh.vertices == pytest.approx(without.mesh.vertices)
+    with pytest.raises(FitRefused, match="in no picture"):
+        by_visual_hull(evidence_of((), blank))
+
+
+@pytest.mark.parametrize("estimator", [*BY_TOUCH.values(), by_raw_points])
+def test_without_a_contact_there_is_no_answer_by_touch(estimator: Estimator) -> None:
+    with pytest.raises(FitRefused, match="none of 0 touches met"):
+        estimator(evidence_of((), LOOK))
+
+
+def test_the_visual_hull_holds_what_is_seen_and_does_not_know_how_deep_it_is() -> None:
+    answer = by_visual_hull(evidence_of((), LOOK))
+    require_whole(answer)
+    seen = MUG.vertices[np.abs(MUG.vertices[:, 0]) < 1.0]
+    inside = trimesh.Trimesh(answer.mesh.vertices, answer.mesh.faces)
+    assert float(inside.contains(seen * 0.98 + 0.02 * seen.mean(axis=0)).mean()) > 0.75
+    assert "x" in answer.not_bounded  # the camera looks along it
+    assert "y" not in answer.not_bounded
+
+
+def test_a_slipped_contact_is_named_with_about_how_far_it_is_off() -> None:
+    slip = TOUCHES[4]
+    normal = slip.normals.mean(axis=0)
+    wrong = replace(slip, points=slip.points - 0.012 * normal / np.linalg.norm(normal))
+    dense = presses(MUG, 60, seed=11)
+    answer = by_hermite(evidence_of((*dense, replace(wrong, index=77))))
+    assert answer.doubtful.get(77, 0.0) > 6e-3
+
+
+def test_contacts_of_a_round_body_find_its_axis_and_those_of_a_box_do_not() -> None:
+    found = find_revolution(thinned(all_samples(evidence_of(TOUCHES))))
+    assert found is not None
+    centre = MUG.vertices[np.abs(MUG.vertices[:, 2] - 0.06) < 3e-3]
+    rim = centre[centre[:, 0] < 0.5 * (centre[:, 0].min() + centre[:, 0].max())]
+    radius = np.linalg.norm(rim[:, :2] - found.centre, axis=1)
+    assert float(np.ptp(radius)) < 0.012  # both faces of the wall, about one axis
+    tray = evidence_of(presses(build("tray", 6e-3), 32, seed=2))
+    assert find_revolution(thinned(all_samples(tray))) is None
+    wrench = evidence_of(presses(build("wrench", 6e-3), 32, seed=2))
+    assert find_revolution(thinned(all_samples(wrench))) is None

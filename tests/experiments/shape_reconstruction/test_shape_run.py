@@ -1,0 +1,239 @@
+"""A run of shape reconstruction in process: a look, presses along chosen lines, an answer from the folder."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.experiment import EXPERIMENT
+from experiments.shape_reconstruction.explorer import ShapeExplorer
+from experiments.shape_reconstruction.methods import QUICK, estimated
+from experiments.shape_reconstruction.readings import evidence_of
+from experiments.shape_reconstruction.section import ShapeRun
+from harness.basics.errors import FitRefused, WrongUse
+from harness.basics.mesh import Mesh
+from harness.bench.scene import scene_from_json
+from harness.bench.station_file import Station
+from harness.experiment.answer import finish
+from harness.experiment.begin import begin
+from harness.experiment.truth import read_true_surface
+from harness.objects.builtin import build
+from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
+from harness.recording.session import Quiet
+from harness.skills.exploring.exploration import MOST_SKIPPED, SKIPPED
+from harness.twin.rehearsal import Segment, rehearse
+from tests.docs.result_keys import COMMON, SHAPE, SHAPE_ESTIMATE
+from tests.experiments.shape_reconstruction.runs import QUICKLY, answered, off_truth, ran, scene_of, went_on
+
+pytestmark = pytest.mark.timeout(300)  # explores objects press by press
+
+
+@pytest.fixture(scope="module")
+def touched(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recording:
+    return ran(tmp_path_factory.mktemp("shape") / "run", scene_of(3, "farthest"), station)
+
+
+@pytest.fixture(scope="module")
+def evidence(touched: Recording) -> ShapeEvidence:
+    return evidence_of(RunFiles(touched), touched.steps())
+
+
+def test_contacts_are_on_the_true_surface_and_face_out_of_it(
+    touched: Recording, evidence: ShapeEvidence
+) -> None:
+    assert len(evidence.touches) == 3
+    assert evidence.contacts
+    for touch in evidence.contacts:
+        assert off_truth(touched, touch.points) < 3.0 * touch.sigma
+        assert np.all(touch.normals @ touch.stand_from_gel[:3, 2] < 0.0)
+        assert np.linalg.norm(touch.normals, axis=1) == pytest.approx(1.0)
+        assert touch.way > 0.0
+    assert evidence.look is not None
+    assert 500 < evidence.look.mask.sum() < 10_000
+
+
+def test_presses_lead_to_places_far_from_each_other(evidence: ShapeEvidence) -> None:
+    ends = np.array([touch.stand_from_gel[:3, 3] for touch in evidence.touches])
+    apart = np.linalg.norm(ends[:, None] - ends[None], axis=2)[np.triu_indices(3, 1)]
+    assert apart.min() > 0.02
+
+
+def test_the_answer_is_the_same_to_the_bit_when_it_is_replayed(touched: Recording) -> None:
+    first = answered(touched)
+    assert first == answered(Recording(touched.folder))
+    assert first["estimates"]["touch"]["chamfer_m"] == pytest.approx(first["error_m"])
+    assert 0.0 < first["error_m"] < 0.05
+    assert first["estimates"]["vision"]["refused"]
+    assert (first["presses"], first["choose"]) == (3, "farthest")
+
+
+def test_the_truth_changes_no_estimate(touched: Recording, tmp_path: Path) -> None:
+    before, away = answered(touched), {}
+    for path in (touched.truth_path, touched.truth_path.with_suffix(".npz")):
+        away[path] = path.rename(tmp_path / path.name)
+    try:
+        after = answered(touched)
+    finally:
+        for path, there in away.items():
+            there.rename(path)
+    assert after["extents_m"] == before["extents_m"]
+    assert after["error_m"] is None
+    assert after["estimates"]["fused"]["completeness_m"] is None
+
+
+def test_the_mesh_of_the_scene_changes_no_plan(touched: Recording) -> None:
+    run, other = RunFiles(touched), build("wrench")
+    object.__setattr__(run, "mesh", Mesh(other.vertices, other.faces))
+    made = touched.step(1).step.parameters
+    planned = ShapeExplorer(run, QUICK).plan(touched, 1)
+    assert {key: made[key] for key in planned} == planned
+
+
+def test_no_travel_enters_the_space_that_the_object_may_take(touched: Recording) -> None:
+    run = RunFiles(touched)
+    explorer = ShapeExplorer(run, QUICK)
+    explorer.plan(touched, 1)
+    true = read_true_surface(touched)
+    assert true is not None
+    moved = list(travels(touched))
+    assert len(moved) >= 3
+    assert not rehearse(explorer.travels, moved).refusals
+    assert not rehearse(explorer._twin(true), moved).refusals
+
+
+def travels(recording: Recording) -> list[Segment]:
+    """Every joint motion of its presses, as it was planned."""
+    found = []
+    for record in recording.steps():
+        if record.step.kind == "press":
+            here = np.array(record.step.parameters["start_rad"])
+            for there in np.array(record.step.parameters["travel_rad"]).reshape(-1, 6):
+                found.append(Segment(record.step.index, "travel", "joint", here, there))
+                here = there
+    return found
+
+
+def test_a_run_that_was_stopped_goes_on_with_the_same_presses(
+    touched: Recording, tmp_path: Path, station: Station
+) -> None:
+    recording = begin(EXPERIMENT, scene_of(3, "farthest"), station, 0, "default", tmp_path / "run").recording
+
+    class Stops(Quiet):
+        def ended(self, step: Any, seconds: float) -> None:
+            if step.index == 1:
+                raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        went_on(recording, Stops())
+    again = Recording(tmp_path / "run")
+    assert again.committed == 2
+    assert went_on(again, Quiet())
+    assert [record.step.parameters for record in again.steps()] == [
+        record.step.parameters for record in touched.steps()
+    ]
+
+
+def test_the_report_and_the_surfaces_are_beside_the_result(touched: Recording, tmp_path: Path) -> None:
+    def no_page(*_: Any) -> Path:
+        raise AssertionError("the experiment has a page of its own")
+
+    result = finish(EXPERIMENT, touched, QUICKLY, no_page, folder=tmp_path)
+    page = Path(result["report"]).read_text()
+    for title in ("The surface", "Sections", "The silhouette"):
+        assert f"<h2>{title}</h2>" in page
+    assert page.count("<img") == 3
+    assert "MOCK" in page
+    for sense in ("touch", "fused"):
+        assert (tmp_path / result["estimates"][sense]["mesh"]).stat().st_size > 100
+    assert len(EXPERIMENT.lines(result)) == 3
+    assert set(result) == {*COMMON, *SHAPE}
+    for one in result["estimates"].values():
+        assert set(one) == set(SHAPE_ESTIMATE)
+
+
+@pytest.fixture(scope="module")
+def blind(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recording:
+    scene = scene_of(4, "random", camera=False, mesh="builtin:wrench", largest="15 cm")
+    return ran(tmp_path_factory.mktemp("blind") / "run", scene, station, seed=1)
+
+
+def test_a_way_that_met_nothing_is_a_reading(blind: Recording) -> None:
+    evidence = evidence_of(RunFiles(blind), blind.steps())
+    missed = [touch for touch in evidence.touches if not touch.met]
+    assert len(evidence.touches) == 4
+    assert missed
+    for touch in missed:
+        assert touch.points.shape == touch.normals.shape == (0, 3)
+        planned = blind.step(touch.index).step.parameters["search_m"]
+        assert touch.way == pytest.approx(planned, abs=3e-3)
+
+
+def refuses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No way is free to any press."""
+
+    def planned(_self: ShapeExplorer, _recording: Recording, _index: int) -> dict[str, Any]:
+        raise WrongUse("no free way was found")
+
+    monkeypatch.setattr(ShapeExplorer, "plan", planned)
+
+
+def test_a_run_without_a_free_way_ends_and_keeps_why(
+    tmp_path: Path, station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refuses(monkeypatch)
+    recording = ran(tmp_path / "run", scene_of(8, "farthest", camera=False), station)
+    steps = [record.step for record in recording.steps()]
+    assert [step.kind for step in steps] == [SKIPPED] * MOST_SKIPPED
+    assert "no free way" in steps[0].parameters["why"]
+
+
+def test_presses_on_the_drawing_are_a_benchmark_and_say_so(tmp_path: Path, station: Station) -> None:
+    recording = ran(tmp_path / "run", scene_of(2, "planned", camera=False), station, gap="none")
+    evidence = evidence_of(RunFiles(recording), recording.steps())
+    assert len(evidence.contacts) == 2
+    for touch in evidence.contacts:
+        # Without a gap only what the gel's picture says is left, of all that a sigma stands for.
+        assert off_truth(recording, touch.points) < 0.5 * touch.sigma
+    assert any("benchmark" in one for one in answered(recording)["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("tree", "words"),
+    [
+        ({"sensors": {"touch": False}}, "nothing is to be read"),
+        ({"shape": {"presses": 0}}, "nothing is to be read"),
+        ({"object": {"mesh": "builtin:mug", "pose": {"anchor": "origin"}}}, "anchor"),
+    ],
+    ids=["no sense", "no press", "origin"],
+)
+def test_a_scene_that_cannot_be_explored_is_refused_before_anything_moves(
+    tmp_path: Path, station: Station, tree: dict[str, Any], words: str
+) -> None:
+    scene = scene_from_json({"schema": 1, "object": {"mesh": "builtin:mug"}, **tree}, "the scene")
+    with pytest.raises(WrongUse, match=words):
+        begin(EXPERIMENT, scene, station, 0, "none", tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_run_ends_when_the_shape_is_known_as_well_as_was_asked(
+    touched: Recording, tmp_path: Path, station: Station
+) -> None:
+    run = RunFiles(touched)
+    asked = run.scene.section(ShapeRun).model_copy(update={"until": 0.5})
+    object.__setattr__(run, "scene", run.scene.with_section(asked))
+    assert ShapeExplorer(run, QUICK).is_sure(touched, 2)
+    never = run.scene.section(ShapeRun).model_copy(update={"until": 1e-9})
+    object.__setattr__(run, "scene", run.scene.with_section(never))
+    assert not ShapeExplorer(run, QUICK).is_sure(touched, 2)
+
+
+def test_readings_of_nothing_are_refused_with_what_to_do_next(blind: Recording) -> None:
+    evidence = evidence_of(RunFiles(blind), blind.steps())
+    missed = tuple(touch for touch in evidence.touches if not touch.met)
+    for method in ("box", "rbf", "family"):
+        with pytest.raises(FitRefused, match=f"{len(missed)} ways of the gel met nothing; check where"):
+            estimated(method, replace(evidence, touches=missed))
