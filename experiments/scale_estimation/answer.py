@@ -22,7 +22,6 @@ from experiments.scale_estimation.unseen.answer import (
     ways_alone,
 )
 from experiments.scale_estimation.unseen.contact_set import GelWay
-from experiments.scale_estimation.unseen.real_shapes import fused_alone
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, FitRefused, MeshRefused, WrongUse
@@ -183,11 +182,8 @@ class ScaleAnswering:
                 seconds[sense] = self._read[sense] + time.perf_counter() - began
         if not found:
             raise WrongUse("the scene asks for no sense; set sensors.camera, sensors.sound or sensors.touch")
-        beliefs = {s: one.belief for s, one in found.items() if not isinstance(one, FitRefused)}
-        if not beliefs:
-            together = Belief.ignorant(self.model.sizes)
-        else:
-            together = fused(list(beliefs.values())) if shape_known else fused_alone(beliefs)
+        beliefs = [one.belief for one in found.values() if not isinstance(one, FitRefused)]
+        together = fused(beliefs) if beliefs else Belief.ignorant(self.model.sizes)
         usable = sum(not strike.fault for strike in self.strikes)
         return SizeAnswer(found, together, seconds, len(self.patches), usable)
 

@@ -156,10 +156,6 @@ class Belief:
         uniform = 1.0 / (STEP * len(self.log_density))
         return Belief.of(self.range, np.log((1.0 - share) * np.exp(self.log_density) + share * uniform))
 
-    def raised(self, power: float) -> "Belief":
-        """The same raised to a power: below 1 less sure, as one that errs as another does."""
-        return Belief.of(self.range, power * self.log_density)
-
     def widened(self, sigma: float) -> "Belief":
         """The same, its logarithm off by a normal error of that standard deviation besides."""
         if sigma < 0.25 * STEP:

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from experiments.scale_estimation.size import Belief, SizeRange
-from experiments.scale_estimation.unseen.real_shapes import fused_alone, shape_sigma
+from experiments.scale_estimation.unseen.real_shapes import shape_sigma
 from experiments.scale_estimation.unseen.training.real_shapes import (
-    POWERS,
     SIGMAS,
-    likeliest,
+    likeliest_sigma,
+    log_densities,
     meshes_in,
-    power_densities,
     resting,
-    sigma_densities,
 )
 from harness.basics.errors import DataRefused
 from harness.basics.mesh import Mesh
@@ -34,27 +32,8 @@ def said(true: float, off: float) -> Belief:
 def test_the_deviation_found_is_that_of_the_errors_beyond_what_was_stated(besides: float) -> None:
     random = np.random.default_rng(4)
     errors = np.hypot(STATED, besides) * random.standard_normal(400)
-    found = likeliest(sigma_densities([(said(0.2, float(off)), 0.2) for off in errors]), SIGMAS)
+    found = likeliest_sigma(log_densities([(said(0.2, float(off)), 0.2) for off in errors]))
     assert found == pytest.approx(besides, abs=1.01 * SIGMAS[1])
-
-
-@pytest.mark.parametrize(("alike", "power"), [(0.0, 1.0), (1.0, 0.5)])
-def test_senses_that_err_alike_count_as_one(alike: float, power: float) -> None:
-    random = np.random.default_rng(5)
-    pairs = []
-    for _ in range(400):
-        own, common = STATED * random.standard_normal(2), STATED * random.standard_normal()
-        seen, felt = np.sqrt(1.0 - alike) * own + np.sqrt(alike) * common
-        pairs.append(({"vision": said(0.2, float(seen)), "touch": said(0.2, float(felt))}, 0.2))
-    assert likeliest(power_densities(pairs), POWERS) == pytest.approx(power, abs=0.101)
-
-
-def test_a_sense_alone_is_as_sure_as_it_is() -> None:
-    one = said(0.2, 0.0)
-    assert fused_alone({"touch": one}, 0.5).interval == one.interval
-    both = {"touch": one, "vision": one}
-    assert fused_alone(both, 0.5).interval == pytest.approx(one.interval, rel=0.01)
-    assert fused_alone(both, 1.0).spread < 0.8 * one.spread
 
 
 def test_things_that_tables_are_measured_on_are_left_out(tmp_path: Path) -> None:

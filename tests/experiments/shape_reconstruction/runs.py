@@ -16,8 +16,8 @@ from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import score
 from harness.experiment.begin import begin
-from harness.experiment.perform import perform_on
 from harness.experiment.in_process import IN_PROCESS
+from harness.experiment.perform import perform_on
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet

@@ -1,7 +1,7 @@
 """How far off senses are about scanned things, of which no family is: each answer is widened by as much."""
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,6 @@ import numpy as np
 
 from experiments.scale_estimation.size import STEP, Belief, SizeRange
 from experiments.scale_estimation.unseen.network import by_ways
-from experiments.scale_estimation.unseen.real_shapes import SHAPE_SENSES, fused_alone
 from experiments.scale_estimation.unseen.regression import by_outline
 from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, contact_sample
 from experiments.scale_estimation.unseen.training.outlines import picture
@@ -17,8 +16,8 @@ from experiments.scale_estimation.unseen.training.samples import SIZES, draw_siz
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused
 from harness.basics.mesh import Mesh
-from harness.experiment.subjects import REAL
 from harness.basics.mesh_hull import hull_of
+from harness.experiment.subjects import REAL
 from harness.sim.solid.mesh_read import read_mesh
 
 READINGS = 8
@@ -31,9 +30,6 @@ _KINDS = ("*.obj", "*.stl", "*.ply")
 _LEAST = 6
 _FLAT = 0.8
 """Of the height of a thing as it stands: one that is no lower when it lies is not laid down."""
-
-POWERS = tuple(0.3 + 0.05 * k for k in range(15))
-"""Of the senses that err alike, that are tried."""
 
 Reading = tuple[Belief, float]
 """What a sense says of an object, and its size in m."""
@@ -82,24 +78,26 @@ def readings(path: Path, seed: int) -> dict[str, list[Reading]]:
     return found
 
 
-def sigma_densities(read: Sequence[Reading]) -> FloatArray:
-    """``(n, SIGMAS)`` logarithms of the true size's density, were a deviation added to what is said."""
-    return np.array([[_log_density(one.widened(sigma), size) for sigma in SIGMAS] for one, size in read])
+def log_densities(read: Sequence[Reading]) -> FloatArray:
+    """``(n, SIGMAS)`` of the true size, were a deviation added to what is said."""
+    return np.array(
+        [[_log_density(belief.widened(sigma), size) for sigma in SIGMAS] for belief, size in read]
+    )
 
 
-def power_densities(read: Sequence[tuple[Mapping[str, Belief], float]]) -> FloatArray:
-    """``(n, POWERS)`` the same of what both senses say together, were they raised to a power."""
-    return np.array([[_log_density(fused_alone(both, p), size) for p in POWERS] for both, size in read])
-
-
-def likeliest(densities: FloatArray, values: Sequence[float]) -> float:
-    """That of the values with which the true sizes are likeliest; ``(n, values)`` logarithms."""
-    return values[int(densities.mean(axis=0).argmax())]
+def likeliest_sigma(densities: FloatArray) -> float:
+    """The deviation with which the true sizes are likeliest, of ``log_densities``."""
+    return SIGMAS[int(densities.mean(axis=0).argmax())]
 
 
 def _log_density(belief: Belief, size: float) -> float:
     logs = belief.range.logs
     return float(belief.log_density[round((np.log(size) - logs[0]) / STEP)])
+
+
+def _held(read: Sequence[Reading], sigma: float) -> float:
+    intervals = [(belief.widened(sigma).interval, size) for belief, size in read]
+    return round(float(np.mean([low <= size <= high for (low, high), size in intervals])), 3)
 
 
 def train_real_shapes(folder: Path, seed: int) -> dict[str, Any]:
@@ -109,47 +107,22 @@ def train_real_shapes(folder: Path, seed: int) -> dict[str, Any]:
         sys.stderr.write(f"real shapes: {path.name}\n")
         per_thing.append(readings(path, seed))
     found: dict[str, Any] = {"meshes": [str(path.relative_to(folder)) for path in paths]}
-    for sense in SHAPE_SENSES:
-        every = [one[sense] for one in per_thing]
-        found[sense] = _chosen(every, "sigma", SIGMAS, sigma_densities, Belief.widened)
-    pairs = [_pairs(one, found) for one in per_thing]
-    found["together"] = _chosen(pairs, "power", POWERS, power_densities, fused_alone)
+    for sense in ("vision", "touch"):
+        found[sense] = _widths([one[sense] for one in per_thing])
     return found
 
 
-def _pairs(
-    read: Mapping[str, Sequence[Reading]], found: Mapping[str, Mapping[str, float]]
-) -> list[tuple[dict[str, Belief], float]]:
-    """What both senses say of the same thing of the same size, each as wide as it must be."""
-    return [
-        ({sense: read[sense][row][0].widened(found[sense]["sigma"]) for sense in SHAPE_SENSES}, size)
-        for row, (_, size) in enumerate(read["vision"])
-    ]
-
-
-def _chosen(
-    per_thing: Sequence[Sequence[tuple[Any, float]]],
-    name: str,
-    values: Sequence[float],
-    densities_of: Callable[[Any], FloatArray],
-    apply_to: Callable[[Any, float], Belief],
-) -> dict[str, Any]:
-    """The likeliest value, and the share of intervals that hold things left out of choosing it."""
-    densities = [densities_of(read) for read in per_thing]
-
-    def held(read: Sequence[tuple[Any, float]], value: float) -> float:
-        intervals = [(apply_to(one, value).interval, size) for one, size in read]
-        return float(np.mean([low <= size <= high for (low, high), size in intervals]))
-
+def _widths(per_thing: Sequence[Sequence[Reading]]) -> dict[str, Any]:
+    densities = [log_densities(read) for read in per_thing]
     left_out = [
-        held(own, likeliest(np.concatenate([d for k, d in enumerate(densities) if k != row]), values))
+        _held(own, likeliest_sigma(np.concatenate([d for k, d in enumerate(densities) if k != row])))
         for row, own in enumerate(per_thing)
     ]
-    best = likeliest(np.concatenate(densities), values)
-    answers = [(apply_to(one, best).size, size) for read in per_thing for one, size in read]
+    together = [reading for read in per_thing for reading in read]
     return {
-        name: round(best, 2),
-        "readings": len(answers),
+        "sigma": round(likeliest_sigma(np.concatenate(densities)), 2),
+        "readings": len(together),
+        "held_before": _held(together, 0.0),
         "held_left_out": round(float(np.mean(left_out)), 3),
-        "mean_error_cm": round(float(np.mean([1e2 * abs(found - size) for found, size in answers])), 2),
+        "mean_error_cm": round(float(np.mean([1e2 * abs(b.size - s) for b, s in together])), 2),
     }
