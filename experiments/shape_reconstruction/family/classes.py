@@ -4,12 +4,13 @@ Sizes are what such things are sold in, rounded outward: tableware by makers' li
 plates of 150 to 300 mm, bowls of 100 to 260 mm, stemmed glasses of 130 to 260 mm), cans by the American can
 sizes (202 to 603, that is 54 to 157 mm across), bottles and jugs by their litres (0.2 to 2.5), pans by hob
 sizes (140 to 300 mm), spanners by DIN 3113 (8 to 32 mm across flats, 100 to 350 mm long, heads 2.0 to 2.4
-times the flats), packets and boards by kitchen shelves (20 to 350 mm). None is of an object of the bench's
-tables.
+times the flats), packets and boards by kitchen shelves (20 to 350 mm). Walls are 2 to 5 mm of cups and jugs,
+3 to 6 mm of stoneware, 1 to 3 mm of glass. None is of an object of the bench's tables.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -57,6 +58,42 @@ def draw_shape(name: str, random: _Random) -> FamilyShape:
     theta = np.zeros(layout.SIZE)
     CLASSES[name](random, code, theta)
     return FamilyShape(name, code, theta)
+
+
+PART = 3.0
+"""Natural logarithm of how much rarer a thing is with a part that no draw of its class has."""
+
+SOLID = 6.0
+"""The same of a vessel that is solid, of a solid body that is open, and of one that widens to its top."""
+
+_UNNAMED = {"knob": 2.0, "vase": 2.0}
+"""The same of classes that hold any round shape: what has a name of its own is seen more often."""
+
+_SAMPLE = 40
+
+
+def rarity(shape: FamilyShape) -> float:
+    """Natural logarithm of how much rarer such a thing is, with such parts, than an ordinary one."""
+    apart = (np.array(_codes_of(shape.name)) != shape.code).astype(np.float64)
+    apart[:, layout.HOLLOW] *= SOLID / PART
+    price = PART * float(apart.sum(axis=1).min()) + _UNNAMED.get(shape.name, 0.0)
+    unlikely = _widens(shape) and shape.code[layout.HOLLOW] == 0 and not apart[:, layout.HOLLOW].any()
+    return price + (SOLID if unlikely else 0.0)
+
+
+def _widens(shape: FamilyShape) -> bool:
+    """Whether a turned body is widest at its top, as vessels are and solid things are not."""
+    radii = shape.theta[layout.RADII : layout.RADII + KNOTS]
+    wide = radii[-1] > radii.max() - 0.1 and radii[-1] > radii[0] + 0.15
+    return bool(shape.code[layout.KIND] == TURNED and wide)
+
+
+@lru_cache(maxsize=64)
+def _codes_of(name: str) -> tuple[tuple[int, ...], ...]:
+    """Codes that draws of a class have."""
+    random = np.random.default_rng(0)
+    found = {tuple(int(part) for part in draw_shape(name, random).code) for _ in range(_SAMPLE)}
+    return tuple(sorted(found))
 
 
 def add_loop(shape: FamilyShape, random: _Random) -> FamilyShape:
@@ -142,7 +179,7 @@ def _cup(random: _Random, code: IntArray, theta: FloatArray) -> None:
     height, radius = _between(random, 60.0, 150.0), _between(random, 30.0, 55.0)
     foot, rim = random.uniform(0.65, 1.0), random.uniform(0.92, 1.1)
     radii = radius * np.interp(_EVEN, [0.0, random.uniform(0.15, 1.0), 1.0], [foot, 1.0, rim])
-    wall = _between(random, 1.5, 6.0)
+    wall = _between(random, 2.2, 5.0)
     _turn(random, code, theta, height, radii, wall=wall, floor=wall * random.uniform(1.0, 2.5))
 
 
@@ -162,7 +199,7 @@ def _bowl(random: _Random, code: IntArray, theta: FloatArray) -> None:
     radius = _between(random, 50.0, 130.0)
     height = radius * random.uniform(0.45, 1.1)
     radii, shares = _dish(random, radius, random.uniform(0.3, 0.65))
-    wall = _between(random, 2.0, 7.0)
+    wall = _between(random, 3.0, 6.0)
     _turn(random, code, theta, height, radii, shares, wall, wall * random.uniform(1.0, 2.5))
 
 
@@ -170,7 +207,7 @@ def _plate(random: _Random, code: IntArray, theta: FloatArray) -> None:
     radius = _between(random, 70.0, 160.0)
     height = radius * random.uniform(0.12, 0.35)
     radii, shares = _dish(random, radius, random.uniform(0.4, 0.75))
-    wall = _between(random, 2.5, 6.0)
+    wall = _between(random, 3.5, 6.0)
     _turn(random, code, theta, height, radii, shares, wall, wall * random.uniform(1.0, 2.0))
 
 
@@ -202,7 +239,7 @@ def _stemmed(random: _Random, code: IntArray, theta: FloatArray) -> None:
     shares = np.array([0.0, 0.03, 0.1, low, 0.5 * (low + belly), belly, 1.0])
     foot, rim = random.uniform(0.7, 1.0) * widest, random.uniform(0.65, 1.05) * widest
     radii = np.array([foot, 0.8 * foot, stem, stem, 0.85 * widest, widest, rim])
-    wall = _between(random, 1.2, 4.0)
+    wall = _between(random, 1.2, 2.5)
     _turn(random, code, theta, height, radii, shares, wall, height * low + 2.0 * wall)
 
 
@@ -211,7 +248,7 @@ def _jug(random: _Random, code: IntArray, theta: FloatArray) -> None:
     waist, rim = random.uniform(0.65, 1.0), random.uniform(0.7, 1.05)
     knots = [0.0, random.uniform(0.2, 0.45), random.uniform(0.7, 0.85), 1.0]
     radii = radius * np.interp(_EVEN, knots, [random.uniform(0.75, 1.0), 1.0, waist, rim])
-    wall = _between(random, 1.8, 5.0)
+    wall = _between(random, 2.2, 4.5)
     _turn(random, code, theta, height, radii, wall=wall, floor=wall * random.uniform(1.0, 2.0))
     _loop(random, code, theta, height)
     theta[layout.LIMB_WIDE] = np.log(_between(random, 6.0, 16.0))
@@ -237,7 +274,7 @@ def _any_round(random: _Random) -> tuple[float, FloatArray]:
 
 def _vase(random: _Random, code: IntArray, theta: FloatArray) -> None:
     height, radii = _any_round(random)
-    wall = _between(random, 2.0, 7.0)
+    wall = _between(random, 3.0, 6.0)
     _turn(random, code, theta, height, radii, wall=wall, floor=1.5 * wall)
 
 
@@ -267,7 +304,7 @@ def _tray(random: _Random, code: IntArray, theta: FloatArray) -> None:
     half = _between(random, 55.0, 220.0)
     half_y, height = half * random.uniform(0.45, 1.0), _between(random, 12.0, 70.0)
     corner = half_y * random.uniform(0.1, 0.5)
-    wall = _between(random, 2.0, 10.0)
+    wall = _between(random, 3.0, 9.0)
     radii = corner * np.linspace(random.uniform(0.6, 1.0), 1.0, KNOTS)
     _turn(random, code, theta, height, radii, wall=wall, floor=wall * random.uniform(0.7, 1.5))
     _core(code, theta, half - corner, half_y - corner)
@@ -292,7 +329,7 @@ def _board(random: _Random, code: IntArray, theta: FloatArray) -> None:
 def _square_cup(random: _Random, code: IntArray, theta: FloatArray) -> None:
     half, height = _between(random, 28.0, 80.0), _between(random, 50.0, 200.0)
     corner = half * random.uniform(0.15, 0.7)
-    wall = _between(random, 2.0, 6.0)
+    wall = _between(random, 2.5, 5.0)
     radii = corner * np.linspace(random.uniform(0.75, 1.0), 1.0, KNOTS)
     _turn(random, code, theta, height, radii, wall=wall, floor=1.5 * wall)
     _core(code, theta, half - corner, (half - corner) * random.uniform(0.6, 1.0))

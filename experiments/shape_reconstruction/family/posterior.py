@@ -7,11 +7,8 @@ import numpy as np
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.freedom import basis_of
-from experiments.shape_reconstruction.family.search import Hypothesis
+from experiments.shape_reconstruction.family.search import TEMPERATURE, Hypothesis
 from harness.basics.arrays import FloatArray
-
-TEMPERATURE = 3.0
-"""By which costs are divided: residuals of one reading, and of neighbours, err together."""
 
 LEAST = 0.01
 """Weight of a hypothesis, of the greatest, below which it is left out."""
@@ -43,10 +40,15 @@ class Mixture:
         return self.hypotheses[0]
 
     def by_class(self) -> dict[str, float]:
-        """Weight of every class among them, the greatest first."""
+        """Weight of every class among them, the greatest first; classes of the same parts are one.
+
+        A bowl and a vase of one shape are no two answers: the name is that of the one of most weight.
+        """
+        names: dict[bytes, str] = {}
         totals: dict[str, float] = {}
         for one, weight in zip(self.hypotheses, self.weights, strict=True):
-            totals[one.shape.name] = totals.get(one.shape.name, 0.0) + float(weight)
+            name = names.setdefault(one.shape.code.tobytes(), one.shape.name)
+            totals[name] = totals.get(name, 0.0) + float(weight)
         return dict(sorted(totals.items(), key=lambda item: -item[1]))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.changes import changes
-from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, draw_shape
+from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, draw_shape, rarity
 from experiments.shape_reconstruction.family.freedom import (
     OUTLINE_BIAS,
     basis_of,
@@ -27,8 +27,11 @@ from harness.basics.arrays import FloatArray
 
 _Random = np.random.Generator
 
-LAYING = ((1, 0.4), (2, 0.5), (3, 1.0))
+LAYING = ((1, 0.5), (2, 0.5), (2, 1.0))
 """Rounds in which draws find their place, turn and size; the share of each class that goes on after them."""
+
+TEMPERATURE = 3.0
+"""By which costs are divided where they become weights: readings near each other err together."""
 
 CHANGING = 5
 """Rounds in which a changed shape finds its numbers."""
@@ -44,14 +47,21 @@ class Hypothesis:
     Attributes:
         shape: in the frame ``stand``.
         prior: that its numbers are refined under.
-        cost: half the sum of squares of readings and prior.
+        cost: half the sum of squares of readings and prior, and the price of parts that are rare.
         curvature: ``(n, n)`` of the cost along its free numbers.
+        price: of its parts.
     """
 
     shape: FamilyShape
     prior: Prior
     cost: float
     curvature: FloatArray
+    price: float = 0.0
+
+    @property
+    def misfit(self) -> float:
+        """The cost less the price: how well the shape fits, however rare its parts are."""
+        return self.cost - self.price
 
 
 class Search:
@@ -88,13 +98,20 @@ class Search:
         begun = [*_stratified(self.laid(), settings.starts), *seeds]
         started = _ranked(self.refined(one, settings.refining) for one in begun)
         random = np.random.default_rng(settings.seed + 1)
-        changed = [
-            self.refined(self._under_prior(shape), CHANGING)
-            for one in started[: settings.changed]
+        changed = self._next_to(started, settings.changed, random)
+        # What one change made better may need another: a wall that was taken for solid is hollow again.
+        again = self._next_to(changed, -(-settings.changed // 2), random)
+        last = _distinct(_ranked([*started, *changed, *again]), settings.finals)
+        return _ranked(self.refined(one, settings.finishing, robust=True) for one in last)
+
+    def _next_to(self, hypotheses: list[Hypothesis], count: int, random: _Random) -> list[Hypothesis]:
+        """All shapes that differ by a part or a turn from those that fit best, refined."""
+        promising = sorted(hypotheses, key=lambda one: one.misfit)[:count]
+        return [
+            self.refined(self._changed(one, shape), CHANGING)
+            for one in promising
             for shape in changes(one.shape, random)
         ]
-        last = _distinct(_ranked([*started, *changed]), settings.finals)
-        return _ranked(self.refined(one, settings.finishing, robust=True) for one in last)
 
     def laid(self) -> list[Hypothesis]:
         """Draws in their best place, turn and size; of every class those that fit best."""
@@ -134,6 +151,12 @@ class Search:
         rows = np.concatenate([self._bench, shape_rows(shape.code)])
         return Hypothesis(shape, Prior(self._middle(shape.theta), rows), cost, np.empty((0, 0)))
 
+    def _changed(self, one: Hypothesis, shape: FamilyShape) -> Hypothesis:
+        """Another shape beside a hypothesis: what they share is believed as before, not as it was fitted."""
+        middle = np.where(shape.theta == one.shape.theta, one.prior.middle, shape.theta)
+        rows = np.concatenate([self._bench, shape_rows(shape.code)])
+        return Hypothesis(shape, Prior(self._middle(middle), rows), np.inf, np.empty((0, 0)))
+
     def _middle(self, theta: FloatArray) -> FloatArray:
         middle = theta.copy()
         middle[: layout.POSE_END] = self._bench_middle[: layout.POSE_END]
@@ -144,7 +167,9 @@ class Search:
         code = one.shape.code
         basis = basis_of(code, self.guides.sighted, self.guides.touched)
         theta, cost, curvature = refine(code, one.shape.theta, self.full, one.prior, basis, robust, rounds)
-        return Hypothesis(FamilyShape(one.shape.name, code, theta), one.prior, cost, curvature)
+        shape = FamilyShape(one.shape.name, code, theta)
+        price = TEMPERATURE * rarity(shape)
+        return Hypothesis(shape, one.prior, cost + price, curvature, price)
 
 
 def _by_cost(one: Hypothesis) -> float:

@@ -21,7 +21,7 @@ class FamilySettings:
 
     draws: int = 1260
     yaws: int = 4
-    starts: int = 36
+    starts: int = 42
     refining: int = 7
     changed: int = 4
     finals: int = 10

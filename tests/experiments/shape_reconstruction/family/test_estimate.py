@@ -1,0 +1,142 @@
+"""The estimate's promises: finite, closed, convergent, and honest where nothing limits the object."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.family.estimate import family_estimate
+from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.family.warp import displacement
+from experiments.shape_reconstruction.metric import shape_error
+from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
+from harness.basics.errors import OutOfDomain
+from harness.basics.mesh import Mesh
+from harness.objects.builtin import build
+from tests.support.shape_readings import look_at, shape_readings, touch_at, touches_on
+
+COARSE = replace(LEVELS["coarse"], draws=210)
+
+
+@pytest.fixture(scope="module")
+def can() -> Mesh:
+    """A cylinder of 66 mm by 90 mm, off its nominal place: in the family, and no class was made for it."""
+    import trimesh
+
+    made = trimesh.creation.cylinder(0.033, 0.09, sections=96).subdivide_to_size(3e-3)
+    return Mesh(np.asarray(made.vertices) + np.array([0.01, -0.004, 0.045]), made.faces)
+
+
+@pytest.fixture(scope="module")
+def readings(can: Mesh) -> ShapeEvidence:
+    return shape_readings(touches_on(can, 8, seed=2), look_at(can))
+
+
+@pytest.fixture(scope="module")
+def estimate(readings: ShapeEvidence) -> ShapeEstimate:
+    return family_estimate(readings, COARSE)
+
+
+def require_sound(found: ShapeEstimate) -> None:
+    """Finite everywhere, and every edge is shared by two faces."""
+    count = len(found.mesh.vertices)
+    assert np.isfinite(found.mesh.vertices).all()
+    assert found.deviation.shape == (count,)
+    assert np.isfinite(found.deviation).all()
+    assert (found.deviation > 0.0).all()
+    assert found.known_by.shape == (count,)
+    assert set(np.unique(found.known_by)) <= {SUPPOSED, SEEN, TOUCHED}
+    edges = np.sort(found.mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+
+
+def test_a_can_is_found_by_eight_touches_and_a_picture(estimate: ShapeEstimate, can: Mesh) -> None:
+    require_sound(estimate)
+    assert shape_error(estimate.mesh, can, samples=3000).chamfer < 2e-3
+    assert estimate.not_bounded == ()
+    assert not estimate.doubtful
+
+
+def test_the_same_seed_gives_the_same_answer(estimate: ShapeEstimate, readings: ShapeEvidence) -> None:
+    again = family_estimate(readings, COARSE)
+    np.testing.assert_array_equal(again.mesh.vertices, estimate.mesh.vertices)
+    np.testing.assert_array_equal(again.deviation, estimate.deviation)
+
+
+def test_where_the_gel_pressed_counts_as_touched(estimate: ShapeEstimate, readings: ShapeEvidence) -> None:
+    points = readings.contacts[0].points
+    gaps = np.linalg.norm(estimate.mesh.vertices[:, None] - points[:1], axis=2).min(axis=1)
+    assert (estimate.known_by[gaps < 3e-3] == TOUCHED).all()
+    assert (estimate.known_by == SEEN).any()
+
+
+def test_all_presses_in_one_place_leave_the_object_unbounded(can: Mesh) -> None:
+    side = np.array([0.043, -0.004, 0.05])
+    touches = tuple(touch_at(can, side, np.array([1.0, 0.0, 0.0]), k) for k in range(4))
+    found = family_estimate(shape_readings(touches, None), COARSE)
+    require_sound(found)
+    assert found.not_bounded == ("x", "y", "z")
+    far = np.linalg.norm(found.mesh.vertices - side, axis=1) > 40e-3
+    near = np.linalg.norm(found.mesh.vertices - side, axis=1) < 4e-3
+    assert np.median(found.deviation[far]) > 5e-3
+    assert np.median(found.deviation[near]) < np.median(found.deviation[far])
+
+
+def test_a_picture_alone_gives_a_closed_shape_and_a_wide_deviation(
+    readings: ShapeEvidence, estimate: ShapeEstimate
+) -> None:
+    found = family_estimate(replace(readings, touches=()), COARSE)
+    require_sound(found)
+    assert found.not_bounded == ()
+    assert np.median(found.deviation) > np.median(estimate.deviation)
+
+
+def test_a_blank_picture_is_no_reading(readings: ShapeEvidence) -> None:
+    assert readings.look is not None
+    blank = replace(readings.look, mask=np.zeros_like(readings.look.mask))
+    with_it = family_estimate(replace(readings, look=blank), COARSE)
+    without = family_estimate(replace(readings, look=None), COARSE)
+    np.testing.assert_array_equal(with_it.mesh.vertices, without.mesh.vertices)
+
+
+def test_nothing_read_is_refused(readings: ShapeEvidence) -> None:
+    with pytest.raises(OutOfDomain, match="one contact or one silhouette"):
+        family_estimate(replace(readings, touches=(), look=None), COARSE)
+
+
+def test_a_body_of_no_class_is_said_to_be_outside() -> None:
+    import trimesh
+
+    arms = [trimesh.creation.box((0.12, 0.02, 0.1)), trimesh.creation.box((0.02, 0.12, 0.1))]
+    cross = trimesh.boolean.union(arms, engine="manifold").subdivide_to_size(4e-3)
+    mesh = Mesh(np.asarray(cross.vertices) + np.array([0.0, 0.0, 0.05]), cross.faces)
+    found = family_estimate(shape_readings(touches_on(mesh, 14, seed=0), look_at(mesh)), COARSE)
+    require_sound(found)
+    assert any("outside the family" in flag for flag in found.flags)
+
+
+def test_a_thin_board_that_stands_keeps_its_two_sides_apart() -> None:
+    import trimesh
+
+    made = trimesh.creation.box((0.12, 0.004, 0.1)).subdivide_to_size(4e-3)
+    board = Mesh(np.asarray(made.vertices) + np.array([0.0, 0.0, 0.05]), made.faces)
+    found = family_estimate(shape_readings(touches_on(board, 8, seed=0), look_at(board)), COARSE)
+    require_sound(found)
+    assert shape_error(found.mesh, board, samples=3000).chamfer < 5e-3
+
+
+def test_displacements_meet_their_places_and_die_away() -> None:
+    places = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    offsets = np.array([[0.0, 0.0, 2e-3], [1e-3, 0.0, 0.0]])
+    sigma = np.full(2, 1e-6)
+    np.testing.assert_allclose(displacement(places, offsets, sigma, places), offsets, atol=1e-8)
+    assert np.abs(displacement(places, offsets, sigma, places + np.array([0.0, 0.3, 0.0]))).max() < 1e-9
+    assert displacement(np.empty((0, 3)), np.empty((0, 3)), np.empty(0), places).tolist() == [[0.0] * 3] * 2
+
+
+def test_a_mug_s_handle_is_in_the_answer() -> None:
+    mug = build("mug", 4e-3)
+    found = family_estimate(shape_readings(touches_on(mug, 10, seed=0), look_at(mug)), COARSE)
+    require_sound(found)
+    assert shape_error(found.mesh, mug, samples=3000).chamfer < 4e-3
