@@ -43,6 +43,11 @@ class LibraryShape:
         return cKDTree(points), points, self.mesh.face_normals[faces]
 
     @cached_property
+    def area(self) -> float:
+        """Of its surface, over the square of its longest side."""
+        return float(self.mesh.face_areas.sum())
+
+    @cached_property
     def search(self) -> NearestSurface:
         """For the exact nearest places."""
         return NearestSurface(self.mesh)

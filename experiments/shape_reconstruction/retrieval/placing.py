@@ -29,6 +29,12 @@ SCALE = 2.0e-3
 NORMAL = 0.35
 """Rad, one standard deviation of the surface's direction at a contact: shapes of a kind differ."""
 
+AREA = 0.5
+"""Of the logarithm of the surface: the larger it is, the less likely that touches met it just there.
+
+Halved, since touches are not even over a surface.
+"""
+
 _FEW = 60
 _SAMPLES = 600
 _FREE = 3.0e-3
@@ -45,7 +51,7 @@ class PlacedShape:
         size: m, its longest side.
         yaw: rad about z.
         place: ``(2,)`` m.
-        cost: the less the better: of contacts, normals, free space and silhouette, over their deviations.
+        cost: the less the better: of contacts, normals, free space, silhouette and area; may be below 0.
     """
 
     shape: LibraryShape
@@ -144,6 +150,7 @@ def _costed(
     cost += float(np.log1p((np.maximum(sensor_depth(evidence, own), 0.0) / _FREE) ** 2).mean())
     if silhouette is not None:
         cost += _picture_cost(own, silhouette)
+    cost += AREA * float(np.log(at.shape.area * at.size**2 / evidence.largest**2))
     beyond = max(at.size / evidence.largest - 1.0, 0.0)
     return PlacedShape(at.shape, at.size, at.yaw, at.place, cost + 10.0 * beyond)
 
