@@ -105,7 +105,7 @@ def glb_bytes_of(estimate: ShapeEstimate) -> bytes:
     y_up_from_stand = transform(rotation_about(np.array([1.0, 0.0, 0.0]), -0.5 * np.pi), np.zeros(3))
     scene = trimesh.Scene()
     scene.add_geometry(body, node_name="shape", geom_name="shape", transform=y_up_from_stand)
-    return bytes(scene.export(file_type="glb"))
+    return bytes(scene.export(file_type="glb"))  # type: ignore[no-untyped-call]
 
 
 def points_bytes_of(estimate: ShapeEstimate) -> bytes:

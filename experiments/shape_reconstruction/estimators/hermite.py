@@ -206,6 +206,6 @@ def _deviations(field: ThinPlateField, mesh: Mesh) -> FloatArray:
     """``(vertices,)`` m: of some vertices, the others as the nearest three of them."""
     some = np.random.default_rng(0).permutation(len(mesh.vertices))[:_SOME]
     found = field.deviations(mesh.vertices[some])
-    apart, near = cKDTree(mesh.vertices[some]).query(mesh.vertices, k=[1, 2, 3])
+    apart, near = (np.asarray(one) for one in cKDTree(mesh.vertices[some]).query(mesh.vertices, k=[1, 2, 3]))
     share = 1.0 / (apart + 1e-6)
     return np.asarray((share * found[near]).sum(axis=1) / share.sum(axis=1))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from experiments.shape_reconstruction.estimators.average import by_average
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples, thinned
 from experiments.shape_reconstruction.estimators.free_space import CLEARANCE, Silhouette, sensor_depth
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
@@ -18,7 +19,8 @@ from experiments.shape_reconstruction.metric import points_error, shape_error
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
-from harness.basics.geometry import apply, rotation_about, transform
+from harness.basics.faces.mesh_rays import is_inside
+from harness.basics.geometry import apply, inverse, rotation_about, transform
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, look_at, presses, touch_of
@@ -27,6 +29,12 @@ MUG = build("mug", 5e-3)
 TOUCHES = presses(MUG, 32, seed=3)
 LOOK = look_at(MUG)
 BOTH = evidence_of(TOUCHES, LOOK)
+FLAT = touch_of(
+    np.random.default_rng(0).normal(size=(9, 3)) * [5e-3, 5e-3, 0.0],
+    np.array([0.0, 0.0, 1.0]),
+    np.tile([0.0, 0.0, 1.0], (9, 1)),
+    0,
+)
 BY_TOUCH = {"rbf": by_hermite, "box": by_box, "hull": by_hull}
 
 Estimator = Callable[[ShapeEvidence], ShapeEstimate]
@@ -59,13 +67,12 @@ def moved(touch: GuardedTouch, pose: FloatArray) -> GuardedTouch:
 def test_every_answer_is_a_closed_body_that_says_how_well_it_is_known(
     name: str, count: int, seen: bool
 ) -> None:
-    touches = presses(MUG, 2, seed=5)[:1] if count == 1 else TOUCHES[:count]
-    evidence = evidence_of(touches, LOOK if seen else None)
-    try:
-        require_whole(BY_TOUCH[name](evidence))
-    except FitRefused as refused:
-        assert (name, count) == ("hull", 1)  # a flat patch spans no body, and that is said
-        assert "one plane" in str(refused)
+    evidence = evidence_of(TOUCHES[:count], LOOK if seen else None)
+    if (name, count) == ("hull", 1):
+        with pytest.raises(FitRefused, match="one plane"):
+            by_hull(evidence_of((FLAT,)))
+        return
+    require_whole(BY_TOUCH[name](evidence))
 
 
 def test_the_surface_through_contacts_is_near_them_and_better_than_plainer_answers() -> None:
@@ -74,8 +81,6 @@ def test_the_surface_through_contacts_is_near_them_and_better_than_plainer_answe
     for plainer in (by_box, by_hull):
         assert ours.chamfer < shape_error(plainer(evidence).mesh, MUG, samples=4000).chamfer
     assert ours.chamfer < points_error(by_raw_points(evidence).points, MUG, 4000).chamfer
-    at_contacts = shape_error(MUG, by_hermite(evidence).mesh, samples=4000)
-    assert at_contacts.chamfer == pytest.approx(ours.chamfer, abs=1e-9)
 
 
 def test_more_contacts_are_better_and_touched_places_are_known_best() -> None:
@@ -92,7 +97,7 @@ def test_the_answer_turns_and_moves_with_the_readings(name: str) -> None:
     pose = transform(rotation_about(np.array([0.0, 0.0, 1.0]), 0.7), np.array([0.02, -0.01, 0.0]))
     turned = evidence_of(tuple(moved(touch, pose) for touch in TOUCHES))
     one, other = BY_TOUCH[name](evidence_of(TOUCHES)), BY_TOUCH[name](turned)
-    back = Mesh(apply(np.linalg.inv(pose), other.mesh.vertices), other.mesh.faces)
+    back = Mesh(apply(inverse(pose), other.mesh.vertices), other.mesh.faces)
     assert shape_error(one.mesh, back, samples=3000).chamfer < 1.5e-3  # a fraction of the grid's pitch
 
 
@@ -120,9 +125,7 @@ def test_nothing_of_the_answer_is_where_the_sensor_was_or_beside_the_silhouette(
 
 
 def test_presses_all_in_one_place_bound_nothing_and_say_so() -> None:
-    site = TOUCHES[0]
-    here = [t for t in presses(MUG, 200, 7) if np.linalg.norm(t.points.mean(0) - site.points.mean(0)) < 0.012]
-    answer = by_hermite(evidence_of(tuple(here[:6])))
+    answer = by_hermite(evidence_of(tuple(replace(TOUCHES[0], index=k) for k in range(6))))
     require_whole(answer)
     assert len(answer.not_bounded) >= 2
     supposed = answer.known_by == SUPPOSED
@@ -147,9 +150,8 @@ def test_without_a_contact_there_is_no_answer_by_touch(estimator: Estimator) -> 
 def test_the_visual_hull_holds_what_is_seen_and_does_not_know_how_deep_it_is() -> None:
     answer = by_visual_hull(evidence_of((), LOOK))
     require_whole(answer)
-    seen = MUG.vertices[np.abs(MUG.vertices[:, 0]) < 1.0]
-    inside = trimesh.Trimesh(answer.mesh.vertices, answer.mesh.faces)
-    assert float(inside.contains(seen * 0.98 + 0.02 * seen.mean(axis=0)).mean()) > 0.75
+    within = is_inside(0.95 * MUG.vertices[::40] + [0.0, 0.0, 0.002], answer.mesh.corners)
+    assert float(within.mean()) > 0.75
     assert "x" in answer.not_bounded  # the camera looks along it
     assert "y" not in answer.not_bounded
 
@@ -174,3 +176,12 @@ def test_contacts_of_a_round_body_find_its_axis_and_those_of_a_box_do_not() -> N
     assert find_revolution(thinned(all_samples(tray))) is None
     wrench = evidence_of(presses(build("wrench", 6e-3), 32, seed=2))
     assert find_revolution(thinned(all_samples(wrench))) is None
+
+
+def test_the_average_shape_looks_at_nothing_and_is_worse_than_touch() -> None:
+    answer = by_average(evidence_of(()))
+    require_whole(answer)
+    assert np.array_equal(answer.mesh.vertices, by_average(BOTH).mesh.vertices)
+    assert answer.not_bounded == ("x", "y", "z")
+    touched = shape_error(by_hermite(evidence_of(TOUCHES[:8])).mesh, MUG, samples=3000).chamfer
+    assert shape_error(answer.mesh, MUG, samples=3000).chamfer > touched

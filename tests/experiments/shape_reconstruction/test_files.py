@@ -3,6 +3,7 @@
 import io
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ def paths(estimate: ShapeEstimate, tmp_path_factory: pytest.TempPathFactory) -> 
 def test_the_ply_holds_surface_deviation_source_and_colour(
     estimate: ShapeEstimate, paths: dict[str, Path]
 ) -> None:
-    read = trimesh.load(paths["ply"], process=False)
+    read: Any = trimesh.load_mesh(paths["ply"], process=False)
     assert read.vertices == pytest.approx(estimate.mesh.vertices)
     assert np.array_equal(read.faces, estimate.mesh.faces)
     assert read.is_watertight
@@ -49,15 +50,15 @@ def test_the_ply_holds_surface_deviation_source_and_colour(
 
 
 def test_the_obj_holds_the_surface_and_its_colours(estimate: ShapeEstimate, paths: dict[str, Path]) -> None:
-    read = trimesh.load(paths["obj"], process=False)
+    read: Any = trimesh.load_mesh(paths["obj"], process=False)
     assert read.vertices == pytest.approx(estimate.mesh.vertices, abs=1e-9)
     assert np.array_equal(read.faces, estimate.mesh.faces)
     assert read.visual.vertex_colors[:, :3] == pytest.approx(colours_of(estimate.deviation), abs=1)
 
 
 def test_the_glb_stands_upright_where_y_is_up(estimate: ShapeEstimate, paths: dict[str, Path]) -> None:
-    scene = trimesh.load(paths["glb"])
-    read = scene.to_geometry()
+    scene = trimesh.load_scene(paths["glb"])
+    read: Any = scene.to_geometry()
     low, high = estimate.mesh.bounds
     assert read.bounds[:, 1] == pytest.approx([low[2], high[2]], abs=1e-6)
     assert read.bounds[:, 0] == pytest.approx([low[0], high[0]], abs=1e-6)
