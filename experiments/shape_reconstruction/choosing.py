@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.section import Choice
 from experiments.shape_reconstruction.surface import ShapeEstimate
+from experiments.shape_reconstruction.telling import disagreement
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 
@@ -35,8 +36,9 @@ def farthest(evidence: ShapeEvidence, estimate: ShapeEstimate | None, lines: Flo
 
 
 def most_telling(evidence: ShapeEvidence, estimate: ShapeEstimate | None, lines: FloatArray) -> FloatArray:
-    """How far the estimates of the shape differ along each line, where it is met."""
-    raise NotImplementedError("experiments.shape_reconstruction.choosing.most_telling: choose = active")
+    """M by which likely shapes differ along each line, where it is met; as ``farthest`` while they agree."""
+    apart = None if estimate is None else disagreement(evidence, estimate, lines)
+    return farthest(evidence, estimate, lines) if apart is None else apart
 
 
 CHOOSERS: dict[Choice, Chooser] = {"random": blindly, "farthest": farthest, "active": most_telling}

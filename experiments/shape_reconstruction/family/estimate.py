@@ -121,7 +121,8 @@ def _details(mixture: Mixture, fit: ContactFit) -> dict[str, object]:
                 "cost": one.cost,
                 "code": one.shape.code.tolist(),
                 "numbers": one.shape.theta.tolist(),
+                "about": [shape.theta.tolist() for shape in about],
             }
-            for one, weight in zip(mixture.hypotheses, mixture.weights, strict=True)
+            for one, weight, about in zip(mixture.hypotheses, mixture.weights, mixture.about, strict=True)
         ],
     }
