@@ -23,7 +23,7 @@ STRANGE = 16.0
 ALONE = 5.0
 """By how many times it exceeds the median contact's: where all are off, the shape is, not the contacts."""
 
-LEAST_OFF = 0.8e-3
+LEAST_OFF = 1.0e-3
 """M that a doubtful contact is off at least: normals at edges differ without being wrong."""
 
 _PROBE = 0.5e-3

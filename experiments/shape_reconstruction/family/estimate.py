@@ -1,6 +1,7 @@
 """The shape of an object by the family: household shapes that the readings allow, and the surface between."""
 
 import time
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import median_surface
 from experiments.shape_reconstruction.family.known import known_by, not_bounded
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
-from experiments.shape_reconstruction.family.search import Search
+from experiments.shape_reconstruction.family.search import Hypothesis, Search
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.surface import ShapeEstimate
@@ -32,12 +33,16 @@ RIVAL = 0.2
 """Weight of a second class above which the class is unknown."""
 
 
-def family_estimate(evidence: ShapeEvidence, settings: FamilySettings | None = None) -> ShapeEstimate:
+def family_estimate(
+    evidence: ShapeEvidence, settings: FamilySettings | None = None, previous: Sequence[ShapeEstimate] = ()
+) -> ShapeEstimate:
     """The median surface of the household shapes that the readings allow, moved to its contacts.
 
     Args:
         evidence: one contact or a silhouette at least.
         settings: how much is searched; the default level where not given.
+        previous: estimates by this function of the same object, of fewer or other readings: the search begins
+            at their hypotheses as well.
 
     Raises:
         OutOfDomain: nothing was touched or seen.
@@ -51,7 +56,8 @@ def family_estimate(evidence: ShapeEvidence, settings: FamilySettings | None = N
             "contact or one silhouette: press at the object, or take its picture"
         )
     search = Search(evidence, settings)
-    mixture = mixture_of(search.found(), sighted, bool(evidence.contacts), settings.seed)
+    seeds = [seed for estimate in previous for seed in _seeds_of(search, estimate)]
+    mixture = mixture_of(search.found(seeds), sighted, bool(evidence.contacts), settings.seed)
     fit = contact_fit(mixture.best.shape, search.full)
     plain = median_surface(mixture, settings.pitch)
     mesh = _warped(plain, mixture.best.shape, evidence, fit)
@@ -70,6 +76,15 @@ def family_estimate(evidence: ShapeEvidence, settings: FamilySettings | None = N
         seconds=time.perf_counter() - began,
         details=_details(mixture, fit),
     )
+
+
+def _seeds_of(search: Search, estimate: ShapeEstimate) -> Iterator[Hypothesis]:
+    """Hypotheses of an earlier estimate; none of one that is not the family's."""
+    listed = estimate.details.get("hypotheses", ())
+    assert isinstance(listed, Sequence)
+    for one in listed:
+        code, numbers = np.array(one["code"], np.int64), np.array(one["numbers"], np.float64)
+        yield search.seeded(FamilyShape(str(one["class"]), code, numbers), np.array(one["drawn_about"]))
 
 
 def _warped(mesh: Mesh, shape: FamilyShape, evidence: ShapeEvidence, fit: ContactFit) -> Mesh:
@@ -122,6 +137,7 @@ def _details(mixture: Mixture, fit: ContactFit) -> dict[str, object]:
                 "code": one.shape.code.tolist(),
                 "numbers": one.shape.theta.tolist(),
                 "about": [shape.theta.tolist() for shape in about],
+                "drawn_about": one.prior.middle.tolist(),
             }
             for one, weight, about in zip(mixture.hypotheses, mixture.weights, mixture.about, strict=True)
         ],

@@ -1,7 +1,7 @@
 """From draws of the prior to shapes that the readings allow: many are laid, some refined, few finished."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,7 +92,7 @@ class Search:
         """Hypotheses of least cost, the best first.
 
         Args:
-            seeds: of other searches, to begin at as well.
+            seeds: of earlier estimates, to begin at as well.
         """
         settings = self.settings
         begun = [*_stratified(self.laid(), settings.starts), *seeds]
@@ -148,14 +148,21 @@ class Search:
 
     def _under_prior(self, shape: FamilyShape, cost: float = np.inf) -> Hypothesis:
         """A shape whose own numbers are believed as they are, give or take what such shapes differ by."""
+        return replace(self.seeded(shape, shape.theta), cost=cost)
+
+    def seeded(self, shape: FamilyShape, middle: FloatArray) -> Hypothesis:
+        """A hypothesis of an earlier estimate, under the prior that it had then.
+
+        Args:
+            shape: in ``stand``.
+            middle: ``(SIZE,)`` that its own numbers were drawn about.
+        """
         rows = np.concatenate([self._bench, shape_rows(shape.code)])
-        return Hypothesis(shape, Prior(self._middle(shape.theta), rows), cost, np.empty((0, 0)))
+        return Hypothesis(shape, Prior(self._middle(middle), rows), np.inf, np.empty((0, 0)))
 
     def _changed(self, one: Hypothesis, shape: FamilyShape) -> Hypothesis:
         """Another shape beside a hypothesis: what they share is believed as before, not as it was fitted."""
-        middle = np.where(shape.theta == one.shape.theta, one.prior.middle, shape.theta)
-        rows = np.concatenate([self._bench, shape_rows(shape.code)])
-        return Hypothesis(shape, Prior(self._middle(middle), rows), np.inf, np.empty((0, 0)))
+        return self.seeded(shape, np.where(shape.theta == one.shape.theta, one.prior.middle, shape.theta))
 
     def _middle(self, theta: FloatArray) -> FloatArray:
         middle = theta.copy()

@@ -16,6 +16,8 @@ from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
 from tests.support.shape_readings import look_at, shape_readings, touch_at, touches_on
 
+pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
+
 COARSE = replace(LEVELS["coarse"], draws=210)
 
 
@@ -64,6 +66,17 @@ def test_the_same_seed_gives_the_same_answer(estimate: ShapeEstimate, readings: 
     np.testing.assert_array_equal(again.deviation, estimate.deviation)
 
 
+def test_a_search_that_begins_at_an_earlier_answer_is_no_worse(
+    estimate: ShapeEstimate, readings: ShapeEvidence
+) -> None:
+    few = replace(COARSE, draws=42, seed=5)
+    alone, seeded = family_estimate(readings, few), family_estimate(readings, few, previous=[estimate])
+    costs = [found.details["cost"] for found in (alone, seeded)]
+    assert isinstance(costs[0], float)
+    assert isinstance(costs[1], float)
+    assert costs[1] <= costs[0] + 1e-9
+
+
 def test_where_the_gel_pressed_counts_as_touched(estimate: ShapeEstimate, readings: ShapeEvidence) -> None:
     points = readings.contacts[0].points
     gaps = np.linalg.norm(estimate.mesh.vertices[:, None] - points[:1], axis=2).min(axis=1)
@@ -78,7 +91,8 @@ def test_all_presses_in_one_place_leave_the_object_unbounded(can: Mesh) -> None:
     require_sound(found)
     assert found.not_bounded == ("x", "y", "z")
     far = np.linalg.norm(found.mesh.vertices - side, axis=1) > 40e-3
-    near = np.linalg.norm(found.mesh.vertices - side, axis=1) < 4e-3
+    near = np.linalg.norm(found.mesh.vertices - side, axis=1) < 8e-3
+    assert near.any()
     assert np.median(found.deviation[far]) > 5e-3
     assert np.median(found.deviation[near]) < np.median(found.deviation[far])
 

@@ -26,6 +26,8 @@ from harness.basics.geometry import apply, translation
 from harness.basics.mesh import Mesh
 from tests.support.shape_readings import look_at, missed, shape_readings, touches_on
 
+pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
+
 SHAPES = ("mug", "bowl", "tray", "bottle", "spanner")
 
 
