@@ -104,7 +104,7 @@ def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate
         rim = rim_data(silhouette, _cut(field, bounds), data.points, low, high)
         field = fitted(data.joined(rim), low, high, by_contacts.amplitude)
     grid = Grid.over(low, high, PITCH)
-    mesh = grid.surface(_cut(field, bounds)(grid.points))
+    mesh = grid.surface(grid.near_zero(_cut(field, bounds)))
     return _finished(_Fit(evidence, whole, silhouette, field, axis, doubtful), mesh, start)
 
 
