@@ -1,8 +1,10 @@
 """A box of cells that holds all the space in which an object may be."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.isosurface import isosurface
@@ -10,6 +12,9 @@ from harness.basics.mesh import Mesh
 
 MOST_CORNERS = 200_000
 """Of a grid: beyond it the cells are made larger."""
+
+BAND = 3.0
+"""Pitches from zero, within which every corner is asked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +47,23 @@ class Grid:
         """``(n, 3)`` m, all corners, the last axis fastest."""
         axes = [self.origin[axis] + self.pitch * np.arange(self.shape[axis]) for axis in range(3)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+    def near_zero(self, field: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """``(n,)`` m of a field that grows by about a metre a metre: exact near zero, else between corners.
+
+        Every second corner is asked, and the others where the field may be zero nearby.
+
+        Args:
+            field: m at ``(n, 3)`` m.
+        """
+        half = tuple((count + 2) // 2 for count in self.shape)
+        coarse = Grid(self.origin, 2.0 * self.pitch, (half[0], half[1], half[2]))
+        known = field(coarse.points).reshape(half)
+        at = np.indices(self.shape).reshape(3, -1) / 2.0
+        values = np.asarray(ndimage.map_coordinates(known, at, order=1, mode="nearest"))
+        band = np.abs(values) < BAND * self.pitch
+        values[band] = field(self.points[band])
+        return values
 
     def surface(self, field: FloatArray) -> Mesh:
         """The closed surface around where ``(n,)`` m of the corners are below zero.

@@ -12,6 +12,7 @@ from experiments.shape_reconstruction.estimators.free_space import CLEARANCE, Si
 from experiments.shape_reconstruction.estimators.grid import Grid
 from experiments.shape_reconstruction.estimators.knowledge import (
     beyond_deviation,
+    hollow_deviation,
     known_by,
     limited_sides,
     not_bounded,
@@ -45,6 +46,7 @@ _HULL = 2.0e-3
 _SILHOUETTE = 1.0e-3
 _NORMAL = 0.1
 _COPY_SIGMA, _COPY_NORMAL, _COPIES = 2.0e-3, 0.2, 120
+_MOUTH = 0.05
 _SOME = 1200
 _NEAR = 2.0 * PITCH
 
@@ -102,7 +104,7 @@ def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate
         rim = rim_data(silhouette, _cut(field, bounds), data.points, low, high)
         field = fitted(data.joined(rim), low, high, by_contacts.amplitude)
     grid = Grid.over(low, high, PITCH)
-    mesh = grid.surface(_cut(field, bounds)(grid.points))
+    mesh = grid.surface(grid.near_zero(_cut(field, bounds)))
     return _finished(_Fit(evidence, whole, silhouette, field, axis, doubtful), mesh, start)
 
 
@@ -122,14 +124,18 @@ def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
     known = known_by(mesh, fit.samples, fit.silhouette)
     sides = limited_sides(mesh, fit.samples, fit.silhouette)
     beyond = beyond_deviation(mesh, known, sides, fit.evidence.largest)
-    round_ = "supposed to be round about a vertical axis, as its contacts are"
+    hollow = hollow_deviation(mesh, known, fit.samples)
+    round_ = "supposed to be round about a vertical axis, as its contacts are" if fit.axis else ""
+    open_ = (
+        "may be hollow: its top was touched nowhere near its middle" if (hollow > 0.0).mean() > _MOUTH else ""
+    )
     return ShapeEstimate(
         mesh=mesh,
-        deviation=np.sqrt(_deviations(fit.field, mesh) ** 2 + READING**2 + beyond**2),
+        deviation=np.sqrt(_deviations(fit.field, mesh) ** 2 + READING**2 + beyond**2 + hollow**2),
         known_by=known,
         not_bounded=not_bounded(sides),
         doubtful=fit.doubtful,
-        flags=() if fit.axis is None else (round_,),
+        flags=tuple(flag for flag in (round_, open_) if flag),
         seconds=time.perf_counter() - start,
         details={
             "estimator": "rbf",

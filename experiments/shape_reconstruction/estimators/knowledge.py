@@ -19,6 +19,9 @@ _FACES_ALIKE = 0.5
 _NEAR_END = 0.25
 _TOWARDS_CAMERA = 0.5
 
+OPENING = 20.0e-3
+"""M from any touched place that looks up, beyond which what looks up may as well be the mouth of a vessel."""
+
 Sides = dict[tuple[str, int], bool]
 
 
@@ -85,3 +88,15 @@ def beyond_deviation(mesh: Mesh, known: IntArray, sides: Sides, largest: float) 
             looking = np.maximum(sign * mesh.vertex_normals[:, axis], 0.0)
             np.maximum(deviation, room * looking, out=deviation)
     return np.where(known == SUPPOSED, deviation, 0.0)
+
+
+def hollow_deviation(mesh: Mesh, known: IntArray, samples: ContactSamples) -> FloatArray:
+    """``(vertices,)`` m, one standard deviation of a top that nobody touched: it may be a vessel's mouth.
+
+    Its bottom is then anywhere between the support and here: the root mean square of an even density.
+    """
+    up = samples.points[samples.normals[:, 2] > _FACES_ALIKE]
+    looking_up = (mesh.vertex_normals[:, 2] > _FACES_ALIKE) & (known == SUPPOSED)
+    if len(up):
+        looking_up &= np.asarray(cKDTree(up).query(mesh.vertices)[0]) > OPENING
+    return np.where(looking_up, np.maximum(mesh.vertices[:, 2], 0.0) / np.sqrt(3.0), 0.0)

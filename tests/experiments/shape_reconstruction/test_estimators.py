@@ -185,3 +185,15 @@ def test_the_average_shape_looks_at_nothing_and_is_worse_than_touch() -> None:
     assert answer.not_bounded == ("x", "y", "z")
     touched = shape_error(by_hermite(evidence_of(TOUCHES[:8])).mesh, MUG, samples=3000).chamfer
     assert shape_error(answer.mesh, MUG, samples=3000).chamfer > touched
+
+
+def test_a_top_that_nobody_touched_may_be_a_mouth_and_is_not_sure() -> None:
+    bowl = build("bowl", 6e-3)
+    outside = tuple(touch for touch in presses(bowl, 60, seed=2) if touch.normals[:, 2].mean() < 0.3)
+    answer = by_hermite(evidence_of(outside))
+    assert any("hollow" in flag for flag in answer.flags)
+    top = (answer.mesh.vertex_normals[:, 2] > 0.8) & (answer.mesh.vertices[:, 2] > 0.04)
+    assert float(np.median(answer.deviation[top])) > 0.02
+    made = trimesh.creation.box((0.07, 0.07, 0.06)).subdivide().subdivide()
+    block = Mesh(made.vertices + np.array([0.0, 0.0, 0.03]), made.faces)
+    assert by_hermite(evidence_of(presses(block, 60, seed=2))).flags == ()
