@@ -8,7 +8,7 @@ from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.distance import distances
-from experiments.shape_reconstruction.family.observed import Observed
+from experiments.shape_reconstruction.family.observed import FamilyEvidence
 from experiments.shape_reconstruction.family.residuals import (
     contact_sums,
     evaluate,
@@ -51,7 +51,7 @@ class ContactFit:
         return float(np.median(self.sums)) if len(self.sums) else 0.0
 
 
-def contact_fit(shape: FamilyShape, seen: Observed) -> ContactFit:
+def contact_fit(shape: FamilyShape, seen: FamilyEvidence) -> ContactFit:
     """How the contacts fit a shape."""
     out, q = rows_for(seen), prepared_room()
     cost = evaluate(shape.code, shape.theta, seen, False, out, q)

@@ -12,7 +12,7 @@ from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import median_surface
 from experiments.shape_reconstruction.family.known import known_by, not_bounded
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
-from experiments.shape_reconstruction.family.search import Hypothesis, Search
+from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.surface import ShapeEstimate
@@ -55,7 +55,7 @@ def family_estimate(
             f"{len(evidence.touches)} touches met nothing and no silhouette was seen; a shape needs one "
             "contact or one silhouette: press at the object, or take its picture"
         )
-    search = Search(evidence, settings)
+    search = FamilySearch(evidence, settings)
     seeds = [seed for estimate in previous for seed in _seeds_of(search, estimate)]
     mixture = mixture_of(search.found(seeds), sighted, bool(evidence.contacts), settings.seed)
     fit = contact_fit(mixture.best.shape, search.full)
@@ -78,7 +78,7 @@ def family_estimate(
     )
 
 
-def _seeds_of(search: Search, estimate: ShapeEstimate) -> Iterator[Hypothesis]:
+def _seeds_of(search: FamilySearch, estimate: ShapeEstimate) -> Iterator[Hypothesis]:
     """Hypotheses of an earlier estimate; none of one that is not the family's."""
     listed = estimate.details.get("hypotheses", ())
     assert isinstance(listed, Sequence)

@@ -27,7 +27,7 @@ _ACROSS = 5
 _WAY_STEP = 8.0e-3
 
 
-class Observed(NamedTuple):
+class FamilyEvidence(NamedTuple):
     """What the compiled residuals read.
 
     Attributes:
@@ -61,14 +61,14 @@ class Observed(NamedTuple):
     rays: SightRays
 
 
-def observe(evidence: ShapeEvidence, coarse: bool = False) -> Observed:
+def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
     """The arrays of some evidence; ``coarse`` takes fewer of all, for ranking many shapes."""
     contacts = evidence.contacts
     per_touch = 3 if coarse else POINTS_A_TOUCH
     chosen = [farthest_points(touch.points, per_touch) for touch in contacts]
     points = [touch.points[rows] for touch, rows in zip(contacts, chosen, strict=True)]
     sigma = np.array([np.hypot(touch.sigma, MODEL) for touch in contacts])
-    return Observed(
+    return FamilyEvidence(
         points=_stacked(points, 3),
         touch=np.repeat(np.arange(len(contacts)), [len(rows) for rows in points]).astype(np.int64),
         sigma=sigma,

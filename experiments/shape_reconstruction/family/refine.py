@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.shape_reconstruction.family.observed import Observed
+from experiments.shape_reconstruction.family.observed import FamilyEvidence
 from experiments.shape_reconstruction.family.residuals import (
     Rows,
     active_rows,
@@ -27,7 +27,7 @@ _MOST = 0.6
 """Longest step of a logarithm or an angle: beyond it the model's slope says nothing."""
 
 
-class Prior(NamedTuple):
+class PriorRows(NamedTuple):
     """A normal density about a vector.
 
     Attributes:
@@ -41,7 +41,13 @@ class Prior(NamedTuple):
 
 @compiled
 def total_cost(
-    code: IntArray, theta: FloatArray, seen: Observed, prior: Prior, robust: bool, out: Rows, q: FloatArray
+    code: IntArray,
+    theta: FloatArray,
+    seen: FamilyEvidence,
+    prior: PriorRows,
+    robust: bool,
+    out: Rows,
+    q: FloatArray,
 ) -> float:
     """Half the sum of squares of readings and prior; very large where the shape is no number."""
     off = prior.rows @ (theta - prior.middle)
@@ -53,8 +59,8 @@ def total_cost(
 def refine(
     code: IntArray,
     theta: FloatArray,
-    seen: Observed,
-    prior: Prior,
+    seen: FamilyEvidence,
+    prior: PriorRows,
     basis: FloatArray,
     robust: bool,
     rounds: int,
@@ -111,8 +117,8 @@ def _bounded(step: FloatArray) -> FloatArray:
 def _normal_equations(
     code: IntArray,
     theta: FloatArray,
-    seen: Observed,
-    prior: Prior,
+    seen: FamilyEvidence,
+    prior: PriorRows,
     basis: FloatArray,
     along: FloatArray,
     out: Rows,

@@ -16,7 +16,7 @@ from experiments.shape_reconstruction.family.layout import (
     GEL,
     OUTLINE,
 )
-from experiments.shape_reconstruction.family.observed import Observed
+from experiments.shape_reconstruction.family.observed import FamilyEvidence
 from experiments.shape_reconstruction.family.ray_depth import nearest_along
 from experiments.shape_reconstruction.family.sight import GRAZE, MEET, PASS
 from harness.basics.arrays import FloatArray, IntArray
@@ -56,14 +56,14 @@ class Rows(NamedTuple):
 
 
 @compiled
-def row_count(seen: Observed) -> int:
+def row_count(seen: FamilyEvidence) -> int:
     """Rows of all readings: points, three to a normal, free places, rays."""
     return int(len(seen.points) + 3 * len(seen.middles) + len(seen.free) + len(seen.rays.kinds))
 
 
 @compiled
 def evaluate(
-    code: IntArray, theta: FloatArray, seen: Observed, robust: bool, out: Rows, q: FloatArray
+    code: IntArray, theta: FloatArray, seen: FamilyEvidence, robust: bool, out: Rows, q: FloatArray
 ) -> float:
     """Fill in the rows of a shape; returns half the sum of what they cost.
 
@@ -85,7 +85,7 @@ def evaluate(
 
 @compiled
 def _evaluate_rays(
-    code: IntArray, theta: FloatArray, seen: Observed, out: Rows, q: FloatArray, first: int
+    code: IntArray, theta: FloatArray, seen: FamilyEvidence, out: Rows, q: FloatArray, first: int
 ) -> float:
     rays, cost = seen.rays, 0.0
     origin, towards, to_middle = np.empty(3), np.empty(3), np.empty(3)
@@ -102,7 +102,7 @@ def _evaluate_rays(
 
 
 @compiled
-def _turned_ray(theta: FloatArray, seen: Observed, i: int, towards: FloatArray) -> None:
+def _turned_ray(theta: FloatArray, seen: FamilyEvidence, i: int, towards: FloatArray) -> None:
     """A ray's direction, were the picture's scale off by what the shape's vector says."""
     rays = seen.rays
     scale = theta[CAMERA_SCALE]
@@ -111,7 +111,7 @@ def _turned_ray(theta: FloatArray, seen: Observed, i: int, towards: FloatArray) 
 
 
 @compiled
-def _sighted(theta: FloatArray, seen: Observed, i: int, d: float) -> float:
+def _sighted(theta: FloatArray, seen: FamilyEvidence, i: int, d: float) -> float:
     """A ray's residual where it passes the shape at ``d`` m."""
     rays = seen.rays
     sigma = np.hypot(PIXELS * rays.pixel, RAY_MODEL)
@@ -123,14 +123,14 @@ def _sighted(theta: FloatArray, seen: Observed, i: int, d: float) -> float:
 
 
 @compiled
-def _point(code: IntArray, theta: FloatArray, seen: Observed, q: FloatArray, i: int) -> float:
+def _point(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
     j = seen.touch[i]
     x, y, z = _moved(theta, seen, j, seen.points[i])
     return float(distance(code, q, False, x, y, z) / seen.sigma[j])
 
 
 @compiled
-def _moved(theta: FloatArray, seen: Observed, j: int, point: FloatArray) -> tuple[float, float, float]:
+def _moved(theta: FloatArray, seen: FamilyEvidence, j: int, point: FloatArray) -> tuple[float, float, float]:
     """Where a place of contact ``j`` is, were the gel off by what the shape's vector says."""
     r = seen.gel[j]
     a, b, c = theta[GEL], theta[GEL + 1], theta[GEL + 2]
@@ -142,7 +142,7 @@ def _moved(theta: FloatArray, seen: Observed, j: int, point: FloatArray) -> tupl
 
 @compiled
 def _normal(
-    code: IntArray, theta: FloatArray, seen: Observed, q: FloatArray, j: int, out: FloatArray
+    code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, j: int, out: FloatArray
 ) -> None:
     """The gradient just outside a contact less its normal; four places give it."""
     x, y, z = _moved(theta, seen, j, seen.middles[j])
@@ -160,7 +160,7 @@ def _normal(
 
 
 @compiled
-def _free(code: IntArray, seen: Observed, q: FloatArray, i: int) -> float:
+def _free(code: IntArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
     p = seen.free[i]
     return float(inside_depth(code, q, p[0], p[1], p[2]) / FREE_SIGMA)
 
@@ -176,7 +176,7 @@ def _weigh(row: int, worth: float, out: Rows) -> float:
 
 
 @compiled
-def _weigh_contacts(seen: Observed, robust: bool, out: Rows) -> float:
+def _weigh_contacts(seen: FamilyEvidence, robust: bool, out: Rows) -> float:
     sums = contact_sums(seen, out.values)
     cost = 0.0
     n = len(seen.points)
@@ -199,7 +199,7 @@ def _weigh_contacts(seen: Observed, robust: bool, out: Rows) -> float:
 
 
 @compiled
-def contact_sums(seen: Observed, values: FloatArray) -> FloatArray:
+def contact_sums(seen: FamilyEvidence, values: FloatArray) -> FloatArray:
     """``(contacts,)`` sums of the squared residuals of each contact, as independent as they are."""
     sums = np.zeros(len(seen.middles))
     n = len(seen.points)
@@ -215,7 +215,7 @@ def contact_sums(seen: Observed, values: FloatArray) -> FloatArray:
 def frozen(
     code: IntArray,
     theta: FloatArray,
-    seen: Observed,
+    seen: FamilyEvidence,
     active: IntArray,
     along: FloatArray,
     q: FloatArray,
@@ -255,7 +255,7 @@ def frozen(
 
 
 @compiled
-def active_rows(seen: Observed, values: FloatArray) -> IntArray:
+def active_rows(seen: FamilyEvidence, values: FloatArray) -> IntArray:
     """Rows that pull: all of contacts and grazing rays, and of the others those that are violated."""
     first = len(seen.points) + 3 * len(seen.middles)
     rays = first + len(seen.free)
@@ -269,7 +269,7 @@ def active_rows(seen: Observed, values: FloatArray) -> IntArray:
 
 
 @compiled
-def rows_for(seen: Observed) -> Rows:
+def rows_for(seen: FamilyEvidence) -> Rows:
     """Room for the rows of some readings."""
     count = row_count(seen)
     return Rows(np.zeros(count), np.zeros(count), np.zeros(len(seen.rays.kinds)))

@@ -18,9 +18,9 @@ from experiments.shape_reconstruction.family.freedom import (
     stand_rows,
 )
 from experiments.shape_reconstruction.family.guides import Guides, guides_of
-from experiments.shape_reconstruction.family.observed import Observed, observe
+from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
 from experiments.shape_reconstruction.family.proposals import lay
-from experiments.shape_reconstruction.family.refine import Prior, refine, total_cost
+from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from harness.basics.arrays import FloatArray
@@ -53,7 +53,7 @@ class Hypothesis:
     """
 
     shape: FamilyShape
-    prior: Prior
+    prior: PriorRows
     cost: float
     curvature: FloatArray
     price: float = 0.0
@@ -64,7 +64,7 @@ class Hypothesis:
         return self.cost - self.price
 
 
-class Search:
+class FamilySearch:
     """One search through the family.
 
     Attributes:
@@ -78,8 +78,8 @@ class Search:
         """Read the evidence into arrays."""
         self.settings = settings
         self.guides: Guides = guides_of(evidence)
-        self.coarse: Observed = observe(evidence, coarse=True)
-        self.full: Observed = observe(evidence)
+        self.coarse: FamilyEvidence = observe(evidence, coarse=True)
+        self.full: FamilyEvidence = observe(evidence)
         self._place_error = evidence.place_error
         rays = self.full.rays
         self._bench = bench_rows(
@@ -130,7 +130,7 @@ class Search:
         tried = lay(shape, self.guides, random, self._place_error, self.settings.yaws)
         tried[:, layout.OUTLINE] = self._bench_middle[layout.OUTLINE]
         middle = self._middle(tried[0])
-        prior = Prior(middle, np.concatenate([self._bench, stand_rows(shape.code)]))
+        prior = PriorRows(middle, np.concatenate([self._bench, stand_rows(shape.code)]))
         best = tried[0]
         if len(tried) > 1:
             out, q = rows_for(self.coarse), prepared_room()
@@ -158,7 +158,7 @@ class Search:
             middle: ``(SIZE,)`` that its own numbers were drawn about.
         """
         rows = np.concatenate([self._bench, shape_rows(shape.code)])
-        return Hypothesis(shape, Prior(self._middle(middle), rows), np.inf, np.empty((0, 0)))
+        return Hypothesis(shape, PriorRows(self._middle(middle), rows), np.inf, np.empty((0, 0)))
 
     def _changed(self, one: Hypothesis, shape: FamilyShape) -> Hypothesis:
         """Another shape beside a hypothesis: what they share is believed as before, not as it was fitted."""

@@ -11,8 +11,8 @@ from experiments.shape_reconstruction.family.classes import FamilyShape, draw_sh
 from experiments.shape_reconstruction.family.contacts_fit import contact_fit
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
-from experiments.shape_reconstruction.family.observed import Observed, observe
-from experiments.shape_reconstruction.family.refine import Prior, refine, total_cost
+from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
+from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import (
     active_rows,
     evaluate,
@@ -44,15 +44,15 @@ def made(name: str) -> tuple[FamilyShape, ShapeEvidence]:
     return shape, shape_readings(touches_on(mesh, 6, seed=1), look_at(mesh))
 
 
-def cost_of(shape: FamilyShape, seen: Observed, robust: bool = True) -> float:
+def cost_of(shape: FamilyShape, seen: FamilyEvidence, robust: bool = True) -> float:
     return float(evaluate(shape.code, shape.theta, seen, robust, rows_for(seen), prepared_room()))
 
 
-def prior_of(shape: FamilyShape) -> Prior:
+def prior_of(shape: FamilyShape) -> PriorRows:
     rows = np.concatenate([bench_rows(0.02, 1e-3, 2e-3, 3e-3, 5e-3), shape_rows(shape.code)])
     middle = shape.theta.copy()
     middle[: layout.POSE_END] = 0.0
-    return Prior(middle, rows)
+    return PriorRows(middle, rows)
 
 
 def nudged(shape: FamilyShape, by: float, seed: int = 0) -> FloatArray:
