@@ -65,7 +65,7 @@ def test_presses_lead_to_places_far_from_each_other(evidence: ShapeEvidence) -> 
 def test_the_answer_is_the_same_to_the_bit_when_it_is_replayed(touched: Recording) -> None:
     first = answered(touched)
     assert first == answered(Recording(touched.folder))
-    assert first["estimates"]["touch"]["chamfer_m"] == pytest.approx(first["error_m"])
+    assert first["estimates"]["fused"]["chamfer_m"] == first["error_m"]
     assert 0.0 < first["error_m"] < 0.05
     assert first["estimates"]["vision"]["refused"]
     assert (first["presses"], first["choose"]) == (3, "farthest")
