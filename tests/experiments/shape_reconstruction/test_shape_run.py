@@ -219,16 +219,19 @@ def test_a_scene_that_cannot_be_explored_is_refused_before_anything_moves(
     assert not (tmp_path / "run").exists()
 
 
-def test_a_run_ends_when_the_shape_is_known_as_well_as_was_asked(
-    touched: Recording, tmp_path: Path, station: Station
+@pytest.mark.parametrize(
+    ("until", "bounded", "sure"), [(0.5, True, True), (1e-9, True, False), (0.5, False, False)]
+)
+def test_a_run_ends_when_the_shape_is_known_as_well_as_was_asked_and_nothing_is_open(
+    touched: Recording, monkeypatch: pytest.MonkeyPatch, until: float, bounded: bool, sure: bool
 ) -> None:
     run = RunFiles(touched)
-    asked = run.scene.section(ShapeRun).model_copy(update={"until": 0.5})
+    found = estimated(QUICK, evidence_of(run, touched.steps()))
+    found = replace(found, not_bounded=() if bounded else ("z",))
+    monkeypatch.setattr(ShapeExplorer, "_estimate", lambda _self: found)
+    asked = run.scene.section(ShapeRun).model_copy(update={"until": until})
     object.__setattr__(run, "scene", run.scene.with_section(asked))
-    assert ShapeExplorer(run, QUICK).is_sure(touched, 2)
-    never = run.scene.section(ShapeRun).model_copy(update={"until": 1e-9})
-    object.__setattr__(run, "scene", run.scene.with_section(never))
-    assert not ShapeExplorer(run, QUICK).is_sure(touched, 2)
+    assert ShapeExplorer(run, QUICK).is_sure(touched, 2) is sure
 
 
 def test_readings_of_nothing_are_refused_with_what_to_do_next(blind: Recording) -> None:
