@@ -26,7 +26,7 @@ PAPER_PROFILES = MappingProxyType(
         "paper": PaperAmounts(
             520,
             MappingProxyType({"picture": 8, "spectrogram": 4, "imprints": 16}),
-            MappingProxyType({"picture": 6, "spectrogram": 5, "imprints": 40}),
+            MappingProxyType({"picture": 6, "spectrogram": 3, "imprints": 40}),
         ),
         "paper-smoke": PaperAmounts(
             26,
