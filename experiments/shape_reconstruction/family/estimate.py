@@ -2,9 +2,13 @@
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from experiments.shape_reconstruction.estimators.knowledge import beyond_deviation, limited_sides
+from experiments.shape_reconstruction.estimators.knowledge import not_bounded as open_axes
+from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contacts_fit import ContactFit, contact_fit, moved_points
@@ -66,7 +70,7 @@ def family_estimate(
         for touch, off, bad in zip(evidence.contacts, fit.off, fit.doubtful, strict=True)
         if bad
     }
-    return ShapeEstimate(
+    found = ShapeEstimate(
         mesh=mesh,
         deviation=_deviation(plain, mixture, mesh),
         known_by=known_by(mesh.vertices, evidence),
@@ -75,6 +79,19 @@ def family_estimate(
         flags=_flags(mixture, fit, doubtful),
         seconds=time.perf_counter() - began,
         details=_details(mixture, fit),
+    )
+    return found if evidence.contacts else _by_picture_alone(found, evidence)
+
+
+def _by_picture_alone(found: ShapeEstimate, evidence: ShapeEvidence) -> ShapeEstimate:
+    """The same, as unsure of its depth along the line of sight as one outline leaves it."""
+    sides = limited_sides(found.mesh, None, silhouette_of(evidence, np.zeros((0, 3))))
+    beyond = beyond_deviation(found.mesh, found.known_by, sides, evidence.largest)
+    return replace(
+        found,
+        deviation=np.hypot(found.deviation, beyond),
+        not_bounded=open_axes(sides),
+        flags=(*found.flags, "by the picture alone: its depth along the line of sight is supposed"),
     )
 
 
