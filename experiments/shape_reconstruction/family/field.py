@@ -4,6 +4,7 @@ import numpy as np
 
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.distance import BOX, PREPARED, distance, prepare
+from experiments.shape_reconstruction.family.layout import FLOOR, HOLLOW, KIND, TURNED, WALL
 from experiments.shape_reconstruction.family.posterior import Mixture
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
@@ -19,6 +20,9 @@ _STEEP = 1.4
 _MOST = 160
 """Cells along a side: larger bodies are sampled more coarsely."""
 
+_RESOLVED = 1.2
+"""Thickness of a wall, over a cell, from which on the grid shows no hole in it."""
+
 _WEIGHT = 0.03
 """Below it a hypothesis does not move the median."""
 
@@ -28,16 +32,35 @@ def median_surface(mixture: Mixture, pitch: float) -> Mesh:
 
     Args:
         mixture: of shapes in ``stand``.
-        pitch: m of the grid, coarser where the body is larger than 160 cells.
+        pitch: m of the grid; finer where a wall is thin, coarser where the body is larger than 160 cells. A
+            wall too thin for the grid that is left is drawn as thick as it shows, on its inner side.
     """
     pairs = zip(mixture.hypotheses, mixture.weights, strict=True)
     shapes = [(one.shape, float(weight)) for one, weight in pairs if weight >= _WEIGHT]
     low, high = _box([shape for shape, _ in shapes])
-    cell = max(pitch, float((high - low).max()) / _MOST)
+    thinnest = min(_thickness(shape) for shape, _ in shapes)
+    cell = max(min(pitch, thinnest / _RESOLVED), float((high - low).max()) / _MOST)
     counts = np.ceil((high - low) / cell).astype(np.int64) + 1
-    fields = np.stack([grid_distances(shape, low, cell, counts) for shape, _ in shapes])
+    drawn = [_thickened(shape, _RESOLVED * cell) for shape, _ in shapes]
+    fields = np.stack([grid_distances(shape, low, cell, counts) for shape in drawn])
     weights = np.array([weight for _, weight in shapes])
     return isosurface(_weighted_median(fields, weights / weights.sum()), low, cell)
+
+
+def _thickness(shape: FamilyShape) -> float:
+    """M of a hollow body's wall and floor, the thinner; infinite of any other, which has none."""
+    if shape.code[KIND] != TURNED or not shape.code[HOLLOW]:
+        return np.inf
+    return float(np.exp(shape.theta[[WALL, FLOOR]].min()))
+
+
+def _thickened(shape: FamilyShape, least: float) -> FamilyShape:
+    """The same, its wall and floor at least so many m thick; its outside as it was."""
+    if _thickness(shape) >= least:
+        return shape
+    theta = shape.theta.copy()
+    theta[[WALL, FLOOR]] = np.maximum(theta[[WALL, FLOOR]], np.log(least))
+    return FamilyShape(shape.name, shape.code, theta)
 
 
 def grid_distances(shape: FamilyShape, origin: FloatArray, cell: float, counts: IntArray) -> FloatArray:

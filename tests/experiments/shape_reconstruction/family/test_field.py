@@ -1,0 +1,50 @@
+"""The surface of a mixture has no hole where a wall is thin."""
+
+import numpy as np
+import pytest
+
+from experiments.shape_reconstruction.family import layout
+from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
+from experiments.shape_reconstruction.family.field import corners_of, median_surface
+from experiments.shape_reconstruction.family.posterior import Mixture
+from experiments.shape_reconstruction.family.search import Hypothesis
+from harness.basics.mesh import Mesh
+
+
+def cup_with(wall: float) -> FamilyShape:
+    cup = draw_shape("bowl", np.random.default_rng(2))
+    theta = cup.theta.copy()
+    theta[[layout.WALL, layout.FLOOR]] = np.log(wall)
+    return FamilyShape(cup.name, cup.code, theta)
+
+
+def surface_of(shape: FamilyShape, pitch: float) -> Mesh:
+    one = Hypothesis.__new__(Hypothesis)
+    object.__setattr__(one, "shape", shape)
+    return median_surface(Mixture((one,), np.ones(1), ((),)), pitch)
+
+
+def holes_and_pieces(mesh: Mesh) -> int:
+    """Euler's characteristic: two for one piece without a hole through it."""
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return len(np.unique(mesh.faces)) - len(np.unique(edges, axis=0)) + len(mesh.faces)
+
+
+@pytest.mark.timeout(300)  # compiles the family where it is the first to
+@pytest.mark.parametrize("wall", [0.4e-3, 1.0e-3, 1.5e-3, 3.0e-3])
+def test_a_thin_wall_has_no_holes_and_its_outside_is_where_it_was(wall: float) -> None:
+    shape = cup_with(wall)
+    mesh = surface_of(shape, 2.5e-3)
+    assert holes_and_pieces(mesh) == 2
+    assert mesh.bounds[1, 2] == pytest.approx(corners_of(shape)[:, 2].max(), abs=1.5e-3)
+
+
+@pytest.mark.timeout(300)
+def test_the_grid_is_fine_enough_for_a_wall_of_a_millimetre_and_a_half() -> None:
+    coarse, fine = (volume(surface_of(cup_with(1.5e-3), pitch)) for pitch in (2.5e-3, 0.9e-3))
+    assert coarse == pytest.approx(fine, rel=0.1)
+
+
+def volume(mesh: Mesh) -> float:
+    a, b, c = mesh.corners.transpose(1, 0, 2)
+    return float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6.0)
