@@ -20,8 +20,11 @@ SIZES = (0.7, 0.85, 1.0, 1.2, 1.45, 1.8)
 REFINED = 3
 """Best starts of a shape that are refined, ..."""
 
-ROUNDS = 10
+ROUNDS = 20
 """... each by so many fits of size, turn and place to nearest places."""
+
+COARSE = 4.0
+"""The loss's width at first, over ``SCALE``."""
 
 SCALE = 2.0e-3
 """M beyond which a contact's distance weighs less and less."""
@@ -112,14 +115,15 @@ def _distance_cost(at: PlacedShape, points: FloatArray) -> float:
 def _refined(at: PlacedShape, samples: ContactSamples) -> PlacedShape:
     """Nearest places, then the size, turn and place that bring them onto the contacts, again and again.
 
-    Weighted by the loss of Cauchy, so that what the shape has not does not pull it.
+    Weighted by the loss of Cauchy, so that what the shape has not does not pull it; at first by a wide one,
+    so that a start far off is not held by the few contacts that it happens to meet.
     """
     tree, places, facing = at.shape.samples
-    for _ in range(ROUNDS):
+    for loss in SCALE * np.geomspace(COARSE, 1.0, ROUNDS):
         nearest = np.asarray(tree.query(at.inward(samples.points))[1])
         normals, moved = facing[nearest] @ at.turn.T, at.outward(places[nearest])
         along = np.einsum("ij,ij->i", samples.points - moved, normals)
-        weight = 1.0 / (1.0 + (along / SCALE) ** 2)
+        weight = 1.0 / (1.0 + (along / loss) ** 2)
         arm = moved - np.append(at.place, 0.0)
         swept = np.column_stack([-arm[:, 1], arm[:, 0], np.zeros(len(arm))])
         terms = np.column_stack(
