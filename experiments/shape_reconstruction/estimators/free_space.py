@@ -28,6 +28,12 @@ def sensor_depth(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
     return deepest
 
 
+def depth_of_touches(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
+    """``(touches,)`` m that the deepest of ``(n, 3)`` points is in what each housing passed; 0 at least."""
+    deepest = [float(_depth_in_housing(evidence, touch, points).max()) for touch in evidence.touches]
+    return np.maximum(np.array(deepest), 0.0)
+
+
 def _depth_in_housing(evidence: ShapeEvidence, touch: GuardedTouch, points: FloatArray) -> FloatArray:
     """The housing and all the places it came through: one box, since its way is straight along its axis."""
     in_gel = apply(inverse(touch.stand_from_gel), points)

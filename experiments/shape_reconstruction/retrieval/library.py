@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, cKDTree
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import MeshRefused, WrongUse
@@ -43,9 +43,9 @@ class LibraryShape:
         return cKDTree(points), points, self.mesh.face_normals[faces]
 
     @cached_property
-    def area(self) -> float:
-        """Of its surface, over the square of its longest side."""
-        return float(self.mesh.face_areas.sum())
+    def outside(self) -> float:
+        """Area of its convex hull over the square of its longest side: of what touches come to, about."""
+        return float(ConvexHull(self.mesh.vertices).area)
 
     @cached_property
     def search(self) -> NearestSurface:

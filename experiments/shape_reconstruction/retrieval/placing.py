@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples
-from experiments.shape_reconstruction.estimators.free_space import Silhouette, sensor_depth
+from experiments.shape_reconstruction.estimators.free_space import Silhouette, depth_of_touches
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.retrieval.library import LibraryShape
 from harness.basics.arrays import FloatArray
@@ -31,12 +31,6 @@ SCALE = 2.0e-3
 
 NORMAL = 0.35
 """Rad, one standard deviation of the surface's direction at a contact: shapes of a kind differ."""
-
-AREA = 0.5
-"""Of the logarithm of the surface: the larger it is, the less likely that touches met it just there.
-
-Halved, since touches are not even over a surface.
-"""
 
 _FEW = 60
 _SAMPLES = 600
@@ -151,10 +145,12 @@ def _costed(
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     cost = float(np.log1p((apart / SCALE) ** 2).mean() + np.log1p((angle / NORMAL) ** 2).mean())
     own = at.outward(at.shape.samples[1][:_SAMPLES])
-    cost += float(np.log1p((np.maximum(sensor_depth(evidence, own), 0.0) / _FREE) ** 2).mean())
+    # Of each touch, as its contact is: one that could not have been made there is not outweighed by area.
+    cost += float(np.log1p((depth_of_touches(evidence, own) / _FREE) ** 2).mean())
     if silhouette is not None:
         cost += _picture_cost(own, silhouette)
-    cost += AREA * float(np.log(at.shape.area * at.size**2 / evidence.largest**2))
+    # Touches come to the outside evenly: the density of each is one over its area.
+    cost += float(np.log(at.shape.outside * at.size**2 / evidence.largest**2))
     beyond = max(at.size / evidence.largest - 1.0, 0.0)
     return PlacedShape(at.shape, at.size, at.yaw, at.place, cost + 10.0 * beyond)
 
