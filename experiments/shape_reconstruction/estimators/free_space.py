@@ -31,7 +31,7 @@ def sensor_depth(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
 def depth_of_touches(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
     """``(touches,)`` m that the deepest of ``(n, 3)`` points is in what each housing passed; 0 at least."""
     deepest = [float(_depth_in_housing(evidence, touch, points).max()) for touch in evidence.touches]
-    return np.maximum(np.array(deepest), 0.0)
+    return np.asarray(np.maximum(deepest, 0.0))
 
 
 def _depth_in_housing(evidence: ShapeEvidence, touch: GuardedTouch, points: FloatArray) -> FloatArray:
