@@ -36,7 +36,7 @@ def hashes(folder: Path) -> dict[Path, str]:
 
 def test_a_kill_during_a_strike_loses_that_contact_alone(tmp_path: Path) -> None:
     program = RunProcess([*MUG, "--out", str(tmp_path / "run")], tmp_path)
-    program.wait_for(lambda: struck(tmp_path) == 2, 240.0)
+    program.wait_for(lambda: struck(tmp_path) == 2, 330.0)
     ports = program.ports()
     assert len(ports) >= 4, "dashboard, script, real-time exchange, gel; the box is a terminal"
     program.kill()
