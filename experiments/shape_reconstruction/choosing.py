@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
+from experiments.shape_reconstruction.disagreement import disagreement
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.section import Choice
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from experiments.shape_reconstruction.telling import disagreement
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.ray_mesh import RayMesh
 
@@ -35,13 +35,15 @@ def farthest(evidence: ShapeEvidence, estimate: ShapeEstimate | None, lines: Flo
     return np.asarray(cKDTree(np.array(led)).query(meeting_places(estimate, lines))[0])
 
 
-def most_telling(evidence: ShapeEvidence, estimate: ShapeEstimate | None, lines: FloatArray) -> FloatArray:
+def most_informative(
+    evidence: ShapeEvidence, estimate: ShapeEstimate | None, lines: FloatArray
+) -> FloatArray:
     """M by which likely shapes differ along each line, where it is met; as ``farthest`` while they agree."""
     apart = None if estimate is None else disagreement(evidence, estimate, lines)
     return farthest(evidence, estimate, lines) if apart is None else apart
 
 
-CHOOSERS: dict[Choice, Chooser] = {"random": blindly, "farthest": farthest, "active": most_telling}
+CHOOSERS: dict[Choice, Chooser] = {"random": blindly, "farthest": farthest, "active": most_informative}
 """Of lines into what is not known, by ``shape.choose``."""
 
 

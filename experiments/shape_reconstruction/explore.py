@@ -3,7 +3,7 @@
 import numpy as np
 
 from experiments.shape_reconstruction.explorer import DrawnContacts, ShapeExplorer
-from experiments.shape_reconstruction.methods import QUICK, TELLING
+from experiments.shape_reconstruction.methods import INFORMATIVE, QUICK
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
@@ -45,12 +45,12 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
             'an unknown object stands where its bottom is: set object.pose.anchor = "bottom", and its '
             "position to where its middle should be on the support"
         )
-    asked, looks = scene.section(ShapeRun), scene.sensors.camera
-    if asked.choose != "planned" or _presses(scene) == 0:
+    settings, looks = scene.section(ShapeRun), scene.sensors.camera
+    if settings.choose != "planned" or _presses(scene) == 0:
         place = np.array(scene.object.pose.position)
         bench = twin_of(scene, station, nowhere(place), np.eye(4))
         return Planned(kinds(looks, _presses(scene)), rehearse(bench, []), bench)
-    wanted = ContactRequest(_presses(scene), "spread", PressLimits(tilt=asked.tilt, depth=asked.depth))
+    wanted = ContactRequest(_presses(scene), "spread", PressLimits(tilt=settings.tilt, depth=settings.depth))
     made = plan_run(scene, station, mesh, seed, wanted)
     presses = [{"kind": "contact", **parameters} for parameters in made.parameters()]
     return Planned([*kinds(looks, 0), *presses], made.rehearsal, made.bench)
@@ -71,4 +71,4 @@ def _explorer(run: RunFiles, helpers: Helpers) -> NextContact:
     choose = run.scene.section(ShapeRun).choose
     if choose == "planned":
         return DrawnContacts(helpers.twin)
-    return ShapeExplorer(run, TELLING if choose == "active" else QUICK)
+    return ShapeExplorer(run, INFORMATIVE if choose == "active" else QUICK)

@@ -73,7 +73,7 @@ class ShapeExplorer:
 
     def __init__(self, run: RunFiles, method: str) -> None:
         self._run, self._method = run, method
-        self._asked = run.scene.section(ShapeRun)
+        self._settings = run.scene.section(ShapeRun)
         self._readings = ShapeReadings(run)
         self._read, self._skipped = 0, 0
         self._joints: FloatArray = HOME
@@ -86,13 +86,13 @@ class ShapeExplorer:
     @cached_property
     def stand(self) -> UnknownStand:
         """Where the object was put, and what looks at it."""
-        asked = self._asked
+        settings = self._settings
         errors = CameraErrors(
-            position=asked.camera_position_error,
-            rotation=asked.camera_rotation_error,
-            focal_length=asked.focal_length_error,
-            support=asked.support_error,
-            place=asked.place_error,
+            position=settings.camera_position_error,
+            rotation=settings.camera_rotation_error,
+            focal_length=settings.focal_length_error,
+            support=settings.support_error,
+            place=settings.place_error,
         )
         return UnknownStand(self.place, errors, self._run.station.camera)
 
@@ -113,7 +113,7 @@ class ShapeExplorer:
     @cached_property
     def travels(self) -> TwinBench:
         """The bench with all the space that the object may take in its place."""
-        return self._twin(unknown_space(self.stand, self.outline, self._asked.largest))
+        return self._twin(unknown_space(self.stand, self.outline, self._settings.largest))
 
     @cached_property
     def _nothing(self) -> TwinBench:
@@ -128,7 +128,7 @@ class ShapeExplorer:
 
     def is_sure(self, recording: Recording, index: int) -> bool:
         """Whether the steps before one tell the shape as well as the scene asks."""
-        until = self._asked.until
+        until = self._settings.until
         if until is None or index == 0:
             return False
         self._take_in(recording, index)
@@ -153,12 +153,12 @@ class ShapeExplorer:
         self._take_in(recording, index)
         random = np.random.default_rng((recording.header.seed, index))
         here = Surroundings(self._run.scene, self._run.station, self.travels, self._nothing, self._joints)
-        estimate = None if self._asked.choose == "random" else self._estimate()
+        estimate = None if self._settings.choose == "random" else self._estimate()
         lines = np.concatenate([self._towards_surface(estimate, random), self._blind(here, random)])
-        scores = CHOOSERS[self._asked.choose](self._readings.evidence(), estimate, lines)
+        scores = CHOOSERS[self._settings.choose](self._readings.evidence(), estimate, lines)
         best = np.argsort(-scores, kind="stable")[:LINES]
         return contact_along(
-            here, translation(self.place) @ lines[best], float(random.uniform(*self._asked.depth))
+            here, translation(self.place) @ lines[best], float(random.uniform(*self._settings.depth))
         )
 
     def _take_in(self, recording: Recording, index: int) -> None:
@@ -189,6 +189,6 @@ class ShapeExplorer:
             aims = aims_at_mask(look, thing, self.place, LINES, random)
         else:
             first = not self._readings.touches
-            aims = aims_unseen(self.place, self._asked.place_error, UP_TO, first, random)
+            aims = aims_unseen(self.place, self._settings.place_error, UP_TO, first, random)
         lines = lines_to(aims, here, float(self.place[2]), random)
         return np.asarray(translation(-self.place) @ np.array(list(lines)))

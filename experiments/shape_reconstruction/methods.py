@@ -22,7 +22,7 @@ METHODS: Mapping[str, Callable[[ShapeEvidence], ShapeEstimate]] = {
 }
 """From cheap to dear."""
 
-QUICK, TELLING, BEST = "rbf", "family-coarse", "family"
+QUICK, INFORMATIVE, BEST = "rbf", "family-coarse", "family"
 """While the arm waits for the next press; where that goes by which shapes are likely; by default."""
 
 TABLED: Mapping[str, tuple[str, ...]] = {

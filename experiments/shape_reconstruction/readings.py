@@ -46,16 +46,16 @@ class ShapeReadings:
 
     def evidence(self) -> ShapeEvidence:
         """All of it."""
-        asked, sensor = self.run.scene.section(ShapeRun), self.run.station.gel.sensor
+        settings, sensor = self.run.scene.section(ShapeRun), self.run.station.gel.sensor
         return ShapeEvidence(
             touches=tuple(self.touches),
             look=self.look,
             housing=sensor.housing,
             gel_thickness=sensor.gel_thickness,
             housing_depth=HOUSING_DEPTH,
-            place_error=asked.place_error,
-            support_error=asked.support_error,
-            largest=asked.largest,
+            place_error=settings.place_error,
+            support_error=settings.support_error,
+            largest=settings.largest,
         )
 
 
@@ -78,7 +78,7 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
     Raises:
         RecordingDamaged: the step has no pictures or no poses.
     """
-    calibration, asked = run.calibration, run.scene.section(ShapeRun)
+    calibration, settings = run.calibration, run.scene.section(ShapeRun)
     aspect = aspect_stated(calibration.header.made_from)
     seen = observe_step(record, run.station.flange_from_gel, aspect=aspect)
     mean = np.rint(seen.images.mean(axis=0)).astype(np.uint8)
@@ -92,8 +92,8 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
         way=_way(run, record, seen.base_from_gel),
         points=read_only(nothing if found is None else apply(stand_from_gel, found.points)),
         normals=read_only(nothing if found is None else found.normals @ stand_from_gel[:3, :3].T),
-        sigma=float(np.hypot(asked.contact_error, 0.0 if found is None else found.error)),
-        normal_sigma=asked.contact_tilt_error,
+        sigma=float(np.hypot(settings.contact_error, 0.0 if found is None else found.error)),
+        normal_sigma=settings.contact_tilt_error,
         index=record.step.index,
     )
 
@@ -110,7 +110,7 @@ def seen_mask(run: RunFiles, record: StepRecord) -> SeenMask | None:
     Raises:
         DataRefused: the two pictures are of two sizes.
     """
-    camera, asked = run.station.camera, run.scene.section(ShapeRun)
+    camera, settings = run.station.camera, run.scene.section(ShapeRun)
     assert camera is not None  # there are its pictures
     live, bare = (_median(record.readings[name].values) for name in (IMAGE, BARE_IMAGE))
     mask = mask_by_background(live, bare)
@@ -123,9 +123,9 @@ def seen_mask(run: RunFiles, record: StepRecord) -> SeenMask | None:
         hidden=read_only(np.zeros(mask.shape, np.bool_)),
         stand_from_camera=read_only(stand_from_camera),
         focal_length=camera.focal_length,
-        position_error=asked.camera_position_error,
-        rotation_error=asked.camera_rotation_error,
-        focal_length_error=asked.focal_length_error,
+        position_error=settings.camera_position_error,
+        rotation_error=settings.camera_rotation_error,
+        focal_length_error=settings.focal_length_error,
     )
 
 

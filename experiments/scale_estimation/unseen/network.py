@@ -156,18 +156,7 @@ def opened(data: bytes, card: str, sense: str) -> SizeNetwork:
         DataRefused: the graph must not be run, or is not of this sense.
     """
     stated = json.loads(card)
-    inputs = [
-        Input(
-            name=name,
-            dtype="float32",
-            shape=("n", *shape),
-            unit="1",
-            meaning="numbers of the reading",
-            domain=Domain(low=(-_GREATEST,), high=(_GREATEST,)),
-            normaliser="in the graph",
-        )
-        for name, shape in INPUTS[sense]
-    ]
+    inputs = [reading_input(name, shape, _GREATEST) for name, shape in INPUTS[sense]]
     outputs = [_output("logits", BINS), _output("codes", CODE)]
     family = Family(
         np.array(stated["family"]["middle"]),
@@ -175,6 +164,19 @@ def opened(data: bytes, card: str, sense: str) -> SizeNetwork:
         stated["family"]["usual"],
     )
     return SizeNetwork(Network(data, f"{sense}.onnx", inputs, outputs), stated["temperature"], family, stated)
+
+
+def reading_input(name: str, shape: tuple[int, ...], greatest: float) -> Input:
+    """An input of a network that takes readings: ``(n, *shape)``, none beyond +-``greatest``."""
+    return Input(
+        name=name,
+        dtype="float32",
+        shape=("n", *shape),
+        unit="1",
+        meaning="numbers of the reading",
+        domain=Domain(low=(-greatest,), high=(greatest,)),
+        normaliser="in the graph",
+    )
 
 
 def _output(name: str, numbers: int) -> Tensor:

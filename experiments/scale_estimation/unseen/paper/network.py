@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.scale_estimation.unseen.network import reading_input
 from experiments.scale_estimation.unseen.paper.inputs import INPUTS
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused
-from harness.objectfile.entries import Domain, Input, Tensor
+from harness.objectfile.entries import Tensor
 from harness.objectfile.runtime import Network
 
 _GREATEST = 100.0
@@ -85,18 +86,6 @@ def opened_paper(folder: Path, sense: str) -> PaperNetwork:
         card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise DataRefused(f"{path} has no card beside it ({error}); train it again: {_TRAIN}") from error
-    inputs = [_input(name, shape) for name, shape in INPUTS[sense]]
+    inputs = [reading_input(name, shape, _GREATEST) for name, shape in INPUTS[sense]]
     size = Tensor(name="log_size", dtype="float32", shape=("n", 1), unit="1", meaning="log of the size in m")
     return PaperNetwork(Network(path.read_bytes(), path.name, inputs, [size]), card)
-
-
-def _input(name: str, shape: tuple[int, ...]) -> Input:
-    return Input(
-        name=name,
-        dtype="float32",
-        shape=("n", *shape),
-        unit="1",
-        meaning="numbers of the reading",
-        domain=Domain(low=(-_GREATEST,), high=(_GREATEST,)),
-        normaliser="in the graph",
-    )

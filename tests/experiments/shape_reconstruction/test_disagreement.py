@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.choosing import farthest, most_telling
+from experiments.shape_reconstruction.choosing import farthest, most_informative
+from experiments.shape_reconstruction.disagreement import MOST, disagreement
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from experiments.shape_reconstruction.telling import MOST, disagreement
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, transform
 from harness.objects.builtin import build
@@ -90,7 +90,7 @@ def test_a_line_that_half_of_them_pass_by_counts_a_quarter() -> None:
 def test_shapes_that_agree_leave_the_press_to_go_where_none_was() -> None:
     alike = estimate_of(shape_at(0.0), shape_at(1.0e-3))
     assert disagreement(evidence(), alike, LINES) is None
-    assert np.array_equal(most_telling(evidence(), alike, LINES), farthest(evidence(), alike, LINES))
+    assert np.array_equal(most_informative(evidence(), alike, LINES), farthest(evidence(), alike, LINES))
 
 
 def test_an_estimate_without_hypotheses_says_nothing_of_where_it_is_unsure() -> None:
