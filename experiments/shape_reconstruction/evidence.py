@@ -78,6 +78,7 @@ class ShapeEvidence:
         place_error: m, one standard deviation per axis of where on the support the object was put.
         support_error: m, one standard deviation of the support's height.
         largest: m, no side of the object is longer.
+        library: folder of known shapes, of which it may be one; None for those that come with the program.
     """
 
     touches: tuple[GuardedTouch, ...]
@@ -88,6 +89,7 @@ class ShapeEvidence:
     place_error: float
     support_error: float
     largest: float
+    library: str | None = None
 
     def __post_init__(self) -> None:
         for touch in self.touches:

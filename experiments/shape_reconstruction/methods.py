@@ -1,38 +1,44 @@
 """Estimators of shape by their names: levels of the dial ``shape.method``."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 
+from experiments.shape_reconstruction.estimators.ellipsoid import by_ellipsoid
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.estimators.plain_bodies import by_box, by_hull, by_visual_hull
+from experiments.shape_reconstruction.estimators.point_answer import PointEstimate, by_raw_points
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import family_estimate
 from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.pcn.completed_surface import by_completed_surface
+from experiments.shape_reconstruction.pcn.network import by_completion
+from experiments.shape_reconstruction.retrieval.known_shapes import by_known_shapes
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, OutOfDomain
 
 METHODS: Mapping[str, Callable[[ShapeEvidence], ShapeEstimate]] = {
     "box": by_box,
+    "ellipsoid": by_ellipsoid,
     "hull": by_hull,
     "visual-hull": by_visual_hull,
     "rbf": by_hermite,
+    "pcn": by_completed_surface,
     "family-coarse": partial(family_estimate, settings=LEVELS["coarse"]),
+    "retrieval": by_known_shapes,
     "family": family_estimate,
     "family-fine": partial(family_estimate, settings=LEVELS["fine"]),
 }
-"""From cheap to dear."""
+"""From cheap to dear: a box takes 10 ms, the family some seconds."""
+
+POINTS: Mapping[str, Callable[[ShapeEvidence], PointEstimate]] = {
+    "raw points": by_raw_points,
+    "pcn": by_completion,
+}
+"""Those that answer in points, as a table scores them; of these, ``pcn`` has a surface too."""
 
 QUICK, INFORMATIVE, BEST = "rbf", "family-coarse", "family"
 """While the arm waits for the next press; where that goes by which shapes are likely; by default."""
-
-TABLED: Mapping[str, tuple[str, ...]] = {
-    "box": ("T",),
-    "hull": ("T",),
-    "visual-hull": ("V", "TV"),
-    "rbf": ("T", "TV"),
-    "family": ("T", "V", "TV"),
-}
-"""Methods in the table of shapes, from touch alone, the picture alone, and both."""
 
 
 def estimated(method: str, evidence: ShapeEvidence) -> ShapeEstimate:
@@ -43,6 +49,7 @@ def estimated(method: str, evidence: ShapeEvidence) -> ShapeEstimate:
         evidence: of a run.
 
     Raises:
+        WrongUse: the folder of known shapes is not there, or holds none.
         FitRefused: the readings say too little for it, or contradict each other.
     """
     if evidence.look is None and not evidence.contacts:
@@ -50,7 +57,24 @@ def estimated(method: str, evidence: ShapeEvidence) -> ShapeEstimate:
             f"the object was not seen, and {len(evidence.touches)} ways of the gel met nothing; check where "
             "it stands and where the camera looks, or press again"
         )
-    try:
+    with _refusing():
         return METHODS[method](evidence)
+
+
+def pointed(method: str, evidence: ShapeEvidence) -> PointEstimate:
+    """Places of the shape's surface by a method, a key of ``POINTS``.
+
+    Raises:
+        FitRefused: the readings say too little for it.
+    """
+    with _refusing():
+        return POINTS[method](evidence)
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """Readings outside of what a method is made for are a refusal of its answer."""
+    try:
+        yield
     except OutOfDomain as error:
         raise FitRefused(str(error)) from error

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused, OutOfDomain
 from harness.basics.faces.nearest_surface import NearestSurface
 from harness.basics.mesh import Mesh
@@ -50,6 +50,59 @@ class ShapeError:
     hausdorff95: float
 
 
+@dataclass(frozen=True, eq=False)
+class SurfacesApart:
+    """Samples of an answer and of the truth, even by area, each with its nearest place on the other surface.
+
+    Attributes:
+        answer: ``(n, 3)`` m, samples of the answer.
+        answer_faces: ``(n,)`` its faces that they are on.
+        towards_truth: ``(n,)`` m from each of them to the truth.
+        nearest: ``(n, 3)`` m, the answer's places nearest to samples of the truth.
+        nearest_faces: ``(n,)`` the answer's faces that those are on.
+        towards_answer: ``(n,)`` m from each of the truth's samples to its place.
+    """
+
+    answer: FloatArray
+    answer_faces: IntArray
+    towards_truth: FloatArray
+    nearest: FloatArray
+    nearest_faces: IntArray
+    towards_answer: FloatArray
+
+    @property
+    def error(self) -> ShapeError:
+        """How far apart they are."""
+        return _summed(self.towards_truth, self.towards_answer, None)
+
+
+def surfaces_apart(answer: Mesh, truth: Mesh, samples: int = SAMPLES, seed: int = 0) -> SurfacesApart:
+    """An answer with a surface, against the truth, sample by sample.
+
+    Args:
+        answer: m, in the truth's frame.
+        truth: m, its whole surface, the inner walls of a vessel too.
+        samples: on each surface.
+        seed: of the samples; both surfaces are sampled alike, so that swapping them changes nothing.
+
+    Raises:
+        MeshRefused: a surface without area or with vertices that are not finite.
+    """
+    for mesh, whose in ((answer, "answer"), (truth, "truth")):
+        _require_surface(mesh, whose)
+    points, faces = random_points(answer, samples, np.random.default_rng(seed))
+    true = _sampled(truth, samples, seed)
+    nearest, nearest_faces = NearestSurface(answer).places(true)
+    return SurfacesApart(
+        answer=points,
+        answer_faces=faces,
+        towards_truth=_to_surface(points, truth),
+        nearest=nearest,
+        nearest_faces=nearest_faces,
+        towards_answer=np.asarray(np.linalg.norm(nearest - true, axis=1)),
+    )
+
+
 def shape_error(
     answer: Mesh, truth: Mesh, touchable: Mesh | None = None, samples: int = SAMPLES, seed: int = 0
 ) -> ShapeError:
@@ -65,15 +118,12 @@ def shape_error(
     Raises:
         MeshRefused: a surface without area or with vertices that are not finite.
     """
-    for mesh, whose in ((answer, "answer"), (truth, "truth")):
-        _require_surface(mesh, whose)
-    towards_truth = _to_surface(_sampled(answer, samples, seed), truth)
-    towards_answer = _to_surface(_sampled(truth, samples, seed), answer)
+    apart = surfaces_apart(answer, truth, samples, seed)
     reached = None
     if touchable is not None:
         _require_surface(touchable, "touchable part of the truth")
         reached = float(_to_surface(_sampled(touchable, samples, seed), answer).mean())
-    return _summed(towards_truth, towards_answer, reached)
+    return _summed(apart.towards_truth, apart.towards_answer, reached)
 
 
 def points_error(answer: FloatArray, truth: Mesh, samples: int = SAMPLES, seed: int = 0) -> ShapeError:
@@ -97,6 +147,19 @@ def published_chamfer(answer: Mesh, truth: Mesh, count: int = PUBLISHED_POINTS, 
         for mesh, stream in zip((answer, truth), streams, strict=True)
     )
     return published_points_chamfer(first, second)
+
+
+def published_from_points(
+    answer: FloatArray, truth: Mesh, count: int = PUBLISHED_POINTS, seed: int = 0
+) -> float:
+    """M: the published form of an answer of ``(n, 3)`` points m, as many as it has.
+
+    Raises:
+        OutOfDomain: no point, or one that is not finite.
+        MeshRefused: as ``shape_error``.
+    """
+    _require_surface(truth, "truth")
+    return published_points_chamfer(answer, _sampled(truth, count, seed))
 
 
 def published_points_chamfer(first: FloatArray, second: FloatArray) -> float:

@@ -56,6 +56,7 @@ class ShapeReadings:
             place_error=settings.place_error,
             support_error=settings.support_error,
             largest=settings.largest,
+            library=settings.library,
         )
 
 

@@ -8,6 +8,8 @@ from pydantic import Field
 from harness.basics.quantities import Angle, Length, Nonnegative, Ordered, Positive, Ratio
 from harness.bench.scene import Section
 
+MOST_PRESSES = 100
+
 Choice = Literal["planned", "random", "farthest", "active"]
 
 
@@ -34,11 +36,13 @@ class ShapeRun(Section):
             what its colours say.
         until: m: a run ends when the mean deviation that the estimate claims is no greater, whatever presses
             are left; None to make them all.
+        library: folder of meshes or ObjectFiles that ``shape.method = "retrieval"`` chooses among; None for
+            household shapes that come with the program.
         seed: of where and how deep the presses are; a run may say another.
     """
 
     table: ClassVar[str] = "shape"
-    presses: int = Field(default=16, ge=0, le=100)
+    presses: int = Field(default=16, ge=0, le=MOST_PRESSES)
     choose: Choice = "farthest"
     depth: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] = (0.5e-3, 1.5e-3)
     tilt: Annotated[Angle, Nonnegative] = math.radians(15.0)
@@ -51,3 +55,4 @@ class ShapeRun(Section):
     contact_error: Annotated[Length, Positive] = 0.6e-3
     contact_tilt_error: Annotated[Angle, Positive] = math.radians(2.5)
     until: Annotated[Length, Positive] | None = None
+    library: str | None = None

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from harness.basics.mesh import Mesh
 from harness.bench.device import Health
@@ -117,6 +117,21 @@ class MeasuredCondition:
     tabled: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class MeasuredColumn:
+    """A mean that a table shows beside the errors, over the runs whose rows have it.
+
+    Attributes:
+        key: of a row's JSON values: a number, or a bool of which the share is shown.
+        heading: over it.
+        unit: ``"mm"`` of a value in metres, ``"%"`` of a share.
+    """
+
+    key: str
+    heading: str
+    unit: Literal["mm", "%"]
+
+
 class RunCell(Protocol):
     """One run of a table or a cost curve."""
 
@@ -203,6 +218,9 @@ class Measurement:
         gross: m: an error beyond this is a failure.
         notes: sentences that a curve keeps, from the models made on the way.
         published: what others printed, by method; for the foot of a table.
+        subjects: real meshes beside those of every experiment: file under the data folder, units, material.
+        columns: means beside the errors, in the order of a table.
+        per_object: keys of rows, lengths, whose mean on each object is printed too.
     """
 
     estimator: str
@@ -219,6 +237,9 @@ class Measurement:
     gross: float = 20.0e-3
     notes: Callable[[Mapping[str, Any]], tuple[str, ...]] = lambda _: ()
     published: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    subjects: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
+    columns: tuple[MeasuredColumn, ...] = ()
+    per_object: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

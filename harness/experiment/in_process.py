@@ -14,6 +14,7 @@ from harness.bench.station_file import Station
 from harness.experiment.begin import begin
 from harness.experiment.experiment import Experiment, RunCell
 from harness.experiment.perform import perform_on
+from harness.experiment.truth import truth_paths
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
@@ -65,8 +66,9 @@ def recorded(
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".performing-", dir=folder) as aside:
         made = performed(experiment, cell, scene, station, Path(aside) / cell.name)
-        if made.truth_path.exists():
-            made.truth_path.replace(folder / made.truth_path.name)
+        for truth in truth_paths(made):
+            if truth.exists():
+                truth.replace(folder / truth.name)
         made.folder.replace(path)
     return Recording(path)
 

@@ -1,5 +1,6 @@
 """The objects that tables and cost curves are measured on: our own, and real meshes where they are."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from harness.basics.mesh import Mesh
@@ -15,14 +16,22 @@ REAL = {
 """Real meshes: file under the data folder, units, material."""
 
 
-def objects(data: Path | None, builtin_only: bool = False) -> dict[str, SceneFile]:
-    """Scenes by the object's name: ours, and the real ones where the data is there."""
+def objects(
+    data: Path | None, builtin_only: bool = False, more: Mapping[str, tuple[str, str, str]] | None = None
+) -> dict[str, SceneFile]:
+    """Scenes by the object's name: ours, and the real ones where the data is there.
+
+    Args:
+        data: the data folder; None where it is not there.
+        builtin_only: whether real meshes are left out.
+        more: real meshes that an experiment has beside ``REAL``, as that has them.
+    """
     scenes = {name: scene_from_options(f"builtin:{name}") for name in MATERIALS}
     if data is None or builtin_only:
         return scenes
     real = {
         name: scene_from_options(str(data / file), material, units)
-        for name, (file, units, material) in REAL.items()
+        for name, (file, units, material) in {**REAL, **(more or {})}.items()
     }
     return {**scenes, **real}
 

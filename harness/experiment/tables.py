@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,7 @@ class TableRow:
         seconds: median of an answer; from all of the run's readings.
         refused: of the runs, how many were not answered; each counts as the experiment says.
         answered: mean of the others; None where none was refused, or all were.
+        means: of the experiment's columns, by key; of those runs that have it.
     """
 
     conditions: Mapping[str, str]
@@ -54,6 +55,7 @@ class TableRow:
     seconds: float
     refused: int = 0
     answered: Interval | None = None
+    means: Mapping[str, float] = field(default_factory=dict)
 
 
 def measure(
@@ -179,18 +181,20 @@ def key_of(cell: RunCell) -> Key:
     return tuple(cell.conditions.items())
 
 
-def by_object(results: Results, condition: Key) -> dict[str, dict[str, float]]:
-    """Mean error in metres of every method on every object, under one condition.
+def by_object(results: Results, condition: Key, value: str = "error_m") -> dict[str, dict[str, float]]:
+    """Mean in metres, the error where nothing else is named, of every method on every object.
 
     Args:
         results: of the cells.
-        condition: as ``key_of`` gives it.
+        condition: as ``key_of`` gives it; runs of others are left out.
+        value: key of a row; a method without it on an object is left out.
     """
     found: dict[str, dict[str, list[float]]] = {}
     for cell, result in results.items():
         if "rows" in result and key_of(cell) == condition:
             for method, row in result["rows"].items():
-                found.setdefault(cell.object, {}).setdefault(method, []).append(row["error_m"])
+                if value in row:
+                    found.setdefault(cell.object, {}).setdefault(method, []).append(row[value])
     return {name: {m: float(np.mean(e)) for m, e in methods.items()} for name, methods in found.items()}
 
 
@@ -214,7 +218,14 @@ def _row(performed: Results, condition: Key, method: str, measured: Measurement)
         float(np.median([one["seconds"] for one in found])),
         len(raw) - len(answered),
         bootstrap(answered, mean) if 0 < len(answered) < len(raw) else None,
+        _means(found, [column.key for column in measured.columns]),
     )
+
+
+def _means(found: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> dict[str, float]:
+    """By key, of the rows that have it; a key that none has is left out."""
+    values = {key: [float(one[key]) for one in found if key in one] for key in keys}
+    return {key: float(np.mean(numbers)) for key, numbers in values.items() if numbers}
 
 
 def _statistics(

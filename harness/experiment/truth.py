@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,14 @@ class Truth:
     differences: Mapping[str, Any]
 
 
+def truth_paths(recording: Recording) -> tuple[Path, Path]:
+    """Of what the world wrote beside a run, whether or not it is there: numbers, and the true surface."""
+    return recording.truth_path, recording.truth_path.with_suffix(".npz")
+
+
 def read_truth(recording: Recording) -> Truth | None:
     """The truth of a run; None at a real bench, and where the file was taken away."""
-    path = recording.truth_path
+    path, _ = truth_paths(recording)
     if not path.exists():
         return None
     written = json.loads(path.read_text(encoding="utf-8"))
@@ -37,7 +43,7 @@ def read_truth(recording: Recording) -> Truth | None:
 
 def read_true_surface(recording: Recording) -> Mesh | None:
     """The true object of a mocked run as it stands, in base; None where nothing says it."""
-    path = recording.truth_path.with_suffix(".npz")
+    _, path = truth_paths(recording)
     if not path.exists():
         return None
     with np.load(path, allow_pickle=False) as archive:

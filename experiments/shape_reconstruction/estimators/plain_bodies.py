@@ -3,18 +3,13 @@
 import time
 
 import numpy as np
-from scipy.spatial import QhullError, cKDTree
+from scipy.spatial import QhullError
 
-from experiments.shape_reconstruction.estimators.contact_samples import ContactSamples, all_samples
-from experiments.shape_reconstruction.estimators.free_space import Silhouette, sensor_depth, shift_sigma
+from experiments.shape_reconstruction.estimators.contact_samples import all_samples
+from experiments.shape_reconstruction.estimators.free_space import Silhouette, sensor_depth
 from experiments.shape_reconstruction.estimators.grid import Grid
-from experiments.shape_reconstruction.estimators.knowledge import (
-    beyond_deviation,
-    known_by,
-    limited_sides,
-    not_bounded,
-)
 from experiments.shape_reconstruction.estimators.picture import silhouette_of
+from experiments.shape_reconstruction.estimators.plain_answer import plain_answer
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
@@ -26,10 +21,6 @@ from harness.basics.mesh_hull import closed_hull
 PITCH = 4.0e-3
 _THIN = 2.0e-3
 _YAWS = 45
-_RATE = 0.25
-"""Of the distance from the nearest contact: one standard deviation of a surface that is supposed there."""
-
-_READING = 0.7e-3
 _COARSE = 8.0e-3
 
 
@@ -51,7 +42,7 @@ def by_box(evidence: ShapeEvidence) -> ShapeEstimate:
     mesh = _box_mesh(half)
     rotation = np.eye(3)
     rotation[:2, :2] = turn.T
-    return _finished(
+    return plain_answer(
         evidence, samples, None, Mesh(mesh.vertices @ rotation.T + middle, mesh.faces), "box", start
     )
 
@@ -89,7 +80,7 @@ def by_hull(evidence: ShapeEvidence) -> ShapeEstimate:
     beyond = np.full(len(grid.points), -np.inf)
     for corner, normal in zip(corners, hull.face_normals, strict=True):
         np.maximum(beyond, (grid.points - corner) @ normal, out=beyond)
-    return _finished(evidence, samples, None, grid.surface(beyond), "hull", start)
+    return plain_answer(evidence, samples, None, grid.surface(beyond), "hull", start)
 
 
 def by_visual_hull(evidence: ShapeEvidence) -> ShapeEstimate:
@@ -119,7 +110,7 @@ def by_visual_hull(evidence: ShapeEvidence) -> ShapeEstimate:
     low, high = left.min(axis=0) - _COARSE, left.max(axis=0) + _COARSE
     fine = Grid.over(np.maximum(low, [-np.inf, -np.inf, 0.0]), high, PITCH)
     mesh = fine.surface(_beyond(evidence, silhouette, fine.points, within))
-    return _finished(evidence, samples, silhouette, mesh, "visual hull", start)
+    return plain_answer(evidence, samples, silhouette, mesh, "visual hull", start)
 
 
 def _slab(silhouette: Silhouette, points: FloatArray) -> tuple[FloatArray, float, float]:
@@ -149,33 +140,3 @@ def _beyond(
     if evidence.touches:
         outside = np.maximum(outside, sensor_depth(evidence, points))
     return np.asarray(np.maximum(outside, -1.0))
-
-
-def _finished(
-    evidence: ShapeEvidence,
-    samples: ContactSamples | None,
-    silhouette: Silhouette | None,
-    mesh: Mesh,
-    name: str,
-    start: float,
-) -> ShapeEstimate:
-    known, sides = known_by(mesh, samples, silhouette), limited_sides(mesh, samples, silhouette)
-    spread = np.full(len(mesh.vertices), np.inf)
-    if samples is not None:
-        spread = _RATE * np.asarray(cKDTree(samples.points).query(mesh.vertices)[0])
-    if silhouette is not None:
-        depth = silhouette.pixels(mesh.vertices)[1]
-        sigma = np.hypot(1.0, shift_sigma(silhouette.look, float(depth.mean())))
-        beside = np.abs(silhouette.outside_metres(mesh.vertices))
-        spread = np.minimum(spread, beside + sigma * depth / silhouette.look.focal_length)
-    beyond = beyond_deviation(mesh, known, sides, evidence.largest)
-    return ShapeEstimate(
-        mesh=mesh,
-        deviation=np.sqrt(spread**2 + _READING**2 + beyond**2),
-        known_by=known,
-        not_bounded=not_bounded(sides),
-        doubtful={},
-        flags=(),
-        seconds=time.perf_counter() - start,
-        details={"estimator": name, "contacts": len(evidence.contacts)},
-    )

@@ -14,6 +14,7 @@ from experiments.shape_reconstruction.estimators.point_answer import PointEstima
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN, TAKEN, PointFrame, taken
 from harness.basics.arrays import FloatArray
+from harness.basics.errors import DataRefused
 from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.runtime import Network
 
@@ -32,6 +33,21 @@ class TouchCompletion:
 
     network: Network
     card: Mapping[str, object]
+
+    @property
+    def held_out(self) -> float:
+        """M, mean Chamfer-L1 from points to points on shapes that the network was not fitted to.
+
+        Raises:
+            DataRefused: the card does not say it.
+        """
+        held = self.card.get("held_out")
+        error = held.get("mean_chamfer_points_m") if isinstance(held, Mapping) else None
+        if not isinstance(error, float):
+            raise DataRefused(
+                'the network\'s card has no "held_out" with "mean_chamfer_points_m" in metres; train it again'
+            )
+        return error
 
     def completed(self, points: FloatArray) -> FloatArray:
         """``(GIVEN, 3)`` m all over the object of which ``(n, 3)`` m in ``stand`` were touched.

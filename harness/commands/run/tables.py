@@ -1,16 +1,15 @@
 """``touchstone tables``: what a paper would print, measured on the mocked bench."""
 
 import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 
 from harness.commands import options
-from harness.commands.output import ANSWERS, emit, run_progress, warn
+from harness.commands.output import emit, run_progress, warn
 from harness.commands.run.conditions import WhereOption, levels_of
+from harness.commands.run.printed_tables import plain_row, print_by_object, print_published, print_table
 
 
 def tables(
@@ -76,7 +75,7 @@ def tables(
     folder = data or _data_folder()
     if folder is None:
         warn("real meshes not found (--data, TOUCHSTONE_DATA or ../shared/data): built-in objects only")
-    scenes = objects(folder)
+    scenes = objects(folder, more=measured.subjects)
     for name in only or []:
         if name not in scenes:
             raise WrongUse(f"no object {name!r} in this table; {nearest(name, scenes)}")
@@ -100,15 +99,17 @@ def tables(
             advance()
     table = rows(kind, results)
     failed = sum("failed" in result for result in results.values())
+    conditions = sorted({key_of(cell) for cell, result in results.items() if "rows" in result})
     if json:
-        objects_ = [
-            {**dict(key), "mean_error_m": by_object(results, key)}
-            for key in sorted({key_of(cell) for cell, result in results.items() if "rows" in result})
-        ]
-        rows_ = [_plain(row) for row in table]
+        objects_ = [_by_object(results, key, by_object, measured.per_object) for key in conditions]
+        rows_ = [plain_row(row) for row in table]
         emit({"schema": 1, "runs": len(results), "failed": failed, "rows": rows_, "by_object": objects_})
         return 0
-    _print(table, measured.published)
+    print_table(table, measured.columns)
+    for key in conditions:
+        for value in measured.per_object:
+            print_by_object(key, value, by_object(results, key, value), [row.method for row in table])
+    print_published(measured.published)
     if failed:
         warn(f"{failed} of {len(results)} runs could not be planned or performed; they are not in the table")
     return 0
@@ -120,55 +121,9 @@ def _data_folder() -> Path | None:
     return next((path for path in candidates if (path / "meshes").is_dir()), None)
 
 
-_HEADINGS = ("method", "median", "mean", "gross", "refused", "answered", "modulo symmetry", "region", "s")
-_GAPS = {"default": "on", "none": "off"}
-"""Of gaps, in a title."""
-
-
-def _plain(row: Any) -> dict[str, Any]:
-    tree = asdict(row)
-    return {**tree.pop("conditions"), **tree}
-
-
-def _print(table: list[Any], published: Any) -> None:
-    conditions = sorted({tuple(row.conditions.items()) for row in table})
-    for condition in conditions:
-        chosen = [row for row in table if tuple(row.conditions.items()) == condition]
-        said = ", ".join(f"{name} {_GAPS.get(level, level)}" for name, level in condition)
-        drawn = Table(title=f"mock: {said}; {chosen[0].runs} runs; mm [5 to 95 %]")
-        lines = [_cells(row) for row in chosen]
-        shown = [k for k in range(len(_HEADINGS)) if any(line[k] for line in lines)]
-        for k in shown:
-            drawn.add_column(_HEADINGS[k], no_wrap=True)
-        for line in lines:
-            drawn.add_row(*(line[k] for k in shown))
-        ANSWERS.print(drawn)
-    if published:
-        said = "; ".join(
-            f"{name}: {', '.join(f'{v:g}' for v in values)}" for name, values in published.items()
-        )
-        ANSWERS.print(f"the paper (ObjectFolder 2.0, other objects, mean error in cm): {said}", markup=False)
-
-
-def _cells(row: Any) -> list[str]:
-    median, mean, gross = row.raw
-    symmetric = "" if row.symmetric is None else (
-        f"{1e3 * row.symmetric[0].value:.1f} / {1e3 * row.symmetric[1].value:.1f} / "
-        f"{100 * row.symmetric[2].value:.0f} %"
-    )  # fmt: skip
-    return [
-        row.method,
-        _interval(median, 1e3, 1),
-        _interval(mean, 1e3, 1),
-        _interval(gross, 100, 0) + " %",
-        str(row.refused or ""),
-        "" if row.answered is None else _interval(row.answered, 1e3, 1),
-        symmetric,
-        "" if row.held is None else f"{100 * row.held:.0f} %",
-        f"{row.seconds:.2f}",
-    ]
-
-
-def _interval(interval: Any, scale: float, digits: int) -> str:
-    value, low, high = (scale * number for number in (interval.value, interval.low, interval.high))
-    return f"{value:.{digits}f} \\[{low:.{digits}f} {high:.{digits}f}]"
+def _by_object(results: Any, key: Any, mean_of: Any, values: Any) -> dict[str, Any]:
+    """Means of one condition on each object: of the error, and of what else the experiment prints so."""
+    return {
+        **dict(key),
+        **{f"mean_{value}": mean_of(results, key, value) for value in dict.fromkeys(("error_m", *values))},
+    }

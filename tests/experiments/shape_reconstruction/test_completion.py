@@ -1,18 +1,26 @@
 """The point completion network: its frame, what it learns from, and that its graph answers as torch does."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from experiments.shape_reconstruction.estimators.point_answer import by_raw_points
 from experiments.shape_reconstruction.metric import points_error
+from experiments.shape_reconstruction.pcn.completed_surface import (
+    PITCH,
+    by_completed_surface,
+    closed_around,
+)
 from experiments.shape_reconstruction.pcn.network import by_completion, opened, shipped
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN, TAKEN, PointFrame, taken
 from experiments.shape_reconstruction.pcn.train import main
 from experiments.shape_reconstruction.pcn.training.samples import WHOLE, shape_of, touch_sets
-from harness.basics.errors import FitRefused, OutOfDomain
+from harness.basics.errors import DataRefused, FitRefused, OutOfDomain
+from harness.basics.faces.mesh_rays import is_inside
 from harness.basics.faces.nearest_surface import NearestSurface
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, presses
@@ -57,6 +65,39 @@ def test_it_completes_what_raw_points_leave_open(name: str) -> None:
     ours, raw = by_completion(evidence), by_raw_points(evidence)
     assert points_error(ours.points, mesh, 4000).chamfer < points_error(raw.points, mesh, 4000).chamfer
     assert points_error(ours.points, mesh, 4000).chamfer < 0.01
+
+
+@pytest.mark.parametrize("count", [1, 4, 24])
+def test_its_surface_is_closed_around_its_points_and_as_sure_as_it_was_on_shapes_held_out(count: int) -> None:
+    evidence = evidence_of(presses(build("mug", 6e-3), count, seed=4))
+    answer = by_completed_surface(evidence)
+    body = trimesh.Trimesh(answer.mesh.vertices, answer.mesh.faces, process=False)
+    assert body.is_watertight
+    assert body.volume > 0.0
+    assert np.isfinite(answer.mesh.vertices).all()
+    assert answer.mesh.bounds[0, 2] >= 0.0
+    apart = NearestSurface(answer.mesh).distances(by_completion(evidence).points)
+    assert float(np.median(apart)) < 2.0 * PITCH
+    assert (answer.deviation >= shipped().held_out).all()
+
+
+def test_closing_fills_a_ball_and_leaves_a_bowl_open() -> None:
+    random = np.random.default_rng(0)
+    ball = random.normal(size=(1024, 3))
+    ball *= 0.06 / np.linalg.norm(ball, axis=1)[:, None]
+    ball[:, 2] += 0.06
+    middle = np.array([[0.0, 0.0, 0.045]])
+    solid, bowl = closed_around(ball), closed_around(ball[ball[:, 2] < 0.05])
+    assert is_inside(middle, solid.corners)[0]
+    assert np.ptp(solid.bounds, axis=0) == pytest.approx(
+        0.12 + 2.0 * PITCH, abs=PITCH
+    )  # walls have a thickness
+    assert not is_inside(middle, bowl.corners)[0]
+
+
+def test_a_card_without_what_was_held_out_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataRefused, match="train it again"):
+        replace(shipped(), card={"held_out": {}}).held_out  # noqa: B018 - it is computed
 
 
 def test_the_card_says_what_was_held_out_and_that_it_is_better_than_nothing() -> None:

@@ -9,6 +9,7 @@ import trimesh
 
 from experiments.shape_reconstruction.estimators.average import by_average
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples, thinned
+from experiments.shape_reconstruction.estimators.ellipsoid import by_ellipsoid
 from experiments.shape_reconstruction.estimators.free_space import CLEARANCE, Silhouette, sensor_depth
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.estimators.plain_bodies import by_box, by_hull, by_visual_hull
@@ -35,7 +36,7 @@ FLAT = touch_of(
     np.tile([0.0, 0.0, 1.0], (9, 1)),
     0,
 )
-BY_TOUCH = {"rbf": by_hermite, "box": by_box, "hull": by_hull}
+BY_TOUCH = {"rbf": by_hermite, "box": by_box, "ellipsoid": by_ellipsoid, "hull": by_hull}
 
 Estimator = Callable[[ShapeEvidence], ShapeEstimate]
 
@@ -78,7 +79,7 @@ def test_every_answer_is_a_closed_body_that_says_how_well_it_is_known(
 def test_the_surface_through_contacts_is_near_them_and_better_than_plainer_answers() -> None:
     evidence = evidence_of(TOUCHES)
     ours = shape_error(by_hermite(evidence).mesh, MUG, samples=4000)
-    for plainer in (by_box, by_hull):
+    for plainer in (by_box, by_ellipsoid, by_hull):
         assert ours.chamfer < shape_error(plainer(evidence).mesh, MUG, samples=4000).chamfer
     assert ours.chamfer < points_error(by_raw_points(evidence).points, MUG, 4000).chamfer
 
@@ -145,6 +146,17 @@ def test_a_blank_picture_is_no_picture() -> None:
 def test_without_a_contact_there_is_no_answer_by_touch(estimator: Estimator) -> None:
     with pytest.raises(FitRefused, match="none of 0 touches met"):
         estimator(evidence_of((), LOOK))
+
+
+@pytest.mark.parametrize("radii", [(0.05, 0.05, 0.05), (0.07, 0.03, 0.04)])
+def test_the_ellipsoid_of_contacts_with_an_ellipsoid_is_that_one(radii: tuple[float, float, float]) -> None:
+    made = trimesh.creation.icosphere(subdivisions=4)
+    turn = rotation_about(np.array([0.0, 0.0, 1.0]), 0.6)
+    truth = Mesh((made.vertices * radii) @ turn.T + [0.02, -0.01, radii[2]], made.faces)
+    answer = by_ellipsoid(evidence_of(presses(truth, 24, seed=5)))
+    require_whole(answer)
+    assert shape_error(answer.mesh, truth, samples=3000).chamfer < 1.5e-3
+    assert answer.mesh.bounds[0, 2] >= 0.0
 
 
 def test_the_visual_hull_holds_what_is_seen_and_does_not_know_how_deep_it_is() -> None:

@@ -8,6 +8,11 @@ import pytest
 import trimesh
 
 from experiments.shape_reconstruction.metric import shape_error
+from experiments.shape_reconstruction.retrieval.known_shapes import (
+    EACH,
+    by_known_shapes,
+    household_library,
+)
 from experiments.shape_reconstruction.retrieval.library import LibraryShape, library_of
 from experiments.shape_reconstruction.retrieval.retrieve import by_retrieval
 from harness.basics.errors import FitRefused, MeshRefused, WrongUse
@@ -15,6 +20,7 @@ from harness.basics.geometry import rotation_about
 from harness.basics.mesh import Mesh
 from harness.objectfile.surface_file import ply_bytes
 from harness.objects.builtin import build
+from harness.sim.solid.household.families import FAMILIES
 from tests.experiments.shape_reconstruction.touched import evidence_of, look_at, presses
 
 NAMES = ("mug", "bowl", "wrench", "tray")
@@ -44,6 +50,33 @@ def test_without_the_object_the_answer_is_less_sure_and_costs_more() -> None:
     costs = [one.details["shapes"] for one in (known, strange)]
     assert costs[0][0]["cost"] < costs[1][0]["cost"]  # type: ignore[index]
     assert np.median(strange.deviation) > np.median(known.deviation)
+
+
+def test_the_shipped_library_is_of_household_shapes_the_same_again() -> None:
+    found = household_library()
+    assert len(found) == EACH * len(FAMILIES)
+    assert len({shape.name for shape in found}) == len(found)
+    household_library.cache_clear()
+    assert all(
+        np.array_equal(one.mesh.vertices, again.mesh.vertices)
+        for one, again in zip(found, household_library(), strict=True)
+    )
+
+
+def test_the_folder_that_evidence_names_is_chosen_from_else_the_shipped_library(tmp_path: Path) -> None:
+    bowl = build("bowl", 8e-3)
+    (tmp_path / "this bowl.ply").write_bytes(ply_bytes(bowl))
+    (tmp_path / "open.ply").write_bytes(ply_bytes(Mesh(bowl.vertices, bowl.faces[:-40])))
+    evidence = evidence_of(presses(bowl, 12, seed=1))
+    named = by_known_shapes(replace(evidence, library=str(tmp_path))).details
+    assert {one["name"] for one in named["shapes"]} >= {"this bowl.ply"}  # type: ignore[attr-defined]
+    assert named["library"] == str(tmp_path)
+    shipped = by_known_shapes(evidence).details
+    assert shipped["library"] == "household"
+    names = {shape.name for shape in household_library()}
+    assert {one["name"] for one in shipped["shapes"]} <= names  # type: ignore[attr-defined]
+    with pytest.raises(WrongUse, match="no folder"):
+        by_known_shapes(replace(evidence, library=str(tmp_path / "nowhere")))
 
 
 def test_a_mesh_of_another_size_is_the_same_shape() -> None:

@@ -19,6 +19,8 @@ from harness.experiment.lookup import named
 from harness.experiment.plain import PlainCell, perform_in_process
 from harness.experiment.subjects import object_key
 from harness.experiment.tables import measurement_of
+from harness.experiment.truth import read_true_surface
+from harness.recording.recording import Recording
 from tests.experiments.toy.experiment import CLAIMED, STRIDE
 from tests.support.whole_run import in_process_run, touch_scene
 
@@ -83,6 +85,7 @@ def test_its_table_reproduces_from_its_recordings(tmp_path: Path, capsys: pytest
     one = ["--only", "mug", "--seeds", "1", "--gap", "none", "--workers", "1", "--recordings", str(runs)]
     first = said(capsys, "tables", "toy", *one, "--out", str(tmp_path / "first"))
     (recorded,) = runs.glob("*/run.json")
+    assert read_true_surface(Recording(recorded.parent)) is not None
     before = recorded.stat().st_mtime_ns
     again = said(capsys, "tables", "toy", *one, "--out", str(tmp_path / "again"))
     assert without_seconds(again["rows"]) == without_seconds(first["rows"])

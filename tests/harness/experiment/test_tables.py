@@ -1,14 +1,19 @@
-"""A table's folder holds runs of one set of the scene's keys."""
+"""A table's folder holds runs of one set of the scene's keys; its rows are means over runs."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from harness.basics.errors import WrongUse
 from harness.bench.scene import scene_from_options
 from harness.commands.scenes import with_assignments
+from harness.experiment.experiment import MeasuredColumn
 from harness.experiment.lookup import named
-from harness.experiment.tables import require_same_keys
+from harness.experiment.plain import PlainCell
+from harness.experiment.subjects import REAL, objects
+from harness.experiment.tables import by_object, measurement_of, require_same_keys, rows
 
 
 def test_a_folder_goes_on_with_the_keys_it_began_with(tmp_path: Path) -> None:
@@ -40,3 +45,41 @@ def test_every_scene_has_the_keys_that_are_set() -> None:
         with_assignments(scenes, section, ["contcats=4"])
     with pytest.raises(WrongUse, match="no table in a scene"):
         with_assignments(scenes, None, ["contacts=4"])
+
+
+MEASURED = replace(
+    measurement_of(named("scale-estimation")),
+    methods=("a", "b"),
+    columns=(MeasuredColumn("f", "F", "%"), MeasuredColumn("far_m", "far", "mm")),
+)
+RESULTS: dict[PlainCell, dict[str, Any]] = {
+    PlainCell("mug", "none", 0): {"rows": {"a": {"error_m": 1.0, "seconds": 1.0, "f": True}}},
+    PlainCell("mug", "none", 1): {
+        "rows": {"a": {"error_m": 3.0, "seconds": 1.0, "f": False}, "b": {"error_m": 5.0, "seconds": 1.0}}
+    },
+    PlainCell("bowl", "none", 0): {"rows": {"a": {"error_m": 7.0, "seconds": 1.0}}},
+    PlainCell("bowl", "none", 1): {"failed": "WrongUse: no way"},
+}
+
+
+def test_further_columns_are_means_of_the_rows_that_have_them() -> None:
+    experiment = replace(named("scale-estimation"), measurement=MEASURED)
+    by_method = {row.method: row for row in rows(experiment, RESULTS)}
+    assert by_method["a"].means == {"f": 0.5}
+    assert by_method["b"].means == {}
+
+
+def test_each_object_has_its_own_mean_of_what_is_named() -> None:
+    condition = (("gap", "none"),)
+    assert by_object(RESULTS, condition) == {"mug": {"a": 2.0, "b": 5.0}, "bowl": {"a": 7.0}}
+    assert by_object(RESULTS, condition, "f") == {"mug": {"a": 0.5}}
+
+
+def test_an_experiment_may_have_real_objects_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "ball.stl").write_text("")
+    for file, _, _ in REAL.values():
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / file).write_text("")
+    more = {"ball": ("ball.stl", "m", "plastic")}
+    assert set(objects(tmp_path, more=more)) == {*objects(tmp_path), "ball"}
+    assert "ball" not in objects(None, more=more)

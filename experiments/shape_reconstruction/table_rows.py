@@ -1,0 +1,170 @@
+"""The rows of the table of shapes: what each is answered from, by which method, and how it is scored."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from experiments.shape_reconstruction.estimators.average import by_average
+from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.methods import POINTS, estimated, pointed
+from experiments.shape_reconstruction.metric import (
+    ShapeError,
+    points_error,
+    published_chamfer,
+    published_floor,
+    published_from_points,
+    surfaces_apart,
+)
+from experiments.shape_reconstruction.section import MOST_PRESSES
+from experiments.shape_reconstruction.stated_band import band_held
+from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.clock import now
+from harness.basics.errors import FitRefused
+from harness.basics.mesh import Mesh
+
+PRESSES = (8, 16, 32)
+"""Of each run, the first so many are answered from; the last is how many are made."""
+
+FEW = (2, 4, 6)
+"""As PRESSES, of a picture and touch by the best method: how soon a shape is known."""
+
+FLOOR, AVERAGE = "the truth itself", "average"
+"""Rows that read nothing: the true surface as an answer, whose published form is the floor of all others; and
+one shape for every object."""
+
+_NONE = (0,)
+
+TABLED: Mapping[str, Mapping[str, tuple[int, ...]]] = {
+    "raw points": {"T": PRESSES},
+    "box": {"T": PRESSES},
+    "ellipsoid": {"T": PRESSES},
+    "hull": {"T": PRESSES},
+    "visual-hull": {"V": _NONE, "TV": PRESSES},
+    "pcn": {"T": PRESSES},
+    "retrieval": {"T": (8, 32), "TV": (8, 32)},
+    "rbf": {"T": PRESSES, "TV": PRESSES},
+    "family": {"T": PRESSES, "V": _NONE, "TV": (*FEW, *PRESSES)},
+}
+"""By method, from touch alone, the picture alone, or both: after how many presses."""
+
+SAMPLES = 6000
+"""On each surface: means are then known to 0.04 mm, in a quarter of the time."""
+
+GROSS = 10.0e-3
+"""M: an error beyond is a failure."""
+
+
+@dataclass(frozen=True)
+class ShapeRow:
+    """What a row is answered from.
+
+    Attributes:
+        method: of ``METHODS`` or ``POINTS``.
+        senses: ``"T"``, ``"V"`` or ``"TV"``.
+        presses: of the run, the first so many.
+    """
+
+    method: str
+    senses: str
+    presses: int
+
+    @property
+    def name(self) -> str:
+        """``"family, TV8"``."""
+        return f"{self.method}, {self.senses}{self.presses or ''}"
+
+    def part(self, evidence: ShapeEvidence) -> ShapeEvidence:
+        """Of a run's evidence, what the row may use."""
+        look = evidence.look if "V" in self.senses else None
+        return replace(evidence, touches=evidence.touches[: self.presses], look=look)
+
+
+def rows_after(presses: int) -> list[ShapeRow]:
+    """Of a run of so many presses: after the counts that are tabled, and after all of them."""
+    found = []
+    for method, by_senses in TABLED.items():
+        for senses, counts in by_senses.items():
+            made = [count for count in counts if count < presses] + [presses]
+            used = made if "T" in senses else _NONE
+            found += [ShapeRow(method, senses, count) for count in used if count or senses == "V"]
+    return found
+
+
+ROW_NAMES = (
+    FLOOR,
+    AVERAGE,
+    *(
+        ShapeRow(method, senses, count).name
+        for method, by_senses in TABLED.items()
+        for senses in by_senses
+        for count in (range(1, MOST_PRESSES + 1) if "T" in senses else _NONE)
+    ),
+)
+"""Of all rows that a run of any number of presses may have, in the order of a table."""
+
+
+def scored_rows(evidence: ShapeEvidence, truth: Mesh, presses: int) -> dict[str, dict[str, Any]]:
+    """Every row of a run, as JSON values by its name.
+
+    Args:
+        evidence: of the whole run.
+        truth: m in ``stand``.
+        presses: that the run was to make; it may have ended sooner.
+    """
+    rows = {FLOOR: _floor(truth), AVERAGE: _surface_row(by_average(evidence), truth)}
+    for row in rows_after(presses):
+        rows[row.name] = _answered(row, evidence, truth)
+    return rows
+
+
+def _floor(truth: Mesh) -> dict[str, Any]:
+    error = surfaces_apart(truth, truth, SAMPLES).error
+    return {**_errors(error), "chamfer_points_m": published_floor(truth), "seconds": 0.0}
+
+
+def _answered(row: ShapeRow, evidence: ShapeEvidence, truth: Mesh) -> dict[str, Any]:
+    """An answer's errors; what is refused counts as far off as the object is large, and says why."""
+    part, began = row.part(evidence), now()
+    found: PointEstimate | ShapeEstimate
+    try:
+        found = pointed(row.method, part) if row.method in POINTS else estimated(row.method, part)
+    except FitRefused as refusal:
+        size = truth.diagonal
+        return {"error_m": size, "seconds": now() - began, "gross": True, "refused": str(refusal)}
+    seconds = now() - began
+    scored = _points_row(found, truth) if isinstance(found, PointEstimate) else _surface_row(found, truth)
+    return {**scored, "seconds": seconds}
+
+
+def _points_row(found: PointEstimate, truth: Mesh) -> dict[str, Any]:
+    return {
+        **_errors(points_error(found.points, truth, SAMPLES)),
+        "chamfer_points_m": published_from_points(found.points, truth),
+    }
+
+
+def _surface_row(found: ShapeEstimate, truth: Mesh) -> dict[str, Any]:
+    apart = surfaces_apart(found.mesh, truth, SAMPLES)
+    held, errors = band_held(found, apart), _errors(apart.error)
+    return {
+        **errors,
+        "chamfer_points_m": published_chamfer(found.mesh, truth),
+        "deviation_m": float(found.deviation.mean()),
+        "within90_truth": held.truth,
+        "within90_answer": held.answer,
+        "not_bounded": list(found.not_bounded),
+        "gross_unsaid": bool(errors["gross"] and not found.not_bounded),
+        "seconds": found.seconds,
+    }
+
+
+def _errors(error: ShapeError) -> dict[str, Any]:
+    return {
+        "error_m": error.chamfer,
+        "accuracy_m": error.accuracy,
+        "completeness_m": error.completeness,
+        "f_score": error.f_score,
+        "hausdorff95_m": error.hausdorff95,
+        "gross": bool(error.chamfer > GROSS),
+    }
