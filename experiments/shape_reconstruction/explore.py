@@ -1,9 +1,11 @@
 """The steps of a shape reconstruction: a look, then presses chosen one by one, or planned on the drawing."""
 
+from pathlib import Path
+
 import numpy as np
 
 from experiments.shape_reconstruction.explorer import DrawnContacts, ShapeExplorer
-from experiments.shape_reconstruction.methods import INFORMATIVE, QUICK
+from experiments.shape_reconstruction.live import live_method
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
@@ -35,8 +37,8 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
     those before are read.
 
     Raises:
-        WrongUse: nothing is to be read; or the scene says where the mesh file's origin is, which says
-            nothing of where an unknown object touches its support.
+        WrongUse: nothing is to be read; there is no such folder of known shapes; or the scene says where the
+            mesh file's origin is, which says nothing of where an unknown object touches its support.
     """
     if steps_of(scene) == 0:
         raise WrongUse("nothing is to be read: ask for vision, for presses, or for both")
@@ -45,6 +47,7 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
             'an unknown object stands where its bottom is: set object.pose.anchor = "bottom", and its '
             "position to where its middle should be on the support"
         )
+    _require_library(scene.section(ShapeRun).library)
     settings, looks = scene.section(ShapeRun), scene.sensors.camera
     if settings.choose != "planned" or _presses(scene) == 0:
         place = np.array(scene.object.pose.position)
@@ -54,6 +57,15 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
     made = plan_run(scene, station, mesh, seed, wanted)
     presses = [{"kind": "contact", **parameters} for parameters in made.parameters()]
     return Planned([*kinds(looks, 0), *presses], made.rehearsal, made.bench)
+
+
+def _require_library(folder: str | None) -> None:
+    """Before anything moves: the answer would find out after the last press."""
+    if folder is not None and not Path(folder).is_dir():
+        raise WrongUse(
+            f"[shape] library = {folder!r}: there is no such folder; name one that holds meshes or "
+            "ObjectFiles, or leave the key out"
+        )
 
 
 def performer(run: RunFiles, helpers: Helpers) -> Exploration:
@@ -71,4 +83,4 @@ def _explorer(run: RunFiles, helpers: Helpers) -> NextContact:
     choose = run.scene.section(ShapeRun).choose
     if choose == "planned":
         return DrawnContacts(helpers.twin)
-    return ShapeExplorer(run, INFORMATIVE if choose == "active" else QUICK)
+    return ShapeExplorer(run, live_method(choose))

@@ -6,18 +6,30 @@ from pathlib import Path
 import numpy as np
 
 from experiments.shape_reconstruction.answer import ShapeAnswer
-from experiments.shape_reconstruction.result import true_surface
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.live import LiveEstimate, live_estimates, live_method
+from experiments.shape_reconstruction.metric import shape_error, surfaces_apart
+from experiments.shape_reconstruction.result import stem_of, true_surface
+from experiments.shape_reconstruction.section import ShapeRun
+from experiments.shape_reconstruction.stated_band import band_held
+from experiments.shape_reconstruction.surface import SEEN, TOUCHED, ShapeEstimate
 from harness.basics.arrays import FloatArray
+from harness.basics.mesh import Mesh
 from harness.bench.device import Health
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.experiment.lookup import named
 from harness.report.figures.figures import Album
 from harness.report.figures.shape import KnownSurface, mask_figure, sections_figure, surface_figure
+from harness.report.figures.shape_strip import SurfaceThen, strip_figure
 from harness.report.run_page import PageSection, write_run_page
+from harness.report.turned import turned_surface
 from harness.skills.look import IMAGE
 
 _NAME = "shape-reconstruction"
+
+_SAMPLES = 2000
+"""On each surface, for an error to a tenth of a millimetre."""
 
 
 def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] | None, folder: Path) -> Path:
@@ -29,22 +41,78 @@ def write(scored: Scored, comparison: Comparison, health: Mapping[str, Health] |
 
 def _sections(scored: Scored, album: Album) -> Iterator[PageSection]:
     answer: ShapeAnswer = scored.found
-    yield _surface(answer, album)
+    yield _surface(scored, answer, album)
+    if answer.evidence.touches:
+        yield _strip(scored, answer, album)
     yield _cuts(scored, answer, album)
     if answer.evidence.look is not None:
         yield _seen(scored, answer, album)
 
 
-def _surface(answer: ShapeAnswer, album: Album) -> PageSection:
-    touches = answer.evidence.touches
+def _surface(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
+    found, truth = answer.fused, _truth(scored)
+    shown = _shown(found, answer.evidence)
+    words = (
+        f"By all readings: {len(shown.contacts)} contacts (white), {len(shown.passed)} ways that met nothing "
+        f"(dotted). {_sources(found)} The colour is one standard deviation of the surface along its normal: "
+        f"the darker, the less sure. {'' if truth is None else _held(found, truth)}"
+        f"Beside result.json: {stem_of('fused')}.ply (deviation and source of each vertex), .obj, .glb, .npz."
+    )
+    picture = album.photograph("surface", surface_figure(shown))
+    return PageSection("The surface", words, picture, turned_surface(shown))
+
+
+def _sources(found: ShapeEstimate) -> str:
+    touched, seen = (100.0 * float((found.known_by == source).mean()) for source in (TOUCHED, SEEN))
+    return (
+        f"Of its vertices {touched:.0f} % lie under a contact and {seen:.0f} % at the silhouette's border; "
+        "all others are supposed."
+    )
+
+
+def _held(found: ShapeEstimate, truth: Mesh) -> str:
+    apart = surfaces_apart(found.mesh, truth, _SAMPLES)
+    return (
+        f"It is {1e3 * apart.error.chamfer:.1f} mm off the truth on average, which only a mocked run knows; "
+        f"{100.0 * band_held(found, apart).truth:.0f} % of the true surface lie within its 90 % band. "
+    )
+
+
+def _shown(estimate: ShapeEstimate, evidence: ShapeEvidence) -> KnownSurface:
+    """A surface with the readings that it is made of."""
+    touches = evidence.touches
     contacts = np.array([touch.points.mean(axis=0) for touch in touches if touch.met]).reshape(-1, 3)
     passed = [_way(touch.stand_from_gel, touch.way) for touch in touches if not touch.met]
-    shown = KnownSurface(answer.fused.mesh, answer.fused.deviation, contacts, passed)
+    return KnownSurface(estimate.mesh, estimate.deviation, contacts, passed)
+
+
+def _strip(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
+    method = live_method(scored.run.scene.section(ShapeRun).choose)
+    truth = _truth(scored)
+    found = [_then(live, truth) for live in live_estimates(answer.evidence, method)]
+    seen = "presses" if answer.evidence.look is None else "the picture and all presses"
     words = (
-        f"By all readings: {len(contacts)} contacts (white), {len(passed)} ways that met nothing (dotted). "
-        "The colour is how well the surface is known there."
+        f"The surface from {seen} until then, by the method that the arm waits for ({method}): how well it "
+        "is stated to be known, and how far off the truth it is, which only a mocked run knows; means in mm. "
+        "Contacts are white; colours are of one scale."
     )
-    return PageSection("The surface", words, album.photograph("surface", surface_figure(shown)))
+    if all(one.shown is None for one in found):
+        return PageSection("Press by press", f"{words} None of them said enough for a surface.")
+    return PageSection("Press by press", words, album.photograph("strip", strip_figure(found)))
+
+
+def _then(live: LiveEstimate, truth: Mesh | None) -> SurfaceThen:
+    title, estimate = f"press {live.presses}", live.estimate
+    if estimate is None:
+        return SurfaceThen(title, "not enough for a surface", None)
+    words = f"known to {1e3 * float(estimate.deviation.mean()):.1f} mm"
+    if truth is not None:
+        words += f", {1e3 * shape_error(estimate.mesh, truth, samples=_SAMPLES).chamfer:.1f} off"
+    return SurfaceThen(title, words, _shown(estimate, live.evidence))
+
+
+def _truth(scored: Scored) -> Mesh | None:
+    return None if scored.truth is None else true_surface(scored.run)
 
 
 def _way(stand_from_gel: FloatArray, length: float) -> FloatArray:
@@ -54,17 +122,22 @@ def _way(stand_from_gel: FloatArray, length: float) -> FloatArray:
 
 
 def _cuts(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
-    truth = None if scored.truth is None else true_surface(scored.run)
+    truth = _truth(scored)
     beside = "" if truth is None else ", and the true object by the same planes"
     figure = sections_figure(answer.fused.mesh, truth)
-    words = f"The surface cut through its middle{beside}."
+    words = f"The surface cut by three planes through its middle{beside}."
     return PageSection("Sections", words, album.drawing("sections", figure))
 
 
 def _seen(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
-    look = next(record for record in scored.run.recording.steps() if IMAGE in record.readings)
+    recording = scored.run.recording
+    records = (recording.step(index) for index in range(recording.committed))  # the look is the first
+    look = next(record for record in records if IMAGE in record.readings)
     picture = np.asarray(np.median(look.readings[IMAGE].values, axis=0)).astype(np.uint8)
     assert answer.evidence.look is not None
-    words = "What differs from the picture of the bare bench is taken for the object."
+    words = (
+        "What differs from the picture of the bare bench is taken for the object. No more of the picture is "
+        "used than this outline."
+    )
     figure = mask_figure(picture, answer.evidence.look.mask)
     return PageSection("The silhouette", words, album.photograph("silhouette", figure))

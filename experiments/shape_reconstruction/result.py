@@ -23,6 +23,9 @@ from harness.recording.run_folder import RunFiles
 ERRORS = ("chamfer_m", "chamfer_points_m", "accuracy_m", "completeness_m", "f_score")
 """Of an estimate against the truth of a mocked run."""
 
+_BY = {"vision": "by the picture alone", "touch": "by touch alone", "fused": "by all readings"}
+"""Of estimates, for people."""
+
 _NOT_ASKED = "the scene does not ask for it"
 
 
@@ -129,15 +132,14 @@ def lines_of(result: Mapping[str, Any]) -> list[str]:
     said = []
     for sense, one in result["estimates"].items():
         if one["extents_m"] is None:
-            said.append(f"{mock}{sense}: no answer: {one['refused']}")
+            said.append(f"{mock}{_BY[sense]}: no answer: {one['refused']}")
             continue
         sides = " x ".join(f"{1e2 * side:.1f}" for side in one["extents_m"])
         open_sides = f", not bounded along {', '.join(one['not_bounded'])}" if one["not_bounded"] else ""
         error = (
             "" if one["chamfer_m"] is None else f"; {1e3 * one['chamfer_m']:.1f} mm off the truth on average"
         )
-        said.append(
-            f"{mock}{sense}: {sides} cm{open_sides}, known to {1e3 * one['deviation_m']:.1f} mm on average"
-            f"{error}; {one['seconds']:.1f} s; {one['mesh']}"
-        )
+        stated = f"known to {1e3 * one['deviation_m']:.1f} mm on average"
+        cost = f"{one['seconds']:.1f} s; {one['mesh']}"
+        said.append(f"{mock}{_BY[sense]}: {sides} cm{open_sides}, {stated}{error}; {cost}")
     return said

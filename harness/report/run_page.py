@@ -14,10 +14,14 @@ from harness.report.figures.figures import Picture
 from harness.report.instruments import artefacts, instruments
 from harness.report.simulated import effect_rows, flat, observed_rows, world_rows
 from harness.report.template import write_page
+from harness.report.turned import TurnedSurface
 from harness.report.values import Missing
 
 PAGE = "report.html"
 TEMPLATE = "run.html"
+
+_LONGEST = 240
+"""Letters of a value in the table of the answer."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +32,13 @@ class PageSection:
         title: over it.
         words: a sentence or two.
         picture: below them; None for none.
+        turned: a surface that a page's reader can turn, below the picture; None for none.
     """
 
     title: str
     words: str
     picture: Picture | None = None
+    turned: TurnedSurface | None = None
 
 
 def write_run_page(
@@ -105,4 +111,10 @@ def facts_of(
 
 
 def _text(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    """Of a value of the result, the beginning where it is long: a fit may have thousands of numbers."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list) and value and all(isinstance(one, float) for one in value):
+        value = [float(f"{one:.6g}") for one in value]
+    text = str(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."

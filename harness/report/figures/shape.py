@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
+import trimesh
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
@@ -40,20 +42,29 @@ class KnownSurface:
 
 def surface_figure(shown: KnownSurface) -> Figure:
     """The surface from six sides, its colour the deviation, with contacts and ways that met nothing."""
-    most = max(float(np.quantile(shown.deviation, 0.98)), _LEAST_SPREAD)
-    scale = Normalize(0.0, 1e3 * most)
+    scale = scale_of(shown.deviation)
     with styled():
         figure = blank(8.4, 6.0, "constrained")
         axes = figure.subplots(2, 3)
         for one, (title, turn, height) in zip(axes.flat, (*_SIDES, *_SIDES_BELOW), strict=True):
-            painted = _paint(one, shown, _seen_from(turn, height), scale)
+            painted = paint_surface(one, shown, seen_from(turn, height), scale)
             one.set_title(title, fontsize=9, loc="left")
         bar = figure.colorbar(painted, ax=axes, shrink=0.6, extend="max")
         bar.set_label("standard deviation in mm")
     return figure
 
 
-def _seen_from(turn: float, height: float) -> FloatArray:
+def scale_of(deviation: FloatArray) -> Normalize:
+    """Of colours for deviations in mm, from nothing to almost the greatest of ``(n,)`` m."""
+    return Normalize(0.0, 1e3 * max(float(np.quantile(deviation, 0.98)), _LEAST_SPREAD))
+
+
+def painted_colours(shown: KnownSurface, deviation: FloatArray) -> FloatArray:
+    """``(n, 3)``, 0 to 1: what ``(n,)`` m of deviation look like in the figure of a surface."""
+    return np.asarray(HEAT(scale_of(shown.deviation)(1e3 * deviation)))[:, :3]
+
+
+def seen_from(turn: float, height: float) -> FloatArray:
     """``(3, 3)`` rows: right, up and towards the viewer, who stands at these degrees about z and above."""
     a, h = np.radians(turn), np.radians(height)
     towards = np.array([np.cos(a) * np.cos(h), np.sin(a) * np.cos(h), np.sin(h)])
@@ -61,7 +72,15 @@ def _seen_from(turn: float, height: float) -> FloatArray:
     return np.array([right, np.cross(towards, right), towards])
 
 
-def _paint(axes: Axes, shown: KnownSurface, view: FloatArray, scale: Normalize) -> PolyCollection:
+def paint_surface(axes: Axes, shown: KnownSurface, view: FloatArray, scale: Normalize) -> PolyCollection:
+    """Draw a surface with its contacts and ways, in cm; what was painted, for a bar of its colours.
+
+    Args:
+        axes: to draw in; they lose their frame.
+        shown: the surface.
+        view: as ``seen_from`` gives it.
+        scale: of deviations in mm.
+    """
     mesh = shown.mesh
     facing = mesh.face_normals @ view[2]
     seen = np.flatnonzero(facing > 0.0)
@@ -71,8 +90,10 @@ def _paint(axes: Axes, shown: KnownSurface, view: FloatArray, scale: Normalize) 
     light = _AMBIENT + (1.0 - _AMBIENT) * np.abs(mesh.face_normals[seen] @ (_LAMP @ view))
     colours = HEAT(scale(deviation))
     colours[:, :3] *= light[:, None]
+    # In one array: of a list a path would be made face by face.
+    polygons = cast("Sequence[FloatArray]", 1e2 * corners[order, :, :2])
     painted = PolyCollection(
-        list(1e2 * corners[order, :, :2]),
+        polygons,
         facecolors=colours[order],
         edgecolors=colours[order],
         linewidths=0.3,
@@ -100,10 +121,9 @@ def sections_figure(answer: Mesh, truth: Mesh | None) -> Figure:
         for axes, (title, normal, shown) in zip(figure.subplots(1, 3), cuts, strict=True):
             for mesh, colour, label in ((truth, TRUTH, "true (mock)"), (answer, ANSWER, "estimate")):
                 if mesh is not None:
-                    lines = 1e2 * cut_by_plane(mesh, normal, float(middle[normal]))[:, :, shown]
-                    axes.add_collection(
-                        LineCollection(list(lines), colors=colour, linewidths=1.3, label=label)
-                    )
+                    cut = cut_by_plane(mesh, normal, float(middle[normal]))
+                    lines = [1e2 * line[:, shown] for line in cut]
+                    axes.add_collection(LineCollection(lines, colors=colour, linewidths=1.3, label=label))
             axes.autoscale_view()
             axes.set_aspect("equal", adjustable="datalim")
             axes.set_title(title, fontsize=9, loc="left")
@@ -112,18 +132,12 @@ def sections_figure(answer: Mesh, truth: Mesh | None) -> Figure:
     return figure
 
 
-def cut_by_plane(mesh: Mesh, axis: int, height: float) -> FloatArray:
-    """``(n, 2, 3)`` m: where faces are cut by the plane on which a coordinate has a value; a piece a face."""
-    above = mesh.vertices[:, axis] > height
-    cut = mesh.faces[above[mesh.faces].any(axis=1) & ~above[mesh.faces].all(axis=1)]
-    # The corner that is alone on its side comes first: both cut edges begin there.
-    sides = above[cut]
-    lonely = np.argmax(sides == (sides.sum(axis=1) == 1)[:, None], axis=1)
-    rows = np.arange(len(cut))
-    first = mesh.vertices[cut[rows, lonely]]
-    ends = np.stack([mesh.vertices[cut[rows, (lonely + k) % 3]] for k in (1, 2)], axis=1)
-    share = (height - first[:, axis])[:, None] / (ends[:, :, axis] - first[:, None, axis])
-    return np.asarray(first[:, None] + share[:, :, None] * (ends - first[:, None]))
+def cut_by_plane(mesh: Mesh, axis: int, height: float) -> list[FloatArray]:
+    """Lines of ``(n, 3)`` m, where the plane on which a coordinate has a value cuts a surface; joined."""
+    normal = np.eye(3)[axis]
+    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    cut = body.section(plane_normal=normal, plane_origin=height * normal)
+    return [] if cut is None else [np.asarray(line) for line in cut.discrete]
 
 
 def mask_figure(picture: ByteArray, mask: BoolArray) -> Figure:

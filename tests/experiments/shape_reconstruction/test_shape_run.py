@@ -143,9 +143,12 @@ def test_the_report_and_the_surfaces_are_beside_the_result(touched: Recording, t
 
     result = finish(EXPERIMENT, touched, QUICKLY, no_page, folder=tmp_path)
     page = Path(result["report"]).read_text()
-    for title in ("The surface", "Sections", "The silhouette"):
+    for title in ("The surface", "Press by press", "Sections", "The silhouette"):
         assert f"<h2>{title}</h2>" in page
-    assert page.count("<img") == 3
+    assert page.count("<img") == 4
+    assert page.count('<canvas class="turned"') == page.count("<script>") == 1
+    assert "http" not in page
+    assert len(page) < 1_500_000
     assert "MOCK" in page
     for sense in ("touch", "fused"):
         assert (tmp_path / result["estimates"][sense]["mesh"]).stat().st_size > 100
