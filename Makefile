@@ -8,10 +8,10 @@ DEV := $(VENV)/.installed-dev
 # A microphone on a sound card, and a sound card to test it with; all else works without.
 SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 
-.PHONY: help install demo test slow hunt lint types contracts reference bench tables sound clean
+.PHONY: help install demo demo-shape test slow hunt lint types contracts reference bench tables sound clean
 
 help: ## what can be asked for
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
@@ -39,6 +39,9 @@ sound: ## Debian's packages for a microphone on a sound card, if this may instal
 
 demo: $(RUN) ## localize a contact on the mocked bench, and write the report
 	@$(BIN)/touchstone demo
+
+demo-shape: $(RUN) ## a picture, six presses where they say most, and the shape of an object never drawn
+	@$(BIN)/touchstone demo shape-reconstruction
 
 test: $(DEV) sound lint types contracts ## everything CI checks
 	@$(BIN)/python -m pytest -m "not benchmark and not slow" -n auto --dist loadscope

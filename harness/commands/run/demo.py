@@ -1,13 +1,20 @@
 """``touchstone demo``: the whole path once, on the mocked bench."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from harness.commands import options
 from harness.commands.output import CONSOLE
 from harness.commands.run.run import DEFAULT, RUNNABLE, Spacing, run
+
+_OPTIONS: dict[str, dict[str, Any]] = {
+    DEFAULT: {"contacts": 4, "spacing": Spacing.SPREAD, "sense": "both"},
+    "scale-estimation": {"contacts": 5},
+    "shape-reconstruction": {"presses": 6, "set_": ["choose=active"]},
+}
+"""Of ``touchstone run``, by experiment: a short run that shows what it does."""
 
 
 def demo(
@@ -25,27 +32,25 @@ def demo(
 ) -> int:
     """Run an experiment on the mocked bench from end to end, by every sense that it has.
 
-    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object four times and strikes it
-    with a mocked hammer (over a serial line); the drivers are those of a real bench. The estimates are
-    made from the recording alone. The object's modes are computed the first time and kept;
-    with --objectfile and --level sound.shapes=network they come from its ObjectFile, and nothing is solved.
+    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object a few times; where sound
+    is asked for it strikes it with a mocked hammer (over a serial line), and where a picture is, a mocked
+    camera looks first. The drivers are those of a real bench. The estimates are made from the recording
+    alone. The object's modes are computed the first time and kept; with --objectfile and
+    --level sound.shapes=network they come from its ObjectFile, and nothing is solved.
 
-    Try: touchstone demo scale-estimation
+    Try: touchstone demo shape-reconstruction
     """
     CONSOLE.print(
         "mock bench: a UR5e's controller and a GelSight's stream on loopback, a hammer and a microphone on a "
         "serial line, with a reality gap of their own"
     )
-    localizes = experiment == DEFAULT
     return run(
         experiment,
         object_=f"builtin:{object_}",
         objectfile=objectfile,
         level=level,
-        contacts=4 if localizes else 5,
-        spacing=Spacing.SPREAD if localizes else None,
-        sense="both" if localizes else None,
         seed=seed,
         out=out,
         json=json,
+        **_OPTIONS.get(experiment, {}),
     )
