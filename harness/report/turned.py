@@ -9,7 +9,7 @@ from harness.basics.arrays import AnyArray
 from harness.report.figures.fewer_faces import fewer_faces
 from harness.report.figures.shape import KnownSurface, painted_colours
 
-MOST_FACES = 9000
+MOST_FACES = 14_000
 """Of a surface on a canvas, which paints them one by one."""
 
 _STEPS = 32_000

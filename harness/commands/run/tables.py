@@ -55,9 +55,10 @@ def tables(
     method. With --recordings each run's folder is kept too: touchstone replay reads one, and another table
     with the same folder answers them again.
 
-    Errors are in millimetres, with 90 % bootstrap intervals; gross is the share above 20 mm. A refused answer
-    counts as one without readings; beside it the mean of those answered. Region is the share of runs
-    whose 90 % region or interval holds the truth.
+    Errors are in millimetres, with 90 % bootstrap intervals; gross is the share of failures: above 20 mm of a
+    contact, above 10 mm of a shape, above a tenth of a size. A refused answer counts as one without readings;
+    beside it the mean of those answered. Region is the share of runs whose 90 % region or interval holds the
+    truth.
 
     Try: touchstone tables contact-localization --seeds 2 --only mug
     """

@@ -1,4 +1,4 @@
-"""A coarser surface for a small picture: many faces of a pixel each cost time and show nothing."""
+"""A coarser surface for a page: faces of less than a pixel cost bytes and time, and show nothing."""
 
 import numpy as np
 

@@ -1,7 +1,7 @@
 """How a reconstructed surface came about: small pictures of it, one for each of some presses."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,7 +9,6 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from harness.basics.arrays import FloatArray
-from harness.report.figures.fewer_faces import fewer_faces
 from harness.report.figures.shape import KnownSurface, paint_surface, scale_of, seen_from
 from harness.report.figures.style import SOFT, blank, styled
 
@@ -18,7 +17,6 @@ _ACROSS = 4
 """Pictures in a row."""
 
 _WIDTH, _TALL = 2.1, 2.2
-_MOST_FACES = 6000
 _MARGIN = 0.04
 
 
@@ -74,9 +72,4 @@ def _draw(axes: Axes, then: SurfaceThen, view: FloatArray, scale: Normalize) -> 
     if then.shown is None:
         axes.set_axis_off()
     else:
-        paint_surface(axes, _coarser(then.shown), view, scale)
-
-
-def _coarser(shown: KnownSurface) -> KnownSurface:
-    mesh, deviation = fewer_faces(shown.mesh, shown.deviation, _MOST_FACES)
-    return replace(shown, mesh=mesh, deviation=deviation)
+        paint_surface(axes, then.shown, view, scale)
