@@ -24,7 +24,8 @@ from harness.basics.arrays import FloatArray
 
 _Random = np.random.Generator
 
-_QUARTERS = 4
+LOOPS, TURNS = 3, 8
+"""Handles drawn where there is none, and turns that each is tried at."""
 
 
 def changes(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
@@ -45,9 +46,8 @@ def _of_vessel(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
         yield _turned(shape, 0.5 * np.pi)
         yield _turned(shape, -0.5 * np.pi)
     if code[layout.LIMB] != LOOP:
-        first = random.uniform(0.0, 2.0 * np.pi)
-        for quarter in range(_QUARTERS):
-            yield _turned(add_loop(shape, random), first + 2.0 * np.pi * quarter / _QUARTERS)
+        for _ in range(LOOPS):
+            yield from _all_about(add_loop(shape, random), random)
     if code[layout.SPOUT] != 0:
         yield _coded(shape, layout.SPOUT, 0)
     elif code[layout.LIMB] == LOOP:
@@ -65,6 +65,13 @@ def _of_tool(shape: FamilyShape) -> Iterator[FamilyShape]:
         for kind in (PLAIN, DISC, RING, SLOT):
             if shape.code[end] != kind:
                 yield _coded(shape, end, kind)
+
+
+def _all_about(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
+    """The same at turns that are evenly spread."""
+    first = random.uniform(0.0, 2.0 * np.pi)
+    for turn in range(TURNS):
+        yield _turned(shape, first + 2.0 * np.pi * turn / TURNS)
 
 
 def _turned(shape: FamilyShape, by: float) -> FamilyShape:

@@ -20,6 +20,7 @@ class Guides:
     """Proposals that the readings make.
 
     Attributes:
+        places: ``(contacts, 3)`` m, of the contacts.
         middles: ``(n, 2)`` m, where the object's middle may be, by its contacts.
         extents: ``(3,)`` m, of the box around the contacts and the support; zero without contacts.
         turns: ``(m,)`` rad, ways that its long side or a flat side may look.
@@ -29,6 +30,7 @@ class Guides:
         outline: ``(k, 3)`` unit, towards the silhouette's border; none without one.
     """
 
+    places: FloatArray
     middles: FloatArray
     extents: FloatArray
     turns: FloatArray
@@ -56,15 +58,15 @@ class Guides:
 
 def guides_of(evidence: ShapeEvidence) -> Guides:
     """Proposals of some readings."""
-    middles, extents, turns = _by_touch(evidence)
+    places, middles, extents, turns = _by_touch(evidence)
     seen, eye, ray, outline = _by_sight(evidence)
-    return Guides(middles, extents, turns, seen, eye, ray, outline)
+    return Guides(places, middles, extents, turns, seen, eye, ray, outline)
 
 
-def _by_touch(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _by_touch(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     contacts = evidence.contacts
     if not contacts:
-        return np.empty((0, 2)), np.zeros(3), np.empty(0)
+        return np.empty((0, 3)), np.empty((0, 2)), np.zeros(3), np.empty(0)
     places = np.array([touch.points.mean(axis=0) for touch in contacts])
     normals = np.array([touch.normals.mean(axis=0) for touch in contacts])
     low, high = places.min(axis=0), places.max(axis=0)
@@ -78,7 +80,7 @@ def _by_touch(evidence: ShapeEvidence) -> tuple[FloatArray, FloatArray, FloatArr
     if axis is not None:
         middles.append(axis)
     flat = np.arctan2(normals[sides, 1], normals[sides, 0])
-    return np.array(middles), extents, np.concatenate([flat, _long_way(places[:, :2])])
+    return places, np.array(middles), extents, np.concatenate([flat, _long_way(places[:, :2])])
 
 
 def _axis(places: FloatArray, normals: FloatArray) -> FloatArray | None:

@@ -14,6 +14,12 @@ _Random = np.random.Generator
 OWN = 0.3
 """Share of the draws that keep the size that they were drawn with."""
 
+ENOUGH, SPANNED = 6, 0.5
+"""Contacts whose box proposes sides of a body that has straight ones, and share of such draws that take them."""
+
+_BEYOND = 0.15
+"""Logarithm by which sides may reach beyond the contacts."""
+
 _MOST_SCALE = 1.6
 
 
@@ -38,7 +44,23 @@ def lay(shape: FamilyShape, guides: Guides, random: _Random, place_error: float,
     count = yaws if has_yaw(shape.code) else 1
     laid = np.repeat(theta[None], count, axis=0)
     laid[:, layout.YAW] = _turns(guides, random, turn, count)
+    if shape.code[layout.PLAN] == CORED and len(guides.places) >= ENOUGH and random.random() < SPANNED:
+        for one in laid:
+            _span(one, guides.places, random)
     return laid
+
+
+def _span(theta: FloatArray, places: FloatArray, random: _Random) -> None:
+    """Give a body with straight sides the sides and the middle of the contacts' box, as it is turned."""
+    cosine, sine = np.cos(theta[layout.YAW]), np.sin(theta[layout.YAW])
+    along = places[:, :2] @ np.array([[cosine, -sine], [sine, cosine]])
+    low, high = along.min(axis=0), along.max(axis=0)
+    half = 0.5 * (high - low) * np.exp(random.uniform(0.0, _BEYOND))
+    middle = 0.5 * (low + high)
+    theta[layout.X] = cosine * middle[0] - sine * middle[1]
+    theta[layout.Y] = sine * middle[0] + cosine * middle[1]
+    corner = float(np.exp(theta[layout.RADII : layout.RADII + KNOTS].max()))
+    theta[[layout.CORE_X, layout.CORE_Y]] = np.log(np.maximum(half - corner, 0.1 * half))
 
 
 def _is_long(shape: FamilyShape) -> bool:

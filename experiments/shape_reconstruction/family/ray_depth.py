@@ -6,7 +6,6 @@ from experiments.shape_reconstruction.family.distance import BOX, distance
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
 
-LEAST_STEP = 2.5e-3
 _MOST = 120
 _BEYOND = 10.0e-3
 """M above and below the shape at which a ray is still followed: it may pass its rim."""
@@ -21,6 +20,7 @@ def nearest_along(
     radius: float,
     to_middle: FloatArray,
     enough: bool,
+    least_step: float,
 ) -> tuple[float, float]:
     """Least signed distance along a ray, and how far along it is.
 
@@ -32,6 +32,7 @@ def nearest_along(
         radius: m of a ball that holds the shape.
         to_middle: ``(3,)`` m from the origin to the ball's middle.
         enough: whether any place inside will do: the ray needs only to meet the shape.
+        least_step: m between places on it.
 
     Returns:
         M: the least distance found, and where; of a ray that misses the ball, at its place nearest to it.
@@ -64,7 +65,7 @@ def nearest_along(
             best, where = d, t
             if enough and d < 0.0:
                 break
-        t += max(abs(d), LEAST_STEP)
+        t += max(abs(d), least_step)
         if t > end:
             break
     return best, where

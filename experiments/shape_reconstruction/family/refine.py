@@ -64,6 +64,7 @@ def refine(
     basis: FloatArray,
     robust: bool,
     rounds: int,
+    curved: bool = True,
 ) -> tuple[FloatArray, float, FloatArray]:
     """The vector of least cost near one, along the directions of ``basis``.
 
@@ -75,17 +76,22 @@ def refine(
         basis: ``(n, SIZE)`` directions that it may move along.
         robust: whether contacts that do not fit are let go.
         rounds: at most.
+        curved: whether the curvature there is wanted; it costs as much as a round.
 
     Returns:
-        The vector, its cost, and ``(n, n)`` the curvature of the cost along the directions.
+        The vector, its cost, and ``(n, n)`` the curvature of the cost along the directions; empty where it is
+        not wanted.
     """
     best = theta.copy()
     out, trial, q = rows_for(seen), rows_for(seen), prepared_room()
     cost = total_cost(code, best, seen, prior, robust, out, q)
     damping = 1e-2
     along = prior.rows @ basis.T
-    curvature, slope = _normal_equations(code, best, seen, prior, basis, along, out, q)
+    curvature, slope, current = np.empty((0, 0)), np.empty(0), False
     for _ in range(rounds):
+        if not current:
+            curvature, slope = _normal_equations(code, best, seen, prior, basis, along, out, q)
+            current = True
         damped = curvature.copy()
         for i in range(len(damped)):
             damped[i, i] += damping * curvature[i, i] + 1e-9
@@ -94,16 +100,19 @@ def refine(
         now = total_cost(code, moved, seen, prior, robust, trial, q)
         if now < cost:
             gain = cost - now
-            best, cost = moved, now
+            best, cost, current = moved, now, False
             out, trial = trial, out
             damping = max(0.2 * damping, 1e-6)
-            curvature, slope = _normal_equations(code, best, seen, prior, basis, along, out, q)
             if gain < _SETTLED * cost:
                 break
         else:
             damping *= 8.0
             if damping > 1e5:
                 break
+    if not curved:
+        return best, cost, np.empty((0, 0))
+    if not current:
+        curvature, slope = _normal_equations(code, best, seen, prior, basis, along, out, q)
     return best, cost, curvature
 
 

@@ -95,7 +95,9 @@ def _evaluate_rays(
         to_middle[a] -= origin[a]
     for i in range(len(rays.kinds)):
         _turned_ray(theta, seen, i, towards)
-        d, out.along[i] = nearest_along(code, q, origin, towards, radius, to_middle, rays.kinds[i] == MEET)
+        d, out.along[i] = nearest_along(
+            code, q, origin, towards, radius, to_middle, rays.kinds[i] == MEET, rays.step
+        )
         out.values[first + i] = _sighted(theta, seen, i, d)
         cost += _weigh(first + i, rays.worth[i], out)
     return cost

@@ -1,6 +1,6 @@
 """From draws of the prior to shapes that the readings allow: many are laid, some refined, few finished."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,14 +27,20 @@ from harness.basics.arrays import FloatArray
 
 _Random = np.random.Generator
 
-LAYING = ((1, 0.5), (2, 0.5), (2, 1.0))
+LAYING = ((1, 0.5), (1, 0.5), (2, 1.0))
 """Rounds in which draws find their place, turn and size; the share of each class that goes on after them."""
 
 TEMPERATURE = 3.0
 """By which costs are divided where they become weights: readings near each other err together."""
 
+BEGINNING = 3
+"""Rounds after which the starts that fit worst are left."""
+
 CHANGING = 5
 """Rounds in which a changed shape finds its numbers."""
+
+LIKELY = 2
+"""Changes of one code that are refined, of each shape: those that fit best as they were put on."""
 
 ALIKE = 1.5e-3
 """M by which two shapes of one code differ at most to be one hypothesis."""
@@ -95,8 +101,9 @@ class FamilySearch:
             seeds: of earlier estimates, to begin at as well.
         """
         settings = self.settings
-        begun = [*_stratified(self.laid(), settings.starts), *seeds]
-        started = _ranked(self.refined(one, settings.refining) for one in begun)
+        begun = [self.refined(one, BEGINNING) for one in _stratified(self.laid(), settings.starts)]
+        kept = [*_stratified(begun, settings.refined), *seeds]
+        started = _ranked(self.refined(one, settings.refining) for one in kept)
         random = np.random.default_rng(settings.seed + 1)
         changed = self._next_to(started, settings.changed, random)
         # What one change made better may need another: a wall that was taken for solid is hollow again.
@@ -108,10 +115,22 @@ class FamilySearch:
         """All shapes that differ by a part or a turn from those that fit best, refined."""
         promising = sorted(hypotheses, key=lambda one: one.misfit)[:count]
         return [
-            self.refined(self._changed(one, shape), CHANGING)
-            for one in promising
-            for shape in changes(one.shape, random)
+            self.refined(changed, CHANGING) for one in promising for changed in self._changes_of(one, random)
         ]
+
+    def _changes_of(self, one: Hypothesis, random: _Random) -> Iterator[Hypothesis]:
+        """Of each code that a part more or less gives, those that fit best before they are refined."""
+        by_code: dict[bytes, list[Hypothesis]] = {}
+        for shape in changes(one.shape, random):
+            by_code.setdefault(shape.code.tobytes(), []).append(self._changed(one, shape))
+        for alike in by_code.values():
+            few = alike if len(alike) <= LIKELY else _ranked(self._costed(other) for other in alike)
+            yield from few[:LIKELY]
+
+    def _costed(self, one: Hypothesis) -> Hypothesis:
+        out, q = rows_for(self.coarse), prepared_room()
+        shape = one.shape
+        return replace(one, cost=total_cost(shape.code, shape.theta, self.coarse, one.prior, False, out, q))
 
     def laid(self) -> list[Hypothesis]:
         """Draws in their best place, turn and size; of every class those that fit best."""
@@ -127,22 +146,22 @@ class FamilySearch:
         return [self._under_prior(one.shape, one.cost) for one in draws]
 
     def _at_best_turn(self, shape: FamilyShape, random: _Random) -> Hypothesis:
-        tried = lay(shape, self.guides, random, self._place_error, self.settings.yaws)
+        turns = self.settings.yaws * (1 if shape.code[layout.LIMB] == layout.NO_LIMB else 2)
+        tried = lay(shape, self.guides, random, self._place_error, turns)
         tried[:, layout.OUTLINE] = self._bench_middle[layout.OUTLINE]
         middle = self._middle(tried[0])
         prior = PriorRows(middle, np.concatenate([self._bench, stand_rows(shape.code)]))
-        best = tried[0]
-        if len(tried) > 1:
-            out, q = rows_for(self.coarse), prepared_room()
-            costs = [total_cost(shape.code, one, self.coarse, prior, False, out, q) for one in tried]
-            best = tried[int(np.argmin(costs))]
-        return Hypothesis(FamilyShape(shape.name, shape.code, best), prior, np.inf, np.empty((0, 0)))
+        out, q = rows_for(self.coarse), prepared_room()
+        costs = [total_cost(shape.code, one, self.coarse, prior, False, out, q) for one in tried]
+        best = int(np.argmin(costs))
+        placed = FamilyShape(shape.name, shape.code, tried[best])
+        return Hypothesis(placed, prior, costs[best], np.empty((0, 0)))
 
     def _stood(self, one: Hypothesis, rounds: int) -> Hypothesis:
         """Moved, turned and scaled to fit the coarse readings better."""
         shape = one.shape
         theta, cost, curvature = refine(
-            shape.code, shape.theta, self.coarse, one.prior, stand_basis(shape.code), False, rounds
+            shape.code, shape.theta, self.coarse, one.prior, stand_basis(shape.code), False, rounds, False
         )
         return Hypothesis(FamilyShape(shape.name, shape.code, theta), one.prior, cost, curvature)
 

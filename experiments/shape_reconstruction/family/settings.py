@@ -10,7 +10,8 @@ class FamilySettings:
     Attributes:
         draws: shapes drawn from the prior, spread evenly over the classes.
         yaws: turns that each draw is tried at.
-        starts: of them that are refined.
+        starts: of them that are fitted to all readings, for a few rounds.
+        refined: of those, how many go on.
         refining: rounds of each.
         changed: hypotheses of which parts are then put on, taken off or exchanged.
         finals: hypotheses that are refined to the end.
@@ -21,7 +22,8 @@ class FamilySettings:
 
     draws: int = 1260
     yaws: int = 4
-    starts: int = 42
+    starts: int = 84
+    refined: int = 42
     refining: int = 7
     changed: int = 4
     finals: int = 10
@@ -31,10 +33,20 @@ class FamilySettings:
 
 
 LEVELS = {
-    "coarse": FamilySettings(draws=420, starts=16, changed=2, finals=5, finishing=8, pitch=4.0e-3),
+    "coarse": FamilySettings(
+        draws=420, starts=40, refined=16, changed=2, finals=5, finishing=8, pitch=4.0e-3
+    ),
     "default": FamilySettings(),
     "fine": replace(
-        FamilySettings(), draws=4200, yaws=8, starts=100, changed=10, finals=20, finishing=20, pitch=2.0e-3
+        FamilySettings(),
+        draws=4200,
+        yaws=8,
+        starts=300,
+        refined=100,
+        changed=10,
+        finals=20,
+        finishing=20,
+        pitch=2.0e-3,
     ),
 }
 """By name, the cheapest first."""
