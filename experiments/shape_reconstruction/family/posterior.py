@@ -54,6 +54,7 @@ class Mixture:
 
 def mixture_of(found: list[Hypothesis], sighted: bool, touched: bool, seed: int) -> Mixture:
     """Weights by cost and by how much of its prior each hypothesis had to give up (Laplace)."""
+    found = _modes(found, sighted, touched)
     scores = np.array([_log_weight(one, sighted, touched) for one in found])
     weights = np.exp(scores - scores.max())
     order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] >= LEAST]
@@ -61,6 +62,26 @@ def mixture_of(found: list[Hypothesis], sighted: bool, touched: bool, seed: int)
     random = np.random.default_rng(seed)
     about = tuple(_drawn(found[i], sighted, touched, random) for i in order)
     return Mixture(tuple(found[i] for i in order), kept, about)
+
+
+def _modes(found: list[Hypothesis], sighted: bool, touched: bool) -> list[Hypothesis]:
+    """One hypothesis of each mode, that of least cost: two within one uncertainty would count it twice."""
+    kept: list[Hypothesis] = []
+    for one in sorted(found, key=lambda one: one.cost):
+        if not any(_of_one_mode(one, other, sighted, touched) for other in kept):
+            kept.append(one)
+    return kept
+
+
+def _of_one_mode(one: Hypothesis, other: Hypothesis, sighted: bool, touched: bool) -> bool:
+    if not np.array_equal(one.shape.code, other.shape.code):
+        return False
+    basis = basis_of(one.shape.code, sighted, touched)
+    off = basis @ (one.shape.theta - other.shape.theta)
+    turn = basis[:, layout.YAW] != 0.0
+    off[turn] = np.arctan2(np.sin(off[turn]), np.cos(off[turn]))
+    precision = other.curvature / TEMPERATURE + _prior_precision(other, sighted, touched)
+    return float(off @ precision @ off) < len(off)
 
 
 def _log_weight(one: Hypothesis, sighted: bool, touched: bool) -> float:

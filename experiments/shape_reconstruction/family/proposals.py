@@ -15,7 +15,7 @@ OWN = 0.3
 """Share of the draws that keep the size that they were drawn with."""
 
 ENOUGH, SPANNED = 6, 0.5
-"""Contacts whose box proposes sides of a body that has straight ones, and share of such draws that take them."""
+"""Contacts whose box proposes the sides of a body with straight ones; share of such draws that take them."""
 
 _BEYOND = 0.15
 """Logarithm by which sides may reach beyond the contacts."""

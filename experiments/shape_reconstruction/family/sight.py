@@ -24,8 +24,8 @@ _PASSING = ((2.0, 14, 70), (4.0, 12, 60), (9.0, 10, 50), (20.0, 8, 40), (45.0, 5
 """Pixels from the mask, and how many rays there: for ranking, and for fitting."""
 
 _STEPS = (5.0e-3, 2.5e-3)
-"""M between places on a ray, for ranking and for fitting: half of it squared over twice the radius of what the
-ray passes is how much too far the nearest place seems, 0.1 mm of a cup."""
+"""M between places on a ray, for ranking and for fitting: a cup then seems 0.1 mm too far from it
+at most."""
 
 _SMOOTH = 0.8
 _CLEAR = 2
