@@ -9,8 +9,8 @@ from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.estimators.plain_bodies import by_box, by_hull, by_visual_hull
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate, by_raw_points
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.estimate import family_estimate
 from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.family_or_smooth import by_family
 from experiments.shape_reconstruction.pcn.completed_surface import by_completed_surface
 from experiments.shape_reconstruction.pcn.network import by_completion
 from experiments.shape_reconstruction.retrieval.known_shapes import by_known_shapes
@@ -24,10 +24,10 @@ METHODS: Mapping[str, Callable[[ShapeEvidence], ShapeEstimate]] = {
     "visual-hull": by_visual_hull,
     "rbf": by_hermite,
     "pcn": by_completed_surface,
-    "family-coarse": partial(family_estimate, settings=LEVELS["coarse"]),
+    "family-coarse": partial(by_family, settings=LEVELS["coarse"]),
     "retrieval": by_known_shapes,
-    "family": family_estimate,
-    "family-fine": partial(family_estimate, settings=LEVELS["fine"]),
+    "family": by_family,
+    "family-fine": partial(by_family, settings=LEVELS["fine"]),
 }
 """From cheap to dear: a box takes 10 ms, the family some seconds."""
 

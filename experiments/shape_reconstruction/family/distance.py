@@ -74,7 +74,8 @@ def inside_depth(code: IntArray, q: FloatArray, x: float, y: float, z: float) ->
 def distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
     """Metres from the surface at a place in ``stand``, negative inside.
 
-    ``filled`` closes what a silhouette is filled at: the hole of a handle or of a ring.
+    ``filled`` closes what no ray of sight gets through, a vessel up to its rim, and what masks are filled at,
+    the hole of a handle or of a ring.
     """
     px, py, pz = x - q[0], y - q[1], z - q[2]
     # The body's tilt, to first order, then its yaw.

@@ -30,8 +30,18 @@ NOISE = 0.6e-3
 WIDER = 1.4
 """Factor on the hypotheses' spread: few of them are kept, and their costs are of one likelihood."""
 
+MISFIT = 0.5
+"""By how much of a contact's typical sum of squares the variance grows: where the best shape leaves its contacts,
+it is wrong elsewhere too."""
+
 OUTSIDE = 6.0
 """A contact's typical sum of squares, of some five numbers, above which the object is of no class."""
+
+FOREIGN = 40.0
+"""A contact's typical sum of squares above which no class fits at all."""
+
+DOUBTED, SLIPS = 1.0 / 6.0, 2
+"""Share of doubtful contacts, and how many, above which they have not slipped: no class fits."""
 
 RIVAL = 0.2
 """Weight of a second class above which the class is unknown."""
@@ -72,13 +82,13 @@ def family_estimate(
     }
     found = ShapeEstimate(
         mesh=mesh,
-        deviation=_deviation(plain, mixture, mesh),
+        deviation=_deviation(plain, mixture, mesh) * np.sqrt(1.0 + MISFIT * fit.typical),
         known_by=known_by(mesh.vertices, evidence),
         not_bounded=not_bounded(evidence),
         doubtful=doubtful,
         flags=_flags(mixture, fit, doubtful),
         seconds=time.perf_counter() - began,
-        details=_details(mixture, fit),
+        details={**_details(mixture, fit), "foreign": _is_foreign(fit)},
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
 
@@ -122,6 +132,12 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh) -> FloatArray:
             total += weight / len(shapes) * gap**2
     moved = np.sum((mesh.vertices - plain.vertices) ** 2, axis=1)
     return np.asarray(np.sqrt(WIDER**2 * total + 0.25 * moved + NOISE**2))
+
+
+def _is_foreign(fit: ContactFit) -> bool:
+    """Whether the contacts are of no class: all are far off, or too many to have slipped."""
+    doubtful = int(fit.doubtful.sum())
+    return bool(fit.typical > FOREIGN or doubtful > max(SLIPS, DOUBTED * len(fit.sums)))
 
 
 def _flags(mixture: Mixture, fit: ContactFit, doubtful: dict[int, float]) -> tuple[str, ...]:

@@ -126,9 +126,12 @@ def basis_of(code: IntArray, sighted: bool, touched: bool) -> FloatArray:
     return _basis_of(_key(code), sighted, touched)
 
 
-def stand_basis(code: IntArray) -> FloatArray:
-    """``(n, SIZE)`` directions of place, turn, size and proportions, along which a draw is laid down."""
-    return _stand_basis(_key(code))
+def stand_basis(code: IntArray, two_senses: bool) -> FloatArray:
+    """``(n, SIZE)`` directions of place, turn, size and proportions, along which a draw is laid down.
+
+    With ``two_senses``, sight and touch, the picture's shift too: it is what they differ by most.
+    """
+    return _stand_basis(_key(code), two_senses)
 
 
 def _key(code: IntArray) -> tuple[int, ...]:
@@ -136,10 +139,11 @@ def _key(code: IntArray) -> tuple[int, ...]:
 
 
 @lru_cache(maxsize=256)
-def _stand_basis(key: tuple[int, ...]) -> FloatArray:
+def _stand_basis(key: tuple[int, ...], two_senses: bool) -> FloatArray:
     code = np.array(key)
     kind = int(code[layout.KIND])
-    rows = [_along(layout.X), _along(layout.Y), _along(*_SIZES[kind])]
+    rows = [_along(layout.CAMERA_RIGHT), _along(layout.CAMERA_DOWN)] if two_senses else []
+    rows += [_along(layout.X), _along(layout.Y), _along(*_SIZES[kind])]
     rows.append(_along({TURNED: layout.HEIGHT, TOOL: layout.LENGTH, BENT: layout.ARC}[kind]))
     if has_yaw(code):
         rows.append(_along(layout.YAW))

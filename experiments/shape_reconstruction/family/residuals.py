@@ -120,7 +120,7 @@ def _sighted(theta: FloatArray, seen: FamilyEvidence, i: int, d: float) -> float
     if rays.kinds[i] == GRAZE:
         return float((d - theta[OUTLINE]) / sigma)
     if rays.kinds[i] == PASS:
-        return float(min(d, 0.0) / sigma)
+        return float(min(d, 0.0) * rays.gain[i] / sigma)
     return float(max(d, 0.0) / sigma)
 
 

@@ -159,9 +159,10 @@ class FamilySearch:
 
     def _stood(self, one: Hypothesis, rounds: int) -> Hypothesis:
         """Moved, turned and scaled to fit the coarse readings better."""
-        shape = one.shape
+        shape, guides = one.shape, self.guides
+        basis = stand_basis(shape.code, guides.sighted and guides.touched)
         theta, cost, curvature = refine(
-            shape.code, shape.theta, self.coarse, one.prior, stand_basis(shape.code), False, rounds, False
+            shape.code, shape.theta, self.coarse, one.prior, basis, False, rounds, False
         )
         return Hypothesis(FamilyShape(shape.name, shape.code, theta), one.prior, cost, curvature)
 

@@ -18,6 +18,9 @@ OUTLINE_SIGMA = 0.5
 OUTLINE_WORTH = 60.0
 """Independent readings that all grazing rays together count as at most: neighbours err alike."""
 
+GAIN = 0.5
+"""Of a ray that passes the mask, by pixel from it."""
+
 _GRAZING = (36, 120)
 _MEETING = (12, 60)
 _PASSING = ((2.0, 14, 70), (4.0, 12, 60), (9.0, 10, 50), (20.0, 8, 40), (45.0, 5, 30), (90.0, 3, 20))
@@ -39,6 +42,8 @@ class SightRays(NamedTuple):
         directions: ``(n, 3)`` unit.
         kinds: ``(n,)`` ``PASS``, ``GRAZE`` or ``MEET``.
         worth: ``(n,)`` weight of each one's squared residual.
+        gain: ``(n,)`` by which a distance counts for more than it is: a thin part far outside of the mask is
+            as wrong as a thick one.
         pixel: m per pixel at the object, a first guess of it.
         right, down: ``(3,)`` unit, axes of the picture.
         middle: ``(3,)`` unit, towards the middle of the mask.
@@ -51,6 +56,7 @@ class SightRays(NamedTuple):
     directions: FloatArray
     kinds: IntArray
     worth: FloatArray
+    gain: FloatArray
     pixel: float
     right: FloatArray
     down: FloatArray
@@ -62,10 +68,10 @@ class SightRays(NamedTuple):
 
 def no_rays() -> SightRays:
     """Of no picture."""
-    zero = np.zeros(3)
-    empty = np.empty(0)
+    zero, empty = np.zeros(3), np.empty(0)
+    kinds = np.empty(0, np.int64)
     return SightRays(
-        zero, np.empty((0, 3)), np.empty(0, np.int64), empty, 1e-3, zero, zero, zero, 1e-3, 1e-3, 1e-3
+        zero, np.empty((0, 3)), kinds, empty, empty, 1e-3, zero, zero, zero, 1e-3, 1e-3, _STEPS[1]
     )
 
 
@@ -77,15 +83,19 @@ def sight_rays(look: SeenMask, coarse: bool) -> SightRays:
     clear = ~ndimage.binary_dilation(look.hidden, iterations=_CLEAR) if look.hidden.any() else ~look.hidden
     outline = _spread(_outline(look.mask, clear), _GRAZING[which])
     inside = _spread(_inside(look.mask, clear), _MEETING[which])
-    outside = _outside(look.mask, clear, which)
+    outside, away = _outside(look.mask, clear, which)
     places = np.concatenate([outline, inside, outside])
     kinds = np.repeat([GRAZE, MEET, PASS], [len(outline), len(inside), len(outside)]).astype(np.int64)
     worth = np.ones(len(places))
     worth[: len(outline)] = min(1.0, OUTLINE_WORTH / max(len(outline), 1))
-    return _rays(look, places, kinds, worth, _STEPS[which])
+    gain = np.ones(len(places))
+    gain[len(places) - len(outside) :] += GAIN * away
+    return _rays(look, places, kinds, (worth, gain), _STEPS[which])
 
 
-def _rays(look: SeenMask, places: FloatArray, kinds: IntArray, worth: FloatArray, step: float) -> SightRays:
+def _rays(
+    look: SeenMask, places: FloatArray, kinds: IntArray, weights: tuple[FloatArray, FloatArray], step: float
+) -> SightRays:
     rotation, eye = look.stand_from_camera[:3, :3], np.ascontiguousarray(look.stand_from_camera[:3, 3])
     directions = directions_of(look, places)
     rows, columns = np.nonzero(look.mask)
@@ -96,7 +106,8 @@ def _rays(look: SeenMask, places: FloatArray, kinds: IntArray, worth: FloatArray
         eye=eye,
         directions=directions,
         kinds=kinds,
-        worth=worth,
+        worth=weights[0],
+        gain=weights[1],
         pixel=away / look.focal_length,
         right=np.ascontiguousarray(rotation[:, 0]),
         down=np.ascontiguousarray(rotation[:, 1]),
@@ -147,11 +158,16 @@ def _inside(mask: BoolArray, clear: BoolArray) -> FloatArray:
     return np.column_stack([columns + 0.5, rows + 0.5])
 
 
-def _outside(mask: BoolArray, clear: BoolArray, which: int) -> FloatArray:
-    """``(n, 2)`` places around the mask, dense near it: what is near is what a shape would stick out into."""
+def _outside(mask: BoolArray, clear: BoolArray, which: int) -> tuple[FloatArray, FloatArray]:
+    """``(n, 2)`` places around the mask, and how many pixels each is from it.
+
+    Dense near it: what is near is what a shape would stick out into.
+    """
     away = ndimage.distance_transform_edt(~mask)
-    found = [np.empty((0, 2))]
+    found, distances = [np.empty((0, 2))], [np.empty(0)]
     for pixels, *counts in _PASSING:
         rows, columns = np.nonzero((np.abs(away - pixels) < 0.8) & clear)
-        found.append(_spread(np.column_stack([columns + 0.5, rows + 0.5]), counts[which]))
-    return np.concatenate(found)
+        places = _spread(np.column_stack([columns + 0.5, rows + 0.5]), counts[which])
+        found.append(places)
+        distances.append(np.full(len(places), pixels))
+    return np.concatenate(found), np.concatenate(distances)

@@ -135,7 +135,11 @@ def turned_box(code: IntArray, q: FloatArray, box: FloatArray) -> None:
 
 @compiled_fast
 def turned_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
-    """Metres from the body's surface, negative inside; ``filled`` closes a handle's hole, as masks do."""
+    """Metres from the body's surface, negative inside.
+
+    ``filled`` closes a handle's hole, as masks do, and a vessel up to its rim, which no ray of sight gets
+    through: how far a ray goes in is then not how thick the wall is.
+    """
     side = _side(code, q, x, y, z)
     body = max(side, max(-z, z - q[_H]))
     if code[LIMB] == LOOP and x > 0.0:
@@ -144,7 +148,7 @@ def turned_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: fl
         body = min(body, _bar(q, x, y, z))
     if code[SPOUT] != 0 and x < 0.0:
         body = min(body, _spout(q, x, y, z))
-    if code[HOLLOW] != 0:
+    if code[HOLLOW] != 0 and not filled:
         body = max(body, -max(side + q[_WALL], q[_FLOOR] - z))
     return float(body)
 
