@@ -31,8 +31,8 @@ WIDER = 1.4
 """Factor on the hypotheses' spread: few of them are kept, and their costs are of one likelihood."""
 
 MISFIT = 0.5
-"""By how much of a contact's typical sum of squares the variance grows: where the best shape leaves its contacts,
-it is wrong elsewhere too."""
+"""By how much of a contact's typical sum of squares the variance grows: a shape that is off its contacts is
+wrong elsewhere too."""
 
 OUTSIDE = 6.0
 """A contact's typical sum of squares, of some five numbers, above which the object is of no class."""
