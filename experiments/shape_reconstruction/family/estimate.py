@@ -40,8 +40,9 @@ OUTSIDE = 6.0
 FOREIGN = 40.0
 """A contact's typical sum of squares above which no class fits at all."""
 
-DOUBTED, SLIPS = 1.0 / 6.0, 2
-"""Share of doubtful contacts, and how many, above which they have not slipped: no class fits."""
+DOUBTED, SLIPS, DEAR = 1.0 / 6.0, 2, 8.0
+"""Share of doubtful contacts, and how many, above which they have not slipped; cost of all readings by contact
+above which it is then not a rim or an edge either, and no class fits."""
 
 RIVAL = 0.2
 """Weight of a second class above which the class is unknown."""
@@ -88,7 +89,7 @@ def family_estimate(
         doubtful=doubtful,
         flags=_flags(mixture, fit, doubtful),
         seconds=time.perf_counter() - began,
-        details={**_details(mixture, fit), "foreign": _is_foreign(fit)},
+        details={**_details(mixture, fit), "foreign": _is_foreign(fit, mixture.best.misfit)},
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
 
@@ -134,10 +135,11 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh) -> FloatArray:
     return np.asarray(np.sqrt(WIDER**2 * total + 0.25 * moved + NOISE**2))
 
 
-def _is_foreign(fit: ContactFit) -> bool:
+def _is_foreign(fit: ContactFit, misfit: float) -> bool:
     """Whether the contacts are of no class: all are far off, or too many to have slipped."""
-    doubtful = int(fit.doubtful.sum())
-    return bool(fit.typical > FOREIGN or doubtful > max(SLIPS, DOUBTED * len(fit.sums)))
+    count, doubtful = len(fit.sums), int(fit.doubtful.sum())
+    too_many = doubtful > max(SLIPS, DOUBTED * count) and misfit > DEAR * count
+    return bool(fit.typical > FOREIGN or too_many)
 
 
 def _flags(mixture: Mixture, fit: ContactFit, doubtful: dict[int, float]) -> tuple[str, ...]:
