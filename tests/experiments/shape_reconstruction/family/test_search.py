@@ -11,7 +11,10 @@ from experiments.shape_reconstruction.family.classes import FamilyShape, draw_sh
 from experiments.shape_reconstruction.family.contacts_fit import contact_fit
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
+from experiments.shape_reconstruction.family.guides import guides_of
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
+from experiments.shape_reconstruction.family.posterior import mixture_of
+from experiments.shape_reconstruction.family.proposals import lay
 from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import (
     active_rows,
@@ -20,6 +23,8 @@ from experiments.shape_reconstruction.family.residuals import (
     prepared_room,
     rows_for,
 )
+from experiments.shape_reconstruction.family.search import FamilySearch
+from experiments.shape_reconstruction.family.settings import LEVELS
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.isosurface import isosurface
 from harness.basics.geometry import apply, translation
@@ -149,3 +154,46 @@ def test_a_gel_that_went_through_the_body_and_met_nothing_costs() -> None:
     ]
     assert costs[1] == 0.0
     assert costs[0] > 3.0
+
+
+def test_a_vessel_in_front_of_what_was_not_seen_costs_the_same_however_thin_its_wall_is() -> None:
+    _, readings = made("bottle")
+    seen = observe(replace(readings, touches=()))
+    costs = []
+    for wall in (1e-3, 8e-3):
+        tray = draw_shape("tray", np.random.default_rng(0))
+        tray.theta[layout.WALL] = np.log(wall)
+        costs.append(cost_of(tray, seen))
+    assert costs[0] == pytest.approx(costs[1], rel=1e-9)
+
+
+def test_a_thin_board_far_outside_of_the_mask_is_not_nearly_right() -> None:
+    _, readings = made("mug")
+    seen = observe(replace(readings, touches=()))
+    board = draw_shape("board", np.random.default_rng(0))
+    board.theta[layout.HEIGHT], board.theta[layout.X] = np.log(0.06), 0.12
+    alike = seen._replace(rays=seen.rays._replace(gain=np.ones_like(seen.rays.gain)))
+    assert cost_of(board, seen) > 3.0 * cost_of(board, alike)
+
+
+def test_a_hypothesis_found_twice_counts_once() -> None:
+    shape, readings = made("mug")
+    search = FamilySearch(readings, LEVELS["coarse"])
+    best = search.refined(search.seeded(shape, shape.theta), 8, robust=True)
+    beside = search.refined(search.seeded(replace(shape, theta=best.shape.theta + 1e-5), shape.theta), 1)
+    assert len(mixture_of([best, beside], True, True, 0).hypotheses) == 1
+
+
+def test_sides_are_proposed_that_span_the_contacts() -> None:
+    _, readings = made("tray")
+    guides, random = guides_of(readings), np.random.default_rng(0)
+    low, high = guides.places.min(axis=0), guides.places.max(axis=0)
+    fitting = 0
+    for _ in range(40):
+        for laid in lay(draw_shape("tray", random), guides, random, readings.place_error, 4):
+            if abs(np.sin(2.0 * laid[layout.YAW])) > 0.2:
+                continue
+            corner = np.exp(laid[layout.RADII : layout.RADII + layout.KNOTS].max())
+            sides = 2.0 * (np.exp(laid[[layout.CORE_X, layout.CORE_Y]]) + corner)
+            fitting += bool((np.abs(np.sort(sides) / np.sort(high - low)[1:] - 1.1) < 0.12).all())
+    assert fitting >= 5
