@@ -41,8 +41,8 @@ FOREIGN = 40.0
 """A contact's typical sum of squares above which no class fits at all."""
 
 DOUBTED, SLIPS, DEAR = 1.0 / 6.0, 2, 8.0
-"""Share of doubtful contacts, and how many, above which they have not slipped; cost of all readings by contact,
-above which no class fits: below, the doubtful ones met a rim or an edge."""
+"""Share of doubtful contacts, and how many, above which they have not slipped; cost of all readings to a
+contact, above which no class fits: below, the doubtful ones met a rim or an edge."""
 
 RIVAL = 0.2
 """Weight of a second class above which the class is unknown."""

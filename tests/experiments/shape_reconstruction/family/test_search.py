@@ -25,6 +25,7 @@ from experiments.shape_reconstruction.family.residuals import (
 )
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.family.sight import PASS
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.isosurface import isosurface
 from harness.basics.geometry import apply, translation
@@ -167,13 +168,18 @@ def test_a_vessel_in_front_of_what_was_not_seen_costs_the_same_however_thin_its_
     assert costs[0] == pytest.approx(costs[1], rel=1e-9)
 
 
-def test_a_thin_board_far_outside_of_the_mask_is_not_nearly_right() -> None:
+def test_a_thin_board_far_outside_of_the_mask_is_wrong_by_more_than_it_is_thick() -> None:
     _, readings = made("mug")
     seen = observe(replace(readings, touches=()))
     board = draw_shape("board", np.random.default_rng(0))
     board.theta[layout.HEIGHT], board.theta[layout.X] = np.log(0.06), 0.12
-    alike = seen._replace(rays=seen.rays._replace(gain=np.ones_like(seen.rays.gain)))
-    assert cost_of(board, seen) > 3.0 * cost_of(board, alike)
+    out = rows_for(seen)
+    evaluate(board.code, board.theta, seen, False, out, prepared_room())
+    passing = out.values[-len(seen.rays.kinds) :][seen.rays.kinds == PASS]
+    met = passing[passing < 0.0]
+    thick = np.exp(board.theta[layout.RADII])
+    assert len(met) > 3
+    assert np.median(-met) * seen.rays.pixel > 3.0 * thick
 
 
 def test_a_hypothesis_found_twice_counts_once() -> None:
