@@ -40,10 +40,6 @@ OUTSIDE = 6.0
 FOREIGN = 40.0
 """A contact's typical sum of squares above which no class fits at all."""
 
-DOUBTED, SLIPS, DEAR = 1.0 / 6.0, 2, 8.0
-"""Share of doubtful contacts, and how many, above which they have not slipped; cost of all readings to a
-contact, above which no class fits: below, the doubtful ones met a rim or an edge."""
-
 RIVAL = 0.2
 """Weight of a second class above which the class is unknown."""
 
@@ -89,7 +85,7 @@ def family_estimate(
         doubtful=doubtful,
         flags=_flags(mixture, fit, doubtful),
         seconds=time.perf_counter() - began,
-        details={**_details(mixture, fit), "foreign": _is_foreign(fit, mixture.best.misfit)},
+        details={**_details(mixture, fit), "foreign": fit.typical > FOREIGN},
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
 
@@ -133,13 +129,6 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh) -> FloatArray:
             total += weight / len(shapes) * gap**2
     moved = np.sum((mesh.vertices - plain.vertices) ** 2, axis=1)
     return np.asarray(np.sqrt(WIDER**2 * total + 0.25 * moved + NOISE**2))
-
-
-def _is_foreign(fit: ContactFit, misfit: float) -> bool:
-    """Whether the contacts are of no class: all are far off, or too many to have slipped."""
-    count, doubtful = len(fit.sums), int(fit.doubtful.sum())
-    too_many = doubtful > max(SLIPS, DOUBTED * count) and misfit > DEAR * count
-    return bool(fit.typical > FOREIGN or too_many)
 
 
 def _flags(mixture: Mixture, fit: ContactFit, doubtful: dict[int, float]) -> tuple[str, ...]:

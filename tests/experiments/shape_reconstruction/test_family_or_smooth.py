@@ -8,8 +8,8 @@ import pytest
 from experiments.shape_reconstruction import family_or_smooth
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.contacts_fit import ContactFit
-from experiments.shape_reconstruction.family.estimate import DEAR, FOREIGN, _is_foreign
+from experiments.shape_reconstruction.family.estimate import family_estimate
+from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family_or_smooth import by_family
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.objects.builtin import build
@@ -20,11 +20,6 @@ from tests.support.shape_readings import look_at, shape_readings, touches_on
 def readings() -> ShapeEvidence:
     mesh = build("mug")
     return shape_readings(touches_on(mesh, 8, seed=0), look_at(mesh))
-
-
-def fit_of(sums: list[float], doubtful: int) -> ContactFit:
-    count = len(sums)
-    return ContactFit(np.array(sums), np.zeros(count), np.arange(count) < doubtful, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -47,16 +42,12 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
         assert found is fitted
 
 
-def test_an_object_is_foreign_where_all_contacts_are_far_off() -> None:
-    assert _is_foreign(fit_of([2.0 * FOREIGN] * 8, 0), 0.0)
-    assert not _is_foreign(fit_of([0.5 * FOREIGN] * 8, 0), 0.0)
-
-
-def test_slipped_contacts_alone_make_no_object_foreign() -> None:
-    assert not _is_foreign(fit_of([1.0] * 12, 2), 1e3)
-    assert not _is_foreign(fit_of([1.0] * 12, 4), 0.5 * DEAR * 12)
-    assert _is_foreign(fit_of([1.0] * 12, 4), 2.0 * DEAR * 12)
-
-
-def test_without_a_contact_no_object_is_foreign() -> None:
-    assert not _is_foreign(fit_of([], 0), 50.0)
+def test_contacts_of_no_object_at_all_are_foreign_to_the_family(readings: ShapeEvidence) -> None:
+    random = np.random.default_rng(0)
+    scattered = tuple(
+        replace(touch, points=touch.points + random.uniform(-0.03, 0.03, 3), normals=-touch.normals)
+        for touch in readings.touches
+    )
+    few = replace(LEVELS["coarse"], draws=42)
+    assert family_estimate(replace(readings, touches=scattered), few).details["foreign"]
+    assert not family_estimate(readings, few).details["foreign"]
