@@ -76,11 +76,11 @@ COMMANDS = {
         "Say what an ObjectFile holds: modes, networks, sources, licence.",
     ),
     "object import": Command(
-        "harness.commands.object.import_published:import_published",
+        "harness.commands.object.published.importing:import_published",
         "Read a published ObjectFile (ObjectFolder 1.0 or 2.0) into a folder of ONNX networks.",
     ),
     "object render queries": Command(
-        "harness.commands.object.render_queries:render",
+        "harness.commands.object.published.render:render",
         "Answer ObjectFolder's own query files by an imported object: sounds, touches, pictures.",
     ),
     "object render audio": Command(

@@ -87,7 +87,7 @@ def _rays(
         raw = _raw(fine, view, directions, depths)
     weights = ray_weights(raw[..., 3], depths, directions)
     cover = weights.sum(axis=1)
-    colour = np.einsum("rs,rsc->rc", weights, _colour(raw[..., :3], entry.colour))
+    colour = _summed(weights, raw, entry.colour)
     return colour + (1.0 - cover)[:, None] if entry.white else colour, cover
 
 
@@ -135,6 +135,13 @@ def drawn_depths(edges: FloatArray, weights: FloatArray, count: int) -> FloatArr
     first, last = np.take_along_axis(edges, before, 1), np.take_along_axis(edges, behind, 1)
     found: FloatArray = first + (shares - low) / width * (last - first)
     return found
+
+
+def _summed(weights: FloatArray, raw: FloatArray, kind: str) -> FloatArray:
+    """``(r, 3)``: the weighted colour of every ray; of most samples, nothing is seen."""
+    rays, samples = np.nonzero(weights)
+    scattered = weights[rays, samples, None] * _colour(raw[rays, samples, :3], kind)
+    return np.stack([np.bincount(rays, channel, len(weights)) for channel in scattered.T], axis=1)
 
 
 def _colour(raw: FloatArray, kind: str) -> FloatArray:

@@ -1,15 +1,11 @@
 """Imported networks against the published formulas in float64: every head, to 1e-5 of its greatest number."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from harness.authoring.published.imported import gathered, written
-from harness.authoring.published.layout import format_of
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.objectfile.entries import Source
 from harness.objectfile.published.camera import views_of
 from harness.objectfile.published.field import open_fields
 from harness.objectfile.published.folder import PublishedObject
@@ -19,6 +15,7 @@ from harness.objectfile.published.spectrum_sound import open_spectra
 from harness.objectfile.published.touch import open_colours, open_depths
 from tests.oracles import objectfolder_formulas as formulas
 from tests.samples import published_trees
+from tests.samples.published_objects import imported_object
 
 CLOSE = 1e-5
 BOX = np.array([-0.06, -0.05, 0.01]), np.array([0.05, 0.09, 0.12])
@@ -26,28 +23,22 @@ BOUNDS = (2.0, 21.0)
 TOUCHED = (-0.07, 0.13)
 
 
-def imported(tree: dict[str, Any], folder: Path, **bounds: Any) -> PublishedObject:
-    kind = format_of(tree, "a file")
-    parts = gathered(tree, "a file", kind, bounds.get("audio"), bounds.get("touch"))
-    return written(parts, kind, Source(what="a file", origin="a file", licence="none"), "mug", folder)
-
-
 @pytest.fixture(scope="module")
 def second(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], PublishedObject]:
     tree = published_trees.second()
-    return tree, imported(tree, tmp_path_factory.mktemp("second") / "kilo")
+    return tree, imported_object(tree, tmp_path_factory.mktemp("second") / "kilo")
 
 
 @pytest.fixture(scope="module")
 def second_osf(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], PublishedObject]:
     tree = published_trees.second(1, prefix="", vectors=False, kilo=False)
-    return tree, imported(tree, tmp_path_factory.mktemp("second") / "osf")
+    return tree, imported_object(tree, tmp_path_factory.mktemp("second") / "osf")
 
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], PublishedObject]:
     tree = published_trees.first(2)
-    return tree, imported(tree, tmp_path_factory.mktemp("first") / "mug", audio=BOUNDS, touch=TOUCHED)
+    return tree, imported_object(tree, tmp_path_factory.mktemp("first") / "mug", audio=BOUNDS, touch=TOUCHED)
 
 
 def points(count: int, seed: int = 5) -> FloatArray:

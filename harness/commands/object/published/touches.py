@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.object.published_queries import TOUCH, AnsweredQueries, QueryFiles
+from harness.commands.object.published.files import TOUCH, AnsweredQueries, QueryFiles
 
 if TYPE_CHECKING:
     from harness.basics.arrays import FloatArray
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from harness.objectfile.published.folder import PublishedObject
 
 
-def touches_of(
+def touches_written(
     of: "PublishedObject", rows: "tuple[FloatArray, ...]", given: QueryFiles, out: Path, into: AnsweredQueries
 ) -> None:
     """Write ``1.npy`` and ``1.png`` and so on; ``rows`` are vertices and, of 2.0, presses."""

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.object.published_queries import VISION, AnsweredQueries, QueryFiles
+from harness.commands.object.published.files import VISION, AnsweredQueries, QueryFiles
 
 if TYPE_CHECKING:
     from harness.basics.arrays import FloatArray

@@ -20,7 +20,7 @@ def published_lines(description: "PublishedDescription") -> list[str]:
     ]
     if dropped:
         lines.append(f"  dropped   {dropped} weights in {len(description.dropped)} layers that nothing uses")
-    return [*lines, *(f"  not in it {sentence}" for sentence in description.missing)]
+    return [*lines, *(f"  lacks     {sentence}" for sentence in description.missing)]
 
 
 def _sound(description: "PublishedDescription") -> list[str]:

@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from harness.commands import options
-from harness.commands.object.published_queries import QueryFiles, answer_queries, as_json
+from harness.commands.object.published.answers import answer_queries, as_json
+from harness.commands.object.published.files import QueryFiles
 from harness.commands.output import ANSWERS, emit, warn
 
 _COMPAT_SIZE = 256

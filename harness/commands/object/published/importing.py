@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from harness.commands import options
-from harness.commands.object.published_info import published_lines
+from harness.commands.object.published.info import published_lines
 from harness.commands.output import ANSWERS, emit
 
 if TYPE_CHECKING:

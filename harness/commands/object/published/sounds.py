@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.basics.errors import WrongUse
-from harness.commands.object.published_queries import AUDIO, AnsweredQueries, QueryFiles
+from harness.commands.object.published.files import AUDIO, AnsweredQueries, QueryFiles
 
 if TYPE_CHECKING:
     from harness.basics.arrays import FloatArray
@@ -15,7 +15,7 @@ _MOST_SAMPLES = 2**28
 """Of all sounds together, 2 GB: they are written with one full scale."""
 
 
-def sounds_of(
+def sounds_written(
     of: "PublishedObject", rows: "tuple[FloatArray, ...]", given: QueryFiles, out: Path, into: AnsweredQueries
 ) -> None:
     """Write ``1.wav`` and so on; ``rows`` are vertices and forces, errors as ``answer_queries``."""
