@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.authoring.published.cell_look import needed_cells
 from harness.authoring.published.imported import gathered, import_published
 from harness.authoring.published.layout import format_of
-from harness.authoring.published.look import needed_cells
 from harness.basics.errors import DataRefused, WrongUse
 from tests.samples import published_trees
 from tests.samples.published_files import write_published
