@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.authoring.published.layout import Part, State, checked
+from harness.authoring.published.layout import FileTable, State, checked
 from harness.authoring.published.senses import TOLERANCE, ImportedParts, refusing
 from harness.authoring.published.settings import octaves_of, refeed, sizes, unit_vectors, whole
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
@@ -26,7 +26,7 @@ _MOST_VOXELS = 1024
 """Along a side; published are 256."""
 
 
-def take_cells(vision: Part, settings: Part, state: State, into: ImportedParts) -> dict[str, Any]:
+def take_cells(vision: FileTable, settings: FileTable, state: State, into: ImportedParts) -> dict[str, Any]:
     """The tables of a KiloOSF, its files among the contents.
 
     Args:
@@ -70,7 +70,7 @@ def _chosen(
     chosen: IntArray,
     cells: tuple[int, int, int],
     cube: tuple[FloatArray, FloatArray],
-    settings: Part,
+    settings: FileTable,
 ) -> CellWeights:
     """The networks of cells that something is in."""
     low, high = cube
@@ -123,7 +123,9 @@ def _cell_files(
     return files
 
 
-def _occupancy(vision: Part, settings: Part) -> tuple[BoolArray | None, tuple[int, int, int] | None]:
+def _occupancy(
+    vision: FileTable, settings: FileTable
+) -> tuple[BoolArray | None, tuple[int, int, int] | None]:
     grid = vision.values.get("occupancy_grid")
     if grid is None:
         return None, None

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.authoring.published.container import read_container, sha256_of
-from harness.authoring.published.layout import Part, format_of
+from harness.authoring.published.layout import FileTable, format_of
 from harness.authoring.published.look import take_first_look, take_look
 from harness.authoring.published.senses import (
     ImportedParts,
@@ -91,9 +91,9 @@ def gathered(
 ) -> ImportedParts:
     """Tables and files of everything that a file holds; arguments and errors as ``import_published``."""
     _require_bounds(kind, {"--audio-bounds": audio_bounds, "--touch-bounds": touch_bounds})
-    file, into = Part(name, tree), ImportedParts()
+    file, into = FileTable(name, tree), ImportedParts()
     first = kind == "ObjectFolder 1.0"
-    takers: dict[str, Callable[[Part], None]] = {
+    takers: dict[str, Callable[[FileTable], None]] = {
         "AudioNet": partial(take_spectra, bounds=audio_bounds, into=into)
         if first
         else partial(take_gains, into=into),

@@ -24,7 +24,7 @@ DEAD = "views_linears."
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class FileTable:
     """A table of the file.
 
     Attributes:
@@ -35,14 +35,14 @@ class Part:
     name: str
     values: Mapping[str, Any]
 
-    def part(self, key: str) -> "Part":
+    def part(self, key: str) -> "FileTable":
         """A table within; ``DataRefused`` where there is none."""
         found = self.values.get(key)
         if not isinstance(found, Mapping):
             raise DataRefused(
                 f"{self.name} has no table {key!r}; it is no ObjectFile as ObjectFolder publishes them"
             )
-        return Part(f"{self.name}/{key}", found)
+        return FileTable(f"{self.name}/{key}", found)
 
     def array(self, key: str, shape: tuple[int | None, ...]) -> FloatArray:
         """Finite numbers of a shape, None for any size from 1 up, float64; ``DataRefused`` for others."""
@@ -137,7 +137,7 @@ class State:
     used: set[str] = field(default_factory=set)
 
     @classmethod
-    def of(cls, part: Part, key: str) -> "State":
+    def of(cls, part: FileTable, key: str) -> "State":
         """The state of a key.
 
         The prefix goes where every name has it, and then wherever it stands, as in the published programs.

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from harness.authoring.published.cell_look import VISION, take_cells
-from harness.authoring.published.layout import Part, State
+from harness.authoring.published.layout import FileTable, State
 from harness.authoring.published.senses import TOLERANCE, ImportedParts, refusing
 from harness.authoring.published.settings import octaves_of, refeed, sampling, unit_vectors, whole
 from harness.basics.errors import DataRefused
@@ -36,7 +36,7 @@ _OCTAVES, _TURNS = 10, 4
 _MISSING = ["how the vision frame lies to the mesh, and what its unit is in metres: pictures tell no size"]
 
 
-def take_first_look(vision: Part, into: ImportedParts) -> None:
+def take_first_look(vision: FileTable, into: ImportedParts) -> None:
     """The look of version 1.0: a coarse and a fine network.
 
     Raises:
@@ -53,7 +53,7 @@ def take_first_look(vision: Part, into: ImportedParts) -> None:
     into.missing.append("how rays are sampled: the numbers are the published program's")
 
 
-def take_look(vision: Part, into: ImportedParts) -> None:
+def take_look(vision: FileTable, into: ImportedParts) -> None:
     """The look of version 2.0, of either kind; ``DataRefused`` as ``take_first_look``."""
     settings, state = vision.part("cfg"), State.of(vision, "model_state_dict")
     sampled = sampling(settings)
@@ -73,7 +73,7 @@ def take_look(vision: Part, into: ImportedParts) -> None:
 
 
 def _take_osf(
-    settings: Part, state: State, sampled: Mapping[str, Any], into: ImportedParts
+    settings: FileTable, state: State, sampled: Mapping[str, Any], into: ImportedParts
 ) -> dict[str, Any]:
     layers, skip = whole(settings, "num_hidden_layers", 64), refeed(settings)
     turns = (octaves_of(settings, "num_frequencies"), octaves_of(settings, "num_frequencies_direction"))

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from harness.authoring.published.layout import Part, State
+from harness.authoring.published.layout import FileTable, State
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused, WrongUse
 from harness.objectfile.entries import NetworkEntry
@@ -65,7 +65,7 @@ def refusing(where: str, build: Callable[[], _T]) -> _T:
         raise DataRefused(f"{where}: {error}") from error
 
 
-def take_gains(audio: Part, into: ImportedParts) -> None:
+def take_gains(audio: FileTable, into: ImportedParts) -> None:
     """The sound of version 2.0.
 
     Raises:
@@ -100,7 +100,7 @@ def take_gains(audio: Part, into: ImportedParts) -> None:
     into.missing.append("the unit of the gains, so that sounds have no absolute loudness")
 
 
-def take_spectra(audio: Part, bounds: Bounds | None, into: ImportedParts) -> None:
+def take_spectra(audio: FileTable, bounds: Bounds | None, into: ImportedParts) -> None:
     """The sound of version 1.0; ``DataRefused`` as ``take_gains``."""
     state, normaliser = State.of(audio, "model_state_dict"), audio.part("normalizer")
     branches = [
@@ -129,7 +129,7 @@ def take_spectra(audio: Part, bounds: Bounds | None, into: ImportedParts) -> Non
         )
 
 
-def take_depths(touch: Part, into: ImportedParts) -> None:
+def take_depths(touch: FileTable, into: ImportedParts) -> None:
     """The touch of version 2.0; ``DataRefused`` as ``take_gains``."""
     state = State.of(touch, "model_state_dict")
     low, high = (touch.numbers(key, 3) for key in ("xyz_min", "xyz_max"))
@@ -161,7 +161,7 @@ def take_depths(touch: Part, into: ImportedParts) -> None:
     ]
 
 
-def take_colours(touch: Part, bounds: Bounds | None, into: ImportedParts) -> None:
+def take_colours(touch: FileTable, bounds: Bounds | None, into: ImportedParts) -> None:
     """The touch of version 1.0; ``DataRefused`` as ``take_gains``."""
     state = State.of(touch, "model_state_dict")
     weights = state.perceptron()
@@ -179,7 +179,7 @@ def take_colours(touch: Part, bounds: Bounds | None, into: ImportedParts) -> Non
         )
 
 
-def _range(normaliser: Part, key: str, count: int) -> tuple[FloatArray, FloatArray]:
+def _range(normaliser: FileTable, key: str, count: int) -> tuple[FloatArray, FloatArray]:
     """Factor and offset of an output that was trained between 0 and 1."""
     low, high = (normaliser.numbers(f"{key}_{end}", count) for end in ("min", "max"))
     return high - low, low

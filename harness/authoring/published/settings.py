@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from harness.authoring.published.layout import Part
+from harness.authoring.published.layout import FileTable
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
 
 _MOST_OCTAVES = 16
 
 
-def sampling(settings: Part) -> dict[str, Any]:
+def sampling(settings: FileTable) -> dict[str, Any]:
     """How rays are sampled, by the keys of ``object.json``; ``DataRefused`` for what no look has."""
     if flag(settings, "llff_lindisp"):
         raise DataRefused(f"{settings.name} samples rays evenly in disparity, as no published object does")
@@ -25,19 +25,19 @@ def sampling(settings: Part) -> dict[str, Any]:
     }
 
 
-def refeed(settings: Part) -> int | None:
+def refeed(settings: FileTable) -> int | None:
     """The layer behind which the input comes again; written as text where there is none."""
     if settings.values.get("refeed_position_index") in (None, "None"):
         return None
     return whole(settings, "refeed_position_index", 64, least=0)
 
 
-def octaves_of(settings: Part, key: str) -> int:
+def octaves_of(settings: FileTable, key: str) -> int:
     """The octaves of an encoding."""
     return whole(settings, key, _MOST_OCTAVES, least=0)
 
 
-def whole(settings: Part, key: str, most: int, least: int = 1) -> int:
+def whole(settings: FileTable, key: str, most: int, least: int = 1) -> int:
     """A whole number within limits; ``DataRefused`` for others."""
     number = settings.number(key)
     if number != round(number) or not least <= number <= most:
@@ -45,7 +45,7 @@ def whole(settings: Part, key: str, most: int, least: int = 1) -> int:
     return int(number)
 
 
-def sizes(settings: Part, key: str, most: int) -> tuple[int, int, int]:
+def sizes(settings: FileTable, key: str, most: int) -> tuple[int, int, int]:
     """Whole numbers along x, y and z, from 1; ``DataRefused`` for others."""
     x, y, z = settings.array(key, (3,)).tolist()
     if not all(size == round(size) and 1 <= size <= most for size in (x, y, z)):
@@ -53,7 +53,7 @@ def sizes(settings: Part, key: str, most: int) -> tuple[int, int, int]:
     return int(x), int(y), int(z)
 
 
-def flag(settings: Part, key: str) -> bool:
+def flag(settings: FileTable, key: str) -> bool:
     """True or false, which is what a missing one is."""
     value = settings.values.get(key, False)
     if not isinstance(value, bool | int):

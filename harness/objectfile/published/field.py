@@ -70,7 +70,7 @@ class CellNetworks:
         rows, samples = blocks(which[order], self.entry.block)
         for first in range(0, len(rows), _BLOCKS):
             at = slice(first, first + _BLOCKS)
-            chosen = order[np.maximum(samples[at], samples[at][:, :1])]
+            chosen = order[samples[at]]  # behind a block's samples stands any other, whose answer is left out
             inputs: dict[str, AnyArray] = {
                 "network": rows[at][:, None],
                 "points": points[chosen],

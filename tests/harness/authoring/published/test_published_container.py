@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from harness.authoring.published.container import plain_tree, read_container
-from harness.authoring.published.stand_ins import ALLOWED, PickledArray
+from harness.authoring.published.stand_ins import ALLOWED, PickledArray, PickledDtype
 from harness.basics.errors import DataRefused, TouchstoneError, WrongUse
 from harness.cli import invoke
 from tests.samples import published_trees
@@ -80,6 +80,12 @@ def test_numbers_of_numpy_come_through_as_numbers(tmp_path: Path) -> None:
 def test_arrays_of_anything_else_are_refused(value: Any, tmp_path: Path) -> None:
     with pytest.raises(pickle.UnpicklingError):
         reread(value, tmp_path / "a.pkl")
+
+
+@pytest.mark.parametrize("shape", [(3,), (1,), (2**40,), (-2,), (2.0,), 2])
+def test_an_array_has_the_bytes_of_its_shape_or_is_refused(shape: Any) -> None:
+    with pytest.raises(pickle.UnpicklingError, match=r"bytes for an array|of the shape"):
+        PickledArray().__setstate__((1, shape, PickledDtype("f8"), False, bytes(16)))
 
 
 @pytest.mark.parametrize(

@@ -121,6 +121,21 @@ def test_a_look_answers_a_point_alike_in_any_company(second: PublishedObject) ->
     assert apart == pytest.approx(together, rel=1e-5, abs=1e-5)
 
 
+def test_a_thousandth_within_the_faces_of_its_cube_a_look_is_empty(tmp_path: Path) -> None:
+    tree = published_trees.second()
+    tree["VisionNet"]["occupancy_grid"] = np.ones_like(tree["VisionNet"]["occupancy_grid"])
+    of = imported_object({"VisionNet": tree["VisionNet"]}, tmp_path / "mug")
+    assert of.description.vision is not None
+    field, _ = open_fields(of, of.description.vision)
+    inward = np.array([0.0, 0.9e-3, 1.1e-3, 0.1])
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            points = np.full((4, 3), 0.11)
+            points[:, axis] = side * (0.6 - inward)
+            found = field(points, np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([0.0, 0.0, 1.0]))
+            assert found.any(axis=1).tolist() == [False, False, True, True]
+
+
 def test_a_sense_of_version_1_without_bounds_refuses_in_one_sentence(first: PublishedObject) -> None:
     assert first.description.audio_spectrum is not None
     sound = open_spectra(first, first.description.audio_spectrum)
