@@ -81,7 +81,7 @@ COMMANDS = {
     ),
     "object render queries": Command(
         "harness.commands.object.published.render:render",
-        "Answer ObjectFolder's own query files by an imported object: sounds, touches, pictures.",
+        "Answer ObjectFolder's own query files by an object: sounds, touches, pictures.",
     ),
     "object render audio": Command(
         "harness.commands.object.render:render",

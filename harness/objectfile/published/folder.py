@@ -37,9 +37,8 @@ class PublishedObject:
         tree = read_tree(path)
         if not is_published(tree):
             raise WrongUse(
-                f"{folder} was built from a mesh and not imported; ask it by `touchstone object render "
-                "audio`, "
-                "`touch` and `vision`"
+                f"{folder} was built from a mesh and not imported from a published file; open it as an "
+                "ObjectFile"
             )
         return cls(folder, model_from(tree, PublishedDescription, str(path)))
 

@@ -99,16 +99,16 @@ def rung(
     return sounds
 
 
-def compat_sounds(gains: PublishedGains, amplitudes: FloatArray) -> FloatArray:
+def compat_sounds(amplitudes: FloatArray, frequencies: FloatArray, dampings: FloatArray) -> FloatArray:
     """``(n, 132300)``: sounds as ``OF_render.py`` writes them, at ``COMPAT_RATE``.
 
     Two seconds of ringing cut off hard, after two samples of silence, in three seconds; modes above half of
-    the rate fold; the loudest sample is 1 or -1.
+    the rate fold; the loudest sample is 1 or -1. Arguments as of ``rung``.
 
     Raises:
         OutOfDomain: a silent sound, which has no loudest sample.
     """
-    ring = rung(amplitudes, gains.frequencies, gains.dampings, _COMPAT_RING, COMPAT_RATE)
+    ring = rung(amplitudes, frequencies, dampings, _COMPAT_RING, COMPAT_RATE)
     sounds = np.zeros((len(ring), _COMPAT_SAMPLES))
     sounds[:, _COMPAT_LAG : _COMPAT_LAG + _COMPAT_RING] = ring
     return read_only(peak_normalised(sounds))

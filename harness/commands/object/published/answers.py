@@ -1,10 +1,18 @@
 """Query files answered by an imported object: sounds, maps and pictures, named as ObjectFolder does."""
 
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.basics.errors import WrongUse
+from harness.commands.object.published.built import (
+    built_sounds,
+    built_touches,
+    built_views,
+    require_built,
+)
 from harness.commands.object.published.files import AUDIO, TOUCH, VISION, AnsweredQueries, QueryFiles
 from harness.commands.object.published.sounds import sounds_written
 from harness.commands.object.published.touches import touches_written
@@ -12,7 +20,11 @@ from harness.commands.object.published.views import views_written
 
 if TYPE_CHECKING:
     from harness.basics.arrays import FloatArray
+    from harness.objectfile.file import ObjectFile
     from harness.objectfile.published.folder import PublishedObject
+
+    Rows = tuple[FloatArray, ...]
+    Writer = tuple[str, Rows | None, Callable[[Rows, QueryFiles, Path, AnsweredQueries], None]]
 
 
 def answer_queries(of: "PublishedObject", given: QueryFiles, out: Path) -> AnsweredQueries:
@@ -23,25 +35,43 @@ def answer_queries(of: "PublishedObject", given: QueryFiles, out: Path) -> Answe
         DataRefused: a file that is no such query.
         OutOfDomain: a query that a network was not trained at.
     """
-    _require_pairs(of, given)
+    require_files(given)
+    _require_senses(of, given)
     sounds, touches = _sound_rows(given), _touch_rows(given)
     views = _view_rows(given)
+    writers: list[Writer] = [
+        (AUDIO, sounds, partial(sounds_written, of)),
+        (TOUCH, touches, partial(touches_written, of)),
+        (VISION, views, partial(views_written, of)),
+    ]
+    return _written(writers, given, out)
+
+
+def answer_built(of: "ObjectFile", given: QueryFiles, out: Path) -> AnsweredQueries:
+    """The same by an object that was built from its mesh; errors as ``answer_queries``."""
+    require_files(given)
+    require_built(given)
+    writers: list[Writer] = [
+        (AUDIO, _sound_rows(given), partial(built_sounds, of)),
+        (TOUCH, _touch_rows(given), partial(built_touches, of)),
+        (VISION, _view_rows(given), partial(built_views, of)),
+    ]
+    return _written(writers, given, out)
+
+
+def _written(writers: "list[Writer]", given: QueryFiles, out: Path) -> AnsweredQueries:
     found = AnsweredQueries()
-    for name, rows, write in (
-        (AUDIO, sounds, sounds_written), (TOUCH, touches, touches_written), (VISION, views, views_written)
-    ):  # fmt: skip
+    for name, rows, write in writers:
         if rows is not None:
             begun, place = time.perf_counter(), out / name
             place.mkdir(parents=True, exist_ok=True)
-            write(of, rows, given, place, found)
+            write(rows, given, place, found)
             found.seconds[name] = time.perf_counter() - begun
     return found
 
 
-def _require_pairs(of: "PublishedObject", given: QueryFiles) -> None:
-    """What belongs together is there together, and the object has the sense."""
-    described = of.description
-    second = described.format == "ObjectFolder 2.0"
+def require_files(given: QueryFiles) -> None:
+    """Refuse half of a pair of files, or none at all, with ``WrongUse``."""
     if (given.audio_vertices is None) != (given.audio_forces is None):
         raise WrongUse("--audio-vertices and --audio-forces go together: a force for each vertex")
     if given.touch_gelinfo is not None and given.touch_vertices is None:
@@ -50,6 +80,16 @@ def _require_pairs(of: "PublishedObject", given: QueryFiles) -> None:
         raise WrongUse(
             "no query file was given; give --vision, --audio-vertices and --audio-forces, or --touch-vertices"
         )
+
+
+def _require_senses(of: "PublishedObject", given: QueryFiles) -> None:
+    """What was given is what the object's version takes, and the object has the sense."""
+    if given.metres_per_unit is not None:
+        raise WrongUse(
+            "--metres-per-unit is for objects built from a mesh; an imported one has no known size"
+        )
+    described = of.description
+    second = described.format == "ObjectFolder 2.0"
     if given.touch_vertices is not None and second != (given.touch_gelinfo is not None):
         raise WrongUse(
             "an object of ObjectFolder 2.0 is touched with --touch-gelinfo, tilt, azimuth and depth of each "
@@ -95,13 +135,12 @@ def _view_rows(given: QueryFiles) -> "tuple[FloatArray, ...] | None":
     return None if given.vision is None else (read_rows(given.vision, 6, "camera x y z and light x y z"),)
 
 
-def as_json(of: "PublishedObject", given: QueryFiles, found: AnsweredQueries) -> dict[str, Any]:
+def as_json(of: "PublishedObject | ObjectFile", given: QueryFiles, found: AnsweredQueries) -> dict[str, Any]:
     """As scripts read it."""
     return {
         "schema": 1,
         "folder": str(of.folder),
         "object": of.description.name,
-        "format": of.description.format,
         "objectfolder_compat": given.compat,
         "files": {sense: [str(path) for path in paths] for sense, paths in found.files.items()},
         "full_scale": found.full_scale,

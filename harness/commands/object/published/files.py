@@ -20,6 +20,7 @@ class QueryFiles:
         size: pixels a side of pictures.
         seconds: of sounds.
         rate: samples per second.
+        metres_per_unit: of the vision frame, for an object built from its mesh; None for an imported one.
         compat: whether everything is as the published programs do it.
     """
 
@@ -32,6 +33,7 @@ class QueryFiles:
     size: int
     seconds: float
     rate: float
+    metres_per_unit: float | None
     compat: bool
 
 

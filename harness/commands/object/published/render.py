@@ -1,4 +1,4 @@
-"""``touchstone object render queries``: ObjectFolder's own query files, answered by an imported object."""
+"""``touchstone object render queries``: ObjectFolder's own query files, answered by an object."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from harness.commands import options
-from harness.commands.object.published.answers import answer_queries, as_json
+from harness.commands.object.published.answers import answer_built, answer_queries, as_json
 from harness.commands.object.published.files import QueryFiles
 from harness.commands.output import ANSWERS, emit, warn
 
@@ -14,7 +14,7 @@ _COMPAT_SIZE = 256
 
 
 def render(
-    folder: Annotated[Path, typer.Argument(help="The imported object's folder.", metavar="OBJECT")],
+    folder: Annotated[Path, typer.Argument(help="The object's folder, imported or built.", metavar="OBJECT")],
     out: Annotated[Path, typer.Option(help="Made, with audio, touch and vision in it.", metavar="FOLDER")],
     vision: Annotated[
         Path | None,
@@ -44,6 +44,10 @@ def render(
     size: Annotated[int, typer.Option(help="Pixels a side of pictures.", min=1, max=1024)] = _COMPAT_SIZE,
     seconds: Annotated[float, typer.Option(help="Length of sounds.", metavar="S")] = 3.0,
     rate: Annotated[float, typer.Option(help="Samples per second.", metavar="HZ")] = 44100.0,
+    metres_per_unit: Annotated[
+        str | None,
+        typer.Option(help="Of the vision frame about the middle of a built object, as 10cm.", metavar="L"),
+    ] = None,
     objectfolder_compat: Annotated[
         bool,
         typer.Option(
@@ -54,7 +58,7 @@ def render(
     ] = False,
     json: options.Json = False,
 ) -> int:
-    """Answer ObjectFolder's own query files by an imported object: sounds, touches and pictures.
+    """Answer ObjectFolder's own query files by an object, imported or built: sounds, touches and pictures.
 
     Files are named as the published programs name them: audio/1.wav, touch/1.png, vision/000.png. Without
     --objectfolder-compat sounds keep their loudness relative to one another and ring on, cameras may stand
@@ -64,7 +68,9 @@ def render(
     Try: touchstone object render queries objects/published_mug --vision vision_demo.npy --out rendered
     """
     from harness.basics.errors import WrongUse
-    from harness.objectfile.published.folder import PublishedObject
+    from harness.basics.quantities import LENGTH
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.published.folder import PublishedObject, holds_published
 
     if not 0.0 < seconds <= 60.0:
         raise WrongUse(f"--seconds {seconds:g}: sounds are above 0 and at most 60 s long")
@@ -74,10 +80,15 @@ def render(
         )
     given = QueryFiles(
         vision, audio_vertices, audio_forces, touch_vertices, touch_gelinfo, calibration, size, seconds, rate,
-        objectfolder_compat,
+        options.positive("--metres-per-unit", metres_per_unit, LENGTH), objectfolder_compat,
     )  # fmt: skip
-    of = PublishedObject.open(folder)
-    found = answer_queries(of, given, out)
+    of: PublishedObject | ObjectFile
+    if holds_published(folder):
+        of = PublishedObject.open(folder)
+        found = answer_queries(of, given, out)
+    else:
+        of = ObjectFile.open(folder)
+        found = answer_built(of, given, out)
     for sentence in found.notes:
         warn(sentence)
     if json:

@@ -27,9 +27,9 @@ def sounds_written(
         sounds, rate = _of_spectra(of, spectrum, rows, given, into)
     paths = [out / f"{number}.wav" for number in range(1, len(sounds) + 1)]
     if given.compat:
-        _write_float(paths, sounds, rate)
+        write_float(paths, sounds, rate)
     else:
-        into.full_scale = _write_alike(paths, sounds, rate)
+        into.full_scale = write_alike(paths, sounds, rate)
     into.files[AUDIO] = paths
 
 
@@ -46,7 +46,7 @@ def _of_modes(
     sound, (vertices, forces) = open_gains(of, entry), rows
     amplitudes = sound.amplitudes(vertices, forces)
     if given.compat:
-        return compat_sounds(sound, amplitudes), COMPAT_RATE
+        return compat_sounds(amplitudes, sound.frequencies, sound.dampings), COMPAT_RATE
     check_rate(given.rate)
     heard = sound.audible(given.rate)
     if not heard.all():
@@ -54,13 +54,7 @@ def _of_modes(
             f"{int((~heard).sum())} of {len(heard)} modes are at or above half of {given.rate:g} Hz and "
             "were left out"
         )
-    samples = round(given.seconds * given.rate)
-    if samples * len(vertices) > _MOST_SAMPLES:
-        raise WrongUse(
-            f"{len(vertices)} sounds of {samples} samples are more than {_MOST_SAMPLES} together; give "
-            "fewer rows at "
-            "once, or shorter sounds"
-        )
+    samples = require_room(len(vertices), given)
     sounds = rung(amplitudes[:, heard], sound.frequencies[heard], sound.dampings[heard], samples, given.rate)
     return sounds, given.rate
 
@@ -92,7 +86,19 @@ def _of_spectra(
     return peak_normalised(sounds) if given.compat else sounds, entry.rate_hz
 
 
-def _write_alike(paths: list[Path], sounds: "FloatArray", rate: float) -> float:
+def require_room(count: int, given: QueryFiles) -> int:
+    """Samples of each of so many sounds; ``WrongUse`` where all together are too many."""
+    samples = round(given.seconds * given.rate)
+    if samples * count > _MOST_SAMPLES:
+        raise WrongUse(
+            f"{count} sounds of {samples} samples are more than {_MOST_SAMPLES} together; give fewer rows "
+            "at once, "
+            "or shorter sounds"
+        )
+    return samples
+
+
+def write_alike(paths: list[Path], sounds: "FloatArray", rate: float) -> float:
     """24 bits with one full scale for all: what is louder in the sound is louder in the file."""
     import numpy as np
 
@@ -105,7 +111,7 @@ def _write_alike(paths: list[Path], sounds: "FloatArray", rate: float) -> float:
     return scale
 
 
-def _write_float(paths: list[Path], sounds: "FloatArray", rate: float) -> None:
+def write_float(paths: list[Path], sounds: "FloatArray", rate: float) -> None:
     """Single precision, as the published programs write them."""
     import numpy as np
     from scipy.io import wavfile

@@ -179,7 +179,7 @@ def test_a_compatible_sound_is_the_published_programs(second: tuple[dict[str, An
     assert of.description.audio_gains is not None
     sound = open_gains(of, of.description.audio_gains)
     force = np.array([0.3, -1.0, 2.0])
-    found = compat_sounds(sound, sound.amplitudes(points(1), force[None]))[0]
+    found = compat_sounds(sound.amplitudes(points(1), force[None]), sound.frequencies, sound.dampings)[0]
     assert COMPAT_RATE == 44100.0
     assert np.abs(found - formulas.ring(tree["AudioNet"], points(1)[0], force)).max() < CLOSE
 

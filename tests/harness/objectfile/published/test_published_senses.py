@@ -64,7 +64,8 @@ def test_a_mode_rings_as_it_is_written() -> None:
 def test_a_compatible_sound_knows_the_sign_of_a_force_and_not_its_size(second: PublishedObject) -> None:
     sound, force = gains(second), np.array([[0.2, -0.7, 1.0]])
     one, ten, back = (
-        compat_sounds(sound, sound.amplitudes(POINT, scale * force))[0] for scale in (1.0, 10.0, -1.0)
+        compat_sounds(sound.amplitudes(POINT, scale * force), sound.frequencies, sound.dampings)[0]
+        for scale in (1.0, 10.0, -1.0)
     )
     assert one.shape == (132300,)
     assert not one[:2].any()

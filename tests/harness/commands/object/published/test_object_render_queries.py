@@ -11,7 +11,6 @@ from scipy.io import wavfile
 from harness.cli import invoke
 from harness.picture.image_file import read_image
 from tests.samples import published_trees
-from tests.samples.object_bench import egg_file
 from tests.samples.published_files import write_published
 from tests.samples.published_objects import imported_object
 
@@ -96,6 +95,7 @@ def test_touches_of_version_1_are_pictures_by_the_querys_own_bounds(
         (("--audio-vertices", "@vertices"), "--audio-forces go together"),
         (("--touch-gelinfo", "@gel"), "needs --touch-vertices"),
         (("--touch-vertices", "@vertices"), "with --touch-gelinfo"),
+        (("--vision", "@views", "--metres-per-unit", "1m"), "no known size"),
         (("--vision", "@gel"), "not rows of 6"),
         (("--vision", "@views", "--seconds", "0"), "--seconds 0"),
         (("--vision", "@views", "--size", "8", "--objectfolder-compat"), "leave --size"),
@@ -110,14 +110,6 @@ def test_what_cannot_be_answered_is_refused_in_one_sentence(
     assert said in error
     assert "\n" not in error
     assert not list((tmp_path / "out").rglob("*.*"))
-
-
-def test_an_object_built_from_its_mesh_is_sent_to_its_own_commands(
-    tmp_path: Path, bench: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = egg_file(tmp_path / "egg").folder
-    assert render(bench, tmp_path / "out", str(folder), "--vision", "@views") == 2
-    assert "object render audio" in answer(capsys)["error"]
 
 
 @pytest.mark.parametrize("which", ["mug", "old"])
