@@ -75,6 +75,14 @@ COMMANDS = {
         "harness.commands.object.object:info",
         "Say what an ObjectFile holds: modes, networks, sources, licence.",
     ),
+    "object import": Command(
+        "harness.commands.object.published.importing:import_published",
+        "Read a published ObjectFile (ObjectFolder 1.0 or 2.0) into a folder of ONNX networks.",
+    ),
+    "object render queries": Command(
+        "harness.commands.object.published.render:render",
+        "Answer ObjectFolder's own query files by an object: sounds, touches, pictures.",
+    ),
     "object render audio": Command(
         "harness.commands.object.render:render",
         "Render the sound of a strike at a place: a WAV, and a picture of it and of the modes.",
@@ -135,7 +143,7 @@ GROUPS = {
     "tables": "The tables a paper would print, measured on the mocked bench.",
     "cost": "What accuracy costs in seconds, measured on this machine.",
     "object": "ObjectFiles: what is known of one object, in a folder of open files.",
-    "object render": "What an ObjectFile's networks say, for ears and eyes: audio, touch, vision.",
+    "object render": "What an ObjectFile's networks say, for ears and eyes: audio, touch, vision, queries.",
     "object compare": "What instruments read of an object beside what its ObjectFile says: vision.",
     "calibrate": "Instruments' own calibrations, each an artefact with its residual and its reasons.",
     "sim": "What the simulators compute, one at a time.",

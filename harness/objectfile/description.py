@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -22,6 +22,11 @@ from harness.objectfile.touch_entries import TouchEntry
 from harness.objectfile.vision_entry import VisionEntry
 
 SCHEMA = 1
+
+PUBLISHED = "published"
+"""The ``kind`` of an ``object.json`` that describes networks imported from a published file."""
+
+M = TypeVar("M", bound=Entry)
 
 _MOST_BYTES = 16 * 2**20
 """Of ``object.json``; a thousand modes with their self-test are a tenth of it."""
@@ -96,9 +101,32 @@ def read_description(path: Path) -> Description:
     """Read ``object.json``.
 
     Raises:
-        WrongUse: it is missing.
+        WrongUse: it is missing, or of networks imported from a published file.
         DataRefused: it is damaged, of another schema, or says something unknown; every
             mistake is named, an unknown key with the nearest known one.
+    """
+    tree = read_tree(path)
+    if is_published(tree):
+        raise WrongUse(
+            f"{path.parent} holds networks imported from a published file, which predict other quantities "
+            "than a built ObjectFile's and come without mesh and material; `touchstone object info`, "
+            "`object verify` and `object render queries` read it, for all else build the object from its "
+            "mesh with `touchstone object build`"
+        )
+    return description_from(tree, str(path))
+
+
+def is_published(tree: Any) -> bool:
+    """Whether JSON values of an ``object.json`` are those of an imported file, by their ``kind``."""
+    return isinstance(tree, dict) and tree.get("kind") == PUBLISHED
+
+
+def read_tree(path: Path) -> Any:
+    """The JSON values of an ``object.json`` of either kind; strict, and no larger than one is.
+
+    Raises:
+        WrongUse: it is missing.
+        DataRefused: it is no JSON, or has a key twice, or a number that JSON does not know.
     """
     if not path.is_file():
         raise WrongUse(
@@ -108,14 +136,13 @@ def read_description(path: Path) -> Description:
     if path.stat().st_size > _MOST_BYTES:
         raise DataRefused(f"{path} has {path.stat().st_size} bytes, more than {_MOST_BYTES}; build it again")
     try:
-        tree = json.loads(
+        return json.loads(
             path.read_text(encoding="utf-8"), parse_constant=_no_constant, object_pairs_hook=_no_twins
         )
     except (ValueError, RecursionError) as error:
         raise DataRefused(
             f"{path} is not JSON ({error}); copy it again, or build the object again"
         ) from error
-    return description_from(tree, str(path))
 
 
 def description_from(tree: Any, where: str) -> Description:
@@ -124,6 +151,15 @@ def description_from(tree: Any, where: str) -> Description:
     Raises:
         DataRefused: as ``read_description``.
     """
+    return model_from(tree, Description, where)
+
+
+def model_from(tree: Any, model: type[M], where: str) -> M:
+    """JSON values as a description of either kind.
+
+    Raises:
+        DataRefused: of another schema, or what the model does not allow.
+    """
     number = tree.get("schema") if isinstance(tree, dict) else None
     if type(number) is not int or number != SCHEMA:
         raise DataRefused(
@@ -131,12 +167,12 @@ def description_from(tree: Any, where: str) -> Description:
             "or build the object again"
         )
     try:
-        return validate(tree, Description, where)
+        return validate(tree, model, where)
     except WrongUse as error:
         raise DataRefused(str(error)) from error
 
 
-def description_text(description: Description) -> str:
+def description_text(description: Entry) -> str:
     """``object.json``: the same description is always the same text."""
     return _text(description.model_dump(mode="json", by_alias=True), "") + "\n"
 

@@ -9,8 +9,8 @@ from harness.basics.materials import Material
 from harness.basics.toml_file import StrictModel
 from harness.objects.builtin import DESCRIPTION
 
-MOST_BYTES = 256 * 2**20
-"""Of one file; nothing larger is read."""
+MOST_BYTES = 512 * 2**20
+"""Of one file; nothing larger is read. A published look has 4096 networks, 317 MiB in float32."""
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 

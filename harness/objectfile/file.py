@@ -21,7 +21,7 @@ from harness.objectfile.description import (
     description_text,
     read_description,
 )
-from harness.objectfile.entries import AudioEntry, FileEntry, MaterialEntry, MeshEntry, Provenance
+from harness.objectfile.entries import AudioEntry, Entry, FileEntry, MaterialEntry, MeshEntry, Provenance
 from harness.objectfile.surface_file import mesh_from_ply, ply_bytes
 from harness.objectfile.touch_entries import TouchEntry
 from harness.objectfile.vision_entry import VisionEntry
@@ -82,27 +82,30 @@ class ObjectFile:
         Raises:
             DataRefused: it is missing, leads out of the folder, or its size or hash differs.
         """
-        path = self.folder / entry.file
-        if not path.is_file():
-            raise DataRefused(f"{path} is missing; copy the whole folder again, or build the object again")
-        if path.resolve().parent != self.folder.resolve():
-            raise DataRefused(
-                f"{path} leads out of its folder, to {path.resolve()}; put the file itself there"
-            )
-        size = path.stat().st_size
-        if size != entry.bytes:
-            raise DataRefused(
-                f"{path} has {size} bytes where object.json says {entry.bytes}; "
-                "copy it again, or build the object again"
-            )
-        data = path.read_bytes()
-        found = hashlib.sha256(data).hexdigest()
-        if found != entry.sha256:
-            raise DataRefused(
-                f"{path} was changed: its sha256 is {found[:12]}... where object.json says "
-                f"{entry.sha256[:12]}...; copy it again, or build the object again"
-            )
-        return data
+        return read_named(self.folder, entry)
+
+
+def read_named(folder: Path, entry: FileEntry) -> bytes:
+    """The bytes of a file that a folder's ``object.json`` names; as ``ObjectFile.read``."""
+    path = folder / entry.file
+    if not path.is_file():
+        raise DataRefused(f"{path} is missing; copy the whole folder again, or build the object again")
+    if path.resolve().parent != folder.resolve():
+        raise DataRefused(f"{path} leads out of its folder, to {path.resolve()}; put the file itself there")
+    size = path.stat().st_size
+    if size != entry.bytes:
+        raise DataRefused(
+            f"{path} has {size} bytes where object.json says {entry.bytes}; "
+            "copy it again, or build the object again"
+        )
+    data = path.read_bytes()
+    found = hashlib.sha256(data).hexdigest()
+    if found != entry.sha256:
+        raise DataRefused(
+            f"{path} was changed: its sha256 is {found[:12]}... where object.json says "
+            f"{entry.sha256[:12]}...; copy it again, or build the object again"
+        )
+    return data
 
 
 def file_entry(name: str, data: bytes) -> FileEntry:
@@ -146,7 +149,7 @@ def create_object(
         "provenance": provenance.model_dump(mode="json"),
     }
     description = description_from(described, str(folder / DESCRIPTION))
-    _write(folder, description, {MESH: data})
+    write_described(folder, description, {MESH: data})
     return ObjectFile(folder, description)
 
 
@@ -162,7 +165,7 @@ def copied(of: ObjectFile, folder: Path, files: Iterable[FileEntry]) -> ObjectFi
         DataRefused: one of them is missing or damaged.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    _write(folder, of.description, {entry.file: of.read(entry) for entry in files})
+    write_described(folder, of.description, {entry.file: of.read(entry) for entry in files})
     return ObjectFile(folder, of.description)
 
 
@@ -199,11 +202,12 @@ def with_part(
     unnamed = sorted(set(contents) - {file.file for file in description.files})
     if unnamed:
         raise DataRefused(f"{modality} does not name {unnamed}; it would never be read")
-    _write(of.folder, description, contents)
+    write_described(of.folder, description, contents)
     return ObjectFile(of.folder, description)
 
 
-def _write(folder: Path, description: Description, contents: Mapping[str, bytes]) -> None:
+def write_described(folder: Path, description: Entry, contents: Mapping[str, bytes]) -> None:
+    """Write files and then ``object.json``: readers see the old object, the new one, or a refusal."""
     for name, data in contents.items():
         _write_whole(folder / name, data)
     _write_whole(folder / DESCRIPTION, description_text(description).encode())

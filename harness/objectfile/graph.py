@@ -39,6 +39,12 @@ class MlpWeights:
         """Numbers that come out."""
         return int(self.layers[-1][0].shape[1])
 
+    def scaled(self, factor: AnyArray | float, offset: AnyArray | float = 0.0) -> "MlpWeights":
+        """The same, whose outputs are ``output * factor + offset``, folded into the last layer in float64."""
+        *inner, (weight, bias) = self.layers
+        last = np.asarray(weight, np.float64) * factor, np.asarray(bias, np.float64) * factor + offset
+        return MlpWeights((*inner, last), self.skips)
+
 
 @dataclass(frozen=True)
 class Encoding:

@@ -25,6 +25,7 @@ from harness.effects.plan import default_accuracy, plan
 from harness.experiment.compare import CARRIED
 from harness.experiment.lookup import named, names
 from harness.objectfile.description import Description
+from harness.objectfile.published.entries import PublishedDescription
 from harness.recording.recording import SCHEMA, RunHeader
 from tests.docs.model_tables import dataclass_keys, keys, markdown, nested, summary, table
 from tests.docs.result_keys import ASKED, COMMON, ESTIMATE, LOCALIZATION, SHAPE, SHAPE_ESTIMATE
@@ -58,6 +59,12 @@ def pages() -> dict[str, str]:
             "The description in an ObjectFile's folder. Keys carry their unit; an unknown key, "
             "NaN, infinity and a key given twice are refused. "
             "[What an ObjectFile is](../explanation/objectfile.md).",
+        ),
+        "published_object.md": _of_model(
+            "`object.json` of published networks",
+            PublishedDescription,
+            "The description in a folder that `touchstone object import` made. Strict as a built object's. "
+            "[How to use one](../how-to/published_objectfiles.md).",
         ),
         "effects.md": _effects(),
         "commands.md": _commands(),

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from harness.cli import invoke
+from tests.samples import published_trees
+from tests.samples.published_files import write_published
 from tests.support.whole_run import in_process_run, touch_scene
 
 ROOT = Path(__file__).parents[2]
@@ -26,6 +28,7 @@ IN_ORDER = (
     "object build",
     "object render",
     "object verify",
+    "object import",
 )
 
 
@@ -68,7 +71,7 @@ def test_the_snippet_runs() -> None:
     exec(compile(snippet, "README.md", "exec"), {})  # noqa: S102 - our own page
 
 
-@pytest.mark.parametrize("line", [line for line in QUICK if "PRESSES" not in line])
+@pytest.mark.parametrize("line", [line for line in QUICK if "PRESSES" not in line and ".pth" not in line])
 def test_a_quick_command_answers(line: str, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(here)
     assert invoke(filled(line, None)) == 0
@@ -80,6 +83,14 @@ def test_a_set_of_real_presses_is_calibrated(
     (line,) = [line for line in QUICK if "PRESSES" in line]
     monkeypatch.chdir(here)
     assert invoke(filled(line, shared_data)) == 0
+
+
+def test_a_published_file_is_imported(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
+    (line,) = [line for line in QUICK if ".pth" in line]
+    monkeypatch.chdir(here)
+    write_published(published_trees.second(), here / "ObjectFile.pth")
+    assert invoke(filled(line, None)) == 0
 
 
 @pytest.mark.slow

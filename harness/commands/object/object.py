@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from harness.commands import options
+from harness.commands.object.published.info import published_lines
 from harness.commands.output import ANSWERS, emit
 
 if TYPE_CHECKING:
     from harness.objectfile.description import Description
+    from harness.objectfile.published.entries import PublishedDescription
 
 Folder = Annotated[
     Path, typer.Argument(help="The ObjectFile's folder: the one with object.json in it.", metavar="FOLDER")
@@ -24,15 +26,25 @@ def info(folder: Folder, json: options.Json = False) -> int:
 
     Try: touchstone object info objects/mug
     """
-    from harness.objectfile.file import ObjectFile
-
-    description = ObjectFile.open(folder).description
+    description, lines = _described(folder)
     if json:
         emit({"folder": str(folder), **description.model_dump(mode="json", by_alias=True)})
     else:
-        for line in _lines(description):
+        for line in lines:
             ANSWERS.print(line, markup=False)
     return 0
+
+
+def _described(folder: Path) -> "tuple[Description | PublishedDescription, list[str]]":
+    """What an ``object.json`` of either kind says, and the lines for people."""
+    from harness.objectfile.file import ObjectFile
+    from harness.objectfile.published.folder import PublishedObject, holds_published
+
+    if holds_published(folder):
+        published = PublishedObject.open(folder).description
+        return published, published_lines(published)
+    description = ObjectFile.open(folder).description
+    return description, _lines(description)
 
 
 def verify(folder: Folder, json: options.Json = False) -> int:
@@ -45,10 +57,17 @@ def verify(folder: Folder, json: options.Json = False) -> int:
     Try: touchstone object verify objects/mug
     """
     from harness.objectfile.file import ObjectFile
+    from harness.objectfile.published.folder import PublishedObject, holds_published
     from harness.objectfile.verify.verify import verify as look
+    from harness.objectfile.verify.verify import verify_published
 
-    of = ObjectFile.open(folder)
-    checks = look(of)
+    of: ObjectFile | PublishedObject
+    if holds_published(folder):
+        of = PublishedObject.open(folder)
+        checks = verify_published(of)
+    else:
+        of = ObjectFile.open(folder)
+        checks = look(of)
     failed = [check for check in checks if not check.passed]
     if json:
         listed = [{"check": c.name, "passed": c.passed, "said": c.said} for c in checks]

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from onnx import ModelProto, TensorProto, helper
 
-from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.objectfile.graph import (
     Encoding,
@@ -72,12 +72,12 @@ def audio_graph(
     rows = encoded_rows(3, encoding)
     factor, offset = np.asarray(scales.factor, np.float64), np.asarray(scales.offset, np.float64)
     if len(branches) == 1:
-        scaled = _scaled(branches[0], factor.ravel(), offset.ravel())
+        scaled = branches[0].scaled(factor.ravel(), offset.ravel())
         flat = nodes.mlp(encoded, scaled, rows, "the network")
         nodes.add("Reshape", flat, nodes.constant(np.array([-1, modes, 3])), name="gains")
     else:
         named = [f"the {axis} branch" for axis in "xyz"]
-        parts = [_scaled(branch, factor[:, k], offset[:, k]) for k, branch in enumerate(branches)]
+        parts = [branch.scaled(factor[:, k], offset[:, k]) for k, branch in enumerate(branches)]
         apart = [nodes.mlp(encoded, part, rows, what) for part, what in zip(parts, named, strict=True)]
         last = nodes.constant(np.array([2]))
         nodes.add("Concat", *(nodes.add("Unsqueeze", part, last) for part in apart), axis=2, name="gains")
@@ -87,12 +87,6 @@ def audio_graph(
         [helper.make_tensor_value_info("gains", TensorProto.FLOAT, ["n", modes, 3])],
         "Points (n, 3), m in the object's frame, to mass-normalised mode shapes (n, m, 3), 1/sqrt(kg).",
     )
-
-
-def _scaled(branch: MlpWeights, factor: AnyArray, offset: AnyArray) -> MlpWeights:
-    *inner, (weight, bias) = branch.layers
-    last = np.asarray(weight, np.float64) * factor, np.asarray(bias, np.float64) * factor + offset
-    return MlpWeights((*inner, last), branch.skips)
 
 
 def _check(

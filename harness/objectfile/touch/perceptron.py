@@ -65,12 +65,8 @@ def perceptron_graph(
         )
     nodes = Nodes()
     encoded = nodes.encoded(nodes.normalised("pixel", normaliser), INPUTS, encoding)
-    *inner, (weight, bias) = weights.layers
-    last = np.asarray(weight, np.float64) * scale, np.asarray(bias, np.float64) * scale
-    scaled = MlpWeights((*inner, last), weights.skips)
-    nodes.add(
-        "Identity", nodes.mlp(encoded, scaled, encoded_rows(INPUTS, encoding), "the perceptron"), name="depth"
-    )
+    flat = nodes.mlp(encoded, weights.scaled(scale), encoded_rows(INPUTS, encoding), "the perceptron")
+    nodes.add("Identity", flat, name="depth")
     return nodes.model(
         "touch",
         [helper.make_tensor_value_info("pixel", TensorProto.DOUBLE, ["n", INPUTS])],

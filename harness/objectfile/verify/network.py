@@ -8,6 +8,7 @@ from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused
 from harness.objectfile.entries import Domain, Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
 from harness.objectfile.file import ObjectFile
+from harness.objectfile.published.folder import PublishedObject
 from harness.objectfile.runtime import Network, open_network
 from harness.objectfile.surface_search import SurfaceSearch
 
@@ -20,7 +21,7 @@ _AT_ONCE = 16
 Opened = Callable[[], Network]
 
 
-def opened_once(of: ObjectFile, entry: NetworkEntry) -> Opened:
+def opened_once(of: ObjectFile | PublishedObject, entry: NetworkEntry) -> Opened:
     """The network, opened by the first check that asks for it."""
     opened: list[Network] = []
 
@@ -42,7 +43,7 @@ def look_at_graph(run: Opened) -> str:
     return "valid ONNX of known operations, weights inside and finite, inputs and outputs as described"
 
 
-def look_at_domain(of: ObjectFile, run: Opened) -> str:
+def look_at_domain(of: ObjectFile | PublishedObject, run: Opened) -> str:
     """Ask all over the domain it claims.
 
     Raises:
@@ -116,12 +117,17 @@ def _array(item: Input, kept: Whole, rows: int) -> AnyArray:
     return np.array(kept.values, dtype=item.dtype).reshape(shape)
 
 
-def _queries(of: ObjectFile, item: Input, random: np.random.Generator) -> AnyArray:
+def _queries(of: ObjectFile | PublishedObject, item: Input, random: np.random.Generator) -> AnyArray:
     """``2 _INSIDE`` queries of one input, half inside of its domain, half at the edge."""
     domain, count = item.domain, 2 * _INSIDE
     shares = random.random((count, int(np.prod(_shape(item, 1)))))
     shares[_INSIDE:] = np.round(shares[_INSIDE:])
     if domain.near_surface_m is not None:
+        if isinstance(of, PublishedObject):
+            raise DataRefused(
+                f"the domain of {item.name!r} is near a surface, which an import does not have; import it "
+                "again"
+            )
         places, normals = SurfaceSearch(of.mesh).spread(count)
         lifts = domain.near_surface_m * (2.0 * shares[:, :1] - 1.0)
         return np.asarray((places + lifts * normals).astype(item.dtype))

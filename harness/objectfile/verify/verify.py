@@ -8,8 +8,9 @@ import numpy as np
 
 from harness.basics.errors import DataRefused, TouchstoneError
 from harness.objectfile.audio.audio import open_audio
-from harness.objectfile.entries import FileEntry
+from harness.objectfile.entries import FileEntry, NetworkEntry
 from harness.objectfile.file import ObjectFile
+from harness.objectfile.published.folder import PublishedObject
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.verify.network import look_at_domain, look_at_graph, look_at_self_test, opened_once
 from harness.objectfile.verify.touch import look_at_codes
@@ -44,16 +45,22 @@ def verify(of: ObjectFile) -> list[Check]:
     return [_tried(name, look) for name, look in _looks(of)]
 
 
+def verify_published(of: PublishedObject) -> list[Check]:
+    """Look at all of a folder of imported networks that can be looked at without mesh and material."""
+    return [_tried(name, look) for name, look in _published_looks(of)]
+
+
+def _published_looks(of: PublishedObject) -> Iterator[tuple[str, Callable[[], str]]]:
+    yield from _of_files(of)
+    for sense, network in of.description.networks.items():
+        yield from _of_network(of, sense, network)
+
+
 def _looks(of: ObjectFile) -> Iterator[tuple[str, Callable[[], str]]]:
-    for entry in of.description.files:
-        yield f"{entry.file}: bytes", partial(_bytes, of, entry)
-    yield "folder: nothing else", partial(_no_others, of)
+    yield from _of_files(of)
     yield "mesh", partial(_mesh, of)
     for modality, network in of.description.networks.items():
-        run = opened_once(of, network)
-        yield f"{modality}: graph", partial(look_at_graph, run)
-        yield f"{modality}: domain", partial(look_at_domain, of, run)
-        yield f"{modality}: self-test", partial(look_at_self_test, run, network.self_test)
+        yield from _of_network(of, modality, network)
     audio = of.description.audio
     if audio is not None and audio.table is not None:
         yield "audio: table", partial(_table, of)
@@ -69,6 +76,21 @@ def _looks(of: ObjectFile) -> Iterator[tuple[str, Callable[[], str]]]:
         yield "vision: networks and surface", partial(look_at_looks, of)
 
 
+def _of_files(of: ObjectFile | PublishedObject) -> Iterator[tuple[str, Callable[[], str]]]:
+    for entry in of.description.files:
+        yield f"{entry.file}: bytes", partial(_bytes, of, entry)
+    yield "folder: nothing else", partial(_no_others, of)
+
+
+def _of_network(
+    of: ObjectFile | PublishedObject, name: str, network: NetworkEntry
+) -> Iterator[tuple[str, Callable[[], str]]]:
+    run = opened_once(of, network)
+    yield f"{name}: graph", partial(look_at_graph, run)
+    yield f"{name}: domain", partial(look_at_domain, of, run)
+    yield f"{name}: self-test", partial(look_at_self_test, run, network.self_test)
+
+
 def _tried(name: str, look: Callable[[], str]) -> Check:
     try:
         return Check(name, True, look())
@@ -76,11 +98,11 @@ def _tried(name: str, look: Callable[[], str]) -> Check:
         return Check(name, False, str(error))
 
 
-def _bytes(of: ObjectFile, entry: FileEntry) -> str:
+def _bytes(of: ObjectFile | PublishedObject, entry: FileEntry) -> str:
     return f"{len(of.read(entry))} bytes, of the hash that object.json says"
 
 
-def _no_others(of: ObjectFile) -> str:
+def _no_others(of: ObjectFile | PublishedObject) -> str:
     known = {DESCRIPTION, *(entry.file for entry in of.description.files)}
     others = sorted(path.name for path in of.folder.iterdir() if path.name not in known)
     stopped = [name for name in others if name.startswith(".") and name.endswith("_training.npz")]

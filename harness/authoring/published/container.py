@@ -1,0 +1,147 @@
+"""A file of torch as plain tables of numpy arrays. Reading it runs nothing of what is in it.
+
+torch's own restricted reader (``weights_only``) makes tensors, dictionaries and numbers; numpy's arrays, of
+which published files have some, are made by ``stand_ins``. Any other name in the file is refused.
+"""
+
+import hashlib
+import pickle
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.authoring.published.stand_ins import ALLOWED, MOST_NUMBERS, PickledArray
+from harness.basics.arrays import AnyArray
+from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.named_file import require_file
+
+Tree = Any
+"""Tables (``dict`` with text or whole numbers as keys), lists, arrays, numbers, text, None."""
+
+_MOST_BYTES = 2 * 2**30
+"""Of a file and of what it unpacks to: a KiloOSF's 332 MB, several times."""
+
+_DEEPEST = 8
+"""Tables within tables."""
+
+_FOREIGN = "it is no ObjectFile of ObjectFolder; give the .pth as it was published"
+
+
+def read_container(path: Path) -> Tree:
+    """What a ``.pth`` file holds.
+
+    Raises:
+        WrongUse: there is no such file, or torch is not installed.
+        DataRefused: it is foreign or cut short, or asks for code to be run.
+    """
+    require_file(path, "file", "give a published ObjectFile, a .pth file")
+    _require_archive(path)
+    return plain_tree(_loaded(path), path.name)
+
+
+def sha256_of(path: Path) -> str:
+    """Of a file's bytes, hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _require_archive(path: Path) -> None:
+    """Looked at before torch is: a cut file has lost its table of contents, which stands last."""
+    size = path.stat().st_size
+    if size > _MOST_BYTES:
+        raise DataRefused(f"{path.name} has {size} bytes, more than {_MOST_BYTES}; {_FOREIGN}")
+    with path.open("rb") as stream:
+        if stream.read(2) != b"PK":
+            raise DataRefused(f"{path.name} is no archive of torch (of 1.6 or later); {_FOREIGN}")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            listed = archive.infolist()
+    except (zipfile.BadZipFile, OSError, ValueError) as error:
+        raise DataRefused(
+            f"{path.name} is damaged or cut short ({error}); copy or download it again"
+        ) from error
+    unpacked = sum(item.file_size for item in listed)
+    if unpacked > _MOST_BYTES:
+        raise DataRefused(f"{path.name} unpacks to {unpacked} bytes, more than {_MOST_BYTES}; {_FOREIGN}")
+    if not any(item.filename.endswith("data.pkl") for item in listed):
+        raise DataRefused(f"{path.name} is an archive without torch's data.pkl; {_FOREIGN}")
+
+
+def _loaded(path: Path) -> Any:
+    try:
+        import torch
+    except ImportError as error:
+        raise WrongUse(
+            "reading a .pth file needs torch, which is in the extra `author`: pip install '.[author]'"
+        ) from error
+    try:
+        with torch.serialization.safe_globals(list(ALLOWED)):
+            return torch.load(path, map_location="cpu", weights_only=True)
+    except pickle.UnpicklingError as error:
+        raise DataRefused(
+            f"{path.name} asks for what no ObjectFile needs, and nothing of it was run ({_reason(error)}); "
+            f"{_FOREIGN}"
+        ) from error
+    except Exception as error:
+        # torch raises whatever its reader met: KeyError, RuntimeError, EOFError for one damaged file.
+        raise DataRefused(
+            f"{path.name} is damaged or cut short ({_reason(error)}); copy or download it again"
+        ) from error
+
+
+def _reason(error: Exception) -> str:
+    """The cause in one line: torch's advice is to trust the file, and the cause stands behind it."""
+    text = " ".join(str(error).split())
+    said = text.rpartition("WeightsUnpickler error:")[2] or text
+    return said.strip().split(". ")[0][:160] or type(error).__name__
+
+
+def plain_tree(value: Any, where: str, depth: int = 0) -> Tree:
+    """Tables, lists, arrays of numbers, numbers and text; whatever else is there is refused.
+
+    Args:
+        value: as it was loaded.
+        where: for messages.
+        depth: of tables around it.
+
+    Raises:
+        DataRefused: naming the place.
+    """
+    if depth > _DEEPEST:
+        raise DataRefused(f"{where} lies deeper than any table of an ObjectFile; {_FOREIGN}")
+    match value:
+        case None | bool() | int() | float() | str():
+            return value
+        case Mapping():
+            return _table(value, where, depth)
+        case list() | tuple():
+            return [plain_tree(item, f"{where}[{k}]", depth + 1) for k, item in enumerate(value)]
+        case PickledArray() if value.array is not None:
+            return value.array
+    if hasattr(value, "detach") and hasattr(value, "numel"):
+        return _of_tensor(value, where)
+    raise DataRefused(f"{where} is a {type(value).__name__}, of which an ObjectFile has none; {_FOREIGN}")
+
+
+def _table(table: Mapping[Any, Any], where: str, depth: int) -> dict[Any, Tree]:
+    for key in table:
+        if not isinstance(key, str | int):
+            raise DataRefused(f"{where} has a key that is a {type(key).__name__}; {_FOREIGN}")
+    return {key: plain_tree(item, f"{where}[{key!r}]", depth + 1) for key, item in table.items()}
+
+
+def _of_tensor(tensor: Any, where: str) -> AnyArray:
+    if tensor.numel() > MOST_NUMBERS:
+        raise DataRefused(f"{where} has {tensor.numel()} numbers, more than {MOST_NUMBERS}; {_FOREIGN}")
+    try:
+        found = tensor.detach().contiguous()
+        plain = found.float() if str(found.dtype) == "torch.bfloat16" else found
+        array: AnyArray = np.array(plain.numpy())
+    except (TypeError, RuntimeError) as error:
+        raise DataRefused(
+            f"{where} is a tensor that is no plain array ({_reason(error)}); {_FOREIGN}"
+        ) from error
+    return array

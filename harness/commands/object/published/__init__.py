@@ -1,0 +1,1 @@
+"""Commands about objects whose networks were published by others: import, query files."""

@@ -1,0 +1,245 @@
+"""The tables of ``object.json`` for networks imported from a published file.
+
+Published networks predict other quantities than a built ObjectFile's, in frames of their own: gains of modes
+in a unit that is nowhere stated, the distance from a camera to a gel, raw colour and density in a normalised
+cube. Each table names its quantity; what a file does not hold is null and listed under ``missing``.
+"""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from harness.objectfile.entries import Entry, FileEntry, NetworkEntry, Provenance
+
+Positive = Annotated[float, Field(gt=0.0)]
+Size = Annotated[int, Field(ge=1)]
+Point = tuple[float, float, float]
+Bounds = tuple[float, float]
+
+Format = Literal["ObjectFolder 1.0", "ObjectFolder 2.0"]
+
+
+class PublishedGainsEntry(Entry):
+    """Sound of ObjectFolder 2.0: modes, and their gains for a unit force along x, y and z.
+
+    ``s(t) = sum_i g_i exp(-|d_i| t) sin(2 pi f_i t)``
+
+    Attributes:
+        frequencies_hz: Hz, as published: of the damped modes, in any order.
+        dampings_per_s: 1/s, as published; their sign is ignored.
+        low_m: m, least corner of the box that points may lie in.
+        high_m: m, greatest corner.
+        network: points to gains, whose unit the file does not state.
+    """
+
+    frequencies_hz: Annotated[tuple[float, ...], Field(min_length=1)]
+    dampings_per_s: tuple[float, ...]
+    low_m: Point
+    high_m: Point
+    network: NetworkEntry
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        modes = len(self.frequencies_hz)
+        if len(self.dampings_per_s) != modes or self.network.outputs[0].shape != ("n", modes, 3):
+            raise ValueError(
+                f"{modes} frequencies, {len(self.dampings_per_s)} dampings and gains of "
+                f"{self.network.outputs[0].shape}; there is one of each for each mode"
+            )
+        return self
+
+
+class PublishedSpectrumEntry(Entry):
+    """Sound of ObjectFolder 1.0: short-time spectra for a unit force along x, y and z.
+
+    Attributes:
+        rate_hz: samples per second.
+        samples: of a sound.
+        window: samples of a Hann window.
+        hop: samples between windows.
+        transform: samples of a transform; it has ``transform / 2 + 1`` frequencies.
+        frames: windows of a sound.
+        voxels: file of ``(m, 3)`` float64, the solid voxels whose spectra the network learnt.
+        grid: voxels along a side of the grid.
+        translation: added to a point in metres ...
+        scale: ... and multiplied by: then ``grid`` more are voxels.
+        bounds: of the voxels' coordinates, 0 and 1 of the network's; null where nobody gave them.
+        network: normalised place, frequency and time to the spectrum's real and imaginary part.
+    """
+
+    rate_hz: Positive = 16000.0
+    samples: Size = 32000
+    window: Size = 400
+    hop: Size = 160
+    transform: Size = 512
+    frames: Size = 201
+    voxels: FileEntry
+    grid: Size = 32
+    translation: Point
+    scale: Positive
+    bounds: Bounds | None = None
+    network: NetworkEntry
+
+
+class PublishedDepthEntry(Entry):
+    """Touch of ObjectFolder 2.0: the distance from the gel's camera to its surface.
+
+    Attributes:
+        rows: pixels.
+        columns: pixels.
+        low_m: m, least corner of the box that contacts may lie in.
+        high_m: m, greatest corner.
+        most_tilt_rad: rad, of the gel from the vertex's normal, at most.
+        depth_m: m, least and greatest depth of a press.
+        network: nine numbers of a pixel to metres from the camera.
+    """
+
+    rows: Size = 120
+    columns: Size = 160
+    low_m: Point
+    high_m: Point
+    most_tilt_rad: Positive
+    depth_m: tuple[Positive, Positive]
+    network: NetworkEntry
+
+
+class PublishedColoursEntry(Entry):
+    """Touch of ObjectFolder 1.0: what a DIGIT sees of a press along the normal.
+
+    Attributes:
+        rows: pixels.
+        columns: pixels.
+        bounds_m: m, least and greatest coordinate (x, y and z alike) of what the network learnt from; null
+            where nobody gave them.
+        network: normalised place, row and column to red, green and blue, -1 to 1.
+    """
+
+    rows: Size = 160
+    columns: Size = 120
+    bounds_m: Bounds | None = None
+    network: NetworkEntry
+
+
+class PublishedCellsEntry(Entry):
+    """The cells of a KiloOSF: a lattice over a cube, a network in each that matter may be in.
+
+    Attributes:
+        low: least corner of the cube.
+        high: greatest corner.
+        cells: along x, y and z.
+        block: samples of one network that are queried together.
+        networks: file of ``(x y z,)`` int32: the network of each cell, x slowest; -1 where there is none.
+        occupancy: file of packed bits, x slowest, the first voxel in the highest bit; null where all is taken
+            for occupied.
+        voxels: of the occupancy, along x, y and z.
+    """
+
+    low: Point
+    high: Point
+    cells: tuple[Size, Size, Size]
+    block: Size
+    networks: FileEntry
+    occupancy: FileEntry | None = None
+    voxels: tuple[Size, Size, Size] | None = None
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if (self.occupancy is None) != (self.voxels is None):
+            raise ValueError("occupancy and voxels go together")
+        return self
+
+
+class PublishedVisionEntry(Entry):
+    """Look of either: raw colour and density in a normalised frame, summed along rays.
+
+    Lengths are in the frame's own unit. What it is in metres, and how it lies to the mesh, is not published.
+
+    Attributes:
+        kind: ``osf`` one network for all places; ``kilo-osf`` one for each cell.
+        frame: of points, views and light.
+        near: along the camera's axis, the first sample.
+        far: along the camera's axis, the last sample.
+        samples: along a ray.
+        importance: further samples, placed by the weights of the first; 0 for none.
+        white: whether the background is white; else it is black.
+        colour: how raw colour becomes colour before it is stretched by 1.2 about 0.5.
+        network: the only one, or the coarse one.
+        fine: takes the further samples; null where there are none.
+        cells: of ``kilo-osf``.
+    """
+
+    kind: Literal["osf", "kilo-osf"]
+    frame: Literal["vision: normalised, z up"] = "vision: normalised, z up"
+    near: Positive
+    far: Positive
+    samples: Annotated[int, Field(ge=2, le=4096)]
+    importance: Annotated[int, Field(ge=0, le=4096)]
+    white: bool
+    colour: Literal["sigmoid", "clipped"]
+    network: NetworkEntry
+    fine: NetworkEntry | None = None
+    cells: PublishedCellsEntry | None = None
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if not self.near < self.far:
+            raise ValueError(f"samples from {self.near} to {self.far}; far must be beyond near")
+        if (self.kind == "kilo-osf") != (self.cells is not None):
+            raise ValueError("cells belong to kilo-osf and to nothing else")
+        if (self.importance > 0) != (self.fine is not None):
+            raise ValueError("further samples and a fine network go together")
+        return self
+
+
+class PublishedDescription(Entry):
+    """All of an imported ``object.json``.
+
+    Attributes:
+        schema_number: ``schema`` in the file.
+        kind: that it is of networks imported from a published file, not built from a mesh.
+        name: of the object.
+        format: of the published file.
+        missing: what the file does not hold and a user may expect, a sentence each.
+        dropped: numbers of the file that its own program never uses, by name.
+        provenance: file, hash, licence.
+        audio_gains: sound of 2.0.
+        audio_spectrum: sound of 1.0.
+        touch_depth: touch of 2.0.
+        touch_colours: touch of 1.0.
+        vision: look of either.
+    """
+
+    schema_number: Literal[1] = Field(alias="schema")
+    kind: Literal["published"]
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    format: Format
+    missing: tuple[str, ...]
+    dropped: dict[str, int] = Field(default_factory=dict)
+    provenance: Provenance
+    audio_gains: PublishedGainsEntry | None = None
+    audio_spectrum: PublishedSpectrumEntry | None = None
+    touch_depth: PublishedDepthEntry | None = None
+    touch_colours: PublishedColoursEntry | None = None
+    vision: PublishedVisionEntry | None = None
+
+    @property
+    def networks(self) -> dict[str, NetworkEntry]:
+        """By sense, those that there are."""
+        vision = self.vision
+        every = {
+            "audio": self.audio_gains or self.audio_spectrum,
+            "touch": self.touch_depth or self.touch_colours,
+            "vision": vision,
+        }
+        found = {name: entry.network for name, entry in every.items() if entry is not None}
+        if vision is not None and vision.fine is not None:
+            found["vision fine"] = vision.fine
+        return found
+
+    @property
+    def files(self) -> tuple[FileEntry, ...]:
+        """Every file that the folder must hold, each once."""
+        voxels = () if self.audio_spectrum is None else (self.audio_spectrum.voxels,)
+        cells = None if self.vision is None else self.vision.cells
+        others = () if cells is None else (cells.networks, cells.occupancy)
+        return tuple(entry for entry in (*self.networks.values(), *voxels, *others) if entry is not None)

@@ -1,0 +1,226 @@
+"""Imported networks against the published formulas in float64: every head, to 1e-5 of its greatest number."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.objectfile.published.camera import views_of
+from harness.objectfile.published.field import open_fields
+from harness.objectfile.published.folder import PublishedObject
+from harness.objectfile.published.march import picture_of
+from harness.objectfile.published.sound import COMPAT_RATE, compat_sounds, open_gains
+from harness.objectfile.published.spectrum_sound import open_spectra
+from harness.objectfile.published.touch import open_colours, open_depths
+from tests.oracles import objectfolder_formulas as formulas
+from tests.samples import published_trees
+from tests.samples.published_objects import imported_object
+
+CLOSE = 1e-5
+BOX = np.array([-0.06, -0.05, 0.01]), np.array([0.05, 0.09, 0.12])
+BOUNDS = (2.0, 21.0)
+TOUCHED = (-0.07, 0.13)
+
+
+@pytest.fixture(scope="module")
+def second(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], PublishedObject]:
+    tree = published_trees.second()
+    return tree, imported_object(tree, tmp_path_factory.mktemp("second") / "kilo")
+
+
+@pytest.fixture(scope="module")
+def second_osf(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], PublishedObject]:
+    tree = published_trees.second(1, prefix="", vectors=False, kilo=False)
+    return tree, imported_object(tree, tmp_path_factory.mktemp("second") / "osf")
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], PublishedObject]:
+    tree = published_trees.first(2)
+    return tree, imported_object(tree, tmp_path_factory.mktemp("first") / "mug", audio=BOUNDS, touch=TOUCHED)
+
+
+def points(count: int, seed: int = 5) -> FloatArray:
+    found: FloatArray = BOX[0] + np.random.default_rng(seed).random((count, 3)) * (BOX[1] - BOX[0])
+    return found
+
+
+def directions(count: int, seed: int = 6) -> FloatArray:
+    drawn = np.random.default_rng(seed).normal(size=(count, 3))
+    found: FloatArray = drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+    return found
+
+
+def apart(found: AnyArray, wanted: AnyArray) -> float:
+    """Of the head's greatest number."""
+    return float(np.abs(found - wanted).max() / np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("which", ["second", "second_osf"])
+def test_gains_of_modes_are_those_of_the_published_formulas(
+    which: str, request: pytest.FixtureRequest
+) -> None:
+    tree, of = request.getfixturevalue(which)
+    entry = of.description.audio_gains
+    found = open_gains(of, entry).at(points(9))
+    wanted = np.stack([formulas.gains(tree["AudioNet"], point) for point in points(9)])
+    for axis in range(3):
+        assert apart(found[..., axis], wanted[..., axis]) < CLOSE
+
+
+@pytest.mark.parametrize("which", ["second", "second_osf"])
+def test_distances_of_the_gel_are_those_of_the_published_formulas(
+    which: str, request: pytest.FixtureRequest
+) -> None:
+    tree, of = request.getfixturevalue(which)
+    vertices, gel = points(2), np.array([[0.1, 2.3, 0.7e-3], [0.25, -1.0, 1.9e-3]])
+    maps = open_depths(of, of.description.touch_depth).maps(vertices, gel)
+    assert maps.shape == (2, 120, 160)
+    at = [(0, 0, 0), (0, 119, 3), (1, 7, 159), (1, 60, 80), (1, 118, 158)]
+    wanted = [formulas.depth(tree["TouchNet"], vertices[n], gel[n], row, column) for n, row, column in at]
+    assert apart(np.array([maps[place] for place in at]) - 0.0339, np.array(wanted) - 0.0339) < CLOSE
+
+
+def test_one_network_of_a_look_is_that_of_the_published_formulas(
+    second_osf: tuple[dict[str, Any], PublishedObject],
+) -> None:
+    tree, of = second_osf
+    look, state = of.description.vision, tree["VisionNet"]["model_state_dict"]
+    assert look is not None
+    places, views, light = (
+        np.random.default_rng(0).uniform(-1.0, 1.0, (9, 3)),
+        directions(9),
+        directions(1, 8)[0],
+    )
+    for prefix, field in zip(("model_coarse.", "model_fine."), open_fields(of, look), strict=True):
+        assert field is not None
+        wanted = np.stack(
+            [formulas.osf(state, prefix, 4, 1, p, v, light) for p, v in zip(places, views, strict=True)]
+        )
+        found = field(places, views, light)
+        assert apart(found[:, :3], wanted[:, :3]) < CLOSE
+        assert apart(found[:, 3], wanted[:, 3]) < CLOSE
+
+
+def test_the_networks_of_cells_are_those_of_the_published_formulas(
+    second: tuple[dict[str, Any], PublishedObject],
+) -> None:
+    tree, of = second
+    assert of.description.vision is not None
+    places = np.random.default_rng(0).uniform(-0.61, 0.61, (300, 3))
+    views, light = directions(300), directions(1, 8)[0]
+    field, _ = open_fields(of, of.description.vision)
+    wanted = np.stack(
+        [formulas.kilo(tree["VisionNet"], p, v, light) for p, v in zip(places, views, strict=True)]
+    )
+    found = field(places, views, light)
+    nothing = ~wanted.any(axis=1)
+    assert 40 < np.count_nonzero(nothing) < 260
+    assert not found[nothing].any()
+    assert apart(found[:, :3], wanted[:, :3]) < CLOSE
+    assert apart(found[:, 3], wanted[:, 3]) < CLOSE
+
+
+def test_spectra_of_version_1_are_those_of_the_published_formulas(
+    first: tuple[dict[str, Any], PublishedObject],
+) -> None:
+    tree, of = first
+    assert of.description.audio_spectrum is not None
+    sound = open_spectra(of, of.description.audio_spectrum)
+    point = np.array([0.02, 0.03, 0.12])
+    voxels = sound.near(point)
+    solid = tree["AudioNet"]["voxel_vertex"]
+    far = np.linalg.norm(solid - (point + np.array([0.1, 0.05, 0.0])) * 4.0 * 32, axis=1)
+    assert {tuple(voxel) for voxel in voxels} == {tuple(voxel) for voxel in solid[np.argsort(far)[:4]]}
+    found = sound.spectrum((voxels[0] - BOUNDS[0]) / (BOUNDS[1] - BOUNDS[0]))
+    at = [(0, 0), (256, 200), (3, 150), (200, 9), (77, 78)]
+    wanted = np.stack([formulas.spectrum(tree["AudioNet"], voxels[0], BOUNDS, place) for place in at])
+    assert apart(np.stack([found[place] for place in at]), wanted) < CLOSE
+
+
+def test_colours_of_version_1_are_those_of_the_published_formulas(
+    first: tuple[dict[str, Any], PublishedObject],
+) -> None:
+    tree, of = first
+    assert of.description.touch_colours is not None
+    touch = open_colours(of, of.description.touch_colours)
+    vertices = points(2)
+    images = touch.images(vertices)
+    assert images.shape == (2, 160, 120, 3)
+    for n, row, column in [(0, 0, 0), (0, 159, 2), (1, 5, 119), (1, 80, 60)]:
+        wanted = formulas.colour(tree["TouchNet"], vertices[n], TOUCHED, row, column)
+        grey = np.clip((wanted + 1) / 2 * 255, 0, 255)
+        assert np.abs(images[n, row, column] - grey).max() <= 0.5 + 255 * CLOSE * np.abs(wanted).max()
+
+
+def test_both_networks_of_a_look_of_version_1_are_those_of_the_published_formulas(
+    first: tuple[dict[str, Any], PublishedObject],
+) -> None:
+    tree, of = first
+    assert of.description.vision is not None
+    places, views, light = (
+        np.random.default_rng(0).uniform(-1.0, 1.0, (3, 3)),
+        directions(3),
+        directions(1, 8)[0],
+    )
+    keys = ("network_fn_state_dict", "network_fine_state_dict")
+    for key, field in zip(keys, open_fields(of, of.description.vision), strict=True):
+        assert field is not None
+        state = tree["VisionNet"][key]
+        wanted = np.stack(
+            [formulas.osf(state, "", 8, 4, p, v, light) for p, v in zip(places, views, strict=True)]
+        )
+        assert apart(field(places, views, light), wanted) < CLOSE
+
+
+def test_a_compatible_sound_is_the_published_programs(second: tuple[dict[str, Any], PublishedObject]) -> None:
+    tree, of = second
+    assert of.description.audio_gains is not None
+    sound = open_gains(of, of.description.audio_gains)
+    force = np.array([0.3, -1.0, 2.0])
+    found = compat_sounds(sound.amplitudes(points(1), force[None]), sound.frequencies, sound.dampings)[0]
+    assert COMPAT_RATE == 44100.0
+    assert np.abs(found - formulas.ring(tree["AudioNet"], points(1)[0], force)).max() < CLOSE
+
+
+def test_a_spectrum_becomes_the_sound_that_overlapped_windows_make(
+    first: tuple[dict[str, Any], PublishedObject],
+) -> None:
+    _, of = first
+    assert of.description.audio_spectrum is not None
+    random = np.random.default_rng(0)
+    spectrum = random.normal(size=(257, 201)) + 1j * random.normal(size=(257, 201))
+    found = open_spectra(of, of.description.audio_spectrum).heard(spectrum)
+    assert found.shape == (32000,)
+    assert apart(found, formulas.inverse_stft(spectrum)) < 1e-12
+
+
+@pytest.mark.parametrize("which", ["second", "second_osf"])
+def test_a_compatible_picture_is_the_published_programs(which: str, request: pytest.FixtureRequest) -> None:
+    tree, of = request.getfixturevalue(which)
+    look, size, eye, light = of.description.vision, 6, np.array([1.2, -1.5, 1.6]), np.array([0.0, -0.6, 0.8])
+    eye *= 2.5 / np.linalg.norm(eye)
+    view = views_of(np.array([[*eye, *light]]), 1.04, compat=True)[0]
+    found = picture_of(look, open_fields(of, look), view, size, 0.0)
+    rays, settings = formulas.camera_rays(eye, size), tree["VisionNet"]["cfg"]
+    assert found.cover.max() > 0.5
+    for row, column in [(0, 0), (2, 3), (3, 3), (4, 1), (5, 5)]:
+        ray = rays[row, column]
+        depths = np.linspace(settings["near"], settings["far"], settings["num_samples_per_ray"])
+        raw = _raw(tree, "model_coarse.", eye, ray, depths, light)
+        colour, weights = formulas.ray_colour(raw, depths, ray)
+        if settings["num_importance_samples_per_ray"]:
+            depths = formulas.finer_depths(depths, weights, settings["num_importance_samples_per_ray"])
+            colour, _ = formulas.ray_colour(_raw(tree, "model_fine.", eye, ray, depths, light), depths, ray)
+        assert found.colour[row, column] == pytest.approx(colour, abs=CLOSE)
+
+
+def _raw(
+    tree: dict[str, Any], prefix: str, eye: FloatArray, ray: FloatArray, depths: FloatArray, light: FloatArray
+) -> FloatArray:
+    look, view = tree["VisionNet"], ray / np.linalg.norm(ray)
+    if "occupancy_grid" in look:
+        return np.stack([formulas.kilo(look, eye + z * ray, view, light) for z in depths])
+    state = look["model_state_dict"]
+    return np.stack([formulas.osf(state, prefix, 4, 1, eye + z * ray, view, light) for z in depths])
