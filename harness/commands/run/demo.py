@@ -41,8 +41,8 @@ def demo(
     Try: touchstone demo shape-reconstruction
     """
     CONSOLE.print(
-        "mock bench: a UR5e's controller and a GelSight's stream on loopback, a hammer and a microphone on a "
-        "serial line, with a reality gap of their own"
+        "mock bench: a UR5e's controller, a GelSight's stream and what else the run reads, each at the far "
+        "end of its cable, with a reality gap of their own"
     )
     return run(
         experiment,
