@@ -105,9 +105,10 @@ def test_the_script_shows_the_surface_and_turns_it_by_a_drag_and_a_key(tmp_path:
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_what_is_nearer_to_the_viewer_hides_what_is_behind(tmp_path: Path, order: tuple[int, int]) -> None:
     towards = seen_from(-55.0, 35.0)[2]
-    balls = [trimesh.creation.icosphere(2, 0.03).apply_translation(way * 0.05 * towards) for way in (1, -1)]
-    both = trimesh.util.concatenate([balls[k] for k in order])
-    mesh = Mesh(np.asarray(both.vertices), np.asarray(both.faces))
+    ball = trimesh.creation.icosphere(2, 0.03)
+    balls = [ball.vertices + way * 0.05 * towards for way in (1.0, -1.0)]
+    vertices = np.concatenate([balls[k] for k in order])
+    mesh = Mesh(vertices, np.concatenate([ball.faces, ball.faces + len(ball.vertices)]))
     near = mesh.vertices @ towards > 0.0
     surface = KnownSurface(mesh, np.where(near, 1e-4, 1e-2), np.zeros((0, 3)), ())
     drawn = drawn_by_node(tmp_path, surface)["first"]
