@@ -12,7 +12,7 @@ from harness.commands.run.run import DEFAULT, RUNNABLE, Spacing, run
 _OPTIONS: dict[str, dict[str, Any]] = {
     DEFAULT: {"contacts": 4, "spacing": Spacing.SPREAD, "sense": "both"},
     "scale-estimation": {"contacts": 5},
-    "shape-reconstruction": {"presses": 6, "set_": ["choose=active"]},
+    "shape-reconstruction": {"presses": 4, "set_": ["choose=active"]},
 }
 """Of ``touchstone run``, by experiment: a short run that shows what it does."""
 
