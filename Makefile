@@ -40,7 +40,7 @@ sound: ## Debian's packages for a microphone on a sound card, if this may instal
 demo: $(RUN) ## localize a contact on the mocked bench, and write the report
 	@$(BIN)/touchstone demo
 
-demo-shape: $(RUN) ## a picture, six presses where they say most, and the shape of an object never drawn
+demo-shape: $(RUN) ## a picture, four presses where they say most, and the shape of an object never drawn
 	@$(BIN)/touchstone demo shape-reconstruction
 
 test: $(DEV) sound lint types contracts ## everything CI checks

@@ -12,7 +12,7 @@ from harness.commands.run.run import DEFAULT, RUNNABLE, Spacing, run
 _OPTIONS: dict[str, dict[str, Any]] = {
     DEFAULT: {"contacts": 4, "spacing": Spacing.SPREAD, "sense": "both"},
     "scale-estimation": {"contacts": 5},
-    "shape-reconstruction": {"presses": 6, "set_": ["choose=active"]},
+    "shape-reconstruction": {"presses": 4, "set_": ["choose=active"]},
 }
 """Of ``touchstone run``, by experiment: a short run that shows what it does."""
 
@@ -41,8 +41,8 @@ def demo(
     Try: touchstone demo shape-reconstruction
     """
     CONSOLE.print(
-        "mock bench: a UR5e's controller and a GelSight's stream on loopback, a hammer and a microphone on a "
-        "serial line, with a reality gap of their own"
+        "mock bench: a UR5e's controller, a GelSight's stream and what else the run reads, each at the far "
+        "end of its cable, with a reality gap of their own"
     )
     return run(
         experiment,

@@ -159,6 +159,14 @@ def test_the_ellipsoid_of_contacts_with_an_ellipsoid_is_that_one(radii: tuple[fl
     assert answer.mesh.bounds[0, 2] >= 0.0
 
 
+def test_the_ellipsoid_of_contacts_high_up_reaches_down_to_the_support() -> None:
+    made = trimesh.creation.icosphere(subdivisions=4)
+    truth = Mesh(made.vertices * [0.04, 0.04, 0.06] + [0.0, 0.0, 0.06], made.faces)
+    high = tuple(touch for touch in presses(truth, 40, seed=5) if touch.points[:, 2].min() > 0.06)
+    assert len(high) > 4
+    assert by_ellipsoid(evidence_of(high)).mesh.bounds[0, 2] < 0.01
+
+
 def test_the_visual_hull_holds_what_is_seen_and_does_not_know_how_deep_it_is() -> None:
     answer = by_visual_hull(evidence_of((), LOOK))
     require_whole(answer)

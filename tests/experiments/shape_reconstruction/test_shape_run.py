@@ -1,5 +1,6 @@
 """A run of shape reconstruction in process: a look, presses along chosen lines, an answer from the folder."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -149,6 +150,8 @@ def test_the_report_and_the_surfaces_are_beside_the_result(touched: Recording, t
     assert page.count('<canvas class="turned"') == page.count("<script>") == 1
     assert "http" not in page
     assert len(page) < 1_500_000
+    assert set(re.findall('href="#([^"]+)"', page)) <= set(re.findall('id="([^"]+)"', page))
+    assert max(len(cell) for cell in re.findall("<td>(.*?)</td>", page)) < 400  # result.json has them whole
     assert "MOCK" in page
     for sense in ("touch", "fused"):
         assert (tmp_path / result["estimates"][sense]["mesh"]).stat().st_size > 100

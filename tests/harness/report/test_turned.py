@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from matplotlib.path import Path as Polygon
 
 from harness.basics.faces.nearest_surface import NearestSurface
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
 from harness.report.figures.fewer_faces import fewer_faces
-from harness.report.figures.shape import KnownSurface
+from harness.report.figures.shape import KnownSurface, seen_from
 from harness.report.turned import turned_surface
 
 MUG = build("mug", 4e-3)
@@ -68,12 +69,12 @@ def test_places_and_colours_are_those_of_the_surface() -> None:
     assert colours[low].sum() > colours[high].sum() + 200  # the pale end is the well known one
 
 
-def drawn_by_node(tmp_path: Path) -> dict[str, Any]:
+def drawn_by_node(tmp_path: Path, surface: KnownSurface) -> dict[str, Any]:
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not there to run the page's script")
     page = tmp_path / "page.html"
-    page.write_text(" ".join(f'data-{k}="{v}"' for k, v in vars(turned_surface(shown())).items()))
+    page.write_text(" ".join(f'data-{k}="{v}"' for k, v in vars(turned_surface(surface)).items()))
     script = files("harness.report") / "turned.js"
     done = subprocess.run(
         [node, str(Path(__file__).with_name("turned_canvas.js")), str(script), str(page)],
@@ -86,7 +87,7 @@ def drawn_by_node(tmp_path: Path) -> dict[str, Any]:
 
 
 def test_the_script_shows_the_surface_and_turns_it_by_a_drag_and_a_key(tmp_path: Path) -> None:
-    found = drawn_by_node(tmp_path)
+    found = drawn_by_node(tmp_path, shown())
     assert found["hidden"] is False
     marks = [one for one in found["first"] if len(one["path"]) == 1]
     assert len(marks) == len(CONTACTS)
@@ -99,3 +100,19 @@ def test_the_script_shows_the_surface_and_turns_it_by_a_drag_and_a_key(tmp_path:
     assert found["untouched"] == found["back"] == found["first"]
     assert found["dragged"] != found["first"]
     assert found["key"] != found["first"]
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_what_is_nearer_to_the_viewer_hides_what_is_behind(tmp_path: Path, order: tuple[int, int]) -> None:
+    towards = seen_from(-55.0, 35.0)[2]
+    ball = trimesh.creation.icosphere(2, 0.03)
+    balls = [ball.vertices + way * 0.05 * towards for way in (1.0, -1.0)]
+    vertices = np.concatenate([balls[k] for k in order])
+    mesh = Mesh(vertices, np.concatenate([ball.faces, ball.faces + len(ball.vertices)]))
+    near = mesh.vertices @ towards > 0.0
+    surface = KnownSurface(mesh, np.where(near, 1e-4, 1e-2), np.zeros((0, 3)), ())
+    drawn = drawn_by_node(tmp_path, surface)["first"]
+    covering = [one for one in drawn if Polygon(one["path"]).contains_point((300.3, 199.6))]
+    assert len(covering) == 2
+    brightness = [sum(map(int, one["colour"][4:-1].split(","))) for one in covering]
+    assert brightness[1] > brightness[0]  # the nearer is the better known, and pale
