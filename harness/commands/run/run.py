@@ -96,6 +96,7 @@ def run(
     """
     from harness.bench.station_file import load_station, station_path
     from harness.commands.scenes import resolve
+    from harness.effects.file_levels import scene_levels
     from harness.experiment.answer import add_report, finish, write_answer
     from harness.experiment.begin import begin
     from harness.experiment.budget import answer_as_asked, sentences
@@ -132,9 +133,9 @@ def run(
         kind = experiment_of(recording)
         if experiment is not None:
             require_of(recording, named(experiment).name, "--resume")
-        accuracy = chosen_levels(kind.knobs, level or [])
+        accuracy = chosen_levels(kind.knobs, level or [], RunFiles(recording).network_levels)
     else:
-        accuracy = chosen_levels(kind.knobs, level or [])
+        _ = chosen_levels(kind.knobs, level or [])  # a wrong one is refused before any file is read
         keys: dict[str, Any] = {"contacts": contacts, "presses": presses, "spacing": spacing, "yaw": yaw}
         if ends_run and kind.error_key is not None:
             keys[kind.error_key] = error
@@ -152,6 +153,7 @@ def run(
             range_,
             kind.assumed,
         )
+        accuracy = chosen_levels(kind.knobs, level or [], scene_levels(wanted))
         bench = load_station(station_path(station or "mock"))
         if target is not None:
             CONSOLE.print(foresee(kind, wanted, target), markup=False)

@@ -10,7 +10,9 @@ seen them. *The gel.* What reaches behind the gel's plane goes through the skirt
 to the operation.
 
 Inputs: ``node`` int64 ``(n, 1)``, and ``node_from_gel`` float64 ``(n, 3, 4)``, the upper rows of a
-rigid transform in metres. Output ``maps``: float32 ``(n, rows, columns)``, metres of indentation.
+rigid transform in metres. Outputs: ``maps`` float32 ``(n, rows, columns)``, metres of indentation; and
+``gaps`` float32, metres along the gel's z axis from its plane to the object, of every ``ray_pixels``-th
+pixel each way, ``SEARCH_DEPTH`` where nothing is that near.
 """
 
 from dataclasses import dataclass
@@ -24,19 +26,25 @@ from harness.bench.sensor import TactileSensor
 from harness.objectfile.graph import Nodes, Storage
 from harness.objectfile.touch.rays import between, ray_places, row_terms
 from harness.objectfile.touch.skirt import hung
+from harness.objectfile.touch_entries import ray_pixels
 from harness.sim.gel.gel import GelSkirt
+from harness.sim.gel.height_map import SEARCH_DEPTH
 
 _LOOKUPS = 3
 """Along a ray. The error of a look-up shrinks by the surface's slope times the gel's lean, about a fifth."""
 
+_BEYOND = 1
+"""More of them for ``gaps``, which go on where the gel ends."""
+
 _LEAST_COSINE = 0.25
 """Between node and gel: what a rotation that is none may do to a division."""
 
+MOST_TILT = float(np.radians(26.0))
+"""rad between tool and surface that codes answer: a candidate that leans more than a press may is to be seen
+to fit badly, and not to be missing."""
+
 _COVERED = 127.5
 """Of 255, from which a place counts as surface: the edge of a half-plane is then where it is."""
-
-_COARSE = 4
-"""Pixels a side to one ray of the first look-ups, which only say where the last one looks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,15 +123,33 @@ def codes_graph(
     limits = [nodes.constant(np.array(value, np.float32)) for value in (0.0, sensor.gel_thickness)]
     deep = nodes.add("Clip", reached, *limits)
     nodes.add("Identity", hung(nodes, deep, sensor, skirt), name="maps")
+    _gaps(nodes, motion, (heights, covers), near, coarse)
     return nodes.model(
         "touch",
         [
             helper.make_tensor_value_info("node", TensorProto.INT64, ["n", 1]),
             helper.make_tensor_value_info("node_from_gel", TensorProto.DOUBLE, ["n", 3, 4]),
         ],
-        [helper.make_tensor_value_info("maps", TensorProto.FLOAT, ["n", sensor.rows, sensor.columns])],
-        "A node (n, 1) and the gel's pose in its frame (n, 3, 4), m, to indentation (n, rows, columns), m.",
+        [
+            helper.make_tensor_value_info("maps", TensorProto.FLOAT, ["n", sensor.rows, sensor.columns]),
+            helper.make_tensor_value_info(
+                "gaps", TensorProto.FLOAT, ["n", sensor.rows // coarse, sensor.columns // coarse]
+            ),
+        ],
+        "A node (n, 1) and the gel's pose in its frame (n, 3, 4), m, to indentation (n, rows, columns), m, "
+        "and to the gap between gel and object, m, of coarser rays.",
     )
+
+
+def _gaps(nodes: Nodes, motion: "_Motion", images: tuple[str, str], near: str | None, coarse: int) -> None:
+    """The output ``gaps``: of the coarse rays, which are followed beyond the gel's reach."""
+    heights, covers = images
+    for _ in range(_BEYOND):
+        near = motion.to_height(heights, near, coarse, coarse)
+    assert near is not None
+    far = nodes.constant(np.array(SEARCH_DEPTH, np.float32))
+    covered = motion.covered(motion.look_up(covers, near, coarse, coarse))
+    nodes.add("Min", nodes.add("Where", covered, near, far), far, name="gaps")
 
 
 def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
@@ -141,7 +167,7 @@ def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
     columns[patches.inside] = np.arange(pixels)
     index = nodes.constant(columns.ravel().astype(np.int64))
     if patches.basis is None:
-        flat = nodes.add("Gather", code, index, axis=1)
+        flat = _columns(nodes, code, index)
     else:
         held = nodes.weight(np.hstack([patches.basis, np.zeros((len(patches.basis), 1))]), "the basis")
         flat = nodes.add("MatMul", code, nodes.add("Gather", held, index, axis=1))
@@ -151,13 +177,19 @@ def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
     heights = nodes.add("Reshape", nodes.add("Add", metres, above), _shape(nodes, -1, 1, size, size))
     none = np.zeros((len(patches.cover), 1), np.uint8)
     cover = nodes.add("Gather", nodes.constant(np.hstack([patches.cover, none])), asked, axis=0)
-    spread = nodes.add("Cast", nodes.add("Gather", cover, index, axis=1), to=TensorProto.FLOAT)
+    spread = nodes.add("Cast", _columns(nodes, cover, index), to=TensorProto.FLOAT)
     return heights, nodes.add("Reshape", spread, _shape(nodes, -1, 1, size, size))
+
+
+def _columns(nodes: Nodes, rows: str, index: str) -> str:
+    """``(n, m)`` columns of ``(n, k)``, taken as rows of the transpose, which is thrice as fast."""
+    taken = nodes.add("Gather", nodes.add("Transpose", rows, perm=[1, 0]), index, axis=0)
+    return nodes.add("Transpose", taken, perm=[1, 0])
 
 
 def _coarseness(patches: PatchCodes, sensor: TactileSensor) -> tuple[int, int]:
     """Pixels a side to one ray of the first look-ups, and of those of covers."""
-    coarse = _COARSE if sensor.rows % _COARSE == 0 and sensor.columns % _COARSE == 0 else 1
+    coarse = ray_pixels(sensor.rows, sensor.columns)
     # A cover is linear between a patch's pixels: half the rays see all of it where they are closer.
     return coarse, 2 if coarse > 1 and 2.0 * sensor.pitch <= patches.pitch else 1
 
@@ -224,8 +256,11 @@ class _Motion:
     def where_covered(self, reached: str, covers: str) -> str:
         """``(n, rows, columns)`` m that the object reaches into the gel; 0 where there is no surface."""
         nodes = self._nodes
-        covered = nodes.add("Greater", covers, nodes.constant(np.array(_COVERED, np.float32)))
-        return nodes.add("Where", covered, reached, nodes.constant(np.array(0.0, np.float32)))
+        return nodes.add("Where", self.covered(covers), reached, nodes.constant(np.array(0.0, np.float32)))
+
+    def covered(self, covers: str) -> str:
+        """Whether there is surface, ``(n, rows, columns)``."""
+        return self._nodes.add("Greater", covers, self._nodes.constant(np.array(_COVERED, np.float32)))
 
     def finer(self, image: str, coarse: int) -> str:
         """``(n, rows, columns)`` of the pixels, linear between rays that are ``coarse`` pixels apart."""

@@ -110,11 +110,11 @@ def test_sim_touch_draws_the_same_press_from_the_same_codes(
 ) -> None:
     rendered(folder, tmp_path, capsys, *PLACE, *POSE)
     mesh = folder / "mesh.ply"
-    codes = ("--objectfile", folder, "--level", "touch.shapes=codes")
+    codes = ("--objectfile", folder, "--level", "touch.shapes=network")
     given = (mesh, *PLACE, *POSE, "--units", "m", "--out", tmp_path / "b.png")
     answer = answered(capsys, tmp_path, *given, *codes)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert answer["levels"]["touch.shapes"] == "codes"
+    assert answer["levels"]["touch.shapes"] == "network"
     assert answer["flags"]["over_range_m"] is None
     assert answer["error_estimate"]["maps_measured"] == {"psnr_db": 50.0}
     ran = {step["effect"] for step in answer["effects"]["ran"]}
@@ -123,7 +123,7 @@ def test_sim_touch_draws_the_same_press_from_the_same_codes(
     unasked = answered(capsys, tmp_path, *given, "--objectfile", folder)
     assert unasked["error_estimate"]["maps_measured"] is None
     assert "object.touch_codes" not in {step["effect"] for step in unasked["effects"]["ran"]}
-    refused = answered(capsys, tmp_path, *given, "--level", "touch.shapes=codes", code=2)
+    refused = answered(capsys, tmp_path, *given, "--level", "touch.shapes=network", code=2)
     assert "the scene names no ObjectFile" in refused["error"]
 
 
