@@ -14,7 +14,7 @@ import onnxruntime
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, WrongUse
-from harness.objectfile.entries import Input, NetworkEntry, Tensor
+from harness.objectfile.entries import Input, Tensor
 from harness.objectfile.graph_check import checked_graph, require_declared, with_outputs
 
 _FATAL = 4
@@ -74,11 +74,6 @@ class Network:
         """Whether every input is there, in its shape, for no queries."""
         wanted = {tensor.name: _of_none(tensor) for tensor in self.inputs}
         return {name: array.shape for name, array in inputs.items()} == wanted
-
-
-def open_network(data: bytes, entry: NetworkEntry, threads: int = 1, only: Sequence[str] = ()) -> Network:
-    """The network of an entry, from its file's bytes; as ``Network``."""
-    return Network(data, entry.file, entry.inputs, entry.outputs, threads, only)
 
 
 def _session(data: bytes, name: str, threads: int) -> "onnxruntime.InferenceSession":

@@ -16,7 +16,8 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.runtime import Network, open_network
+from harness.objectfile.runtime import Network
+from harness.objectfile.self_test import open_network
 from harness.objectfile.touch.graph import MOST_TILT
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes
 from harness.objectfile.touch.touch import nodes_of, touch_of

@@ -15,7 +15,7 @@ from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.basics.geometry import inverse
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.surface_search import SurfaceSearch
+from harness.objectfile.surface_search import SurfaceSearch, require_own
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes, nodes_from
 from harness.objectfile.touch.pixels import pixel_queries
 from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
@@ -186,7 +186,7 @@ def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) ->
         case "codes" if entry.codes is not None:
             maps = _codes(of, entry.codes, threads)
         case "perceptron" if entry.perceptron is not None:
-            from harness.objectfile.runtime import open_network
+            from harness.objectfile.self_test import open_network
 
             network = open_network(of.read(entry.perceptron), entry.perceptron, threads)
             maps = PerceptronMaps(network, entry.gel)
@@ -210,7 +210,8 @@ def nodes_of(of: ObjectFile, entry: CodesEntry) -> SurfaceNodes:
     """Where the codes of an object belong.
 
     Raises:
-        DataRefused: the file is damaged, or holds another number of them than the graph knows.
+        DataRefused: the file is damaged, holds another number of them than the graph knows, or places of
+            another object.
     """
     nodes = nodes_from(of.read(entry.nodes), entry.nodes.file)
     asked = entry.network.inputs[0].domain
@@ -218,13 +219,14 @@ def nodes_of(of: ObjectFile, entry: CodesEntry) -> SurfaceNodes:
         raise DataRefused(
             f"{entry.nodes.file} has {len(nodes)} nodes, its graph another number; build it again"
         )
+    require_own(SurfaceSearch(of.mesh), nodes.points, entry.nodes.file)
     return nodes
 
 
 def _codes(of: ObjectFile, entry: CodesEntry, threads: int) -> CodeMaps:
     nodes = nodes_of(of, entry)
     # Graphs are heavy to read, and the reference needs none of it.
-    from harness.objectfile.runtime import open_network
+    from harness.objectfile.self_test import open_network
 
     network = open_network(of.read(entry.network), entry.network, threads, ("maps",))
     return CodeMaps(network, NodeSearch(nodes, entry.most_off_m))
