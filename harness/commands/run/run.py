@@ -281,6 +281,7 @@ def _ask(what: str) -> None:
 def _describe(kind: Any, begun: Any, accuracy: Any) -> None:
     """What is about to happen, before anything moves; what is simulated, at the levels that were turned."""
     from harness.effects.explain import as_table, left_out, scene_plan
+    from harness.effects.explain_networks import networks_as_table, networks_in_use
     from harness.recording.run_folder import RunFiles
 
     run = RunFiles(begun.recording)
@@ -296,6 +297,9 @@ def _describe(kind: Any, begun: Any, accuracy: Any) -> None:
     )
     effects = scene_plan(run.scene, run.station.gel.sensor, accuracy)
     CONSOLE.print(as_table(effects, left_out=False))
+    networks = networks_in_use(run.scene, effects)
+    if networks:
+        CONSOLE.print(networks_as_table(networks))
     CONSOLE.print("not simulated:")
     for sentence in left_out(effects):
         CONSOLE.print(f"  {sentence}", markup=False)

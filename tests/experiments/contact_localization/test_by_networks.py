@@ -23,7 +23,7 @@ from harness.experiment.in_process import performed
 from harness.experiment.levels import chosen_levels
 from harness.objectfile.file import ObjectFile
 from harness.recording.run_folder import RunFiles
-from harness.sim.gel import height_map
+from harness.sim.gel import height_map, raster_kernels
 from tests.samples import touch_bench as tb
 
 STATION = load_station(station_path("mock"))
@@ -48,7 +48,7 @@ def run(of: ObjectFile, tmp_path_factory: pytest.TempPathFactory) -> RunFiles:
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What was rasterised and solved, call by call."""
     calls: list[str] = []
-    rasterise = height_map.rasterise
+    rasterise = raster_kernels.rasterise
 
     def counted(*given: Any) -> Any:
         calls.append("rasterised")
@@ -69,7 +69,7 @@ def answered(run: RunFiles, *texts: str) -> tuple[Answer, Accuracy]:
 
 def test_nothing_is_rasterised_where_networks_stand_for_it(run: RunFiles, drawn: list[str]) -> None:
     found, accuracy = answered(run)
-    scored = Scored(run, None, found, None, accuracy, ())  # type: ignore[arg-type]
+    scored = Scored(run, None, found, None, accuracy, ())
     comparison = compare(scored, EXPERIMENT.sources(scored))
     assert accuracy["touch.shapes"] == "network"
     assert comparison.notes == ()
@@ -97,7 +97,7 @@ def test_a_run_is_answered_by_the_networks_that_it_carries(
 
 def test_a_pose_that_no_network_answers_is_drawn_and_said(run: RunFiles, drawn: list[str]) -> None:
     found, accuracy = answered(run)
-    scored = Scored(run, None, found, None, accuracy, ())  # type: ignore[arg-type]
+    scored = Scored(run, None, found, None, accuracy, ())
     beside = np.eye(4)[None] + 0.0
     comparison = compare(scored, {"contact.gel_from_object": beside})
     assert drawn
@@ -106,9 +106,7 @@ def test_a_pose_that_no_network_answers_is_drawn_and_said(run: RunFiles, drawn: 
 
 
 def test_a_perceptron_answers_no_candidates(run: RunFiles) -> None:
-    with pytest.raises(
-        WrongUse, match=r"single presses, of no yaw.*touch\.shapes = network or reference"
-    ):
+    with pytest.raises(WrongUse, match=r"single presses, of no yaw.*touch\.shapes = network or reference"):
         answered(run, "touch.shapes=perceptron")
 
 
