@@ -139,7 +139,8 @@ class ObjectTouch:
     def _limits(self) -> tuple[float, float, float]:
         """m, least and greatest depth, and rad, the greatest tilt."""
         codes = self.entry.codes
-        if self.level == "codes" and codes is not None:
+        # The mesh answers any press, and is asked beside the others.
+        if self.level != "perceptron" and codes is not None:
             return 0.0, codes.deepest_m, codes.most_tilt_rad
         return *self.entry.depth_m, self.entry.most_tilt_rad
 

@@ -157,15 +157,15 @@ def test_for_people_it_says_level_place_and_distance(
     ("more", "code", "said"),
     [
         (
-            (*PLACE, "--depth", "2.5mm"),
+            (*PLACE, "--depth", "2.6mm"),
             1,
-            "2.5 mm deep was asked of the touch's codes, which knows 0.5 to 2 mm",
+            "2.6 mm deep was asked of the touch's codes, which knows 0 to 2.5 mm",
         ),
-        ((*PLACE, "--depth", "0.1mm"), 1, "which knows 0.5 to 2 mm"),
+        ((*PLACE, "--depth", "-0.1mm"), 1, "which knows 0 to 2.5 mm"),
         (
-            (*PLACE, "--tilt", "20deg"),
+            (*PLACE, "--tilt", "30deg"),
             1,
-            "a tilt of 20 deg was asked of the touch's codes, which knows 0 to 15 deg",
+            "a tilt of 30 deg was asked of the touch's codes, which knows 0 to 26 deg",
         ),
         (("--contact", "0.01", "0.02", "0.06"), 1, "10 mm off the surface; the limit is 2 mm"),
         ((*PLACE, "--level", "fine"), 2, "--level takes codes, perceptron, or reference"),
