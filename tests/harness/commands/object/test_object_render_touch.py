@@ -114,6 +114,9 @@ def test_sim_touch_draws_the_same_press_from_the_same_codes(
     given = (mesh, *PLACE, *POSE, "--units", "m", "--out", tmp_path / "b.png")
     answer = answered(capsys, tmp_path, *given, *codes)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    alone = (folder, *PLACE, *POSE, "--out", tmp_path / "c.png", "--level", "touch.shapes=network")
+    answered(capsys, tmp_path, *alone)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "c.png").read_bytes()
     assert answer["levels"]["touch.shapes"] == "network"
     assert answer["flags"]["over_range_m"] is None
     assert answer["error_estimate"]["maps_measured"] == {"psnr_db": 50.0}
