@@ -1,24 +1,32 @@
 """Codes show the object along a tool as its mesh does, everywhere a gel can come to."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from harness.authoring.touch.codes import code_surface
+from harness.authoring.touch.data import choose_nodes
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.geometry import frame_facing, transform
-from harness.objectfile.file import ObjectFile
+from harness.basics.materials import MATERIALS
+from harness.basics.mesh import Mesh
+from harness.objectfile.file import ObjectFile, create_object
 from harness.objectfile.runtime import Network
-from harness.objectfile.touch.graph import MOST_TILT
+from harness.objectfile.touch.graph import MOST_TILT, codes_graph
+from harness.objectfile.touch.part import CodesPart, with_touch
 from harness.objectfile.touch.tool_depth import CodedDepth, open_tool_depth
 from harness.sim.gel.height_map import RasterMesh, depth_image
 from harness.sim.solid.surface_samples import random_points
+from tests.oracles.seen_shapes import cuboid
 from tests.samples import touch_bench as tb
 
 RAYS = 4 * tb.SENSOR.pitch
 SHAPE = (40, 44)
+STEEL = MATERIALS["steel"]
 
 
 @pytest.fixture(scope="module")
@@ -117,3 +125,33 @@ def test_a_folder_of_codes_opens_anywhere(of: ObjectFile, tmp_path: Path) -> Non
     shutil.copytree(of.folder, tmp_path / "moved")
     again = open_tool_depth(ObjectFile.open(tmp_path / "moved"))
     np.testing.assert_array_equal(again(view(2), RAYS, *SHAPE), open_tool_depth(of)(view(2), RAYS, *SHAPE))
+
+
+@pytest.fixture(scope="module")
+def post(tmp_path_factory: pytest.TempPathFactory) -> tuple[CodedDepth, Mesh]:
+    """A plate with a post on it, 30 mm tall, and its codes."""
+    plate, pole = cuboid(0.06, 0.06, 0.01), cuboid(0.01, 0.01, 0.03)
+    raised = pole.vertices + np.array([0.0, 0.0, 0.02])
+    faces = np.concatenate([plate.faces, pole.faces + len(plate.vertices)])
+    mesh = Mesh(np.concatenate([plate.vertices, raised]), faces)
+    coded = code_surface(RasterMesh(mesh), choose_nodes(mesh, tb.SPACING), tb.SENSOR, tb.SPEC, 0)
+    codes = CodesPart(codes_graph(coded.patches, tb.SENSOR, tb.SKIRT), coded.nodes, tb.OFF * tb.SPACING)
+    part = replace(tb.peg_part(), codes=codes)
+    folder = tmp_path_factory.mktemp("objects") / "post"
+    return open_tool_depth(with_touch(create_object(folder, "post", mesh, STEEL, tb.PROVENANCE), part)), mesh
+
+
+@pytest.mark.parametrize("lean", [8.0, 16.0, 25.0])
+def test_what_stands_beside_a_place_casts_no_surface_over_it(
+    post: tuple[CodedDepth, Mesh], lean: float
+) -> None:
+    """A post is in the way of a gel beside it; a tile must not show it where a leant tool sees past it."""
+    coded, mesh = post
+    axis = np.array([np.sin(np.radians(lean)), 0.0, -np.cos(np.radians(lean))])
+    towards = transform(frame_facing(axis, 0.3).T, np.zeros(3))
+    there = depth_image(RasterMesh(mesh), towards, RAYS, *SHAPE)
+    level = -mesh.face_normals[there.face] @ axis > np.cos(MOST_TILT)
+    level &= there.face >= 0
+    found = coded(towards, RAYS, *SHAPE)
+    assert np.isfinite(found[level]).mean() > 0.95
+    assert (there.depth[level] - found[level]).max() < 0.5 * tb.SPEC.pitch
