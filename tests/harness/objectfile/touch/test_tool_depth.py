@@ -9,6 +9,7 @@ import pytest
 
 from harness.authoring.touch.codes import code_surface
 from harness.authoring.touch.data import choose_nodes
+from harness.authoring.touch.touch import OFF
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.geometry import frame_facing, transform
@@ -135,7 +136,7 @@ def post(tmp_path_factory: pytest.TempPathFactory) -> tuple[CodedDepth, Mesh]:
     faces = np.concatenate([plate.faces, pole.faces + len(plate.vertices)])
     mesh = Mesh(np.concatenate([plate.vertices, raised]), faces)
     coded = code_surface(RasterMesh(mesh), choose_nodes(mesh, tb.SPACING), tb.SENSOR, tb.SPEC, 0)
-    codes = CodesPart(codes_graph(coded.patches, tb.SENSOR, tb.SKIRT), coded.nodes, tb.OFF * tb.SPACING)
+    codes = CodesPart(codes_graph(coded.patches, tb.SENSOR, tb.SKIRT), coded.nodes, OFF * tb.SPACING)
     part = replace(tb.peg_part(), codes=codes)
     folder = tmp_path_factory.mktemp("objects") / "post"
     return open_tool_depth(with_touch(create_object(folder, "post", mesh, STEEL, tb.PROVENANCE), part)), mesh
