@@ -111,8 +111,10 @@ def answer(run: str | Path, levels: Sequence[str] = ()) -> dict[str, Any]:
     from harness.experiment.levels import chosen_levels
     from harness.experiment.lookup import experiment_of
     from harness.recording.recording import Recording
+    from harness.recording.run_folder import RunFiles
 
     recording = Recording(Path(run))
     experiment = experiment_of(recording)
-    scored = score(experiment, recording, chosen_levels(experiment.knobs, levels))
+    accuracy = chosen_levels(experiment.knobs, levels, RunFiles(recording).network_levels)
+    scored = score(experiment, recording, accuracy)
     return {**common(experiment, scored), **scored.result}

@@ -1,15 +1,16 @@
 """The model of a scene's object: with its modes where the scene is to be heard."""
 
-from functools import partial
-
 from experiments.contact_localization.model import Model
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
-from harness.experiment.object_modes import ReadFile, object_modes
-from harness.objectfile.file import ObjectFile
+from harness.effects.catalogue import EFFECTS
+from harness.effects.effect import knobs_of
+from harness.effects.file_levels import scene_levels
+from harness.experiment.object_modes import ReadFile, carried_by, object_modes
+from harness.experiment.object_touch import object_touch
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
@@ -19,10 +20,10 @@ def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
 
     Args:
         run: the folder.
-        accuracy: levels of the modes' dials; None for the default ones.
+        accuracy: levels of the simulation's dials; None for the ObjectFile's networks, or the default ones.
     """
-    carried = partial(_carried, run)
-    return model_of_scene(run.scene, run.station, run.mesh, run.calibration, accuracy, carried)
+    mesh, calibration = run.mesh, run.calibration
+    return model_of_scene(run.scene, run.station, mesh, calibration, accuracy, carried_by(run))
 
 
 def model_of_scene(
@@ -40,18 +41,17 @@ def model_of_scene(
         station: gives the sensor.
         mesh: of the object, in metres.
         calibration: of the gel, as the estimator is to know it.
-        accuracy: levels of the modes' dials; None for the default ones.
+        accuracy: levels of the simulation's dials; None for the ObjectFile's networks, or the default ones.
         objectfile: reads the object's; None for the one that the scene names.
 
     Raises:
         MeshRefused: the scene calls for sound, and the object's surface cannot be filled.
-        WrongUse: modes are to come from an ObjectFile, and there is none or another object's.
+        WrongUse: modes or touch are to come from an ObjectFile, and there is none or another object's.
     """
+    chosen = accuracy or Accuracy.default(knobs_of(EFFECTS)).with_(scene_levels(scene))
+    sensor = station.gel.sensor
+    seen = object_touch(scene, station, mesh, calibration, chosen, objectfile)
     if not scene.sensors.sound:
-        return Model(mesh, station.gel.sensor, calibration)
-    modes = object_modes(scene, station, mesh, accuracy, objectfile)
-    return Model(mesh, station.gel.sensor, calibration, modes, MATERIALS[scene.object.material])
-
-
-def _carried(run: RunFiles) -> ObjectFile:
-    return run.objectfile
+        return Model(mesh, sensor, calibration, seen=seen)
+    modes = object_modes(scene, station, mesh, chosen, objectfile)
+    return Model(mesh, sensor, calibration, modes, MATERIALS[scene.object.material], seen)

@@ -18,7 +18,10 @@ from experiments.contact_localization.report.result import result_of
 from experiments.contact_localization.section import Localization
 from harness.bench.scene import SceneFile
 from harness.effects.accuracy import Setting
+from harness.effects.file_levels import networks_of
+from harness.effects.scene_object import named_file
 from harness.experiment.experiment import Experiment, Helpers, MeasuredCondition, Measurement
+from harness.objectfile.entries import Modality
 from harness.recording.run_folder import RunFiles
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
@@ -42,8 +45,13 @@ def _heard(chosen: Mapping[str, Sequence[str]]) -> bool:
 def _settings(
     thorough: bool, chosen: Mapping[str, Sequence[str]], scenes: Mapping[str, SceneFile]
 ) -> Sequence[Setting]:
-    named = all(scene.object.objectfile is not None for scene in scenes.values())
-    return settings(thorough, _heard(chosen), named)
+    networks = frozenset.intersection(*(_networks(scene) for scene in scenes.values()))
+    return settings(thorough, _heard(chosen), networks)
+
+
+def _networks(scene: SceneFile) -> frozenset[Modality]:
+    named = scene.object.objectfile is not None
+    return networks_of(named_file(scene).description) if named else frozenset()
 
 
 MEASUREMENT = Measurement(

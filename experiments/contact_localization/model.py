@@ -1,6 +1,7 @@
 """What an estimator is given beside the readings: the object, the sensor and what is believed of the pose."""
 
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -12,7 +13,8 @@ from harness.basics.errors import WrongUse
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import TactileSensor
-from harness.sim.gel.height_map import RasterMesh
+from harness.sim.gel.height_map import RasterMesh, first_surface
+from harness.sim.gel.view import FirstSurface
 from harness.sim.modal.modes import Modes
 from harness.sim.optics.tactile_calibration import TactileCalibration
 from harness.sim.solid.surface_samples import Surface, sample_surface
@@ -66,6 +68,7 @@ class Model:
         calibration: of its colours, fitted to presses of this sensor.
         modes: of the object; None where no sound is compared.
         material: of the object; None where no sound is compared.
+        seen: the object along the tool, which candidates' tactile images are crops of; None for the mesh's.
     """
 
     mesh: Mesh
@@ -73,14 +76,21 @@ class Model:
     calibration: TactileCalibration
     modes: Modes | None = None
     material: Material | None = None
-    raster: RasterMesh = field(init=False, repr=False)
+    seen: FirstSurface | None = None
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
 
     _gains: dict[float, GainTable] = field(init=False, default_factory=dict, repr=False)
     _turnings: dict[tuple[float, ...], Turning] = field(init=False, default_factory=dict, repr=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "raster", RasterMesh(self.mesh))
+    @cached_property
+    def raster(self) -> RasterMesh:
+        """The mesh, prepared for drawing."""
+        return RasterMesh(self.mesh)
+
+    @property
+    def first_surface(self) -> FirstSurface:
+        """The object along a tool."""
+        return self.seen or partial(first_surface, self.raster)
 
     def surface(self, spacing: float) -> Surface:
         """The object's samples ``spacing`` metres apart, made on first use."""

@@ -28,6 +28,7 @@ from harness.basics.errors import DataRefused, FitRefused, MeshRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
+from harness.experiment.object_modes import carried_by
 from harness.picture.outline import SeenOutline
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import observe_step
@@ -96,7 +97,7 @@ class ScaleAnswering:
 
     def __post_init__(self) -> None:
         run = self.run
-        self.model = ObjectModel(run.mesh, run.scene, run.station)
+        self.model = ObjectModel(run.mesh, run.scene, run.station, carried_by(run))
         self.outline: SeenOutline | FitRefused | None = None
         self.patches: list[Patch] = []
         self.free: list[FloatArray] = []

@@ -19,7 +19,7 @@ from harness.basics.mesh_hull import hull_of
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy, Level
-from harness.experiment.object_modes import object_modes
+from harness.experiment.object_modes import ReadFile, object_modes
 from harness.picture.camera_errors import CameraErrors
 from harness.sim.solid.surface_samples import sample_surface
 from harness.skills.exploring.surroundings import nowhere
@@ -42,11 +42,13 @@ class ObjectModel:
         mesh: in metres, at its nominal size.
         scene: says how it stands, and which sizes it may have.
         station: whose camera looks at it.
+        objectfile: reads the object's; None for the one that the scene names.
     """
 
     mesh: Mesh
     scene: SceneFile
     station: Station
+    objectfile: ReadFile | None = None
     _ringing: dict[tuple[tuple[str, Level], ...], RingingModel] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -161,7 +163,7 @@ class ObjectModel:
         """
         levels = tuple(accuracy.items())
         if levels not in self._ringing:
-            modes = object_modes(self.scene, self.station, self.mesh, accuracy)
+            modes = object_modes(self.scene, self.station, self.mesh, accuracy, self.objectfile)
             self._ringing[levels] = RingingModel.of(modes, MATERIALS[self.scene.object.material])
         return self._ringing[levels]
 

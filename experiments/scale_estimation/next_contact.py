@@ -26,7 +26,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, MotionRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.reading import Reading
-from harness.effects.accuracy import Accuracy
+from harness.experiment.levels import chosen_levels
 from harness.picture.outline import SeenOutline
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import observe_step
@@ -66,7 +66,7 @@ class Explorer:
         self._run = run
         self._asked = run.scene.section(Scale)
         self._drawn = self._asked.shape == "known"
-        self._answering = ScaleAnswering(run, Accuracy.default(KNOBS))
+        self._answering = ScaleAnswering(run, chosen_levels(KNOBS, (), run.network_levels))
         self._model: ObjectModel = self._answering.model
         self._read = 0
         self._joints: FloatArray = HOME

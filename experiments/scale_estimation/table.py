@@ -27,8 +27,8 @@ from harness.basics.clock import now
 from harness.basics.errors import DataRefused, FitRefused
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station_file import Station
-from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Experiment
+from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
@@ -134,7 +134,8 @@ def run_cell(
         truth = read_truth(recording)
         if truth is None:
             raise DataRefused("no instrument read anything in this run: no way to the object was free")
-        answering = ScaleAnswering(RunFiles(recording), Accuracy.default(experiment.knobs))
+        run = RunFiles(recording)
+        answering = ScaleAnswering(run, chosen_levels(experiment.knobs, (), run.network_levels))
         pictures = None
         for record in recording.steps():
             answering.read(record)

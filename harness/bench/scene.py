@@ -24,7 +24,12 @@ from harness.basics.quantities import (
 )
 from harness.basics.toml_file import StrictModel, nearest, read_toml, validate
 from harness.bench.experiments import loaded, section_models
-from harness.objects.builtin import DESCRIPTION
+from harness.bench.scene_objectfile import (
+    OBJECTFILE,
+    holds_objectfile,
+    require_objectfile,
+    with_objectfile,
+)
 
 BUILTIN = "builtin:"
 UNITS = ("m", "cm", "mm", "in")
@@ -65,7 +70,7 @@ class SceneObject(StrictModel):
 
     Attributes:
         mesh: ``"builtin:mug"`` and so on, or a mesh file; relative to the scene file in the file,
-            absolute once it is read.
+            absolute once it is read. Left out where the object is that of an ObjectFile, which has its own.
         units: of the mesh file's numbers; None to go by the file and its size.
         material: a key of ``harness.basics.materials.MATERIALS``; a built-in object has one of its own.
         scale: applied to the mesh after its units; ``"hidden"`` where nobody is told how large the object was
@@ -73,7 +78,8 @@ class SceneObject(StrictModel):
         sizes: m, from and to: the longest side that a hidden size may have; None for half to twice the
             drawing's, within 5 to 45 cm, what this bench's arm can reach around.
         wall: m, of an object whose mesh is only its outside; None for what the mesh says.
-        objectfile: folder of its ObjectFile, found as ``mesh`` is; None where it has none.
+        objectfile: folder of its ObjectFile, found as ``mesh`` is; None where it has none. Without ``mesh``
+            it is the object: its surface, its material and its networks.
         pose: nominal.
     """
 
@@ -90,6 +96,11 @@ class SceneObject(StrictModel):
     def builtin(self) -> str | None:
         """The name of the built-in object, None for a mesh file."""
         return self.mesh.removeprefix(BUILTIN) if self.mesh.startswith(BUILTIN) else None
+
+    @property
+    def is_objectfile(self) -> bool:
+        """Whether its surface and material are those of its ObjectFile."""
+        return self.mesh.startswith(OBJECTFILE)
 
     @property
     def is_hidden(self) -> bool:
@@ -111,7 +122,7 @@ class SceneObject(StrictModel):
     @property
     def name(self) -> str:
         """What to call the object."""
-        return self.builtin or Path(self.mesh).stem
+        return self.builtin or Path(self.mesh.removeprefix(OBJECTFILE)).stem
 
     @model_validator(mode="before")
     @classmethod
@@ -293,7 +304,8 @@ def load_scene(path: Path) -> SceneFile:
     Raises:
         WrongUse: naming each mistake; or the mesh file or the ObjectFile does not exist.
     """
-    return _with_files_found(scene_from_json(read_toml(path), str(path)), path.parent, str(path))
+    tree = with_objectfile(read_toml(path), path.parent, str(path))
+    return _with_files_found(scene_from_json(tree, str(path)), path.parent, str(path))
 
 
 def scene_from_options(
@@ -306,8 +318,8 @@ def scene_from_options(
     """The scene that ``run --object FILE --material M --units mm --wall 2mm`` means.
 
     Args:
-        mesh: file, relative to the working directory, or ``"builtin:mug"``.
-        material: None only for a built-in object.
+        mesh: file, relative to the working directory, ``"builtin:mug"``, or the folder of an ObjectFile.
+        material: None only for a built-in object and for an ObjectFile.
         units: of the file's numbers.
         wall: a length with its unit.
         objectfile: folder, relative to the working directory.
@@ -316,13 +328,22 @@ def scene_from_options(
         WrongUse: an option that cannot be, or no such file.
     """
     given = {"mesh": mesh, "material": material, "units": units, "wall": wall, "objectfile": objectfile}
-    if material is None and not mesh.startswith(BUILTIN):
+    if holds_objectfile(Path(mesh)):
+        _require_one(mesh, objectfile)
+        given |= {"mesh": None, "objectfile": mesh}
+    elif material is None and not mesh.startswith(BUILTIN):
         raise WrongUse(
             f"--object {mesh} needs --material: it is one of {', '.join(MATERIALS)} (sound and mass "
             "depend on it, touch does not)"
         )
-    tree = {"schema": 1, "object": {key: value for key, value in given.items() if value is not None}}
+    said = {"schema": 1, "object": {key: value for key, value in given.items() if value is not None}}
+    tree = with_objectfile(said, Path.cwd(), "the options")
     return _with_files_found(validate(tree, SceneFile, "the options"), Path.cwd(), "the options")
+
+
+def _require_one(mesh: str, objectfile: str | None) -> None:
+    if objectfile is not None:
+        raise WrongUse(f"--object {mesh} is an ObjectFile already; leave --objectfile {objectfile} out")
 
 
 def scene_from_json(tree: Any, where: str) -> SceneFile:
@@ -351,7 +372,7 @@ def _with_tables(named: tuple[tuple[str, str], ...]) -> type[SceneFile]:
 
 def _with_files_found(scene: SceneFile, folder: Path, where: str) -> SceneFile:
     named, found = scene.object, {}
-    if named.builtin is None:
+    if named.builtin is None and not named.is_objectfile:
         path = (folder / named.mesh).resolve()
         if not path.is_file():
             own = f'our own objects are written "{BUILTIN}mug" and so on'
@@ -359,9 +380,6 @@ def _with_files_found(scene: SceneFile, folder: Path, where: str) -> SceneFile:
         found["mesh"] = str(path)
     if named.objectfile is not None:
         path = (folder / named.objectfile).resolve()
-        if not (path / DESCRIPTION).is_file():
-            make = "make one with `touchstone object build`, or leave the key out"
-            kind = f"ObjectFile {path}, a folder with {DESCRIPTION} in it"
-            raise WrongUse(f"{where}: 'object.objectfile': there is no {kind}; {make}")
+        require_objectfile(path, where)
         found["objectfile"] = str(path)
     return scene.model_copy(update={"object": named.model_copy(update=found)}) if found else scene

@@ -10,7 +10,13 @@ from harness.commands.output import ANSWERS, emit
 
 
 def explain(
-    scene: Annotated[Path, typer.Argument(help="A scene file; examples are under scenes/.", metavar="SCENE")],
+    scene: Annotated[
+        Path,
+        typer.Argument(
+            help="A scene file, of which examples are under scenes/, or the folder of an ObjectFile.",
+            metavar="SCENE",
+        ),
+    ],
     station: options.Station = "mock",
     level: options.LevelOption = None,
     json: options.Json = False,
@@ -18,20 +24,30 @@ def explain(
     """Say which effects a scene calls for, which not, and why.
 
     Nothing is computed. An effect runs only where something asks for it and the scene has what causes it.
+    Where the scene names an ObjectFile: which of its networks stand for which simulation, how far off they
+    are and how long they take, as their model cards say.
 
     Try: touchstone explain scenes/mug_touch.toml
     """
-    from harness.bench.scene import load_scene
+    from harness.bench.scene import load_scene, scene_from_options
+    from harness.bench.scene_objectfile import holds_objectfile
     from harness.bench.station_file import load_station, station_path
     from harness.effects.catalogue import EFFECTS
     from harness.effects.explain import as_json, as_table, scene_plan
+    from harness.effects.explain_networks import networks_as_json, networks_as_table, networks_in_use
+    from harness.effects.file_levels import scene_levels
     from harness.effects.plan import default_accuracy
 
-    wanted = load_scene(scene)
+    wanted = scene_from_options(str(scene)) if holds_objectfile(scene) else load_scene(scene)
     sensor = load_station(station_path(station)).gel.sensor
-    plan = scene_plan(wanted, sensor, default_accuracy(EFFECTS).with_texts(level or []))
+    accuracy = default_accuracy(EFFECTS).with_(scene_levels(wanted)).with_texts(level or [])
+    plan = scene_plan(wanted, sensor, accuracy)
+    networks = networks_in_use(wanted, plan)
     if json:
-        emit({"schema": 1, "scene": str(scene), "observe": list(wanted.observe), **as_json(plan)})
-    else:
-        ANSWERS.print(as_table(plan))
+        explained = {**as_json(plan), "networks": networks_as_json(networks)}
+        emit({"schema": 1, "scene": str(scene), "observe": list(wanted.observe), **explained})
+        return 0
+    ANSWERS.print(as_table(plan))
+    if networks:
+        ANSWERS.print(networks_as_table(networks))
     return 0

@@ -23,11 +23,11 @@ Levels = Mapping[str, Level]
 
 LOOK = Knob(
     "camera.look",
-    ("one_sample", "onnx", "fused", "direct"),
+    ("one_sample", "onnx", "network", "direct"),
     "",
     "method",
     "direct",
-    "the ObjectFile's networks: one sample a pixel, its graph, the kernel; or rays on the mesh",
+    "the ObjectFile's networks: at one sample a pixel, by their graph, by our kernel; or rays on the mesh",
 )
 
 
@@ -62,7 +62,9 @@ def scene_camera_effects(camera: Condition, lights: Condition) -> tuple[Effect, 
     """
     *others, image = effects_when(lights)
     ways: dict[Level, Implementation] = {
-        level: _from_file(level) for level in ("fused", "onnx", "one_sample")
+        "network": _from_file("fused"),
+        "onnx": _from_file("onnx"),
+        "one_sample": _from_file("one_sample"),
     }
     return (
         *others,

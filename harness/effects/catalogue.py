@@ -138,7 +138,7 @@ EFFECTS = (
         _gel,
         knobs=(GEL,),
         choice=SHAPES,
-        ways={"codes": gel_from("codes"), "perceptron": gel_from("perceptron")},
+        ways={"network": gel_from("codes"), "perceptron": gel_from("perceptron")},
     ),
     Effect("touch.colour", ("touch.gel", "sensor", "sensor.calibration"), _colour, knobs=(OPTICS,)),
     Effect(

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
@@ -19,7 +20,7 @@ class KnownObject:
 
     Attributes:
         mesh: in metres, in the object's frame.
-        report: of the intake of a mesh file; None for a built-in object.
+        report: of the intake of a mesh file; None for a built-in object and for an ObjectFile.
     """
 
     mesh: Mesh
@@ -44,9 +45,23 @@ def known_file(scene: SceneFile, mesh: Mesh) -> ObjectFile | None:
     """
     if scene.object.objectfile is None:
         return None
-    of = ObjectFile.open(Path(scene.object.objectfile))
+    of = named_file(scene)
     require_same(of, walled(mesh, scene.object.wall), MATERIALS[scene.object.material])
     return of
+
+
+def named_file(scene: SceneFile) -> ObjectFile:
+    """The ObjectFile that a scene names.
+
+    Raises:
+        WrongUse: it names none.
+        DataRefused: it is missing or damaged.
+    """
+    if scene.object.objectfile is None:
+        raise WrongUse(
+            "the scene names no ObjectFile; say its folder as objectfile in [object], or with --object FOLDER"
+        )
+    return ObjectFile.open(Path(scene.object.objectfile))
 
 
 def known_object(scene: SceneFile) -> KnownObject:
@@ -55,10 +70,14 @@ def known_object(scene: SceneFile) -> KnownObject:
     Raises:
         WrongUse: units that are wrong or ambiguous.
         MeshRefused: a file that cannot stand for an object.
+        DataRefused: an ObjectFile that is missing or damaged.
     """
     wanted = scene.object
     if wanted.builtin is not None:
         mesh = build(wanted.builtin)
+        return KnownObject(Mesh(mesh.vertices * wanted.drawn_scale, mesh.faces), None)
+    if wanted.is_objectfile:
+        mesh = named_file(scene).mesh
         return KnownObject(Mesh(mesh.vertices * wanted.drawn_scale, mesh.faces), None)
     taken = take_in(Path(wanted.mesh), wanted.units, wanted.drawn_scale, wanted.wall)
     return KnownObject(taken.mesh, taken.report)

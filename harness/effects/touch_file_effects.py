@@ -24,11 +24,11 @@ Levels = Mapping[str, Level]
 
 SHAPES = Knob(
     "touch.shapes",
-    ("perceptron", "codes", "reference"),
+    ("perceptron", "network", "reference"),
     "",
     "method",
     "reference",
-    "the ObjectFile's perceptron, its codes, or the rasteriser on the mesh",
+    "the ObjectFile's perceptron, its network of codes, or the rasteriser on the mesh",
 )
 
 _NEEDS = ("object.file", "object.mesh", "object.wall", "sensor", "sensor.calibration")
@@ -37,7 +37,7 @@ _NEEDS = ("object.file", "object.mesh", "object.wall", "sensor", "sensor.calibra
 def _presses(given: Given, _levels: Levels) -> "Presses":
     from harness.sim.gel.pressed_place import presses_of
 
-    return presses_of(given["object.raster"], given["contact.gel_from_object"])
+    return presses_of(given["object.mesh"], given["contact.gel_from_object"])
 
 
 def _opened(level: "TouchLevel") -> Compute:
@@ -64,7 +64,7 @@ def gel_from(level: "TouchLevel") -> Implementation:
 
 
 FILE_EFFECTS = (
-    Effect("contact.presses", ("object.raster", "contact.gel_from_object"), _presses),
+    Effect("contact.presses", ("object.mesh", "contact.gel_from_object"), _presses),
     Effect("object.touch_codes", _NEEDS, _opened("codes"), when=NAMED),
     Effect("object.touch_perceptron", _NEEDS, _opened("perceptron"), when=NAMED),
 )

@@ -144,12 +144,14 @@ def add_report(
     """Compare, draw the report, and write the result again with both; the arguments are ``finish``'s."""
     scored = written.scored
     comparison = compare(scored, experiment.sources(scored))
+    scored = replace(scored, warnings=(*scored.warnings, *comparison.notes))
     page = (experiment.report or draw)(scored, comparison, health, folder / "report")
     np.savez_compressed(folder / OBSERVED, **comparison.arrays())  # type: ignore[arg-type]
     result = {
         **written.result,
         "plan": plan_json(comparison),
         "observed": comparison.observed(),
+        "warnings": [*written.result["warnings"], *comparison.notes],
         "report": str(page),
     }
     _write(folder / RESULT, result)

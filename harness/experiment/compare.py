@@ -1,21 +1,24 @@
 """What a scene observes, simulated at the answer; what a run can give is checked before it begins."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from harness.basics.arrays import AnyArray
-from harness.basics.errors import WrongUse
+from harness.basics.errors import OutOfDomain, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.store import Store, default_folder
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
+from harness.effects.catalogue import EFFECTS
 from harness.effects.evaluate import Evaluation, evaluate
 from harness.effects.explain import scene_plan
-from harness.effects.plan import Plan
+from harness.effects.file_levels import NETWORK, scene_levels
+from harness.effects.plan import Plan, default_accuracy
+from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment.experiment import Experiment, Scored
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.lit_calibration import shadow_of
@@ -32,10 +35,12 @@ class Comparison:
     Attributes:
         plan: which effects the scene called for.
         evaluation: which ran, how often and how long; their values by name.
+        notes: what a reader must know of how it was simulated.
     """
 
     plan: Plan
     evaluation: Evaluation
+    notes: tuple[str, ...] = ()
 
     def observed(self) -> dict[str, dict[str, Any]]:
         """Every wanted quantity as JSON values: shape and range of an array, its parts of a mapping."""
@@ -62,11 +67,12 @@ def require_sources(
         WrongUse: naming what is missing and which observed quantity needs it; or ``observe`` names something
             that nothing computes, that the scene rules out or that is not built.
     """
-    plan = scene_plan(scene, station.gel.sensor)
+    levels = default_accuracy(EFFECTS).with_(scene_levels(scene))
+    plan = scene_plan(scene, station.gel.sensor, levels)
     given = {*CARRIED, *experiment.gives}
     if shadow_of(calibration) is not None:
         given.add("sensor.shadow_table")
-    if scene.sensors.sound and scene.object.objectfile is not None:
+    if scene.object.objectfile is not None:
         given.add("object.file")
     missing = [name for name in plan.sources if name not in given]
     if missing:
@@ -83,8 +89,21 @@ def compare(scored: Scored, given: Mapping[str, Any]) -> Comparison:
         scored: the answer.
         given: what it gives the simulation, by the names of the experiment's ``gives``.
     """
+    accuracy = scored.accuracy
+    try:
+        return _simulated(scored, given, accuracy)
+    except OutOfDomain as refusal:
+        if accuracy.get(TOUCH.name) != NETWORK:
+            raise
+        # A gel may stand where no network was made for it; the readings are compared all the same.
+        instead = _simulated(scored, given, accuracy.with_({TOUCH.name: TOUCH.default}))
+        note = f"the readings are drawn with {TOUCH.name} = {TOUCH.default}: {refusal}"
+        return replace(instead, notes=(note,))
+
+
+def _simulated(scored: Scored, given: Mapping[str, Any], accuracy: Accuracy) -> Comparison:
     run = scored.run
-    plan = scene_plan(run.scene, run.station.gel.sensor, scored.accuracy)
+    plan = scene_plan(run.scene, run.station.gel.sensor, accuracy)
     sources = {**_carried(run, plan), **given}
     return Comparison(plan, evaluate(plan, sources, Store(default_folder())))
 

@@ -2,9 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from harness.basics.errors import WrongUse
 from harness.effects.accuracy import Accuracy, Knob, Level
-from harness.effects.touch_file_effects import SHAPES as DRAWN
 
 
 def chosen_levels(
@@ -18,13 +16,6 @@ def chosen_levels(
         start: levels to turn from instead of the default ones.
 
     Raises:
-        WrongUse: an unknown dial or level, and the nearest is named; a touch that no run carries.
+        WrongUse: an unknown dial or level, and the nearest is named.
     """
-    accuracy = Accuracy.default(knobs).with_(start or {}).with_texts(list(texts))
-    if DRAWN.name in accuracy and accuracy[DRAWN.name] != DRAWN.default:
-        raise WrongUse(
-            f"{DRAWN.name} = {accuracy[DRAWN.name]}: a run is compared with the mesh that it carries, and it "
-            f"carries no ObjectFile's touch; take {DRAWN.name} = {DRAWN.default}, or draw a press with "
-            "`touchstone object render touch`"
-        )
-    return accuracy
+    return Accuracy.default(knobs).with_(start or {}).with_texts(list(texts))

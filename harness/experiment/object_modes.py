@@ -13,14 +13,21 @@ from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Facts
 from harness.effects.evaluate import evaluate
+from harness.effects.file_levels import scene_levels
 from harness.effects.plan import default_accuracy, plan
 from harness.effects.scene_object import known_file
 from harness.objectfile.file import ObjectFile
+from harness.recording.run_folder import RunFiles
 from harness.sim.modal.modal import from_arrays
 from harness.sim.modal.modes import Modes
 
 ReadFile = Callable[[], ObjectFile | None]
 """Reads the object's ObjectFile, asked only where the modes come from it."""
+
+
+def carried_by(run: RunFiles) -> ReadFile:
+    """Reads the ObjectFile that a run carries, where its scene names one."""
+    return lambda: run.objectfile
 
 
 def object_modes(
@@ -36,12 +43,11 @@ def object_modes(
         scene: says the material and the wall.
         station: gives the sensor.
         mesh: of the object, in metres.
-        accuracy: levels of the modes' dials; None for the default ones.
+        accuracy: levels of the modes' dials; None for the ObjectFile's network, or the default ones.
         objectfile: reads the object's; None for the one that the scene names.
     """
-    chosen = plan(
-        EFFECTS, Facts(scene, station.gel.sensor), ("object.modes",), accuracy or default_accuracy(EFFECTS)
-    )
+    levels = accuracy or default_accuracy(EFFECTS).with_(scene_levels(scene))
+    chosen = plan(EFFECTS, Facts(scene, station.gel.sensor), ("object.modes",), levels)
     sources: dict[str, Any] = {
         "object.mesh": mesh,
         "object.wall": scene.object.wall,

@@ -14,9 +14,10 @@ from harness.bench.experiments import EXPERIMENTS
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
-from harness.effects.accuracy import Accuracy, Knob, Level, Setting
+from harness.effects.accuracy import Knob, Level, Setting
 from harness.experiment.experiment import Experiment, Measurement, RunCell, Say, Scored
 from harness.experiment.in_process import performed, recorded
+from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import named
 from harness.experiment.solving import Budgets, Solved
 from harness.experiment.subjects import object_key
@@ -119,7 +120,7 @@ class PlainRun:
     def solve(self, _readings: "PlainRun", setting: Setting) -> Solved:
         """The answer as JSON values, timed from the first reading on."""
         run = RunFiles(self.recording)
-        accuracy = Accuracy.default(self.experiment.knobs).with_(setting)
+        accuracy = chosen_levels(self.experiment.knobs, (), run.network_levels).with_(setting)
         answering = self.experiment.answering(run, accuracy)
         records = [record for record in self.recording.steps() if record.step.index < self.steps]
         answer, refusal = None, None

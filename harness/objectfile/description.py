@@ -1,7 +1,7 @@
 """``object.json``: strict, with a unit in every key that has one, made to be read by people."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -15,6 +15,7 @@ from harness.objectfile.entries import (
     FileEntry,
     MaterialEntry,
     MeshEntry,
+    Modality,
     NetworkEntry,
     Provenance,
 )
@@ -62,22 +63,13 @@ class Description(Entry):
     @property
     def files(self) -> tuple[FileEntry, ...]:
         """Every file that the folder must hold, each once."""
-        audio = self.audio
-        table = None if audio is None else audio.table
-        network = None if audio is None else audio.network
-        surface = None if table is None else table.surface
-        listed = (self.mesh, network, table, surface, *self._unheard)
-        return tuple(entry for entry in listed if entry is not None)
+        return self.files_of(("audio", "touch", "vision"))
 
-    @property
-    def sound_files(self) -> tuple[FileEntry, ...]:
-        """Those that the sound is made of, and the mesh."""
-        return tuple(entry for entry in self.files if entry not in self._unheard)
-
-    @property
-    def _unheard(self) -> tuple[FileEntry, ...]:
-        touch = () if self.touch is None else self.touch.files
-        return touch if self.vision is None else (*touch, *self.vision.files)
+    def files_of(self, senses: Sequence[Modality]) -> tuple[FileEntry, ...]:
+        """Those that some senses are made of, and the mesh."""
+        parts = [part for part in (self.audio, self.touch, self.vision) if part is not None]
+        chosen = [part for part in parts if part.sense in senses]
+        return (self.mesh, *(entry for part in chosen for entry in part.files))
 
     @property
     def networks(self) -> Mapping[str, NetworkEntry]:

@@ -1,13 +1,15 @@
 """The tables of ``object.json``: files, what graphs take and give, where parts come from."""
 
 import re
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from harness.basics.materials import Material
 from harness.basics.toml_file import StrictModel
 from harness.objects.builtin import DESCRIPTION
+
+Modality = Literal["audio", "touch", "vision"]
 
 MOST_BYTES = 512 * 2**20
 """Of one file; nothing larger is read. A published look has 4096 networks, 317 MiB in float32."""
@@ -272,6 +274,14 @@ class AudioEntry(Entry):
     network: NetworkEntry | None = None
     table: TableEntry | None = None
     provenance: Provenance
+
+    sense: ClassVar[Modality] = "audio"
+
+    @property
+    def files(self) -> tuple[FileEntry, ...]:
+        """All that the folder must hold for it."""
+        surface = None if self.table is None else self.table.surface
+        return tuple(entry for entry in (self.network, self.table, surface) if entry is not None)
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:

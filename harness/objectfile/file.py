@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.materials import Material
@@ -21,15 +21,21 @@ from harness.objectfile.description import (
     description_text,
     read_description,
 )
-from harness.objectfile.entries import AudioEntry, Entry, FileEntry, MaterialEntry, MeshEntry, Provenance
+from harness.objectfile.entries import (
+    AudioEntry,
+    Entry,
+    FileEntry,
+    MaterialEntry,
+    MeshEntry,
+    Modality,
+    Provenance,
+)
 from harness.objectfile.surface_file import mesh_from_ply, ply_bytes
 from harness.objectfile.touch_entries import TouchEntry
 from harness.objectfile.vision_entry import VisionEntry
 from harness.objects.builtin import DESCRIPTION
 
 MESH = "mesh.ply"
-
-Modality = Literal["audio", "touch", "vision"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -175,5 +175,23 @@ def require_declared(model: ModelProto, tensors: Sequence[Tensor], name: str) ->
             )
 
 
+def with_outputs(model: ModelProto, names: Sequence[str]) -> bytes:
+    """The bytes of a graph that gives some of its outputs alone.
+
+    Operations that only others need are taken out: onnxruntime would run them.
+    """
+    graph, needed, kept = model.graph, set(names), []
+    for node in reversed(graph.node):
+        if needed & set(node.output):
+            kept.append(node)
+            needed |= set(node.input)
+    outputs = [value for value in graph.output if value.name in names]
+    weights = [value for value in graph.initializer if value.name in needed]
+    alone = helper.make_graph(kept[::-1], graph.name, graph.input, outputs, weights)
+    return helper.make_model(
+        alone, ir_version=model.ir_version, opset_imports=model.opset_import
+    ).SerializeToString()
+
+
 def _first_line(error: Exception) -> str:
     return " ".join(str(error).split())[:200]

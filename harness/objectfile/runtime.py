@@ -14,8 +14,8 @@ import onnxruntime
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, WrongUse
-from harness.objectfile.entries import Input, NetworkEntry, Tensor
-from harness.objectfile.graph_check import checked_graph, require_declared
+from harness.objectfile.entries import Input, Tensor
+from harness.objectfile.graph_check import checked_graph, require_declared, with_outputs
 
 _FATAL = 4
 """onnxruntime's severity; what goes wrong is raised, and said once."""
@@ -30,17 +30,28 @@ class Network:
         inputs: it must take.
         outputs: it must give.
         threads: that one run may use.
+        only: the outputs that are computed; all where none is named.
 
     Raises:
         DataRefused: the graph must not be run, or is not the one described.
     """
 
     def __init__(
-        self, data: bytes, name: str, inputs: Sequence[Input], outputs: Sequence[Tensor], threads: int = 1
+        self,
+        data: bytes,
+        name: str,
+        inputs: Sequence[Input],
+        outputs: Sequence[Tensor],
+        threads: int = 1,
+        only: Sequence[str] = (),
     ) -> None:
         if threads < 1:
             raise WrongUse(f"{threads} threads compute nothing; say 1 or more")
-        require_declared(checked_graph(data, name), (*inputs, *outputs), name)
+        model = checked_graph(data, name)
+        require_declared(model, (*inputs, *outputs), name)
+        if only:
+            outputs = [tensor for tensor in outputs if tensor.name in only]
+            data = with_outputs(model, only)
         self.name, self.inputs, self.outputs = name, tuple(inputs), tuple(outputs)
         self._session = _session(data, name, threads)
 
@@ -63,11 +74,6 @@ class Network:
         """Whether every input is there, in its shape, for no queries."""
         wanted = {tensor.name: _of_none(tensor) for tensor in self.inputs}
         return {name: array.shape for name, array in inputs.items()} == wanted
-
-
-def open_network(data: bytes, entry: NetworkEntry, threads: int = 1) -> Network:
-    """The network of an entry, from its file's bytes; as ``Network``."""
-    return Network(data, entry.file, entry.inputs, entry.outputs, threads)
 
 
 def _session(data: bytes, name: str, threads: int) -> "onnxruntime.InferenceSession":

@@ -6,10 +6,13 @@ from functools import cached_property
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
-from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.basics.faces.face_grid import FaceGrid, build_face_grid
 from harness.basics.faces.nearest_kernels import near_surface, nearest_places, shares_on_faces
 from harness.basics.mesh import Mesh
+
+_OWN = 1e-3
+"""Of the diagonal, by which a place that a part was made at may be off the object's surface."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +76,30 @@ class SurfaceSearch:
     @cached_property
     def _grid(self) -> FaceGrid:
         return build_face_grid(self.mesh)
+
+
+def require_own(surface: SurfaceSearch, points: FloatArray, name: str) -> None:
+    """Refuse a part of an ObjectFile that was made at places of another object.
+
+    Args:
+        surface: of the object.
+        points: ``(n, 3)`` m, places of the surface that the part was made at.
+        name: of the part's file.
+
+    Raises:
+        DataRefused: one of them is off the surface; how far the farthest is.
+    """
+    most = _OWN * surface.mesh.diagonal
+    _, faces = surface.within(points, most)
+    off = points[faces < 0]
+    if len(off):
+        places, _ = surface.nearest(off, most)
+        far = float(np.linalg.norm(places - off, axis=1).max())
+        raise DataRefused(
+            f"{name} is of another object: {len(off)} of the {len(points)} places that it was made at are "
+            f"off this surface, by {far * 1e3:.3g} mm at most, where {most * 1e3:.3g} mm is the limit; build "
+            "the object again"
+        )
 
 
 def checked_points(points: AnyArray) -> FloatArray:

@@ -1,15 +1,25 @@
 """The tables of ``object.json`` that say what an object's touch is."""
 
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
 from harness.bench.sensor import TactileSensor
-from harness.objectfile.entries import Entry, FileEntry, NetworkEntry, Provenance
+from harness.objectfile.entries import Entry, FileEntry, Modality, NetworkEntry, Provenance
 from harness.sim.gel.gel import GelSkirt
 
 Positive = Annotated[float, Field(gt=0.0)]
 Size = Annotated[int, Field(ge=1)]
+
+Tensors = list[tuple[str, str, tuple[int | str, ...]]]
+"""Name, type and shape of each."""
+
+_COARSE = 4
+
+
+def ray_pixels(rows: int, columns: int) -> int:
+    """Pixels of a gel, each way, to one ray of what is only looked at coarsely."""
+    return _COARSE if rows % _COARSE == 0 and columns % _COARSE == 0 else 1
 
 
 class GelEntry(Entry):
@@ -59,6 +69,11 @@ class GelEntry(Entry):
         """Its skirt again."""
         return GelSkirt(self.skirt_kernels, self.skirt_final, self.skirt_core)
 
+    @property
+    def ray_pixels(self) -> int:
+        """Pixels, each way, to one ray of ``gaps``."""
+        return ray_pixels(self.rows, self.columns)
+
 
 class CodesEntry(Entry):
     """Codes of the surface.
@@ -67,11 +82,15 @@ class CodesEntry(Entry):
         network: graph from a node and the gel's pose to a map.
         nodes: places and outward normals.
         most_off_m: m, how far a press may be from a node.
+        deepest_m: m, the greatest depth of a press; the least is 0, as a press is a motion and not learned.
+        most_tilt_rad: rad, the greatest tilt.
     """
 
     network: NetworkEntry
     nodes: FileEntry
     most_off_m: Positive
+    deepest_m: Positive
+    most_tilt_rad: Annotated[float, Field(gt=0.0, lt=1.5)]
 
 
 class TouchEntry(Entry):
@@ -79,8 +98,8 @@ class TouchEntry(Entry):
 
     Attributes:
         gel: that the maps are of.
-        depth_m: m, least and greatest depth of a press.
-        most_tilt_rad: rad, the greatest tilt.
+        depth_m: m, least and greatest depth of a press, but for codes.
+        most_tilt_rad: rad, the greatest tilt, but for codes.
         near_surface_m: m, how far from the surface a contact may be.
         codes: network of the level ``codes``.
         perceptron: network of the level ``perceptron``.
@@ -94,6 +113,8 @@ class TouchEntry(Entry):
     codes: CodesEntry | None = None
     perceptron: NetworkEntry | None = None
     provenance: Provenance
+
+    sense: ClassVar[Modality] = "touch"
 
     @property
     def files(self) -> tuple[FileEntry, ...]:
@@ -119,7 +140,10 @@ class TouchEntry(Entry):
         image = ("n", self.gel.rows, self.gel.columns)
         if self.codes is not None:
             taken = [("node", "int64", ("n", 1)), ("node_from_gel", "float64", ("n", 3, 4))]
-            _check(self.codes.network, taken, [("maps", "float32", image)], "codes")
+            every = self.gel.ray_pixels
+            rays = ("n", self.gel.rows // every, self.gel.columns // every)
+            given: Tensors = [("maps", "float32", image), ("gaps", "float32", rays)]
+            _check(self.codes.network, taken, given, "codes")
         if self.perceptron is not None:
             _check(
                 self.perceptron,
@@ -132,11 +156,14 @@ class TouchEntry(Entry):
 
 def _check(
     network: NetworkEntry,
-    inputs: list[tuple[str, str, tuple[int | str, ...]]],
-    outputs: list[tuple[str, str, tuple[int | str, ...]]],
+    inputs: Tensors,
+    outputs: Tensors,
     what: str,
 ) -> None:
     taken = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.inputs]
     given = [(tensor.name, tensor.dtype, tensor.shape) for tensor in network.outputs]
     if taken != inputs or given != outputs:
-        raise ValueError(f"its {what} take {taken} and give {given}, where touch has {inputs} and {outputs}")
+        raise ValueError(
+            f"its {what} take {taken} and give {given}, where touch has {inputs} and {outputs}; build the "
+            "touch again"
+        )

@@ -1,10 +1,10 @@
 """The table of ``object.json`` that says what an object's look is."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from harness.objectfile.entries import Entry, FileEntry, NetworkEntry, Provenance
+from harness.objectfile.entries import Entry, FileEntry, Modality, NetworkEntry, Provenance
 from harness.objectfile.vision_tensors import EXTRAS, MOST_CELLS, Corner, Kind, box_tensors
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -91,6 +91,8 @@ class VisionEntry(Entry):
     network: NetworkEntry
     surface: FileEntry | None = None
     provenance: Provenance
+
+    sense: ClassVar[Modality] = "vision"
 
     @property
     def files(self) -> tuple[FileEntry, ...]:

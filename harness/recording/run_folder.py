@@ -20,6 +20,8 @@ from harness.bench.acquisition import AcquisitionCalibration
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.sensor import sensor_path, shipped_sensors
 from harness.bench.station_file import Station, station_from_json
+from harness.effects.accuracy import Level
+from harness.effects.file_levels import network_levels, senses_of
 from harness.effects.scene_object import known_file
 from harness.objectfile.file import ObjectFile, copied
 from harness.objects.builtin import DESCRIPTION
@@ -102,10 +104,10 @@ def create_run(
         acquisition: of the hammer's box; None for a run without sound.
 
     Raises:
-        WrongUse: the folder holds a run; or the scene is heard and names an ObjectFile of another object.
+        WrongUse: the folder holds a run; or the scene names an ObjectFile of another object.
         DataRefused: that ObjectFile is damaged.
     """
-    of = known_file(scene, mesh) if scene.sensors.sound else None
+    of = known_file(scene, mesh)
     require_unused(folder)
     folder.mkdir(parents=True, exist_ok=True)
     np.savez(folder / OBJECT, vertices=mesh.vertices, faces=mesh.faces)
@@ -118,7 +120,7 @@ def create_run(
         shutil.copyfile(sensor_path(station.gel.make), folder / SENSOR)
         carried.append(SENSOR)
     if of is not None:
-        copied(of, folder / OBJECTFILE, of.description.sound_files)
+        copied(of, folder / OBJECTFILE, of.description.files_of(senses_of(scene)))
         carried.append(_DESCRIBED)
     header = RunHeader(
         experiment=experiment,
@@ -174,18 +176,24 @@ class RunFiles:
 
     @cached_property
     def objectfile(self) -> ObjectFile:
-        """What the scene's ObjectFile said of the object's sound when the run was made.
+        """What the scene's ObjectFile said of the object when the run was made, for the senses of the scene.
 
         Raises:
-            WrongUse: the scene named none, or was not to be heard.
+            WrongUse: the scene named none.
             DataRefused: it is damaged.
         """
         if _DESCRIBED not in self.recording.header.files:
             raise WrongUse(
-                f"{self.recording.folder} carries no ObjectFile, as its scene named none or was not to be "
-                "heard; take sound.shapes = elements"
+                f"{self.recording.folder} carries no ObjectFile, as its scene named none; take "
+                "sound.shapes = elements and touch.shapes = reference"
             )
         return ObjectFile.open(self._checked(_DESCRIBED).parent)
+
+    @property
+    def network_levels(self) -> dict[str, Level]:
+        """Levels at which networks of the carried ObjectFile stand for the simulation; none without one."""
+        carried = _DESCRIBED in self.recording.header.files
+        return network_levels(self.scene, self.objectfile.description) if carried else {}
 
     def _checked(self, name: str) -> Path:
         path = self.recording.folder / name

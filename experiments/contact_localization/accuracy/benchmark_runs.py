@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.budget import Run
-from experiments.contact_localization.accuracy.dials import SIMULATED, needs_images
+from experiments.contact_localization.accuracy.dials import HEARD, needs_images
 from experiments.contact_localization.accuracy.solving import (
     Models,
     Readings,
@@ -35,6 +35,7 @@ from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.cost.curve import Sample
 from harness.effects.accuracy import Setting
+from harness.effects.file_levels import scene_levels
 from harness.effects.scene_object import known_object
 from harness.experiment.experiment import Say
 from harness.experiment.solving import Solved
@@ -219,7 +220,11 @@ def _case(
     name = object_key(cell.object, mesh)
     calibration = station_calibration(station)
     own = models.setdefault(
-        name, Models(lambda accuracy: model_of_scene(turned, station, mesh, calibration, accuracy))
+        name,
+        Models(
+            lambda accuracy: model_of_scene(turned, station, mesh, calibration, accuracy),
+            scene_levels(turned),
+        ),
     )
     observations, true_points = recorded
     prior = believed(turned.base_from_object(mesh)[:3, :3], cell)
@@ -280,7 +285,7 @@ def preparations(models: Mapping[str, Models]) -> tuple[str, ...]:
     for own in models.values():
         for levels, model in own.all().items():
             if model.modes is not None:
-                dials = zip(SIMULATED, levels, strict=True)
+                dials = zip(HEARD, levels, strict=False)
                 name = ", ".join(f"{knob.name} {level}" for knob, level in dials)
                 took.setdefault(name, []).append(sum(model.modes.seconds.values()))
     return tuple(

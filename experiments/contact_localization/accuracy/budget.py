@@ -28,6 +28,7 @@ from harness.bench.scene import SceneFile
 from harness.cost.curve import Curve
 from harness.cost.file import load
 from harness.effects.accuracy import Level, Setting
+from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment.solving import Budgets, Solved
 from harness.experiment.subjects import object_key
 from harness.experiment.truth import read_truth
@@ -41,7 +42,7 @@ _UNHEARD = (
     "`touchstone cost contact-localization --sense touch`"
 )
 _NO_OBJECTFILE = (
-    "what accuracy costs was measured with modes out of ObjectFiles alone, and this scene names none; name "
+    "what accuracy costs was measured with networks of ObjectFiles alone, and this scene names none; name "
     "one, or measure without with `touchstone cost contact-localization`"
 )
 
@@ -86,8 +87,9 @@ class Run:
 
     def prepared_alike(self, one: Setting, other: Setting) -> bool:
         """Whether samples and modes are the same, as far as ``one`` needs them."""
-        modes = not needs_sound(one) or all(one.get(k.name) == other.get(k.name) for k in SIMULATED)
-        return modes and one[SPACING.name] == other[SPACING.name]
+        turned = SIMULATED if needs_sound(one) else (TOUCH,)
+        simulated = all(one.get(knob.name) == other.get(knob.name) for knob in turned)
+        return simulated and one[SPACING.name] == other[SPACING.name]
 
     def work(self, setting: Setting) -> float:
         """How much there is to do, whatever the setting: on the object as a setting models it."""
@@ -117,7 +119,7 @@ def run_of(files: RunFiles) -> Run:
     recording, truth = files.recording, read_truth(files.recording)
     return Run(
         observe(files),
-        Models(lambda accuracy: model_of_run(files, accuracy)),
+        Models(lambda accuracy: model_of_run(files, accuracy), files.network_levels),
         prior_of(files),
         recording.header.seed,
         object_key(files.scene.object.name, files.mesh),

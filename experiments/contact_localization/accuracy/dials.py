@@ -1,6 +1,6 @@
 """Every dial of a localization run: the estimator's own and the simulation's, as one accuracy."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from experiments.contact_localization.posterior.dials import (
     BLOCK,
@@ -15,13 +15,19 @@ from experiments.contact_localization.posterior.dials import (
 from harness.effects.accuracy import Accuracy, Knob, Level, Setting
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
+from harness.effects.file_levels import NETWORK
 from harness.effects.sound_effects import EDGE, MODES, SHAPES
+from harness.effects.touch_file_effects import SHAPES as TOUCH
+from harness.objectfile.entries import Modality
 
 KNOBS = (*DIALS, *knobs_of(EFFECTS))
 
-SIMULATED: tuple[Knob[Level], ...] = (MODES, EDGE, SHAPES)
-"""Dials of the simulation that an estimate depends on: the modes that its sounds are compared with.
-Its other terms are its own, and only the comparison of a report draws simulated readings."""
+HEARD: tuple[Knob[Level], ...] = (MODES, EDGE, SHAPES)
+"""Dials of the modes that an estimate compares sounds with."""
+
+SIMULATED: tuple[Knob[Level], ...] = (*HEARD, TOUCH)
+"""Dials of the simulation that an estimate depends on: its modes, and what candidates' tactile images are
+crops of. Its other terms are its own, and only the comparison of a report draws simulated readings."""
 
 
 def grid(senses: str, spacing: float, rounds: int, samples: int, block: int) -> dict[str, Level]:
@@ -40,6 +46,9 @@ def by_sound(spacing: float) -> dict[str, Level]:
     """The grid by sound alone, which no other dial of it changes."""
     return {SENSES.name: "audio", METHOD.name: "grid", SPACING.name: spacing}
 
+
+_DIALS: Mapping[Modality, Knob[Level]] = {"touch": TOUCH, "audio": SHAPES}
+"""By the sense whose network is a level of them."""
 
 _COARSEST = (4e-3, 0, 3000, 16)
 _DEFAULT = (2e-3, 5, 3000, 8)
@@ -65,13 +74,15 @@ def accuracy_at(setting: Setting) -> Accuracy:
     return Accuracy.default(KNOBS).with_(setting)
 
 
-def settings(thorough: bool = False, sound: bool = True, objectfile: bool = False) -> list[dict[str, Level]]:
+def settings(
+    thorough: bool = False, sound: bool = True, networks: Collection[Modality] = ()
+) -> list[dict[str, Level]]:
     """Choices of levels to measure, each once: by every sense, from the cheapest to the finest.
 
     Args:
         thorough: also every single dial turned from the default, by each sense.
         sound: whether the runs were heard; touch alone where not.
-        objectfile: whether every scene names one, from which modes can come too.
+        networks: senses of which the ObjectFile of every scene has one, which can stand for the simulation.
     """
     found = [
         *(grid("touch", *dials) for dials in _GRIDS),
@@ -81,11 +92,13 @@ def settings(thorough: bool = False, sound: bool = True, objectfile: bool = Fals
         found += [grid("both", *dials) for dials in _GRIDS]
         found += [by_sound(float(spacing)) for spacing in SPACING.levels]
         found += _other_modes()
-        found += _other_shapes() if objectfile else []
     for turned in _turned(sound) if thorough else ():
         if turned not in found:
             found.append(turned)
-    return found
+    dials = [dial for sense, dial in _DIALS.items() if sense in networks and (sound or sense == "touch")]
+    # Where an object has networks, what is left open is theirs.
+    simulated = {dial.name: dial.default for dial in dials}
+    return [*({**setting, **simulated} for setting in found), *_by_networks(dials)]
 
 
 def settings_by_count(sound: bool = True) -> list[dict[str, Level]]:
@@ -104,13 +117,16 @@ def _other_modes() -> list[dict[str, Level]]:
     return [*({**full, **level} for level in few), {**quick, **few[0]}, {**by_sound(2e-3), **few[1]}]
 
 
-def _other_shapes() -> list[dict[str, Level]]:
-    """Modes of the ObjectFile in place of those that finite elements give."""
-    others: list[dict[str, Level]] = [
-        {SHAPES.name: level} for level in SHAPES.levels if level != SHAPES.default
-    ]
-    quick = (grid("both", *_COARSEST), grid("both", *_DEFAULT), by_sound(2e-3))
-    return [{**setting, **shapes} for shapes in others for setting in quick]
+def _by_networks(dials: Sequence[Knob[Level]]) -> list[dict[str, Level]]:
+    """The ObjectFile's networks, and its table of modes, in place of what is simulated."""
+    by_touch: dict[str, Level] = {TOUCH.name: NETWORK} if TOUCH in dials else {}
+    found = [{**grid("touch", *each), **by_touch} for each in (_COARSEST, _DEFAULT) if by_touch]
+    for shapes in SHAPES.levels if SHAPES in dials else ():
+        if shapes != SHAPES.default:
+            networks = {**by_touch, SHAPES.name: shapes}
+            found += [{**grid("both", *each), **networks} for each in (_COARSEST, _DEFAULT)]
+            found.append({**by_sound(2e-3), **networks})
+    return found
 
 
 def _turned(sound: bool) -> Iterator[dict[str, Level]]:
@@ -146,8 +162,8 @@ def needs_sound(setting: Mapping[str, Level]) -> bool:
 
 
 def needs_objectfile(setting: Mapping[str, Level]) -> bool:
-    """Whether a setting takes the modes from an ObjectFile."""
-    return setting.get(SHAPES.name, SHAPES.default) != SHAPES.default
+    """Whether a setting takes modes or touch from an ObjectFile."""
+    return any(setting.get(dial.name, dial.default) != dial.default for dial in (SHAPES, TOUCH))
 
 
 def saves_no_answer_time(setting: Mapping[str, Level]) -> bool:

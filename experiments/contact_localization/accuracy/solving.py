@@ -7,7 +7,12 @@ from typing import TypeVar
 
 from numba.core.event import install_recorder
 
-from experiments.contact_localization.accuracy.dials import SIMULATED, accuracy_at, needs_images, needs_sound
+from experiments.contact_localization.accuracy.dials import (
+    SIMULATED,
+    accuracy_at,
+    needs_images,
+    needs_sound,
+)
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import contact_of, height_map
 from experiments.contact_localization.posterior.dials import BLOCK, SPACING
@@ -16,6 +21,7 @@ from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.effects.accuracy import Accuracy, Level, Setting
+from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment.solving import Solved
 from harness.recording.observation import Observation
 
@@ -71,18 +77,22 @@ class Models:
     """The models of one object, one for each choice of the simulation's dials; each is made on first use.
 
     Attributes:
-        make: of the accuracy that chooses the modes.
+        make: of the accuracy that chooses the simulation.
+        start: levels of the simulation that a setting turns from: those of the object's ObjectFile.
     """
 
     make: Callable[[Accuracy], Model]
+    start: Setting = field(default_factory=dict)
     _made: dict[tuple[Level, ...], Model] = field(init=False, default_factory=dict, repr=False)
 
     def at(self, setting: Setting) -> Model:
-        """The model that a setting compares with; without sound all are one."""
-        plain = setting if needs_sound(setting) else {}
-        chosen = tuple(plain.get(knob.name, knob.default) for knob in SIMULATED)
+        """The model that a setting compares with; without sound the dials of modes count for nothing."""
+        turned = SIMULATED if needs_sound(setting) else (TOUCH,)
+        levels = {**self.start, **{knob.name: setting[knob.name] for knob in turned if knob.name in setting}}
+        accuracy = accuracy_at(levels)
+        chosen = tuple(accuracy[knob.name] for knob in SIMULATED)
         if chosen not in self._made:
-            self._made[chosen] = self.make(accuracy_at(plain))
+            self._made[chosen] = self.make(accuracy)
         return self._made[chosen]
 
     def all(self) -> Mapping[tuple[Level, ...], Model]:

@@ -74,7 +74,7 @@ class Search:
         object_from_base = self.prior.object_from_base(np.array([nominal]))[0]
         object_from_gel = object_from_base @ self.contacts[contact].base_from_gel[:3, :3]
         pitch = self._pitch if coarse else 0.5 * self._pitch
-        return view_along(self.model.raster, self.surface.points, object_from_gel, pitch, sensor)
+        return view_along(self.model.first_surface, self.surface.points, object_from_gel, pitch, sensor)
 
     def grid(self, members: IntArray, anchor: int, use_axis: bool = True) -> Hypotheses:
         """Hypotheses on the surface's samples, weighed by the places and tool axes of some contacts.

@@ -73,15 +73,29 @@ def draw_presses(mesh: Mesh, points: FloatArray, seed: int) -> Presses:
     return pressed(points, smooth_normals(mesh, points), seed)
 
 
-def pressed(points: FloatArray, normals: FloatArray, seed: int) -> Presses:
-    """As ``draw_presses``, where the smooth normals are known."""
+def pressed(
+    points: FloatArray,
+    normals: FloatArray,
+    seed: int,
+    depths: tuple[float, float] = DEPTHS,
+    most_tilt: float = MOST_TILT,
+) -> Presses:
+    """As ``draw_presses``, where the smooth normals are known.
+
+    Args:
+        points: ``(n, 3)`` m, of the surface.
+        normals: ``(n, 3)`` unit, outward there.
+        seed: of the presses.
+        depths: m, least and greatest.
+        most_tilt: rad.
+    """
     random = np.random.default_rng([seed, 6])
     count = len(points)
     return Presses(
         points=points,
         normals=normals,
-        depths=random.uniform(*DEPTHS, count),
-        tilts=random.uniform(0.0, MOST_TILT, count),
+        depths=random.uniform(*depths, count),
+        tilts=random.uniform(0.0, most_tilt, count),
         azimuths=random.uniform(0.0, 2.0 * np.pi, count),
         yaws=random.uniform(0.0, 2.0 * np.pi, count),
     )

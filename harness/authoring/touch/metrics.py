@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.authoring.touch.data import DEPTHS, draw_presses, reference_maps
+from harness.authoring.touch.data import DEPTHS, draw_presses, pressed, reference_maps, smooth_normals
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import TactileSensor
 from harness.objectfile.surface_search import SurfaceSearch
+from harness.objectfile.touch.graph import MOST_TILT as CODED_TILT
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes
 from harness.objectfile.touch.touch import Maps
 from harness.sim.gel.gel import GelSkirt
@@ -107,6 +108,12 @@ class PressBench:
         """Poses that were never shown, at places of the surface that were never shown."""
         points = SurfaceSearch(self.mesh).spread(count, seed + _OTHER_PLACES)[0]
         return self.measure(maps, draw_presses(self.mesh, points, seed + 2))
+
+    def of_any_press(self, maps: Maps, count: int, seed: int) -> MapErrors:
+        """At such places, as deep and as leant as codes answer."""
+        points = SurfaceSearch(self.mesh).spread(count, seed + 2 * _OTHER_PLACES)[0]
+        normals, depths = smooth_normals(self.mesh, points), (0.0, self.sensor.gel_thickness)
+        return self.measure(maps, pressed(points, normals, seed + 3, depths, CODED_TILT))
 
     def measure(self, maps: Maps, presses: Presses) -> MapErrors:
         """Maps of presses against the reference; presses with a part of the object in the way are left out.

@@ -9,7 +9,7 @@ from onnx import ModelProto
 from threadpoolctl import threadpool_limits
 
 from harness.authoring.touch.codes import CodedSurface, PatchSpec, code_surface, patch_bytes
-from harness.authoring.touch.data import DEPTHS, choose_nodes
+from harness.authoring.touch.data import choose_nodes
 from harness.authoring.touch.metrics import PressBench
 from harness.authoring.touch.profiles import CodesSpec, TouchPerceptronSpec, TouchProfile
 from harness.authoring.training import Report, median_seconds, train
@@ -48,8 +48,8 @@ class AuthoredTouch:
     Attributes:
         codes: to be written.
         perceptron: to be written; None where the profile has none.
-        errors: ``"trained_places"`` and ``"unseen_places"``, of the codes and of what costs nothing to
-            compare with: by a name with its unit.
+        errors: ``"trained_places"``, ``"unseen_places"`` and ``"any_press"``, of the codes and of what costs
+            nothing to compare with: by a name with its unit.
         settings: how they were made.
         seconds: s on the clock of each stage.
     """
@@ -97,7 +97,12 @@ def author_touch(
     bench = PressBench(mesh, raster, sensor, skirt, coded.nodes, OFF * spacing)
     errors, seconds = {}, {"codes": coding}
     maps = opened_codes(graph, coded.nodes, bench.most_off, sensor)
-    for kind, measure in (("trained_places", bench.at_nodes), ("unseen_places", bench.between_nodes)):
+    kinds = {
+        "trained_places": bench.at_nodes,
+        "unseen_places": bench.between_nodes,
+        "any_press": bench.of_any_press,
+    }
+    for kind, measure in kinds.items():
         report(f"measuring at {kind.replace('_', ' ')}", 0.0)
         begun = time.perf_counter()
         found = measure(maps, profile.presses, seed)
@@ -128,7 +133,7 @@ def author_touch(
 
 def opened_codes(graph: ModelProto, nodes: SurfaceNodes, most_off: float, sensor: TactileSensor) -> CodeMaps:
     """Codes that can be asked, before they are part of an ObjectFile."""
-    inputs, outputs = codes_tensors(len(nodes), most_off + DEPTHS[1], sensor)
+    inputs, outputs = codes_tensors(len(nodes), most_off + sensor.gel_thickness, sensor)
     return CodeMaps(Network(graph.SerializeToString(), CODES, inputs, outputs), NodeSearch(nodes, most_off))
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from harness.authoring.object_source import PartRequest
     from harness.authoring.touch.object_touch import BuiltTouch
 
-_KINDS = {"trained_places": "trained places", "unseen_places": "unseen places"}
+_KINDS = {"trained_places": "trained places", "unseen_places": "unseen places", "any_press": "any press"}
 _ROWS = {"level": "codes", "nearest_trained": "nearest trained place", "background": "untouched gel"}
 
 

@@ -108,7 +108,7 @@ def touch(
     objectfile: Annotated[
         Path | None,
         typer.Option(
-            help="Of a mesh: the object's ObjectFile, for --level touch.shapes=codes or =perceptron.",
+            help="Of a mesh: the object's ObjectFile, for --level touch.shapes=network or =perceptron.",
             metavar="FOLDER",
         ),
     ] = None,

@@ -36,6 +36,7 @@ def replay(
     from harness.experiment.levels import chosen_levels
     from harness.experiment.lookup import experiment_of
     from harness.recording.recording import Recording
+    from harness.recording.run_folder import RunFiles
     from harness.recording.wav_export import export_wav
 
     recording = Recording(run)
@@ -44,9 +45,9 @@ def replay(
         files = export_wav(recording, wav)
         warn(f"{len(files)} WAV files in {wav}; counts, rates and times in wav.json beside them")
     try:
-        own = levels_of_result(kind, recording.folder)
+        own = levels_of_result(kind, recording.folder) or RunFiles(recording).network_levels
     except RecordingDamaged as error:
-        own = {}
+        own = RunFiles(recording).network_levels
         warn(f"{error}; the default levels are taken")
     accuracy = chosen_levels(kind.knobs, level or [], own)
     folder = out or run.with_name(f"{run.name}-replay")

@@ -96,6 +96,7 @@ def run(
     """
     from harness.bench.station_file import load_station, station_path
     from harness.commands.scenes import resolve
+    from harness.effects.file_levels import scene_levels
     from harness.experiment.answer import add_report, finish, write_answer
     from harness.experiment.begin import begin
     from harness.experiment.budget import answer_as_asked, sentences
@@ -132,9 +133,9 @@ def run(
         kind = experiment_of(recording)
         if experiment is not None:
             require_of(recording, named(experiment).name, "--resume")
-        accuracy = chosen_levels(kind.knobs, level or [])
+        accuracy = chosen_levels(kind.knobs, level or [], RunFiles(recording).network_levels)
     else:
-        accuracy = chosen_levels(kind.knobs, level or [])
+        _ = chosen_levels(kind.knobs, level or [])  # a wrong one is refused before any file is read
         keys: dict[str, Any] = {"contacts": contacts, "presses": presses, "spacing": spacing, "yaw": yaw}
         if ends_run and kind.error_key is not None:
             keys[kind.error_key] = error
@@ -152,6 +153,7 @@ def run(
             range_,
             kind.assumed,
         )
+        accuracy = chosen_levels(kind.knobs, level or [], scene_levels(wanted))
         bench = load_station(station_path(station or "mock"))
         if target is not None:
             CONSOLE.print(foresee(kind, wanted, target), markup=False)
@@ -279,6 +281,7 @@ def _ask(what: str) -> None:
 def _describe(kind: Any, begun: Any, accuracy: Any) -> None:
     """What is about to happen, before anything moves; what is simulated, at the levels that were turned."""
     from harness.effects.explain import as_table, left_out, scene_plan
+    from harness.effects.explain_networks import networks_as_table, networks_in_use
     from harness.recording.run_folder import RunFiles
 
     run = RunFiles(begun.recording)
@@ -294,6 +297,9 @@ def _describe(kind: Any, begun: Any, accuracy: Any) -> None:
     )
     effects = scene_plan(run.scene, run.station.gel.sensor, accuracy)
     CONSOLE.print(as_table(effects, left_out=False))
+    networks = networks_in_use(run.scene, effects)
+    if networks:
+        CONSOLE.print(networks_as_table(networks))
     CONSOLE.print("not simulated:")
     for sentence in left_out(effects):
         CONSOLE.print(f"  {sentence}", markup=False)

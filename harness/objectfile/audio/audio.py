@@ -18,7 +18,7 @@ from harness.objectfile.audio.table import HalfArray, interpolated, table_from
 from harness.objectfile.entries import AudioEntry, TableEntry
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.surface_file import mesh_from_ply
-from harness.objectfile.surface_search import SurfaceSearch, checked_points
+from harness.objectfile.surface_search import SurfaceSearch, checked_points, require_own
 from harness.sim.modal.modes import Modes
 
 if TYPE_CHECKING:
@@ -187,8 +187,9 @@ def open_audio(of: ObjectFile, level: AudioLevel = "network", threads: int = 1) 
     match level:
         case "network" if entry.network is not None:
             # What runs graphs is heavy, and a table needs none of it.
-            from harness.objectfile.runtime import open_network
+            from harness.objectfile.self_test import asked_points, open_network
 
+            require_own(surface, asked_points(entry.network), entry.network.file)
             shapes = NetworkShapes(open_network(of.read(entry.network), entry.network, threads))
         case "table" if entry.table is not None:
             shapes = _table(of, entry.table, entry.near_surface_m)

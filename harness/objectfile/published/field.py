@@ -10,7 +10,8 @@ from harness.basics.errors import DataRefused
 from harness.objectfile.npy_file import npy_array
 from harness.objectfile.published.entries import PublishedCellsEntry, PublishedVisionEntry
 from harness.objectfile.published.folder import PublishedObject
-from harness.objectfile.runtime import Network, open_network
+from harness.objectfile.runtime import Network
+from harness.objectfile.self_test import open_network
 
 Field = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 """``(n, 3)`` points and ``(n, 3)`` unit views in the vision frame, and a ``(3,)`` light, to ``(n, 4)``: raw

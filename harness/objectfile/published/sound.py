@@ -9,7 +9,8 @@ from harness.basics.errors import DataRefused, OutOfDomain
 from harness.objectfile.published.entries import PublishedGainsEntry
 from harness.objectfile.published.folder import PublishedObject
 from harness.objectfile.published.queries import require_in_box
-from harness.objectfile.runtime import Network, open_network
+from harness.objectfile.runtime import Network
+from harness.objectfile.self_test import open_network
 
 COMPAT_RATE = 44100.0
 """Samples per second of the published program."""

@@ -17,7 +17,8 @@ from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.npy_file import npy_array
 from harness.objectfile.published.entries import Bounds, PublishedSpectrumEntry
 from harness.objectfile.published.folder import PublishedObject
-from harness.objectfile.runtime import Network, open_network
+from harness.objectfile.runtime import Network
+from harness.objectfile.self_test import open_network
 
 NEAREST = 4
 """Voxels whose sounds are added."""

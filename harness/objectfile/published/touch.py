@@ -10,7 +10,8 @@ from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.objectfile.published.entries import Bounds, PublishedColoursEntry, PublishedDepthEntry
 from harness.objectfile.published.folder import PublishedObject
 from harness.objectfile.published.queries import require_in_box
-from harness.objectfile.runtime import Network, open_network
+from harness.objectfile.runtime import Network
+from harness.objectfile.self_test import open_network
 
 _AT_ONCE = 16384
 """Pixels in one run of a network."""

@@ -10,7 +10,9 @@ seen them. *The gel.* What reaches behind the gel's plane goes through the skirt
 to the operation.
 
 Inputs: ``node`` int64 ``(n, 1)``, and ``node_from_gel`` float64 ``(n, 3, 4)``, the upper rows of a
-rigid transform in metres. Output ``maps``: float32 ``(n, rows, columns)``, metres of indentation.
+rigid transform in metres. Outputs: ``maps`` float32 ``(n, rows, columns)``, metres of indentation; and
+``gaps`` float32, metres along the gel's z axis from its plane to the object, of every ``ray_pixels``-th
+pixel each way, ``SEARCH_DEPTH`` where nothing is that near.
 """
 
 from dataclasses import dataclass
@@ -18,25 +20,25 @@ from dataclasses import dataclass
 import numpy as np
 from onnx import ModelProto, TensorProto, helper
 
-from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.bench.sensor import TactileSensor
 from harness.objectfile.graph import Nodes, Storage
-from harness.objectfile.touch.rays import between, ray_places, row_terms
+from harness.objectfile.touch.patch_rays import PatchRays, shape_of
 from harness.objectfile.touch.skirt import hung
+from harness.objectfile.touch_entries import ray_pixels
 from harness.sim.gel.gel import GelSkirt
+from harness.sim.gel.height_map import SEARCH_DEPTH
 
 _LOOKUPS = 3
 """Along a ray. The error of a look-up shrinks by the surface's slope times the gel's lean, about a fifth."""
 
-_LEAST_COSINE = 0.25
-"""Between node and gel: what a rotation that is none may do to a division."""
+_BEYOND = 1
+"""More of them for ``gaps``, which go on where the gel ends."""
 
-_COVERED = 127.5
-"""Of 255, from which a place counts as surface: the edge of a half-plane is then where it is."""
-
-_COARSE = 4
-"""Pixels a side to one ray of the first look-ups, which only say where the last one looks."""
+MOST_TILT = float(np.radians(26.0))
+"""rad between tool and surface that codes answer: a candidate that leans more than a press may is to be seen
+to fit badly, and not to be missing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +106,7 @@ def codes_graph(
     half_width = 0.5 * size * patches.pitch
     moved = nodes.add("Transpose", nodes.add("Cast", "node_from_gel", to=TensorProto.FLOAT), perm=[0, 2, 1])
     scale = np.array([1.0 / half_width, 1.0 / half_width, 1.0], np.float32)
-    motion = _Motion(nodes, nodes.add("Mul", moved, nodes.constant(scale)), sensor, patches.outside)
+    motion = PatchRays(nodes, nodes.add("Mul", moved, nodes.constant(scale)), sensor, patches.outside)
     coarse, half = _coarseness(patches, sensor)
     near: str | None = None
     for _ in range(lookups - 1):
@@ -115,21 +117,39 @@ def codes_graph(
     limits = [nodes.constant(np.array(value, np.float32)) for value in (0.0, sensor.gel_thickness)]
     deep = nodes.add("Clip", reached, *limits)
     nodes.add("Identity", hung(nodes, deep, sensor, skirt), name="maps")
+    _gaps(nodes, motion, (heights, covers), near, coarse)
     return nodes.model(
         "touch",
         [
             helper.make_tensor_value_info("node", TensorProto.INT64, ["n", 1]),
             helper.make_tensor_value_info("node_from_gel", TensorProto.DOUBLE, ["n", 3, 4]),
         ],
-        [helper.make_tensor_value_info("maps", TensorProto.FLOAT, ["n", sensor.rows, sensor.columns])],
-        "A node (n, 1) and the gel's pose in its frame (n, 3, 4), m, to indentation (n, rows, columns), m.",
+        [
+            helper.make_tensor_value_info("maps", TensorProto.FLOAT, ["n", sensor.rows, sensor.columns]),
+            helper.make_tensor_value_info(
+                "gaps", TensorProto.FLOAT, ["n", sensor.rows // coarse, sensor.columns // coarse]
+            ),
+        ],
+        "A node (n, 1) and the gel's pose in its frame (n, 3, 4), m, to indentation (n, rows, columns), m, "
+        "and to the gap between gel and object, m, of coarser rays.",
     )
+
+
+def _gaps(nodes: Nodes, motion: PatchRays, images: tuple[str, str], near: str | None, coarse: int) -> None:
+    """The output ``gaps``: of the coarse rays, which are followed beyond the gel's reach."""
+    heights, covers = images
+    for _ in range(_BEYOND):
+        near = motion.to_height(heights, near, coarse, coarse)
+    assert near is not None
+    far = nodes.constant(np.array(SEARCH_DEPTH, np.float32))
+    covered = motion.covered(motion.look_up(covers, near, coarse, coarse))
+    nodes.add("Min", nodes.add("Where", covered, near, far), far, name="gaps")
 
 
 def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
     """``(n, 1, size, size)``: heights of the asked nodes over that of all that lies outside, and covers."""
     size = len(patches.inside)
-    asked = nodes.add("Reshape", "node", _shape(nodes, -1))
+    asked = nodes.add("Reshape", "node", shape_of(nodes, -1))
     # In half precision what is below 60 um would be lost, were it metres.
     millimetres = patches.codes * 1e3
     if patches.basis is None:
@@ -141,128 +161,31 @@ def _patch(nodes: Nodes, patches: PatchCodes) -> tuple[str, str]:
     columns[patches.inside] = np.arange(pixels)
     index = nodes.constant(columns.ravel().astype(np.int64))
     if patches.basis is None:
-        flat = nodes.add("Gather", code, index, axis=1)
+        flat = _columns(nodes, code, index)
     else:
         held = nodes.weight(np.hstack([patches.basis, np.zeros((len(patches.basis), 1))]), "the basis")
         flat = nodes.add("MatMul", code, nodes.add("Gather", held, index, axis=1))
     mean = np.append(patches.mean, patches.outside)[columns.ravel()].astype(np.float32)
     metres = nodes.add("Mul", flat, nodes.constant(np.array(1e-3, np.float32)))
     above = nodes.add("Sub", nodes.constant(mean), nodes.constant(np.array(patches.outside, np.float32)))
-    heights = nodes.add("Reshape", nodes.add("Add", metres, above), _shape(nodes, -1, 1, size, size))
+    heights = nodes.add("Reshape", nodes.add("Add", metres, above), shape_of(nodes, -1, 1, size, size))
     none = np.zeros((len(patches.cover), 1), np.uint8)
     cover = nodes.add("Gather", nodes.constant(np.hstack([patches.cover, none])), asked, axis=0)
-    spread = nodes.add("Cast", nodes.add("Gather", cover, index, axis=1), to=TensorProto.FLOAT)
-    return heights, nodes.add("Reshape", spread, _shape(nodes, -1, 1, size, size))
+    spread = nodes.add("Cast", _columns(nodes, cover, index), to=TensorProto.FLOAT)
+    return heights, nodes.add("Reshape", spread, shape_of(nodes, -1, 1, size, size))
+
+
+def _columns(nodes: Nodes, rows: str, index: str) -> str:
+    """``(n, m)`` columns of ``(n, k)``, taken as rows of the transpose, which is thrice as fast."""
+    taken = nodes.add("Gather", nodes.add("Transpose", rows, perm=[1, 0]), index, axis=0)
+    return nodes.add("Transpose", taken, perm=[1, 0])
 
 
 def _coarseness(patches: PatchCodes, sensor: TactileSensor) -> tuple[int, int]:
     """Pixels a side to one ray of the first look-ups, and of those of covers."""
-    coarse = _COARSE if sensor.rows % _COARSE == 0 and sensor.columns % _COARSE == 0 else 1
+    coarse = ray_pixels(sensor.rows, sensor.columns)
     # A cover is linear between a patch's pixels: half the rays see all of it where they are closer.
     return coarse, 2 if coarse > 1 and 2.0 * sensor.pitch <= patches.pitch else 1
-
-
-class _Motion:
-    """The rays of a gel's pixels through the heights of a node."""
-
-    def __init__(self, nodes: Nodes, motion: str, sensor: TactileSensor, outside: float) -> None:
-        self._nodes, self._sensor = nodes, sensor
-        self._names: dict[tuple[str, int], str] = {}
-        columns, height = self._cut(motion, 2, 0, 2), self._cut(motion, 2, 2, 3)
-        # Heights are counted from the height outside, and so are those of the gel's plane.
-        over = np.array([[0.0], [0.0], [0.0], [outside]], np.float32)
-        self._across, self._height = columns, nodes.add("Sub", height, nodes.constant(over))
-        self._drift = self._cut(columns, 1, 2, 3)
-        least = nodes.constant(np.array(_LEAST_COSINE, np.float32))
-        self._rise = nodes.add("Max", self._cut(height, 1, 2, 3), least)
-        limits = (-sensor.gel_thickness, sensor.gel_thickness)
-        self._limits = [nodes.constant(np.array(value, np.float32)) for value in limits]
-
-    def to_height(self, heights: str, near: str | None, coarse: int, fine: int) -> str:
-        """``(n, rows, columns)`` m along the gel's z axis to the height under the rays, as ``look_up``."""
-        nodes = self._nodes
-        found = self.look_up(heights, near, coarse, fine)
-        plane = nodes.add("MatMul", self._rows(fine), self._line(self._height, fine))
-        return nodes.add("Div", nodes.add("Sub", found, plane), self._rise)
-
-    def look_up(self, image: str, near: str | None, coarse: int, fine: int) -> str:
-        """``(n, rows, columns)`` of an image of the node, of rays that are ``fine`` pixels apart.
-
-        They are ``near`` metres along the gel's z, ``(n, rows, columns)`` of rays ``coarse`` pixels apart and
-        linear between them; in the gel's plane if None.
-        """
-        nodes, sensor = self._nodes, self._sensor
-        rows, columns = sensor.rows // fine, sensor.columns // fine
-        grid = nodes.add("Reshape", self._places(near, coarse, fine), _shape(nodes, -1, rows, columns, 2))
-        found = nodes.add("GridSample", image, grid, mode="bilinear", padding_mode="zeros", align_corners=0)
-        return nodes.add("Reshape", found, _shape(nodes, -1, rows, columns))
-
-    def _places(self, near: str | None, coarse: int, fine: int) -> str:
-        """``(n, rows, 2 columns)``: where the rays are in the patch, x and y in turn.
-
-        A place is a sum of what its row says, what its column says and the way along the ray, so that all are
-        found by products with a few columns: one for each ray takes onnxruntime five times as long.
-        """
-        nodes, sensor = self._nodes, self._sensor
-        line = self._line(self._across, fine)
-        if near is None:
-            return nodes.add("MatMul", self._rows(fine), line)
-        rows, columns, step = sensor.rows // coarse, sensor.columns // coarse, coarse // fine
-        shift = nodes.add("MatMul", nodes.add("Reshape", near, _shape(nodes, 0, -1, 1)), self._drift)
-        shift = nodes.add("Reshape", shift, _shape(nodes, -1, rows, 2 * columns))
-        if step == 1:
-            return nodes.add("Add", nodes.add("MatMul", self._rows(fine), line), shift)
-        wide = np.kron(between(columns * step, step).T, np.eye(2, dtype=np.float32))
-        shift = nodes.add("MatMul", shift, nodes.constant(wide))
-        tall = np.hstack([between(rows * step, step), row_terms(sensor, fine)])
-        return nodes.add("MatMul", nodes.constant(tall), nodes.add("Concat", shift, line, axis=1))
-
-    def clipped(self, along: str) -> str:
-        """No farther from the gel's plane than the gel is thick; beyond is no touch, or too much."""
-        return self._nodes.add("Clip", along, *self._limits)
-
-    def where_covered(self, reached: str, covers: str) -> str:
-        """``(n, rows, columns)`` m that the object reaches into the gel; 0 where there is no surface."""
-        nodes = self._nodes
-        covered = nodes.add("Greater", covers, nodes.constant(np.array(_COVERED, np.float32)))
-        return nodes.add("Where", covered, reached, nodes.constant(np.array(0.0, np.float32)))
-
-    def finer(self, image: str, coarse: int) -> str:
-        """``(n, rows, columns)`` of the pixels, linear between rays that are ``coarse`` pixels apart."""
-        if coarse == 1:
-            return image
-        nodes, sensor = self._nodes, self._sensor
-        tall = nodes.add("MatMul", nodes.constant(between(sensor.rows, coarse)), image)
-        return nodes.add("MatMul", tall, nodes.constant(between(sensor.columns, coarse).T))
-
-    def _line(self, motion: str, fine: int) -> str:
-        """``(n, 2, columns k)`` of a motion to k numbers, ``(n, 4, k)``.
-
-        What a place's column says of it, in which x and 1 count, and the step along y: a row's terms times
-        these are the motion of all its places.
-        """
-        x = ray_places(self._sensor, fine)[0]
-        terms = np.zeros((2, len(x), 4), np.float32)
-        terms[0, :, 0], terms[0, :, 3], terms[1, :, 1] = x, 1.0, 1.0
-        line = self._nodes.add("MatMul", self._kept(("columns", fine), terms.reshape(-1, 4)), motion)
-        return self._nodes.add("Reshape", line, _shape(self._nodes, 0, 2, -1))
-
-    def _rows(self, fine: int) -> str:
-        return self._kept(("rows", fine), row_terms(self._sensor, fine))
-
-    def _kept(self, name: tuple[str, int], value: AnyArray) -> str:
-        """The constant of that name, once in the file."""
-        if name not in self._names:
-            self._names[name] = self._nodes.constant(value)
-        return self._names[name]
-
-    def _cut(self, value: str, axis: int, first: int, last: int) -> str:
-        ends = [self._nodes.constant(np.array([number])) for number in (first, last, axis)]
-        return self._nodes.add("Slice", value, *ends)
-
-
-def _shape(nodes: Nodes, *sizes: int) -> str:
-    return nodes.constant(np.array(sizes, np.int64))
 
 
 def _check(patches: PatchCodes, sensor: TactileSensor, lookups: int) -> None:

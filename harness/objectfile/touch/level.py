@@ -7,6 +7,7 @@ from harness.basics.mesh import Mesh
 from harness.bench.sensor import TactileSensor
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import require_same_shape
+from harness.objectfile.touch.tool_depth import CodedDepth, open_tool_depth
 from harness.objectfile.touch.touch import ObjectTouch, TouchLevel, open_touch
 from harness.objectfile.touch_entries import GelEntry
 from harness.sim.gel.gel import GelSkirt
@@ -16,6 +17,12 @@ INSTEAD = "touch.shapes = reference"
 
 _SAME = 1e-6
 """Relative, by which lengths of one gel may differ: more than JSON rounds them by."""
+
+
+def tool_depth_from(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt: GelSkirt) -> CodedDepth:
+    """The object along a tool, by the codes of its ObjectFile; arguments and errors as of ``touch_from``."""
+    _require_own(of, surface, sensor, skirt)
+    return open_tool_depth(of)
 
 
 def touch_from(
@@ -34,6 +41,11 @@ def touch_from(
         WrongUse: an ObjectFile of another object or another gel; what differs is said.
         DataRefused: it has no touch, or not at that level; or a file of it is damaged.
     """
+    _require_own(of, surface, sensor, skirt)
+    return open_touch(of, level)
+
+
+def _require_own(of: ObjectFile, surface: Mesh, sensor: TactileSensor, skirt: GelSkirt) -> None:
     entry = of.description.touch
     if entry is None:
         raise DataRefused(
@@ -41,7 +53,6 @@ def touch_from(
         )
     require_same_shape(of, surface, INSTEAD)
     require_gel(of, entry.gel, sensor, skirt)
-    return open_touch(of, level)
 
 
 def require_gel(of: ObjectFile, gel: GelEntry, sensor: TactileSensor, skirt: GelSkirt) -> None:

@@ -61,8 +61,17 @@ class NodeSearch:
 
     def nearest(self, presses: Presses) -> tuple[IntArray, FloatArray]:
         """``(n,)`` nodes, and ``(n,)`` m how far each press is from its own."""
-        gaps, nodes = self._tree.query(signatures(presses.points, presses.normals))
+        return self.nearest_to(SurfaceNodes(presses.points, presses.normals))
+
+    def nearest_to(self, places: SurfaceNodes) -> tuple[IntArray, FloatArray]:
+        """``(n,)`` nodes, and ``(n,)`` m how far each place is from its own."""
+        gaps, nodes = self._tree.query(signatures(places.points, places.normals))
         return np.asarray(nodes, np.int64), np.asarray(gaps, np.float64)
+
+    def posed(self, nodes: IntArray, object_from_gel: FloatArray) -> dict[str, AnyArray]:
+        """What ``touch_graph.codes_graph`` takes, of ``(n,)`` nodes and ``(n, 4, 4)`` poses of the gel."""
+        node_from_gel = self._node_from_object[nodes] @ object_from_gel
+        return {"node": nodes[:, None], "node_from_gel": np.ascontiguousarray(node_from_gel[:, :3])}
 
     def queries(self, presses: Presses) -> dict[str, AnyArray]:
         """What ``touch_graph.codes_graph`` takes.
@@ -80,8 +89,7 @@ class NodeSearch:
                 f"({x:.4f}, {y:.4f}, {z:.4f}) m: nearest code {gaps[worst] * 1e3:.3g} mm away, the limit is "
                 f"{self.most * 1e3:.3g} mm; take the place and the normal of press_pose.contact_place"
             )
-        node_from_gel = self._node_from_object[nodes] @ presses.object_from_gel
-        return {"node": nodes[:, None], "node_from_gel": np.ascontiguousarray(node_from_gel[:, :3])}
+        return self.posed(nodes, presses.object_from_gel)
 
 
 def nodes_bytes(nodes: SurfaceNodes) -> bytes:

@@ -13,9 +13,11 @@ from harness.bench.sensor import TactileSensor
 from harness.objectfile.entries import Domain, Input, NetworkEntry, Provenance, Tensor
 from harness.objectfile.file import ObjectFile, file_entry, with_part
 from harness.objectfile.network_part import SELF_TEST_VALUES, NetworkPart, network_entry, spread
+from harness.objectfile.touch.graph import MOST_TILT
 from harness.objectfile.touch.nodes import SurfaceNodes, nodes_bytes
-from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
+from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry, ray_pixels
 from harness.sim.gel.gel import GelSkirt
+from harness.sim.gel.height_map import SEARCH_DEPTH
 
 CODES = "touch.onnx"
 NODES = "touch_nodes.npy"
@@ -111,7 +113,7 @@ def with_touch(of: ObjectFile, part: TouchPart) -> ObjectFile:
 
 def codes_tensors(
     count: int, reach: float, sensor: TactileSensor
-) -> tuple[tuple[Input, Input], tuple[Tensor]]:
+) -> tuple[tuple[Input, Input], tuple[Tensor, Tensor]]:
     """What every graph of codes takes and gives.
 
     Args:
@@ -149,7 +151,16 @@ def codes_tensors(
         meaning="how far the gel is pressed in",
         frame="gel",
     )
-    return (node, pose), (maps,)
+    every = ray_pixels(sensor.rows, sensor.columns)
+    gaps = Tensor(
+        name="gaps",
+        dtype="float32",
+        shape=("n", sensor.rows // every, sensor.columns // every),
+        unit="m",
+        meaning=f"from the gel's plane to the object, of rays {every} pixels apart; {SEARCH_DEPTH:g} beyond",
+        frame="gel",
+    )
+    return (node, pose), (maps, gaps)
 
 
 def perceptron_tensors(least: FloatArray, most: FloatArray) -> tuple[tuple[Input], tuple[Tensor]]:
@@ -177,7 +188,8 @@ def perceptron_tensors(least: FloatArray, most: FloatArray) -> tuple[tuple[Input
 
 def _codes(part: TouchPart, codes: CodesPart, contents: dict[str, bytes]) -> CodesEntry:
     count = len(codes.nodes)
-    inputs, outputs = codes_tensors(count, codes.most_off + part.depths[1], part.sensor)
+    deepest = part.sensor.gel_thickness
+    inputs, outputs = codes_tensors(count, codes.most_off + deepest, part.sensor)
     chosen = np.linspace(0, count - 1, _SELF_TEST_ROWS).astype(np.int64)[:, None]
     poses = np.tile(np.eye(4)[:3], (_SELF_TEST_ROWS, 1, 1))
     poses[:, 2, 3] = _SELF_TEST_DEPTH
@@ -185,7 +197,14 @@ def _codes(part: TouchPart, codes: CodesPart, contents: dict[str, bytes]) -> Cod
     contents[NODES] = nodes_bytes(codes.nodes)
     written = NetworkPart(CODES, codes.graph, inputs, outputs, asked, _TOLERANCE, codes.measured, _seen)
     network = network_entry(written, contents)
-    return CodesEntry(network=network, nodes=file_entry(NODES, contents[NODES]), most_off_m=codes.most_off)
+    nodes = file_entry(NODES, contents[NODES])
+    return CodesEntry(
+        network=network,
+        nodes=nodes,
+        most_off_m=codes.most_off,
+        deepest_m=deepest,
+        most_tilt_rad=MOST_TILT,
+    )
 
 
 def _perceptron(part: PerceptronPart, contents: dict[str, bytes]) -> NetworkEntry:

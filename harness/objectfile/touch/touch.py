@@ -15,8 +15,8 @@ from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused, OutOfDomain, WrongUse
 from harness.basics.geometry import inverse
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.surface_search import SurfaceSearch
-from harness.objectfile.touch.nodes import NodeSearch, nodes_from
+from harness.objectfile.surface_search import SurfaceSearch, require_own
+from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes, nodes_from
 from harness.objectfile.touch.pixels import pixel_queries
 from harness.objectfile.touch_entries import CodesEntry, GelEntry, TouchEntry
 from harness.sim.gel.gel import deform, over_range
@@ -135,9 +135,18 @@ class ObjectTouch:
             )
         return found
 
+    @property
+    def _limits(self) -> tuple[float, float, float]:
+        """m, least and greatest depth, and rad, the greatest tilt."""
+        codes = self.entry.codes
+        # The mesh answers any press, and is asked beside the others.
+        if self.level != "perceptron" and codes is not None:
+            return 0.0, codes.deepest_m, codes.most_tilt_rad
+        return *self.entry.depth_m, self.entry.most_tilt_rad
+
     def _require(self, presses: Presses) -> None:
-        low, high = self.entry.depth_m
-        depths, tilts, most = presses.depths, presses.tilts, self.entry.most_tilt_rad
+        low, high, most = self._limits
+        depths, tilts = presses.depths, presses.tilts
         if ((depths < low * (1.0 - _EDGE)) | (depths > high * (1.0 + _EDGE))).any():
             raise OutOfDomain(
                 f"a press {_span(depths * 1e3)} mm deep was asked of the "
@@ -170,9 +179,7 @@ def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) ->
         DataRefused: the object has no touch, or not at that level; or a file of it is damaged.
         WrongUse: an unknown level.
     """
-    entry, name = of.description.touch, of.description.name
-    if entry is None:
-        raise DataRefused(f"{name} has no touch; add it with `touchstone object build --only touch`")
+    entry, name = touch_of(of), of.description.name
     maps: Maps
     match level:
         case "reference":
@@ -180,7 +187,7 @@ def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) ->
         case "codes" if entry.codes is not None:
             maps = _codes(of, entry.codes, threads)
         case "perceptron" if entry.perceptron is not None:
-            from harness.objectfile.runtime import open_network
+            from harness.objectfile.self_test import open_network
 
             network = open_network(of.read(entry.perceptron), entry.perceptron, threads)
             maps = PerceptronMaps(network, entry.gel)
@@ -191,15 +198,36 @@ def open_touch(of: ObjectFile, level: TouchLevel = "codes", threads: int = 1) ->
     return ObjectTouch(level, entry, SurfaceSearch(of.mesh), maps)
 
 
-def _codes(of: ObjectFile, entry: CodesEntry, threads: int) -> CodeMaps:
+def touch_of(of: ObjectFile) -> TouchEntry:
+    """What ``object.json`` says of an object's touch; ``DataRefused`` where it has none."""
+    if of.description.touch is None:
+        raise DataRefused(
+            f"{of.description.name} has no touch; add it with `touchstone object build --only touch`"
+        )
+    return of.description.touch
+
+
+def nodes_of(of: ObjectFile, entry: CodesEntry) -> SurfaceNodes:
+    """Where the codes of an object belong.
+
+    Raises:
+        DataRefused: the file is damaged, holds another number of them than the graph knows, or places of
+            another object.
+    """
     nodes = nodes_from(of.read(entry.nodes), entry.nodes.file)
     asked = entry.network.inputs[0].domain
     if asked.high is None or asked.high[0] != len(nodes) - 1:
         raise DataRefused(
             f"{entry.nodes.file} has {len(nodes)} nodes, its graph another number; build it again"
         )
-    # Graphs are heavy to read, and the reference needs none of it.
-    from harness.objectfile.runtime import open_network
+    require_own(SurfaceSearch(of.mesh), nodes.points, entry.nodes.file)
+    return nodes
 
-    network = open_network(of.read(entry.network), entry.network, threads)
+
+def _codes(of: ObjectFile, entry: CodesEntry, threads: int) -> CodeMaps:
+    nodes = nodes_of(of, entry)
+    # Graphs are heavy to read, and the reference needs none of it.
+    from harness.objectfile.self_test import open_network
+
+    network = open_network(of.read(entry.network), entry.network, threads, ("maps",))
     return CodeMaps(network, NodeSearch(nodes, entry.most_off_m))

@@ -6,10 +6,11 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused
-from harness.objectfile.entries import Domain, Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
+from harness.objectfile.entries import Domain, Input, NetworkEntry, SelfTest, Tensor
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.folder import PublishedObject
-from harness.objectfile.runtime import Network, open_network
+from harness.objectfile.runtime import Network
+from harness.objectfile.self_test import require_self_test
 from harness.objectfile.surface_search import SurfaceSearch
 
 _INSIDE = 256
@@ -27,7 +28,7 @@ def opened_once(of: ObjectFile | PublishedObject, entry: NetworkEntry) -> Opened
 
     def run() -> Network:
         if not opened:
-            opened.append(open_network(of.read(entry), entry))
+            opened.append(Network(of.read(entry), entry.file, entry.inputs, entry.outputs))
         return opened[0]
 
     return run
@@ -79,42 +80,8 @@ def look_at_self_test(run: Opened, test: SelfTest) -> str:
     Raises:
         DataRefused: the answer differs by more than the tolerance, or the test is none.
     """
-    network = run()
-    asked = zip(network.inputs, test.inputs, strict=True)
-    outputs = network({item.name: _array(item, kept, test.rows) for item, kept in asked})
-    worst = max(_gap(outputs[kept.name].ravel(), kept) for kept in test.outputs)
-    if not worst <= test.tolerance:
-        raise DataRefused(
-            f"{network.name} differs from what it gave when it was made by {worst:.2g} of the greatest "
-            f"number, where {test.tolerance:g} is allowed: another onnxruntime that computes otherwise, or "
-            "the self-test is another network's; build the object again"
-        )
+    worst = require_self_test(run(), test)
     return f"as when it was made, to {worst:.1e} of the greatest number ({test.tolerance:g} is allowed)"
-
-
-def _gap(found: AnyArray, kept: Sampled) -> float:
-    if max(kept.at) >= found.size:
-        raise DataRefused(
-            f"the self-test knows number {max(kept.at)} of {kept.name!r}, which has {found.size}; "
-            "build it again"
-        )
-    chosen, values = found[list(kept.at)].astype(np.float64), np.array(kept.values)
-    if not np.isfinite(chosen).all():
-        raise DataRefused(
-            f"{kept.name!r} is not finite where it was when it was made; build the object again"
-        )
-    scale = float(np.abs(values).max()) or 1.0
-    return float(np.abs(chosen - values).max()) / scale
-
-
-def _array(item: Input, kept: Whole, rows: int) -> AnyArray:
-    shape = _shape(item, rows)
-    if len(kept.values) != int(np.prod(shape)):
-        raise DataRefused(
-            f"the self-test gives {len(kept.values)} numbers {kept.name!r} where {rows} queries are {shape}; "
-            "build it again"
-        )
-    return np.array(kept.values, dtype=item.dtype).reshape(shape)
 
 
 def _queries(of: ObjectFile | PublishedObject, item: Input, random: np.random.Generator) -> AnyArray:

@@ -5,7 +5,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused
 from harness.objectfile.file import ObjectFile
-from harness.objectfile.runtime import open_network
+from harness.objectfile.runtime import Network
 from harness.objectfile.vision.coverage.outline import mesh_outline
 from harness.objectfile.vision.network.graph import graph_block, vision_model
 from harness.objectfile.vision.network.plain import Query, evaluate
@@ -54,7 +54,9 @@ def look_at_weights(of: ObjectFile, entry: VisionEntry) -> str:
     data, name = of.read(entry.network), entry.network.file
     model, block = vision_model(data, name), entry.size.block
     asked = blocks_inside(model, _BLOCKS, block, np.random.default_rng(1))
-    found, worst = open_network(data, entry.network)(asked), 0.0
+    of_graph = entry.network
+    network = Network(data, of_graph.file, of_graph.inputs, of_graph.outputs)
+    found, worst = network(asked), 0.0
     for row, network in enumerate(asked["network"][:, 0]):
         extras = asked["extras"][row] if "extras" in asked else np.zeros((block, 0))
         light: FloatArray = asked["light"][row].astype(np.float64)

@@ -71,7 +71,7 @@ def height_maps(raster: RasterMesh, gel_from_object: FloatArray, sensor: Tactile
     Raises:
         OutOfDomain: a pose that is not finite and rigid.
     """
-    poses = _rigid(gel_from_object)
+    poses = rigid_poses(gel_from_object)
     gap = np.empty((len(poses), sensor.rows, sensor.columns))
     no_faces = np.empty((0, 0, 0), np.int64)
     corner = -0.5 * np.array(sensor.window)
@@ -174,14 +174,15 @@ def _picture(
 ) -> FloatArray:
     if not (np.isfinite(pitch) and pitch > 0.0):
         raise OutOfDomain(f"a pixel of {pitch!r} m cannot be drawn; give a pitch greater than zero")
-    poses = _rigid(np.asarray(view_from_object)[None])
+    poses = rigid_poses(np.asarray(view_from_object)[None])
     depth = np.empty((1, *shape))
     corner = -0.5 * pitch * np.array(shape[::-1], np.float64)
     rasterise(raster.clusters, poses, corner, pitch, np.array(span), depth, face)
     return read_only(depth[0])
 
 
-def _rigid(poses: FloatArray) -> FloatArray:
+def rigid_poses(poses: FloatArray) -> FloatArray:
+    """``(n, 4, 4)`` poses as they are; ``OutOfDomain`` where one is not finite and rigid."""
     matrices = np.ascontiguousarray(poses, dtype=np.float64)
     if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
         raise OutOfDomain(f"poses of shape {matrices.shape} were given; a batch of poses is (n, 4, 4)")

@@ -4,17 +4,15 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
+from harness.basics.faces.mesh_rays import first_distances
 from harness.basics.geometry import inverse
-from harness.bench.sensor import TactileSensor
-from harness.sim.gel.height_map import RasterMesh, height_maps
+from harness.basics.mesh import Mesh
+from harness.sim.gel.height_map import SEARCH_DEPTH, STAND_OFF, rigid_poses
 from harness.sim.gel.press_pose import contact_place
 from harness.sim.gel.presses import Presses, frames_facing
 
-_CENTRE = TactileSensor("the gel's centre", 1, 1, 1e-6, 1.0)
-"""One ray, along the gel's z axis."""
 
-
-def presses_of(raster: RasterMesh, gel_from_object: FloatArray) -> Presses:
+def presses_of(mesh: Mesh, gel_from_object: FloatArray) -> Presses:
     """The presses of poses.
 
     The place is where the line through the gel's centre along its z axis first meets the object. A pose
@@ -22,22 +20,25 @@ def presses_of(raster: RasterMesh, gel_from_object: FloatArray) -> Presses:
     are the same turn, and the azimuth of a gel that is not tilted.
 
     Args:
-        raster: the object.
+        mesh: of the object.
         gel_from_object: ``(n, 4, 4)`` rigid.
 
     Raises:
         OutOfDomain: a pose that is not finite and rigid, or whose line meets nothing.
     """
-    gaps = height_maps(raster, gel_from_object, _CENTRE)[:, 0, 0]
+    object_from_gel = inverse(rigid_poses(gel_from_object))
+    inward = object_from_gel[:, :3, 2]
+    starts = object_from_gel[:, :3, 3] - STAND_OFF * inward
+    gaps = first_distances(starts, np.ascontiguousarray(inward), mesh.corners) - STAND_OFF
+    gaps[gaps > SEARCH_DEPTH] = np.inf
     if not np.isfinite(gaps).all():
         bad = int(np.argmin(np.isfinite(gaps)))
         raise OutOfDomain(
             f"the line through the centre of gel {bad + 1} of {len(gaps)} meets nothing of the object, and "
             "presses no place of it; press elsewhere, or take touch.shapes = reference"
         )
-    object_from_gel = inverse(gel_from_object)
     points = object_from_gel[:, :3, 3] + gaps[:, None] * object_from_gel[:, :3, 2]
-    normals = np.array([contact_place(raster.mesh, point).normal for point in points]).reshape(-1, 3)
+    normals = np.array([contact_place(mesh, point).normal for point in points]).reshape(-1, 3)
     leant = np.swapaxes(frames_facing(-normals), 1, 2) @ object_from_gel[:, :3, :3]
     tilts, azimuths, yaws = _angles(leant)
     return Presses(points, normals, -gaps, tilts, azimuths, yaws)

@@ -1,5 +1,6 @@
 """Pictures of an object along the tool: for the touch term, and for where a housing fits."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,9 @@ _SLACK = 3.0e-3
 _MARGIN = 4.0e-3
 """Metres around the object: a tool's line may miss it by a little while the gel still touches."""
 
+
+FirstSurface = Callable[[FloatArray, float, int, int], FloatArray]
+"""As ``height_map.first_surface`` of one object: from a view, a pitch in m, rows and columns to depths."""
 
 POOL = 4
 """Pixels of a view, each way, that share the limits on where the gel can be."""
@@ -49,12 +53,16 @@ class ToolView:
 
 
 def view_along(
-    raster: RasterMesh, samples: FloatArray, object_from_gel: FloatArray, pitch: float, sensor: TactileSensor
+    surface: FirstSurface,
+    samples: FloatArray,
+    object_from_gel: FloatArray,
+    pitch: float,
+    sensor: TactileSensor,
 ) -> ToolView:
     """The object as the gel would meet it, everywhere at once.
 
     Args:
-        raster: the object.
+        surface: of the object: ``first_surface`` of a mesh, or what stands for it.
         samples: ``(n, 3)`` metres, points of its surface that say how far it reaches.
         object_from_gel: ``(3, 3)`` rotation; its third column is the way the tool points.
         pitch: metres a pixel.
@@ -65,7 +73,7 @@ def view_along(
     columns, rows = np.ceil((high - low) / pitch).astype(np.int64) + 2 * round(_MARGIN / pitch)
     centre = 0.5 * (low + high)
     view_from_object = transform(object_from_gel.T, np.array([-centre[0], -centre[1], 0.0]))
-    depth = first_surface(raster, view_from_object, pitch, int(rows), int(columns))
+    depth = surface(view_from_object, pitch, int(rows), int(columns))
     origin = centre - 0.5 * pitch * np.array([columns - 1.0, rows - 1.0])
     return _view_of(depth, object_from_gel, origin, pitch, sensor)
 

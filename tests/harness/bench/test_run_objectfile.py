@@ -64,12 +64,16 @@ def test_a_change_in_the_run_is_noticed(of: ObjectFile, tmp_path: Path) -> None:
         _ = run.objectfile
 
 
-@pytest.mark.parametrize("case", ["only touched", "none named"])
-def test_nothing_is_carried_that_is_not_called_for(of: ObjectFile, tmp_path: Path, case: str) -> None:
-    run = run_of(scene_of(of, sound=False) if case == "only touched" else scene_of(None), tmp_path / "run")
-    assert not (tmp_path / "run" / "objectfile").exists()
+def test_nothing_is_carried_that_is_not_called_for(of: ObjectFile, tmp_path: Path) -> None:
+    run = run_of(scene_of(None), tmp_path / "unnamed")
+    assert not (tmp_path / "unnamed" / "objectfile").exists()
     with pytest.raises(WrongUse, match=r"carries no ObjectFile.*sound\.shapes = elements"):
         _ = run.objectfile
+    touched = run_of(scene_of(of, sound=False), tmp_path / "touched")
+    files = {path.name for path in touched.objectfile.folder.iterdir()}
+    assert files == {"object.json", "mesh.ply"}
+    assert touched.network_levels == {}
+    assert run_of(scene_of(of), tmp_path / "heard").network_levels == {"sound.shapes": "network"}
 
 
 def test_a_run_of_another_object_is_not_begun(of: ObjectFile, tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def test_a_scene_camera_sees_what_rays_and_lights_say() -> None:
     assert np.abs(bare.image.colour - wanted.image.colour).max() > 0.1
 
 
-@pytest.mark.parametrize("level", ["fused", "onnx", "one_sample"])
+@pytest.mark.parametrize("level", ["network", "onnx", "one_sample"])
 def test_a_scene_camera_takes_its_picture_from_the_networks(tmp_path: Path, level: str) -> None:
     """Of a known look; two lamps add up, and no ray on the mesh is followed for it."""
     of = box_file(tmp_path / "box")
@@ -69,6 +69,6 @@ def test_a_scene_camera_takes_its_picture_from_the_networks(tmp_path: Path, leve
 
 def test_a_picture_by_networks_needs_an_objectfile_in_the_scene() -> None:
     scene = SCENE.model_copy(update={"observe": ("camera.image",)})
-    accuracy = default_accuracy(EFFECTS).with_({"camera.look": "fused"})
+    accuracy = default_accuracy(EFFECTS).with_({"camera.look": "network"})
     with pytest.raises(WrongUse, match="names no ObjectFile"):
         scene_plan(scene, GELSIGHT_R15, accuracy)

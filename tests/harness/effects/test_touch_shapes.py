@@ -66,16 +66,16 @@ def evaluated(of: ObjectFile | None, level: str, **given: Any) -> Evaluation:
 
 
 def test_codes_are_a_level_of_what_the_rasteriser_computes(of: ObjectFile) -> None:
-    codes, reference = evaluated(of, "codes"), evaluated(of, "reference")
+    codes, reference = evaluated(of, "network"), evaluated(of, "reference")
     assert np.sqrt(((codes["touch.gel"] - reference["touch.gel"]) ** 2).mean()) < 5e-5
-    assert set(codes.calls) == {"object.raster", "contact.presses", "object.touch_codes", "touch.gel"}
+    assert set(codes.calls) == {"contact.presses", "object.touch_codes", "touch.gel"}
     assert set(reference.calls) == {"object.raster", "touch.height_map", "touch.gel"}
 
 
 def test_a_pose_is_answered_as_the_press_that_it_is(of: ObjectFile) -> None:
     """To float32's rounding of a millimetre."""
     np.testing.assert_allclose(
-        evaluated(of, "codes")["touch.gel"], open_touch(of, "codes").at(presses()), atol=1e-8
+        evaluated(of, "network")["touch.gel"], open_touch(of, "codes").at(presses()), atol=1e-8
     )
 
 
@@ -86,7 +86,7 @@ def test_the_rasteriser_asks_for_no_objectfile_even_where_there_is_one(of: Objec
 
 
 def test_shadows_start_from_the_object_itself_at_every_level(of: ObjectFile) -> None:
-    accuracy = Accuracy(knobs_of(EFFECTS), {"touch.shapes": "codes"})
+    accuracy = Accuracy(knobs_of(EFFECTS), {"touch.shapes": "network"})
     lit = replace(GELSIGHT_R15, casts_shadow=True)
     ran = {
         step.effect.provides
@@ -95,7 +95,7 @@ def test_shadows_start_from_the_object_itself_at_every_level(of: ObjectFile) -> 
     assert {"touch.height_map", "object.touch_codes", "touch.darkening"} <= ran
 
 
-@pytest.mark.parametrize("level", ["codes", "perceptron"])
+@pytest.mark.parametrize("level", ["network", "perceptron"])
 def test_without_an_objectfile_its_levels_are_refused(level: str) -> None:
     with pytest.raises(
         WrongUse, match=rf"touch\.shapes = {level}: the scene names no ObjectFile .*touch\.shapes = reference"
@@ -106,7 +106,7 @@ def test_without_an_objectfile_its_levels_are_refused(level: str) -> None:
 def test_an_objectfile_without_that_touch_is_refused(of: ObjectFile, tmp_path: Path) -> None:
     untouched = create_object(tmp_path / "peg", "peg", tb.peg(), MATERIALS["steel"], PROVENANCE)
     with pytest.raises(DataRefused, match=r"has no touch; add it .*--only touch.*touch\.shapes = reference"):
-        evaluated(untouched, "codes")
+        evaluated(untouched, "network")
     with pytest.raises(DataRefused, match="the touch of peg has no perceptron"):
         evaluated(of, "perceptron")
 
@@ -121,7 +121,7 @@ def test_an_objectfile_without_that_touch_is_refused(of: ObjectFile, tmp_path: P
 )
 def test_another_object_is_refused_and_said(of: ObjectFile, mesh: Mesh, said: str) -> None:
     with pytest.raises(WrongUse, match=f"is not of the scene's object: {said}.*touch.shapes = reference"):
-        evaluated(of, "codes", object__mesh=mesh)
+        evaluated(of, "network", object__mesh=mesh)
 
 
 @pytest.mark.parametrize(
@@ -138,19 +138,19 @@ def test_another_object_is_refused_and_said(of: ObjectFile, mesh: Mesh, said: st
 def test_another_gel_is_refused_and_said(of: ObjectFile, sensor: Any, skirt: Any, said: str) -> None:
     calibration = replace(BENCH, header=replace(BENCH.header, skirt=skirt))
     with pytest.raises(WrongUse, match=f"is of another gel: .*{said}.*touch.shapes = reference"):
-        evaluated(of, "codes", sensor=sensor, sensor__calibration=calibration)
+        evaluated(of, "network", sensor=sensor, sensor__calibration=calibration)
 
 
 def test_a_pose_that_the_codes_were_not_made_for_is_refused(of: ObjectFile) -> None:
-    deep = replace(presses(), depths=np.full(6, 2.2e-3))
-    with pytest.raises(OutOfDomain, match=r"2\.2 mm deep was asked .* knows 0\.5 to 2 mm"):
-        evaluated(of, "codes", contact__gel_from_object=inverse(deep.object_from_gel))
+    deep = replace(presses(), depths=np.full(6, 2.6e-3))
+    with pytest.raises(OutOfDomain, match=r"2\.6 mm deep was asked .* knows 0 to 2\.5 mm"):
+        evaluated(of, "network", contact__gel_from_object=inverse(deep.object_from_gel))
 
 
 @pytest.mark.parametrize(
     ("level", "why"),
     [
-        ("codes", "touch.shapes is codes, and the scene names an ObjectFile"),
+        ("network", "touch.shapes is network, and the scene names an ObjectFile"),
         ("reference", "touch.shapes is reference, its default"),
     ],
 )
@@ -160,7 +160,7 @@ def test_explain_says_which_level_runs_and_why(of: ObjectFile, level: str, why: 
     )
     steps = {step["effect"]: step for step in told["ran"]}
     assert steps["touch.gel"]["reason"].endswith(why)
-    assert ("object.touch_codes" in steps) == (level == "codes")
+    assert ("object.touch_codes" in steps) == (level == "network")
     assert ("touch.height_map" in steps) == (level == "reference")
 
 
@@ -182,7 +182,7 @@ scene = scene_from_options("builtin:mug", objectfile=sys.argv[1])
 gel = Gel(GELSIGHT_R15, shipped_calibration("gelsight_r15_bench"))
 press_mesh({"object.mesh": mesh, "contact.gel_from_object": at[None]}, gel, scene)
 print(sorted(TOUCH & sys.modules.keys()))
-press_mesh({"object.mesh": mesh, "contact.gel_from_object": at[None]}, gel, scene, ["touch.shapes=codes"])
+press_mesh({"object.mesh": mesh, "contact.gel_from_object": at[None]}, gel, scene, ["touch.shapes=network"])
 print("harness.objectfile.touch.touch" in sys.modules)
 """
 

@@ -14,7 +14,7 @@ from harness.objectfile.audio.graph import OutputScales, audio_graph
 from harness.objectfile.audio.table import table_bytes
 from harness.objectfile.entries import Domain, Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
 from harness.objectfile.file import ObjectFile, file_entry
-from harness.objectfile.runtime import open_network
+from harness.objectfile.self_test import open_network
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.verify.network import look_at_domain, look_at_self_test
 from harness.objectfile.verify.verify import verify

@@ -83,13 +83,6 @@ def test_about_thirty_settings_are_measured_over_senses_modes_and_elements() -> 
     assert {setting.get("sound.edge") for setting in found} >= {None, 0.7}
 
 
-@pytest.mark.parametrize("level", ["codes", "perceptron"])
-def test_a_run_takes_no_touch_that_it_does_not_carry(level: str) -> None:
-    with pytest.raises(WrongUse, match=rf"touch\.shapes = {level}: .*take touch\.shapes = reference"):
-        chosen([f"touch.shapes={level}"])
-    assert chosen(["touch.shapes=reference"]) == chosen([])
-
-
 def test_a_shipped_budget_never_buys_coarser_elements() -> None:
     """They are found sooner, once an object, and save an answer nothing: only luck would choose them."""
     curve = shipped_curve()

@@ -28,7 +28,7 @@ from harness.effects.scene_object import known_object
 from harness.experiment import object_modes
 from harness.experiment.front import Front
 from harness.objectfile.audio.part import with_audio
-from harness.objectfile.entries import Provenance
+from harness.objectfile.entries import Modality, Provenance
 from harness.objectfile.file import ObjectFile, create_object
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles, create_run, station_calibration
@@ -110,17 +110,24 @@ def test_nobody_reads_an_objectfile_where_modes_are_solved(
         model_of_scene(scene_of(of), STATION, MUG, CALIBRATION, at({}))
 
 
-def test_settings_with_an_objectfile_are_measured_beside_those_without() -> None:
-    without, beside = settings(), settings(objectfile=True)
-    assert beside[: len(without)] == without
-    added = beside[len(without) :]
-    assert not any(needs_objectfile(setting) for setting in without)
+@pytest.mark.parametrize("sound", [True, False])
+@pytest.mark.parametrize("networks", [("touch",), ("audio",), ("audio", "touch", "vision")])
+def test_settings_with_networks_are_measured_beside_those_without(
+    sound: bool, networks: tuple[Modality, ...]
+) -> None:
+    """The simulation is named where networks are the default, and so measured; nothing is measured twice."""
+    without, beside = settings(sound=sound), settings(sound=sound, networks=networks)
+    simulated, added = beside[: len(without)], beside[len(without) :]
+    assert [{**plain, **named} for plain, named in zip(without, simulated, strict=True)] == simulated
+    assert not any(needs_objectfile(setting) for setting in simulated)
     assert all(needs_objectfile(setting) for setting in added)
-    assert {setting["sound.shapes"] for setting in added} == {"network", "table"}
-    assert not any(needs_objectfile(setting) for setting in settings(thorough=True))
-    assert settings(sound=False, objectfile=True) == settings(sound=False)
-    for setting in added:
+    levels = {setting.get("sound.shapes", "open") for setting in added} - {"open"}
+    assert levels == ({"network", "table"} if sound and "audio" in networks else set())
+    drawn = {setting.get("touch.shapes", "open") for setting in added} - {"open"}
+    assert drawn == ({"network"} if "touch" in networks else set())
+    for setting in beside:
         at(setting)
+        assert beside.count(setting) == 1
 
 
 def test_a_budget_chooses_no_objectfile_where_the_scene_names_none() -> None:

@@ -1,5 +1,7 @@
 """The touch term: highest where the press was, never below its cap, forgiving what is unknown."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,7 @@ from experiments.contact_localization.touch.touch import (
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_about
 from harness.bench.sensor import GELSIGHT_R15
-from harness.sim.gel.height_map import RasterMesh
+from harness.sim.gel.height_map import RasterMesh, first_surface
 from harness.sim.gel.view import ToolView, view_along
 from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
 
@@ -44,7 +46,7 @@ def block() -> RasterMesh:
 def seen(block: RasterMesh, press: Press, off: float = 0.0) -> ToolView:
     """Along the tool as it is believed to have stood, ``off`` rad about the gel's y axis from how it did."""
     rotation = press.object_from_gel[:3, :3] @ rotation_about(np.array([0.0, 1.0, 0.0]), off)
-    return view_along(block, block.mesh.vertices, rotation, 0.5 * PITCH, GELSIGHT_R15)
+    return view_along(partial(first_surface, block), block.mesh.vertices, rotation, 0.5 * PITCH, GELSIGHT_R15)
 
 
 def read(block: RasterMesh, press: Press) -> TouchMap:

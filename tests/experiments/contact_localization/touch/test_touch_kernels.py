@@ -1,5 +1,7 @@
 """The touch term's loops against the same formulas in plain array arithmetic."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.ndimage import correlate1d
@@ -16,7 +18,7 @@ from experiments.contact_localization.touch.touch import (
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 from harness.basics.geometry import rotation_about
 from harness.bench.sensor import GELSIGHT_R15
-from harness.sim.gel.height_map import RasterMesh
+from harness.sim.gel.height_map import RasterMesh, first_surface
 from harness.sim.gel.view import POOL, ToolView, view_along
 from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
 
@@ -36,7 +38,7 @@ def block() -> RasterMesh:
 def view(block: RasterMesh) -> ToolView:
     """Along the tool; nothing asked for yet."""
     pitch = 0.5 * BLOCK * GELSIGHT_R15.pitch
-    return view_along(block, block.mesh.vertices, VIEWED, pitch, GELSIGHT_R15)
+    return view_along(partial(first_surface, block), block.mesh.vertices, VIEWED, pitch, GELSIGHT_R15)
 
 
 @pytest.fixture(scope="module")

@@ -110,11 +110,14 @@ def test_sim_touch_draws_the_same_press_from_the_same_codes(
 ) -> None:
     rendered(folder, tmp_path, capsys, *PLACE, *POSE)
     mesh = folder / "mesh.ply"
-    codes = ("--objectfile", folder, "--level", "touch.shapes=codes")
+    codes = ("--objectfile", folder, "--level", "touch.shapes=network")
     given = (mesh, *PLACE, *POSE, "--units", "m", "--out", tmp_path / "b.png")
     answer = answered(capsys, tmp_path, *given, *codes)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert answer["levels"]["touch.shapes"] == "codes"
+    alone = (folder, *PLACE, *POSE, "--out", tmp_path / "c.png", "--level", "touch.shapes=network")
+    answered(capsys, tmp_path, *alone)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "c.png").read_bytes()
+    assert answer["levels"]["touch.shapes"] == "network"
     assert answer["flags"]["over_range_m"] is None
     assert answer["error_estimate"]["maps_measured"] == {"psnr_db": 50.0}
     ran = {step["effect"] for step in answer["effects"]["ran"]}
@@ -123,7 +126,7 @@ def test_sim_touch_draws_the_same_press_from_the_same_codes(
     unasked = answered(capsys, tmp_path, *given, "--objectfile", folder)
     assert unasked["error_estimate"]["maps_measured"] is None
     assert "object.touch_codes" not in {step["effect"] for step in unasked["effects"]["ran"]}
-    refused = answered(capsys, tmp_path, *given, "--level", "touch.shapes=codes", code=2)
+    refused = answered(capsys, tmp_path, *given, "--level", "touch.shapes=network", code=2)
     assert "the scene names no ObjectFile" in refused["error"]
 
 
@@ -157,15 +160,15 @@ def test_for_people_it_says_level_place_and_distance(
     ("more", "code", "said"),
     [
         (
-            (*PLACE, "--depth", "2.5mm"),
+            (*PLACE, "--depth", "2.6mm"),
             1,
-            "2.5 mm deep was asked of the touch's codes, which knows 0.5 to 2 mm",
+            "2.6 mm deep was asked of the touch's codes, which knows 0 to 2.5 mm",
         ),
-        ((*PLACE, "--depth", "0.1mm"), 1, "which knows 0.5 to 2 mm"),
+        ((*PLACE, "--depth", "-0.1mm"), 1, "which knows 0 to 2.5 mm"),
         (
-            (*PLACE, "--tilt", "20deg"),
+            (*PLACE, "--tilt", "30deg"),
             1,
-            "a tilt of 20 deg was asked of the touch's codes, which knows 0 to 15 deg",
+            "a tilt of 30 deg was asked of the touch's codes, which knows 0 to 26 deg",
         ),
         (("--contact", "0.01", "0.02", "0.06"), 1, "10 mm off the surface; the limit is 2 mm"),
         ((*PLACE, "--level", "fine"), 2, "--level takes codes, perceptron, or reference"),

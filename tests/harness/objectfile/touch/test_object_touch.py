@@ -83,13 +83,22 @@ def test_a_graph_asked_for_some_inputs_and_not_others_says_so(peg_object: Object
 @pytest.mark.parametrize("level", ["codes", "reference"])
 def test_what_a_touch_was_not_made_for_is_refused_and_not_clamped(peg_object: ObjectFile, level: Any) -> None:
     touch, asked = open_touch(peg_object, level), presses()
-    with pytest.raises(OutOfDomain, match=r"knows 0\.5 to 2 mm"):
-        touch.at(replace(asked, depths=np.full(6, 2.01e-3)))
-    with pytest.raises(OutOfDomain, match="knows 0 to 15 deg"):
-        touch.at(replace(asked, tilts=np.full(6, np.radians(15.1))))
+    for depth in (2.51e-3, -1e-5):
+        with pytest.raises(OutOfDomain, match=r"knows 0 to 2\.5 mm"):
+            touch.at(replace(asked, depths=np.full(6, depth)))
+    with pytest.raises(OutOfDomain, match="knows 0 to 26 deg"):
+        touch.at(replace(asked, tilts=np.full(6, np.radians(26.1))))
     with pytest.raises(OutOfDomain, match="off the surface"):
         touch.at(replace(asked, points=asked.points + 0.01))
-    touch.at(replace(asked, depths=np.full(6, 2e-3), tilts=np.full(6, np.radians(15.0))))
+    for depth in (0.0, 2.5e-3):
+        touch.at(replace(asked, depths=np.full(6, depth), tilts=np.full(6, np.radians(26.0))))
+
+
+def test_a_press_as_deep_and_as_leant_as_may_be_is_felt_as_on_the_mesh(peg_object: ObjectFile) -> None:
+    """As near as one that is upright: a press is a motion, of which codes learn nothing."""
+    asked = replace(presses(), depths=np.full(6, 2.5e-3), tilts=np.full(6, np.radians(26.0)))
+    found, truth = (open_touch(peg_object, level).at(asked) for level in ("codes", "reference"))
+    assert np.sqrt(((found - truth) ** 2).mean()) < 1e-4
 
 
 def test_a_press_with_the_normal_of_another_place_is_refused(peg_object: ObjectFile) -> None:

@@ -74,7 +74,7 @@ def test_object_json_says_how_its_numbers_are_meant(box_object: ObjectFile) -> N
     low, high = entry.grid.box
     assert (np.array(low) <= BOX.bounds[0]).all()
     assert (np.array(high) >= BOX.bounds[1]).all()
-    assert box_object.description.sound_files == (box_object.description.mesh,)
+    assert box_object.description.files_of(("audio",)) == (box_object.description.mesh,)
 
 
 def test_the_same_look_is_the_same_bytes(box_object: ObjectFile, tmp_path: Path) -> None:

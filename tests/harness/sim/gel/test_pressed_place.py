@@ -7,12 +7,11 @@ from harness.authoring.touch.data import draw_presses
 from harness.basics.errors import OutOfDomain
 from harness.basics.geometry import inverse, transform
 from harness.objectfile.surface_search import SurfaceSearch
-from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.pressed_place import presses_of
 from harness.sim.gel.presses import Presses
 from tests.samples import touch_bench as tb
 
-RASTER = RasterMesh(tb.peg())
+MESH = tb.peg()
 ROUNDING = 1e-9
 """m and rad: 1e6 times what float64 loses of 0.1 m, for lengths of rays and normals between three corners."""
 
@@ -23,7 +22,7 @@ def drawn(count: int = 60) -> Presses:
 
 def test_a_press_comes_back_from_its_pose() -> None:
     asked = drawn()
-    found = presses_of(RASTER, inverse(asked.object_from_gel))
+    found = presses_of(MESH, inverse(asked.object_from_gel))
     np.testing.assert_allclose(found.points, asked.points, atol=ROUNDING)
     np.testing.assert_allclose(found.depths, asked.depths, atol=ROUNDING)
     same = np.abs(found.normals - asked.normals).max(axis=1) < ROUNDING
@@ -36,7 +35,7 @@ def test_a_press_comes_back_from_its_pose() -> None:
 
 def test_the_press_of_a_pose_has_that_pose() -> None:
     poses = drawn().object_from_gel
-    np.testing.assert_allclose(presses_of(RASTER, inverse(poses)).object_from_gel, poses, atol=ROUNDING)
+    np.testing.assert_allclose(presses_of(MESH, inverse(poses)).object_from_gel, poses, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1e-12, 1e-8])
@@ -44,7 +43,7 @@ def test_the_press_of_a_pose_has_that_pose() -> None:
 def test_an_upright_gel_keeps_its_yaw(tilt: float, yaw: float) -> None:
     asked = drawn(1)
     upright = Presses.one(asked.points[0], asked.normals[0], 1e-3, tilt, 1.2, yaw)
-    found = presses_of(RASTER, inverse(upright.object_from_gel))
+    found = presses_of(MESH, inverse(upright.object_from_gel))
     np.testing.assert_allclose(found.object_from_gel, upright.object_from_gel, atol=ROUNDING)
     assert found.tilts[0] < tilt + ROUNDING
 
@@ -53,4 +52,4 @@ def test_a_gel_beside_the_object_presses_no_place() -> None:
     away = transform(np.eye(3), np.array([1.0, 1.0, 1.0]))
     poses = inverse(np.concatenate([drawn(1).object_from_gel, away[None]]))
     with pytest.raises(OutOfDomain, match=r"gel 2 of 2 meets nothing.*touch\.shapes = reference"):
-        presses_of(RASTER, poses)
+        presses_of(MESH, poses)

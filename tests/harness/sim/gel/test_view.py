@@ -1,5 +1,7 @@
 """The picture along a tool: the first surface where it is, and limits that no press oversteps."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,7 +10,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, rotation_from_vector
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import GELSIGHT_R15
-from harness.sim.gel.height_map import RasterMesh
+from harness.sim.gel.height_map import RasterMesh, first_surface
 from harness.sim.gel.view import POOL, ToolView, view_along, window_depth
 from harness.sim.solid.surface_samples import sample_surface
 from tests.samples.synthetic_press import Press, box, solid, stepped_block
@@ -19,7 +21,7 @@ AWAY = np.array([0.3, -0.2, 0.5])
 
 
 def pictured(mesh: Mesh, rotation: FloatArray, pitch: float = PITCH) -> ToolView:
-    return view_along(RasterMesh(mesh), mesh.vertices, rotation, pitch, GELSIGHT_R15)
+    return view_along(partial(first_surface, RasterMesh(mesh)), mesh.vertices, rotation, pitch, GELSIGHT_R15)
 
 
 def places(view: ToolView) -> FloatArray:
@@ -74,7 +76,7 @@ def test_the_gel_of_every_press_lies_within_the_limits() -> None:
             tuple(surface.points[index]), tuple(axis / np.linalg.norm(axis)), depth=rng.uniform(0.0, 2e-3)
         )
         rotation = press.object_from_gel[:3, :3]
-        view = view_along(raster, mesh.vertices, rotation, PITCH, GELSIGHT_R15)
+        view = view_along(partial(first_surface, raster), mesh.vertices, rotation, PITCH, GELSIGHT_R15)
         centre = press.object_from_gel[:3, 3] @ view.object_from_view
         column, row = np.round((centre[:2] - view.origin) / view.pitch).astype(np.int64)
         if abs(view.depth[row, column] + press.depth - centre[2]) > 0.2e-3:

@@ -1,0 +1,79 @@
+"""Whether a network answers as it did when it was made: another's does not, whatever its hash."""
+
+import numpy as np
+
+from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.errors import DataRefused
+from harness.objectfile.entries import NetworkEntry, Sampled, SelfTest, Tensor, Whole
+from harness.objectfile.runtime import Network
+
+
+def open_network(data: bytes, entry: NetworkEntry, threads: int = 1, only: tuple[str, ...] = ()) -> Network:
+    """The network of an entry, from its file's bytes, once it has answered its self-test.
+
+    Args:
+        data: of the file.
+        entry: what ``object.json`` says of it.
+        threads: that one run may use.
+        only: the outputs that are computed; all where none is named.
+
+    Raises:
+        DataRefused: as ``Network``; or it answers otherwise than when it was made.
+    """
+    network = Network(data, entry.file, entry.inputs, entry.outputs, threads, only)
+    require_self_test(network, entry.self_test)
+    return network
+
+
+def require_self_test(network: Network, test: SelfTest) -> float:
+    """The greatest difference from what was answered when it was made, relative to the greatest number.
+
+    Raises:
+        DataRefused: it is more than the tolerance, or the test is none.
+    """
+    asked = zip(network.inputs, test.inputs, strict=True)
+    outputs = network({item.name: queries_of(item, kept, test.rows) for item, kept in asked})
+    worst = max(_gap(outputs[kept.name].ravel(), kept) for kept in test.outputs if kept.name in outputs)
+    if not worst <= test.tolerance:
+        raise DataRefused(
+            f"{network.name} differs from what it gave when it was made by {worst:.2g} of the greatest "
+            f"number, where {test.tolerance:g} is allowed: another onnxruntime that computes otherwise, or "
+            "another object's network; build the object again"
+        )
+    return worst
+
+
+def queries_of(item: Tensor, kept: Whole, rows: int) -> AnyArray:
+    """The queries of a self-test, as an input takes them.
+
+    Raises:
+        DataRefused: they are of another number.
+    """
+    shape = tuple(rows if size == "n" else size for size in item.shape)
+    if len(kept.values) != int(np.prod(shape)):
+        raise DataRefused(
+            f"the self-test gives {len(kept.values)} numbers {kept.name!r} where {rows} queries are {shape}; "
+            "build it again"
+        )
+    return np.array(kept.values, dtype=item.dtype).reshape(shape)
+
+
+def asked_points(entry: NetworkEntry) -> FloatArray:
+    """``(n, 3)`` m: where the network of a sound was asked when it was made, on its object's surface."""
+    test = entry.self_test
+    return np.asarray(queries_of(entry.inputs[0], test.inputs[0], test.rows), np.float64)
+
+
+def _gap(found: AnyArray, kept: Sampled) -> float:
+    if max(kept.at) >= found.size:
+        raise DataRefused(
+            f"the self-test knows number {max(kept.at)} of {kept.name!r}, which has {found.size}; "
+            "build it again"
+        )
+    chosen, values = found[list(kept.at)].astype(np.float64), np.array(kept.values)
+    if not np.isfinite(chosen).all():
+        raise DataRefused(
+            f"{kept.name!r} is not finite where it was when it was made; build the object again"
+        )
+    scale = float(np.abs(values).max()) or 1.0
+    return float(np.abs(chosen - values).max()) / scale
