@@ -23,6 +23,9 @@ _MOST = 160
 _RESOLVED = 1.2
 """Thickness of a wall, over a cell, from which on the grid shows no hole in it."""
 
+_FINER = (1.0, 0.5, 0.25)
+"""Of the cell, tried in turn until a corner of the grid is inside of the body."""
+
 _WEIGHT = 0.03
 """Below it a hypothesis does not move the median."""
 
@@ -40,11 +43,21 @@ def median_surface(mixture: Mixture, pitch: float) -> Mesh:
     low, high = _box([shape for shape, _ in shapes])
     thinnest = min(_thickness(shape) for shape, _ in shapes)
     cell = max(min(pitch, thinnest / _RESOLVED), float((high - low).max()) / _MOST)
-    counts = np.ceil((high - low) / cell).astype(np.int64) + 1
-    drawn = [_thickened(shape, _RESOLVED * cell) for shape, _ in shapes]
-    fields = np.stack([grid_distances(shape, low, cell, counts) for shape in drawn])
     weights = np.array([weight for _, weight in shapes])
-    return isosurface(_weighted_median(fields, weights / weights.sum()), low, cell)
+    for finer in _FINER:
+        fields = _fields([shape for shape, _ in shapes], low, high, finer * cell)
+        median = _weighted_median(fields, weights / weights.sum())
+        # Thin bodies that lie apart have no place in common that half of the belief is inside of.
+        inside = median if median.min() < 0.0 else fields[0]
+        if inside.min() < 0.0:
+            break
+    return isosurface(inside, low, finer * cell)
+
+
+def _fields(shapes: list[FamilyShape], low: FloatArray, high: FloatArray, cell: float) -> FloatArray:
+    """``(shapes, nx, ny, nz)`` m: their signed distances on one grid."""
+    counts = np.ceil((high - low) / cell).astype(np.int64) + 1
+    return np.stack([grid_distances(_thickened(one, _RESOLVED * cell), low, cell, counts) for one in shapes])
 
 
 def _thickness(shape: FamilyShape) -> float:

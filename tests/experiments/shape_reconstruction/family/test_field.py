@@ -19,9 +19,24 @@ def cup_with(wall: float) -> FamilyShape:
 
 
 def surface_of(shape: FamilyShape, pitch: float) -> Mesh:
-    one = Hypothesis.__new__(Hypothesis)
-    object.__setattr__(one, "shape", shape)
-    return median_surface(Mixture((one,), np.ones(1), ((),)), pitch)
+    return median_surface(mixture_of_all(shape), pitch)
+
+
+def mixture_of_all(*shapes: FamilyShape) -> Mixture:
+    """All as likely as each other."""
+    every = []
+    for shape in shapes:
+        every.append(Hypothesis.__new__(Hypothesis))
+        object.__setattr__(every[-1], "shape", shape)
+    return Mixture(tuple(every), np.full(len(every), 1.0 / len(every)), ((),) * len(every))
+
+
+def board_at(x: float, thick: float) -> FamilyShape:
+    board = draw_shape("board", np.random.default_rng(1))
+    theta = board.theta.copy()
+    theta[layout.RADII : layout.RADII + layout.KNOTS] = np.log(0.5 * thick)
+    theta[layout.CORE_Y], theta[layout.X], theta[layout.YAW] = np.log(1e-5), x, 0.5
+    return FamilyShape(board.name, board.code, theta)
 
 
 def holes_and_pieces(mesh: Mesh) -> int:
@@ -48,3 +63,16 @@ def test_the_grid_is_fine_enough_for_a_wall_of_a_millimetre_and_a_half() -> None
 def volume(mesh: Mesh) -> float:
     a, b, c = mesh.corners.transpose(1, 0, 2)
     return float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6.0)
+
+
+@pytest.mark.timeout(300)
+def test_bodies_that_lie_apart_are_answered_by_the_likeliest() -> None:
+    apart = [board_at(x, 6e-3) for x in (0.0, 0.05, 0.1)]
+    mesh = median_surface(mixture_of_all(*apart), 2.5e-3)
+    assert holes_and_pieces(mesh) == 2
+    assert mesh.bounds[0, 0] < 0.0
+
+
+@pytest.mark.timeout(300)
+def test_a_body_thinner_than_the_grid_has_a_surface() -> None:
+    assert volume(surface_of(board_at(0.0, 1.5e-3), 4e-3)) > 0.0
