@@ -27,6 +27,14 @@ _Random = np.random.Generator
 LOOPS, TURNS = 3, 8
 """Handles drawn where there is none, and turns that each is tried at."""
 
+HEADS, _HOLE = (1.4, 2.0, 2.8), 0.55
+"""Half widths of a tool's head over that of its shaft there; of its hole over its own."""
+
+_ENDS = (
+    (layout.END_A, layout.SHAFT_A, layout.HEAD_A, layout.HOLE_A),
+    (layout.END_B, layout.SHAFT_B, layout.HEAD_B, layout.HOLE_B),
+)
+
 
 def changes(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
     """Shapes that differ from one by one part or by a turn."""
@@ -61,10 +69,17 @@ def _of_vessel(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
 
 
 def _of_tool(shape: FamilyShape) -> Iterator[FamilyShape]:
-    for end in (layout.END_A, layout.END_B):
+    for end, shaft, head, hole in _ENDS:
         for kind in (PLAIN, DISC, RING, SLOT):
-            if shape.code[end] != kind:
-                yield _coded(shape, end, kind)
+            if shape.code[end] == kind:
+                continue
+            changed = _coded(shape, end, kind)
+            yield changed
+            for ratio in HEADS if kind != PLAIN else ():
+                theta = changed.theta.copy()
+                theta[head] = theta[shaft] + np.log(ratio)
+                theta[hole] = theta[head] + np.log(_HOLE)
+                yield FamilyShape(changed.name, changed.code, theta)
 
 
 def _all_about(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
