@@ -66,6 +66,9 @@ PART = 3.0
 SOLID = 6.0
 """The same of a vessel that is solid, of a solid body that is open, and of one that widens to its top."""
 
+NARROW = 0.35
+"""Width over length of a vessel below which it is a trough: as rare as a solid one."""
+
 _UNNAMED = {"knob": 2.0, "vase": 2.0}
 """The same of classes that hold any round shape: what has a name of its own is seen more often."""
 
@@ -78,7 +81,16 @@ def rarity(shape: FamilyShape) -> float:
     apart[:, layout.HOLLOW] *= SOLID / PART
     price = PART * float(apart.sum(axis=1).min()) + _UNNAMED.get(shape.name, 0.0)
     unlikely = _widens(shape) and shape.code[layout.HOLLOW] == 0 and not apart[:, layout.HOLLOW].any()
-    return price + (SOLID if unlikely else 0.0)
+    return price + SOLID * (int(unlikely) + int(_is_trough(shape)))
+
+
+def _is_trough(shape: FamilyShape) -> bool:
+    """Whether a vessel with straight sides is much longer than wide, as none that is drawn is."""
+    if shape.code[layout.PLAN] != CORED or shape.code[layout.HOLLOW] == 0:
+        return False
+    corner = np.exp(shape.theta[layout.RADII : layout.RADII + KNOTS].max())
+    sides = np.exp(shape.theta[[layout.CORE_X, layout.CORE_Y]]) + corner
+    return bool(sides.min() < NARROW * sides.max())
 
 
 def _widens(shape: FamilyShape) -> bool:

@@ -20,7 +20,7 @@ from experiments.shape_reconstruction.family.search import FamilySearch, Hypothe
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import OutOfDomain
 from harness.basics.mesh import Mesh
 
@@ -39,6 +39,9 @@ OUTSIDE = 6.0
 
 FOREIGN = 40.0
 """A contact's typical sum of squares above which no class fits at all."""
+
+SLIPPING = 0.15
+"""Share of contacts that may have slipped."""
 
 RIVAL = 0.2
 """Weight of a second class above which the class is unknown."""
@@ -112,11 +115,19 @@ def _seeds_of(search: FamilySearch, estimate: ShapeEstimate) -> Iterator[Hypothe
 
 
 def _warped(mesh: Mesh, shape: FamilyShape, evidence: ShapeEvidence, fit: ContactFit) -> Mesh:
-    places, offsets = moved_points(shape, evidence, ~fit.doubtful)
+    places, offsets = moved_points(shape, evidence, _believed(fit))
     # Points of one contact err together: each counts as a part of it.
     sigma = np.full(len(places), 1.6e-3)
-    moved = mesh.vertices + displacement(places - offsets, offsets, sigma, mesh.vertices)
+    far = float(np.sqrt(np.mean(np.sum(offsets**2, axis=1)))) if fit.typical > OUTSIDE else 0.0
+    moved = mesh.vertices + displacement(places - offsets, offsets, sigma, mesh.vertices, far)
     return Mesh(moved, mesh.faces)
+
+
+def _believed(fit: ContactFit) -> BoolArray:
+    """Contacts that the surface is moved to: those that slipped are not, unless so many cannot have."""
+    if len(fit.doubtful) and fit.doubtful.mean() > SLIPPING:
+        return np.ones_like(fit.doubtful)
+    return ~fit.doubtful
 
 
 def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh) -> FloatArray:

@@ -11,9 +11,12 @@ LENGTH = 15.0e-3
 AMPLITUDE = 3.0e-3
 """M: one standard deviation of a displacement where nothing was read."""
 
+FAR = 45.0e-3
+"""M over which a shape of the wrong class is off alike."""
+
 
 def displacement(
-    places: FloatArray, offsets: FloatArray, sigma: FloatArray, queries: FloatArray
+    places: FloatArray, offsets: FloatArray, sigma: FloatArray, queries: FloatArray, far: float = 0.0
 ) -> FloatArray:
     """The mean of a Gaussian process of displacements, squared-exponential, each axis by itself.
 
@@ -24,17 +27,19 @@ def displacement(
         offsets: ``(n, 3)`` m that the surface is displaced by there.
         sigma: ``(n,)`` m, one standard deviation of those, greater than zero.
         queries: ``(m, 3)`` m.
+        far: m, one standard deviation of displacements that die away over ``FAR``; none by default.
 
     Returns:
         ``(m, 3)`` m; zero far from all places.
     """
     if len(places) == 0:
         return np.zeros_like(queries)
-    covariance = _kernel(places, places) + np.diag(sigma**2)
+    covariance = _kernel(places, places, far) + np.diag(sigma**2)
     weights = cho_solve(cho_factor(covariance, lower=True), offsets)
-    return np.asarray(_kernel(queries, places) @ weights)
+    return np.asarray(_kernel(queries, places, far) @ weights)
 
 
-def _kernel(a: FloatArray, b: FloatArray) -> FloatArray:
-    squares = np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1) - 2.0 * a @ b.T
-    return np.asarray(AMPLITUDE**2 * np.exp(-0.5 * np.maximum(squares, 0.0) / LENGTH**2))
+def _kernel(a: FloatArray, b: FloatArray, far: float) -> FloatArray:
+    squares = np.maximum(np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1) - 2.0 * a @ b.T, 0.0)
+    near = AMPLITUDE**2 * np.exp(-0.5 * squares / LENGTH**2)
+    return np.asarray(near + far**2 * np.exp(-0.5 * squares / FAR**2) if far > 0.0 else near)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.estimate import family_estimate
+from experiments.shape_reconstruction.family.contacts_fit import ContactFit
+from experiments.shape_reconstruction.family.estimate import _believed, family_estimate
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.metric import shape_error
@@ -166,3 +167,21 @@ def test_a_picture_alone_does_not_bound_what_is_along_the_line_of_sight() -> Non
     towards = found.mesh.vertex_normals @ look.stand_from_camera[:3, 2]
     behind = (towards > 0.7) & (found.known_by == 0)
     assert found.deviation[behind].mean() > 10.0e-3
+
+
+def test_a_body_that_is_off_alike_is_moved_between_its_contacts_too() -> None:
+    places = np.array([[0.0, 0.0, 0.0], [0.06, 0.0, 0.0]])
+    offsets, sigma = np.tile([2e-3, 0.0, 0.0], (2, 1)), np.full(2, 1e-6)
+    between = np.array([[0.03, 0.0, 0.0]])
+    near = displacement(places, offsets, sigma, between)[0, 0]
+    both = displacement(places, offsets, sigma, between, far=4e-3)[0, 0]
+    assert near < 0.7e-3
+    assert both > 1.4e-3
+
+
+@pytest.mark.parametrize(("count", "doubtful", "believed"), [(8, 1, 7), (8, 3, 8), (32, 4, 28), (0, 0, 0)])
+def test_contacts_that_slipped_do_not_move_the_surface_and_too_many_have_not(
+    count: int, doubtful: int, believed: int
+) -> None:
+    fit = ContactFit(np.ones(count), np.zeros(count), np.arange(count) < doubtful, 0.0)
+    assert _believed(fit).sum() == believed

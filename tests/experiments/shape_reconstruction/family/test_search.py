@@ -7,7 +7,7 @@ import pytest
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
+from experiments.shape_reconstruction.family.classes import SOLID, FamilyShape, draw_shape, rarity
 from experiments.shape_reconstruction.family.contacts_fit import contact_fit
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
@@ -203,3 +203,14 @@ def test_sides_are_proposed_that_span_the_contacts() -> None:
             sides = 2.0 * (np.exp(laid[[layout.CORE_X, layout.CORE_Y]]) + corner)
             fitting += bool((np.abs(np.sort(sides) / np.sort(high - low)[1:] - 1.1) < 0.12).all())
     assert fitting >= 5
+
+
+def test_a_vessel_much_longer_than_wide_is_rare() -> None:
+    tray = draw_shape("tray", np.random.default_rng(0))
+    ordinary = rarity(tray)
+    tray.theta[[layout.CORE_X, layout.CORE_Y]] = np.log([0.2, 0.001])
+    assert rarity(tray) == pytest.approx(ordinary + SOLID)
+    solid = draw_shape("packet", np.random.default_rng(0))
+    before = rarity(solid)
+    solid.theta[[layout.CORE_X, layout.CORE_Y]] = np.log([0.2, 0.001])
+    assert rarity(solid) == pytest.approx(before)
