@@ -113,8 +113,9 @@ def test_an_estimate_reads_the_same_shares_of_the_same_peaks(
     assert len(there) >= 3
     for peak in there:
         nearest = min(here, key=lambda other: abs(other.frequency - peak.frequency))
-        # A latency bends the flanks of a broad peak: 1.7 ms turn 90 Hz of it by a radian.
-        assert nearest.frequency == pytest.approx(peak.frequency, rel=3e-3)
+        # A latency bends the flanks of a broad peak: 1.7 ms turn 90 Hz of it by a radian. Its half width is
+        # what two modes that are read as one peak leave open.
+        assert nearest.frequency == pytest.approx(peak.frequency, abs=peak.damping / (2.0 * np.pi))
         assert abs(np.vdot(nearest.y, peak.y)) > 0.98
 
 
