@@ -33,18 +33,19 @@ def box_tensors(
     low, high = box
     directions = Domain(low=(-1.0,) * 3 * block, high=(1.0,) * 3 * block)
     inputs = [
-        _input("network", "int64", ("n", 1), "1", "which network, as counted in networks.first",
-               Domain(low=(0.0,), high=(networks - 1.0,))),
-        _input("points", "float64", ("n", block, 3), "m", "places in the network's cell, else moved to it",
-               Domain(low=low * block, high=high * block), "object"),
-        _input("views", "float32", ("n", block, 3), "1", "unit, from the camera", directions, "object"),
-        _input("light", "float32", ("n", 3), "1", "unit, towards the lamp",
-               Domain(low=(-1.0,) * 3, high=(1.0,) * 3), "object"),
+        graph_input("network", "int64", ("n", 1), "1", "which network, as counted in networks.first",
+                    Domain(low=(0.0,), high=(networks - 1.0,))),
+        graph_input("points", "float64", ("n", block, 3), "m",
+                    "places in the network's cell, else moved to it",
+                    Domain(low=low * block, high=high * block), "object"),
+        graph_input("views", "float32", ("n", block, 3), "1", "unit, from the camera", directions, "object"),
+        graph_input("light", "float32", ("n", 3), "1", "unit, towards the lamp",
+                    Domain(low=(-1.0,) * 3, high=(1.0,) * 3), "object"),
     ]  # fmt: skip
     if extras:
         told = Domain(low=(0.0, -1.0, -1.0, -1.0) * block, high=(1.0,) * 4 * block)
         meaning = "whether the lamp is seen from the surface, and its unit normal there"
-        inputs.append(_input("extras", "float32", ("n", block, extras), "1", meaning, told, "object"))
+        inputs.append(graph_input("extras", "float32", ("n", block, extras), "1", meaning, told, "object"))
     density = Tensor(
         name="density", dtype="float32", shape=("n", block, 1), unit="1/m",
         meaning="of a ray's light, the share taken per metre where it is thin",
@@ -56,7 +57,7 @@ def box_tensors(
     return tuple(inputs), (density, scattered)
 
 
-def _input(
+def graph_input(
     name: str,
     dtype: str,
     shape: tuple[int | str, ...],
@@ -65,6 +66,7 @@ def _input(
     domain: Domain,
     frame: str = "",
 ) -> Input:
+    """An input whose numbers are brought to the network's own range within the graph."""
     return Input.model_validate({
         "name": name, "dtype": dtype, "shape": shape, "unit": unit, "meaning": meaning,
         "frame": frame, "domain": domain, "normaliser": "in the graph",

@@ -4,6 +4,7 @@ import math
 
 from harness.basics.arrays import FloatArray
 from harness.objectfile.entries import Domain, Input, Tensor
+from harness.objectfile.vision_tensors import graph_input
 
 Pair = tuple[Input, Tensor]
 
@@ -24,7 +25,7 @@ DEPTH_PIXELS = (120, 160)
 def gains_tensors(modes: int, low: FloatArray, high: FloatArray) -> Pair:
     """Points in metres to gains of so many modes."""
     box = Domain(low=tuple(low.tolist()), high=tuple(high.tolist()))
-    points = _input("points", "float64", ("n", 3), "m", "where the object is struck", box, "mesh")
+    points = graph_input("points", "float64", ("n", 3), "m", "where the object is struck", box, "mesh")
     gains = Tensor(
         name="gains", dtype="float32", shape=("n", modes, 3), unit="not stated by the file", frame="mesh",
         meaning="gain of each mode for a unit force along x, y, z",
@@ -40,7 +41,7 @@ def depth_tensors(low: FloatArray, high: FloatArray) -> Pair:
         high=(*high.tolist(), TILT, 1.0, 1.0, PRESSED[1], rows - 1.0, columns - 1.0),
     )
     meaning = "x y z, m; tilt, rad; cosine and sine of its azimuth; depth of the press, m; row; column"
-    pixel = _input("pixel", "float64", ("n", 9), "m, rad, 1 and pixels", meaning, box, "mesh")
+    pixel = graph_input("pixel", "float64", ("n", 9), "m, rad, 1 and pixels", meaning, box, "mesh")
     depth = Tensor(
         name="depth",
         dtype="float32",
@@ -54,7 +55,7 @@ def depth_tensors(low: FloatArray, high: FloatArray) -> Pair:
 def spectrum_tensors() -> Pair:
     """Normalised place, frequency and time to a value of the short-time spectrum."""
     box = Domain(low=(0.0,) * 5, high=(1.0,) * 5)
-    place = _input(
+    place = graph_input(
         "place", "float64", ("n", 5), "1", "x y z of a voxel, frequency, time: 0 to 1", box, "mesh"
     )
     spectrum = Tensor(
@@ -67,7 +68,7 @@ def spectrum_tensors() -> Pair:
 def colours_tensors(most: float) -> Pair:
     """Normalised place and pixel to colour; ``most`` is the greatest normalised coordinate."""
     box = Domain(low=(-1.0,) * 5, high=(most, most, most, 1.0, 1.0))
-    place = _input("place", "float64", ("n", 5), "1", "x y z; row and column, -1 to 1", box, "mesh")
+    place = graph_input("place", "float64", ("n", 5), "1", "x y z; row and column, -1 to 1", box, "mesh")
     colours = Tensor(
         name="colours", dtype="float32", shape=("n", 3), unit="1", meaning="red green blue, -1 to 1"
     )
@@ -78,7 +79,7 @@ def osf_tensors(reach: float) -> tuple[tuple[Input, ...], tuple[Tensor, ...]]:
     """A point, a view and a light to raw colour and density; points lie within ``reach`` of the origin."""
     within = Domain(low=(-reach,) * 3, high=(reach,) * 3)
     inputs = (
-        _input("points", "float64", ("n", 3), "1", "where", within, "vision"),
+        graph_input("points", "float64", ("n", 3), "1", "where", within, "vision"),
         _direction("views", ("n", 3), "unit, from the camera", 3),
         _direction("light", ("n", 3), "as trained: unit, the light's direction", 3),
     )  # fmt: skip
@@ -92,8 +93,8 @@ def cell_tensors(
     box = Domain(low=tuple(low.tolist()) * block, high=tuple(high.tolist()) * block)
     which = Domain(low=(0.0,), high=(networks - 1.0,))
     inputs = (
-        _input("network", "int64", ("n", 1), "1", "which network", which),
-        _input("points", "float64", ("n", block, 3), "1", "where, in the network's cell", box, "vision"),
+        graph_input("network", "int64", ("n", 1), "1", "which network", which),
+        graph_input("points", "float64", ("n", block, 3), "1", "where, in the network's cell", box, "vision"),
         _direction("views", ("n", block, 3), "unit, from the camera", 3 * block),
         _direction("light", ("n", 3), "as trained: unit, the light's direction", 3),
     )
@@ -112,21 +113,6 @@ def _raw(rows: tuple[int | str, ...]) -> tuple[Tensor, ...]:
 
 
 def _direction(name: str, shape: tuple[int | str, ...], meaning: str, numbers: int) -> Input:
-    return _input(
+    return graph_input(
         name, "float32", shape, "1", meaning, Domain(low=(-1.0,) * numbers, high=(1.0,) * numbers), "vision"
     )
-
-
-def _input(
-    name: str,
-    dtype: str,
-    shape: tuple[int | str, ...],
-    unit: str,
-    meaning: str,
-    domain: Domain,
-    frame: str = "",
-) -> Input:
-    return Input.model_validate({
-        "name": name, "dtype": dtype, "shape": shape, "unit": unit, "meaning": meaning,
-        "frame": frame, "domain": domain, "normaliser": "in the graph",
-    })  # fmt: skip
