@@ -4,11 +4,13 @@ from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from harness.sim.optics.optics import Optics
 from tests.samples.real_press import R15, drawing, fitted, held_out_presses, judged, set_of
 
 
+@pytest.mark.slow  # measured data that do not change
 def test_presses_of_the_papers_sensor_are_drawn_over_the_whole_frame(shared_data: Path) -> None:
     """One fold of eight; all of them by ``tests/benchmarks/touch/real_pictures.py``. Over a frame most of
     which is never touched, drawing nothing scores 24 dB; within the contact it scores 14."""

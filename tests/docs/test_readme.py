@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 OVER_WIRES = ("run ", "demo ", "check ", "calibrate taxim --station")
-MEASURED = ("tables ", "cost ")
+MEASURED = ("tables ", "cost ", "replay RUN --level ")
 LONG = (*OVER_WIRES, *MEASURED)
 """A run over every wire takes a minute, and each of these commands has quicker tests of its own."""
 
@@ -77,6 +77,7 @@ def test_a_quick_command_answers(line: str, here: Path, monkeypatch: pytest.Monk
     assert invoke(filled(line, None)) == 0
 
 
+@pytest.mark.slow  # measured data that do not change
 def test_a_set_of_real_presses_is_calibrated(
     here: Path, shared_data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

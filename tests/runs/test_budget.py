@@ -209,6 +209,7 @@ def test_a_budget_may_be_written_with_or_without_a_space(text: str) -> None:
     assert run_command._target(None, "5mm", None).error == 5e-3
 
 
+@pytest.mark.slow  # resuming and budgets are tested each by themselves
 def test_a_resumed_run_answers_within_a_budget(
     done: Recording, cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -176,6 +176,7 @@ def test_a_protective_stop_in_the_middle_of_a_motion(resume: Resume, begun: Reco
     assert hashes(begun) == before
 
 
+@pytest.mark.slow  # contacts that meet nothing are tested in process
 def test_an_object_that_is_not_there(resume: Resume, begun: Recording) -> None:
     def take_away(tree: dict[str, Any]) -> None:
         tree["scene"]["object"]["pose"]["position"] = ["0.6 m", "0.6 m", "0.25 m"]

@@ -221,6 +221,7 @@ def test_a_replay_without_the_truth_has_the_same_answer_and_no_scores(
     assert (tmp_path / "run-replay" / "result.json").is_file()
 
 
+@pytest.mark.slow  # three replays; one is compared to the bit above
 def test_a_replay_takes_the_levels_of_the_runs_own_result(
     done: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

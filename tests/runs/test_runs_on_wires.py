@@ -1,6 +1,6 @@
 """The program over every wire: it answers, is interrupted, is killed, and goes on where it was.
 
-``TOUCHSTONE_KILLS=10`` kills it at ten moments instead of two.
+``TOUCHSTONE_KILLS=10`` kills it at ten moments instead of one.
 """
 
 import os
@@ -28,7 +28,7 @@ MUG = (
     *("run", "contact-localization", "--object", "builtin:mug"),
     *("--contacts", str(CONTACTS), "--spacing", "spread", "--seed", "3"),
 )
-KILLS = int(os.environ.get("TOUCHSTONE_KILLS", "2"))
+KILLS = int(os.environ.get("TOUCHSTONE_KILLS", "1"))
 PATIENCE = 150.0
 SAME_ANSWER = 0.2e-3
 """m. Poses differ by micrometres, so other draws follow from them; the posterior is 2 mm wide. Most answers
@@ -133,6 +133,7 @@ def test_kill_loses_at_most_the_step_in_flight(whole: Whole, tmp_path: Path, kil
     assert_same_answer(result, whole)
 
 
+@pytest.mark.slow  # in process in test_run.py; twice stays here
 def test_ctrl_c_once_ends_after_the_contact(whole: Whole, tmp_path: Path) -> None:
     program = started(tmp_path)
     program.wait_for(lambda: contact_begun(tmp_path), 60.0)

@@ -25,7 +25,10 @@ from mocks.in_process.bench import in_process_bench
 from mocks.sound_card.card import why_not
 from tests.support.heard_strikes import Readings, delay, performed, strikes_on
 
-pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not() or "a sound card can be mocked here")
+pytestmark = [
+    pytest.mark.slow,  # the card by itself is in test_sound_card.py
+    pytest.mark.skipif(bool(why_not()), reason=why_not() or "a sound card can be mocked here"),
+]
 
 ROOT = Path(__file__).parents[2]
 BOX = load_station(ROOT / "stations" / "mock.toml")

@@ -25,10 +25,10 @@ def nearest_on_triangle(point: FloatArray, corners: FloatArray, out: FloatArray)
         s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
         if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
             out[0], out[1], out[2] = a[0] + s * ux + t * vx, a[1] + s * uy + t * vy, a[2] + s * uz + t * vz
-            return float(_squared(point, out))
+            return float(squared_gap(point, out))
     for first in range(3):
         start, end = corners[first], corners[(first + 1) % 3]
-        length = _squared(start, end)
+        length = squared_gap(start, end)
         share = 0.0
         if length > 0.0:
             for axis in range(3):
@@ -45,7 +45,8 @@ def nearest_on_triangle(point: FloatArray, corners: FloatArray, out: FloatArray)
 
 
 @compiled
-def _squared(a: FloatArray, b: FloatArray) -> float:
+def squared_gap(a: FloatArray, b: FloatArray) -> float:
+    """M², between two places; written out, as ``np.sum`` of three numbers makes an array of them."""
     return float((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from harness.basics.arrays import AnyArray, FloatArray, IntArray, read_only
 from harness.basics.compiled import compiled
 from harness.basics.errors import MeshRefused
+from harness.basics.faces.nearest_kernels import squared_gap
 from harness.basics.mesh import Mesh
 
 NEIGHBOURS = 24
@@ -161,6 +162,11 @@ def _cells(points: FloatArray, size: float) -> tuple[IntArray, IntArray]:
 
 
 @compiled
+def _cosine(a: FloatArray, b: FloatArray) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@compiled
 def _thin(
     points: FloatArray, normals: FloatArray, cells: IntArray, shape: IntArray, radius: float
 ) -> IntArray:
@@ -177,9 +183,9 @@ def _thin(
                 for c in range(max(z - 1, 0), min(z + 2, shape[2])):
                     j = first[(a * shape[1] + b) * shape[2] + c]
                     while j >= 0 and free:
-                        gap = np.sum((points[i] - points[j]) ** 2)
+                        near = squared_gap(points[i], points[j]) < radius * radius
                         # 60 degrees: a bevel's own faces stay apart, a curved wall's do not.
-                        if gap < radius * radius and np.dot(normals[i], normals[j]) > 0.5:
+                        if near and _cosine(normals[i], normals[j]) > 0.5:
                             free = False
                         j = following[j]
         if free:
@@ -212,8 +218,8 @@ def _mean_normals(
                     cell = (a * shape[1] + b) * shape[2] + c
                     for k in range(starts[cell], starts[cell + 1]):
                         j = order[k]
-                        same_side = np.dot(normals[n], facing[j]) > 0.5
-                        if same_side and np.sum((points[n] - dense[j]) ** 2) < radius * radius:
+                        near = squared_gap(points[n], dense[j]) < radius * radius
+                        if near and _cosine(normals[n], facing[j]) > 0.5:
                             total += facing[j]
         means[n] = total / np.sqrt(np.sum(total**2))
     return means

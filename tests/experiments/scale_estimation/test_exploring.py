@@ -86,6 +86,7 @@ def test_an_object_never_seen_is_struck_where_the_gel_has_just_met_it(heard: Rec
     assert sum(not strike.fault for strike in answering.strikes) >= 2
 
 
+@pytest.mark.slow  # a whole run with strikes; stops after a contact are in quick tests
 def test_a_run_that_was_stopped_after_a_strike_goes_on_with_the_same_contacts(
     heard: Recording, tmp_path: Path, station: Station
 ) -> None:

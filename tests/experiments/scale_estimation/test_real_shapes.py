@@ -28,7 +28,9 @@ def said(true: float, off: float) -> Belief:
     return Belief.of(RANGE, -0.5 * ((RANGE.logs - middle) / STATED) ** 2)
 
 
-@pytest.mark.parametrize("besides", [0.0, 0.1, 0.2])
+@pytest.mark.parametrize(
+    "besides", [0.0, pytest.param(0.1, marks=pytest.mark.slow), pytest.param(0.2, marks=pytest.mark.slow)]
+)  # each draws 150 cases
 def test_the_deviation_found_is_that_of_the_errors_beyond_what_was_stated(besides: float) -> None:
     random = np.random.default_rng(4)
     errors = np.hypot(STATED, besides) * random.standard_normal(150)

@@ -78,6 +78,7 @@ def test_sight_alone_needs_no_contact(tmp_path: Path, station: Station) -> None:
     assert result["estimates"]["touch"]["size_m"] is None
 
 
+@pytest.mark.slow  # a whole run; the bench's rule is in tests of exploring
 def test_a_run_ends_when_the_size_is_known_as_well_as_was_asked(tmp_path: Path, station: Station) -> None:
     scene = scene_of(5, until="2 cm")
     recording = ran(tmp_path / "run", scene, station)

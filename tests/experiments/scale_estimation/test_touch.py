@@ -1,5 +1,7 @@
 """Size by touch: contacts on a model itself are read back; what they leave open stays open."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -44,8 +46,14 @@ def contacts(
     return made
 
 
-@pytest.mark.parametrize("name", ["mug", "bowl", "pitcher"])
-@pytest.mark.parametrize("scale", [0.6, 1.0, 1.7])
+QUICK = (("mug", 0.6), ("bowl", 1.0), ("pitcher", 1.7))
+"""Every object and every size once."""
+OTHERS = [pair for pair in product(("mug", "bowl", "pitcher"), (0.6, 1.0, 1.7)) if pair not in QUICK]
+
+
+@pytest.mark.parametrize(
+    ("name", "scale"), [*QUICK, *(pytest.param(*pair, marks=pytest.mark.slow) for pair in OTHERS)]
+)
 def test_contacts_all_over_give_the_size(name: str, scale: float) -> None:
     stand, nominal = stand_of(name)
     found = by_touch(stand, contacts(name, scale, 10), nominal, RANGE)
@@ -101,7 +109,7 @@ def test_a_way_through_the_object_counts_against_its_being_there() -> None:
     assert FreeSpace(stand, []).cost(both).tolist() == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("scale", [0.35, 2.6])
+@pytest.mark.parametrize("scale", [pytest.param(0.35, marks=pytest.mark.slow), 2.6])
 def test_a_size_beyond_the_range_is_named(scale: float) -> None:
     stand, nominal = stand_of("mug")
     asked = SizeRange(0.5 * nominal, 2.0 * nominal)
@@ -115,6 +123,7 @@ def test_another_object_is_refused() -> None:
         by_touch(stand, contacts("pitcher", 1.0, 12), nominal, RANGE)
 
 
+@pytest.mark.slow  # 16 answers of several levels
 def test_refining_more_places_never_costs_the_answer() -> None:
     stand, nominal = stand_of("mug")
     patches = contacts("mug", 1.3, 8)

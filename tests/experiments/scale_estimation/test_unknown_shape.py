@@ -103,6 +103,7 @@ def struck(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Record
     return ran(tmp_path_factory.mktemp("struck") / "run", unknown(3, "builtin:bowl", sound=True), station, 62)
 
 
+@pytest.mark.slow  # as in test_exploring.py
 def test_it_is_struck_where_the_gel_has_met_it(struck: Recording) -> None:
     made = [record.step.index for record in struck.steps() if POSE in record.readings]
     assert made

@@ -41,6 +41,7 @@ def test_modes_are_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(first.amplitudes, again.amplitudes)
 
 
+@pytest.mark.slow  # of training alone
 def test_modes_go_with_size_and_material_and_are_continued_at_their_spacing() -> None:
     shape, random = ringing_of(7, seed=2), np.random.default_rng(1)
     assert shape is not None

@@ -197,6 +197,7 @@ def test_a_run_without_a_free_way_ends_and_keeps_why(
     assert "no free way" in steps[0].parameters["why"]
 
 
+@pytest.mark.slow  # a whole run
 def test_presses_on_the_drawing_are_a_benchmark_and_say_so(tmp_path: Path, station: Station) -> None:
     recording = ran(tmp_path / "run", scene_of(2, "planned", camera=False), station, gap="none")
     evidence = evidence_of(RunFiles(recording), recording.steps())

@@ -70,6 +70,7 @@ def test_it_is_run_resumed_replayed_and_reported(
     assert resumed["height_m"] == pytest.approx(first["height_m"], abs=1e-4)
 
 
+@pytest.mark.slow  # tables and curves of the others are tested by themselves
 def test_it_has_a_table_and_a_cost_curve(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one = ["--only", "mug", "--seeds", "1", "--gap", "none"]
     table = said(capsys, "tables", "toy", *one, "--workers", "1", "--out", str(tmp_path / "table"))
@@ -123,6 +124,7 @@ def save_a_curve() -> None:
     save(Curve("toy", points, machine(), here, "2026-01-01T00:00:00+00:00", "T"), curve_path("toy"))
 
 
+@pytest.mark.slow  # budgets are in test_budget.py
 def test_it_keeps_a_budget_and_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     save_a_curve()
     wanted = ["run", "toy", "--object", "builtin:mug", "--set", "presses=1"]

@@ -56,12 +56,14 @@ def left_over(strikes: list[Strike], late: FloatArray) -> FloatArray:
     return np.array(left) - np.median(left) if left else np.zeros(0)
 
 
+@pytest.mark.slow  # many drawn cases of a statistic
 @settings(deadline=None, max_examples=8)
 @given(st.integers(2, 6), st.integers(0, 10_000))
 def test_what_is_not_refused_is_brought_together(count: int, seed: int) -> None:
     assert np.abs(left_over(*struck(count, seed, 60e-6))).max(initial=0.0) < 5e-6
 
 
+@pytest.mark.slow  # many drawn cases of a statistic
 def test_few_are_refused_where_resonances_are_apart() -> None:
     known = [len(left_over(*struck(5, seed, 60e-6))) for seed in range(4)]
     assert sum(known) >= 18

@@ -60,6 +60,7 @@ def test_without_noise_every_mode_is_found_to_the_last_digits(
     assert lost == pytest.approx(dampings, rel=1e-8)
 
 
+@pytest.mark.slow  # many drawn cases of a statistic
 def test_errors_are_as_large_as_stated() -> None:
     """A normal law has 95 % within two deviations; 320 numbers tell that to 1.2 %."""
     errors = []

@@ -53,6 +53,7 @@ def test_scale_aspect_and_rotation_are_the_drawn_ones_within_what_is_stated(done
     assert 0.02e-3 < found.scatter < 0.06e-3
 
 
+@pytest.mark.slow  # a whole run; the drawn aspect is measured in the first
 def test_pixels_three_per_cent_too_high_are_measured(tmp_path: Path) -> None:
     aspect = 1.03 if GapDraw(load_gap("target"), 5).run.aspect > 1.0 else 0.97
     recording = performed(tmp_path / "run", 20, seed=5, gap=str(gap_of_aspect(tmp_path, aspect, 5)))
@@ -66,6 +67,7 @@ def test_pixels_three_per_cent_too_high_are_measured(tmp_path: Path) -> None:
     assert abs(found.high.value - wide * aspect) < 3.0 * found.high.sigma
 
 
+@pytest.mark.slow  # a whole run of a rule tested by itself
 def test_the_pitch_believed_before_is_contradicted_where_it_is_wrong(tmp_path: Path) -> None:
     recording = performed(tmp_path / "run", 20, seed=2)
     found, nominal = read_arm_run(recording.folder).scale(), GELSIGHT_R15.pitch
@@ -147,6 +149,7 @@ def test_a_scene_of_something_else_is_refused() -> None:
         ball_scene(RADIUS, mug)
 
 
+@pytest.mark.slow  # a whole run; waiting is in test_settled.py
 def test_a_creeping_gel_is_waited_for_and_its_pictures_count(tmp_path: Path) -> None:
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
@@ -158,6 +161,7 @@ def test_a_creeping_gel_is_waited_for_and_its_pictures_count(tmp_path: Path) -> 
     assert run.pictures.refused == ()
 
 
+@pytest.mark.slow  # a whole run; waiting is in test_settled.py
 def test_a_gel_that_never_rests_is_waited_for_then_refused(tmp_path: Path) -> None:
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
@@ -187,6 +191,7 @@ def test_a_light_that_fades_stops_the_run_between_two_presses_and_says_so(tmp_pa
     assert pose[:3, 3] == pytest.approx(motion.base_from_stand_off[:3, 3], abs=1e-6)
 
 
+@pytest.mark.slow  # a whole run; drift that ends one stays
 def test_a_little_drift_is_told_and_goes_on(tmp_path: Path) -> None:
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
@@ -251,6 +256,7 @@ perform_on(opened(recording), recording, Quiet())
 """
 
 
+@pytest.mark.slow  # a whole run; stopped at any press stays
 def test_a_killed_run_loses_no_press_and_goes_on(tmp_path: Path) -> None:
     recording = begun(tmp_path / "run").recording
     paths = str(Path(__file__).parents[4])

@@ -135,6 +135,7 @@ def test_pictures_bring_networks_nearer_to_them(lit: LitObject, pictures: list[E
     assert apart(finishing.finish(), lit, pictures) < 0.5 * before
 
 
+@pytest.mark.slow  # of the longest training alone
 def test_a_stopped_finish_ends_in_the_same_bits_of_any_number_of_threads(
     lit: LitObject, pictures: list[Exact], tmp_path: Path
 ) -> None:
@@ -166,6 +167,7 @@ def test_cells_that_no_picture_shows_go_on_from_the_surface(lit: LitObject, pict
     assert apart(finishing.finish(), lit, pictures) < 1.5 * before
 
 
+@pytest.mark.slow  # of the longest training alone
 def test_of_a_picture_that_shows_nothing_nothing_is_learned(lit: LitObject, pictures: list[Exact]) -> None:
     """Of a camera that looks away no ray asks anything; what is learned is what the surface says."""
     camera, light, exact = pictures[0]

@@ -34,6 +34,7 @@ def cost(block: Path, *more: str) -> int:
     )  # fmt: skip
 
 
+@pytest.mark.slow  # curves of sound and touch stay
 def test_a_knob_is_turned_and_its_curve_kept(block: Path, capsys: pytest.CaptureFixture[str]) -> None:
     knobs = ("--knob", "termination", "--knob", "grid")
     assert cost(block, *knobs, "--json") == 0

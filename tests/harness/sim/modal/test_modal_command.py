@@ -91,6 +91,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.Captur
     assert answer["exit_code"] == 2
 
 
+@pytest.mark.slow  # a mug's modes; a block's are in quick tests
 def test_a_built_in_object_is_its_own_file_and_of_its_own_material(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -79,6 +79,7 @@ def test_an_open_surface_is_refused_and_says_what_it_needs() -> None:
     assert signed_volume(thick) == pytest.approx(2.0 * np.pi * 0.03**2 * 2e-3, rel=0.02)
 
 
+@pytest.mark.slow  # fTetWild twice
 def test_the_outside_of_a_hollow_thing_gains_a_cavity() -> None:
     outside = sphere(0.03, 64)
     hollow = walled(outside, 2e-3)

@@ -156,6 +156,7 @@ def test_a_bar_twists_as_the_standard_says_once_its_section_may_warp() -> None:
     assert found == pytest.approx(standard, rel=1e-3)
 
 
+@pytest.mark.slow  # boxes meet the same standard in quick tests
 def test_a_bar_given_by_its_surface_is_meshed_finely_enough_for_the_standard(tmp_path: Path) -> None:
     """Both modes of ASTM E1876, at the element size that is chosen where nobody asks for one."""
     sides = (0.2, 0.02, 0.01)

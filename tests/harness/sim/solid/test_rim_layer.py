@@ -47,6 +47,7 @@ def test_what_is_added_lies_a_quarter_of_the_wall_inside_of_a_narrow_side() -> N
     assert away.max() < 0.26 * WALL
 
 
+@pytest.mark.slow  # a comparison of two meshes, not a limit
 def test_every_mode_falls_and_further_than_with_even_cells_of_as_many_unknowns() -> None:
     plate = box(SIDES, COARSE)
     exact = ritz_frequencies(SIDES, STEEL, 18)[:5]
