@@ -77,7 +77,7 @@ _SAMPLE = 40
 
 def rarity(shape: FamilyShape) -> float:
     """Natural logarithm of how much rarer such a thing is, with such parts, than an ordinary one."""
-    apart = (np.array(_codes_of(shape.name)) != shape.code).astype(np.float64)
+    apart = (np.array(codes_of(shape.name)) != shape.code).astype(np.float64)
     apart[:, layout.HOLLOW] *= SOLID / PART
     price = PART * float(apart.sum(axis=1).min()) + _UNNAMED.get(shape.name, 0.0)
     unlikely = _widens(shape) and shape.code[layout.HOLLOW] == 0 and not apart[:, layout.HOLLOW].any()
@@ -101,8 +101,8 @@ def _widens(shape: FamilyShape) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _codes_of(name: str) -> tuple[tuple[int, ...], ...]:
-    """Codes that draws of a class have."""
+def codes_of(name: str) -> tuple[tuple[int, ...], ...]:
+    """Kinds and combinations of parts that draws of a class have."""
     random = np.random.default_rng(0)
     found = {tuple(int(part) for part in draw_shape(name, random).code) for _ in range(_SAMPLE)}
     return tuple(sorted(found))

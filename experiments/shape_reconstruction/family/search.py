@@ -8,7 +8,7 @@ import numpy as np
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.changes import changes
-from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, draw_shape, rarity
+from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, codes_of, draw_shape, rarity
 from experiments.shape_reconstruction.family.freedom import (
     OUTLINE_BIAS,
     basis_of,
@@ -113,7 +113,7 @@ class FamilySearch:
 
     def _next_to(self, hypotheses: list[Hypothesis], count: int, random: _Random) -> list[Hypothesis]:
         """All shapes that differ by a part or a turn from those that fit best, refined."""
-        promising = sorted(hypotheses, key=lambda one: one.misfit)[:count]
+        promising = _of_classes(sorted(hypotheses, key=lambda one: one.misfit), count)
         return [
             self.refined(changed, CHANGING) for one in promising for changed in self._changes_of(one, random)
         ]
@@ -135,11 +135,18 @@ class FamilySearch:
     def laid(self) -> list[Hypothesis]:
         """Draws in their best place, turn and size; of every class those that fit best."""
         random = np.random.default_rng(self.settings.seed)
-        each = -(-self.settings.draws // len(CLASSES))
-        return [one for name in CLASSES for one in self._laid_of(name, each, random)]
+        each = -(-self.settings.draws // sum(len(codes_of(name)) for name in CLASSES))
+        return [one for name in CLASSES for one in self._laid_of(name, each * len(codes_of(name)), random)]
 
     def _laid_of(self, name: str, count: int, random: _Random) -> list[Hypothesis]:
-        draws = [self._at_best_turn(draw_shape(name, random), random) for _ in range(count)]
+        """The best of a class's draws, of each combination of parts as many: none stands for another."""
+        by_code: dict[bytes, list[FamilyShape]] = {}
+        for shape in (draw_shape(name, random) for _ in range(count)):
+            by_code.setdefault(shape.code.tobytes(), []).append(shape)
+        return [one for alike in by_code.values() for one in self._laid_best(alike, random)]
+
+    def _laid_best(self, shapes: list[FamilyShape], random: _Random) -> list[Hypothesis]:
+        draws = [self._at_best_turn(shape, random) for shape in shapes]
         for rounds, share in LAYING:
             draws = _ranked(self._stood(one, rounds) for one in draws)
             draws = draws[: max(int(share * len(draws)), 1)]
@@ -215,6 +222,12 @@ def _stratified(laid: list[Hypothesis], count: int) -> list[Hypothesis]:
     taken = {id(one) for one in chosen}
     rest = [one for one in ranked if id(one) not in taken]
     return chosen + rest[: count - len(chosen)]
+
+
+def _of_classes(ranked: list[Hypothesis], count: int) -> list[Hypothesis]:
+    """The best of so many classes: next to two of one class lie the same shapes."""
+    first = {one.shape.name: one for one in reversed(ranked)}
+    return sorted(first.values(), key=ranked.index)[:count]
 
 
 def _distinct(ranked: list[Hypothesis], count: int) -> list[Hypothesis]:

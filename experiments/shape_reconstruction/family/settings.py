@@ -8,7 +8,7 @@ class FamilySettings:
     """Work and scales of a fit.
 
     Attributes:
-        draws: shapes drawn from the prior, spread evenly over the classes.
+        draws: shapes drawn from the prior, spread evenly over classes and their combinations of parts.
         yaws: turns that each draw is tried at.
         starts: of them that are fitted to all readings, for a few rounds.
         refined: of those, how many go on.
@@ -20,7 +20,7 @@ class FamilySettings:
         seed: of the draws.
     """
 
-    draws: int = 1260
+    draws: int = 1800
     yaws: int = 4
     starts: int = 84
     refined: int = 42
@@ -34,12 +34,12 @@ class FamilySettings:
 
 LEVELS = {
     "coarse": FamilySettings(
-        draws=420, starts=40, refined=16, changed=2, finals=5, finishing=8, pitch=4.0e-3
+        draws=600, starts=40, refined=16, changed=2, finals=5, finishing=8, pitch=4.0e-3
     ),
     "default": FamilySettings(),
     "fine": replace(
         FamilySettings(),
-        draws=4200,
+        draws=6000,
         yaws=8,
         starts=300,
         refined=100,
