@@ -37,8 +37,9 @@ wrong elsewhere too."""
 OUTSIDE = 6.0
 """A contact's typical sum of squares, of some five numbers, above which the object is of no class."""
 
-FOREIGN = 40.0
-"""A contact's typical sum of squares above which no class fits at all."""
+FOREIGN, SURE = 20.0, 6.0
+"""A contact's typical sum of squares above which no class fits at all, were contacts without number; of so
+many contacts it is twice that."""
 
 SLIPPING = 0.15
 """Share of contacts that may have slipped."""
@@ -88,9 +89,13 @@ def family_estimate(
         doubtful=doubtful,
         flags=_flags(mixture, fit, doubtful),
         seconds=time.perf_counter() - began,
-        details={**_details(mixture, fit), "foreign": fit.typical > FOREIGN},
+        details={**_details(mixture, fit), "foreign": _is_foreign(fit)},
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
+
+
+def _is_foreign(fit: ContactFit) -> bool:
+    return bool(len(fit.sums)) and fit.typical > FOREIGN * (1.0 + SURE / len(fit.sums))
 
 
 def _by_picture_alone(found: ShapeEstimate, evidence: ShapeEvidence) -> ShapeEstimate:
