@@ -27,8 +27,11 @@ from harness.basics.arrays import FloatArray
 
 _Random = np.random.Generator
 
+LAID = 0.6
+"""Share of the draws of one code that is laid, those that fit best at their best turn."""
+
 LAYING = ((1, 0.5), (1, 0.5), (2, 1.0))
-"""Rounds in which draws find their place, turn and size; the share of each class that goes on after them."""
+"""Rounds in which draws find their place, turn and size; the share of each code that goes on after them."""
 
 TEMPERATURE = 3.0
 """By which costs are divided where they become weights: readings near each other err together."""
@@ -146,7 +149,8 @@ class FamilySearch:
         return [one for alike in by_code.values() for one in self._laid_best(alike, random)]
 
     def _laid_best(self, shapes: list[FamilyShape], random: _Random) -> list[Hypothesis]:
-        draws = [self._at_best_turn(shape, random) for shape in shapes]
+        draws = _ranked(self._at_best_turn(shape, random) for shape in shapes)
+        draws = draws[: max(int(LAID * len(draws)), 1)]
         for rounds, share in LAYING:
             draws = _ranked(self._stood(one, rounds) for one in draws)
             draws = draws[: max(int(share * len(draws)), 1)]
