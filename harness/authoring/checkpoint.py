@@ -1,6 +1,5 @@
 """A training's state in one file, whole on disk or not at all; none of it needs torch."""
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
+from harness.basics.npz_file import write_arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,19 +36,12 @@ def write_checkpoint(
         progress: of the training.
         arrays: what it goes on from.
     """
-    part = path.with_name(f".{path.name}.part")
-    with part.open("wb") as stream:
-        np.savez(
-            stream,
-            allow_pickle=False,
-            identity=np.array(identity),
-            epoch=np.array(progress.epoch),
-            losses=np.array(progress.losses),
-            **arrays,
-        )
-        stream.flush()
-        os.fsync(stream.fileno())
-    part.replace(path)
+    state = {
+        "identity": np.array(identity),
+        "epoch": np.array(progress.epoch),
+        "losses": np.array(progress.losses),
+    }
+    write_arrays(path, {**state, **arrays})
 
 
 def read_checkpoint(path: Path, identity: str) -> tuple[TrainingProgress, Mapping[str, AnyArray]]:

@@ -1,6 +1,6 @@
-"""The arrays of an ``.npz`` file, read without pickles."""
+"""The arrays of an ``.npz`` file, written whole and read without pickles."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from zipfile import BadZipFile, is_zipfile
 
@@ -8,6 +8,14 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import CalibrationRefused
+from harness.basics.whole_file import whole_file
+
+
+def write_arrays(path: Path, arrays: Mapping[str, AnyArray], compressed: bool = False) -> None:
+    """Write an archive, whole or not at all; the same arrays give the same bytes."""
+    save = np.savez_compressed if compressed else np.savez
+    with whole_file(path) as stream:
+        save(stream, allow_pickle=False, **arrays)
 
 
 def read_arrays(

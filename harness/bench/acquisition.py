@@ -19,6 +19,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import CalibrationRefused, DataRefused
 from harness.basics.resampling import resample
+from harness.basics.whole_file import write_text_whole
 from harness.bench.acquisition_channels import (
     FLAG_FIELDS,
     FLAGS,
@@ -126,10 +127,8 @@ class AcquisitionCalibration:
 
     def save(self, path: Path) -> None:
         """Write the artefact with its schema and hash."""
-        path.write_text(
-            json.dumps({"schema": SCHEMA, **asdict(self), "hash": self.hash}, indent=1) + "\n",
-            encoding="utf-8",
-        )
+        text = json.dumps({"schema": SCHEMA, **asdict(self), "hash": self.hash}, indent=1)
+        write_text_whole(path, text + "\n")
 
     @cached_property
     def hash(self) -> str:

@@ -41,7 +41,7 @@ class Performed:
 
 def steps_planned(procedure: Procedure, recording: Recording) -> int:
     """How many steps the run was planned with."""
-    return len(recording.header.plan[procedure.plan_key])
+    return len(recording.planned(procedure.plan_key))
 
 
 def perform_on_bench(

@@ -4,7 +4,6 @@ Files are read on first use, each against its hash. Reading runs nothing of what
 """
 
 import hashlib
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +13,7 @@ from typing import Any
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
+from harness.basics.whole_file import write_bytes_whole
 from harness.objectfile.description import (
     SCHEMA,
     Description,
@@ -215,15 +215,5 @@ def with_part(
 def write_described(folder: Path, description: Entry, contents: Mapping[str, bytes]) -> None:
     """Write files and then ``object.json``: readers see the old object, the new one, or a refusal."""
     for name, data in contents.items():
-        _write_whole(folder / name, data)
-    _write_whole(folder / DESCRIPTION, description_text(description).encode())
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    """Aside, flushed, renamed: readers see the old file or the new one."""
-    part = path.with_name(f".{path.name}.part")
-    with part.open("wb") as stream:
-        stream.write(data)
-        stream.flush()
-        os.fsync(stream.fileno())
-    part.replace(path)
+        write_bytes_whole(folder / name, data)
+    write_bytes_whole(folder / DESCRIPTION, description_text(description).encode())

@@ -10,12 +10,17 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from harness.basics.errors import RecordingDamaged, WrongUse
-from harness.basics.whole_file import write_text_whole
+from harness.basics.whole_file import make_folder, write_text_whole
 from harness.bench.reading import Reading
+from harness.recording.checksums import SUM, sum_of_values
 from harness.recording.step_file import Step, StepRecord, read_step, write_step
 
-SCHEMA = 1
+SCHEMA = 2
+_UNSUMMED = 1
+"""The schema of runs whose files carry no checksums; they are read as they are."""
 
 
 @dataclass(frozen=True)
@@ -61,14 +66,23 @@ class Recording:
     def create(cls, folder: Path, header: RunHeader) -> "Recording":
         """Make the folder and its ``run.json``; refuses a folder that holds a run already."""
         require_unused(folder)
-        (folder / "steps").mkdir(parents=True, exist_ok=True)
-        write_text_whole(folder / "run.json", json.dumps(asdict(header), indent=1, allow_nan=False))
+        make_folder(folder / "steps")
+        fields = json.loads(json.dumps(asdict(header), allow_nan=False))
+        summed = {**fields, SUM: sum_of_values(fields)}
+        write_text_whole(folder / "run.json", json.dumps(summed, indent=1, allow_nan=False))
         return cls(folder)
 
     @property
     def truth_path(self) -> Path:
         """Where a mock world writes what is true: beside the run, where no estimate looks."""
         return self.folder.with_name(self.folder.name + ".truth.json")
+
+    def planned(self, key: str) -> list[Mapping[str, Any]]:
+        """The steps that ``run.json`` plans under a key; ``RecordingDamaged`` where it plans none there."""
+        steps = self.header.plan.get(key)
+        if not isinstance(steps, list) or not all(isinstance(step, dict) for step in steps):
+            raise RecordingDamaged(f"{self.folder / 'run.json'} plans no {key!r}; {_COPY}")
+        return steps
 
     @property
     def committed(self) -> int:
@@ -88,7 +102,8 @@ class Recording:
 
     def step(self, index: int) -> StepRecord:
         """Step ``index`` as it was performed."""
-        record = read_step(self._path(index), self.header.clock_offset_ns)
+        summed = self.header.schema != _UNSUMMED
+        record = read_step(self._path(index), self.header.clock_offset_ns, summed)
         if record.step.index != index:
             raise RecordingDamaged(f"{self._path(index)} says it is step {record.step.index}")
         return record
@@ -103,7 +118,7 @@ class Recording:
 
 def require_unused(folder: Path) -> None:
     """Refuse a folder that holds a run, before anything in it is touched."""
-    if (folder / "run.json").exists():
+    if (folder / "run.json").exists() or any((folder / "steps").glob("[0-9]*.mcap")):
         raise WrongUse(f"{folder} holds a run already; resume it with --resume, or name another folder")
 
 
@@ -111,12 +126,38 @@ def _read_header(path: Path) -> RunHeader:
     if not path.exists():
         raise WrongUse(f"{path.parent} is not a run: it has no run.json; give the folder that a run wrote")
     try:
-        fields = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise RecordingDamaged(f"{path}: not JSON ({error})") from error
-    if fields.get("schema") != SCHEMA:
-        raise RecordingDamaged(f"{path}: schema {fields.get('schema')!r}; this version reads {SCHEMA}")
+        return header_of(path.read_bytes(), path)
+    except OSError as error:
+        raise RecordingDamaged(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+
+
+def header_of(data: bytes, path: Path) -> RunHeader:
+    """What the bytes of a ``run.json`` say; ``RecordingDamaged`` naming the file where they are others."""
     try:
-        return RunHeader(**fields)
-    except TypeError as error:
-        raise RecordingDamaged(f"{path}: {error}") from error
+        return _checked(json.loads(data, parse_constant=_no_constant), path)
+    except (ValueError, RecursionError) as error:
+        raise RecordingDamaged(f"{path} is not JSON as a run writes it; {_COPY}") from error
+
+
+def _checked(fields: Any, path: Path) -> RunHeader:
+    schema = fields.get("schema") if isinstance(fields, dict) else None
+    if schema not in (SCHEMA, _UNSUMMED) or isinstance(schema, bool):
+        raise RecordingDamaged(f"{path}: schema {schema!r}; this version reads {_UNSUMMED} and {SCHEMA}")
+    if schema == SCHEMA and fields.pop(SUM, None) != sum_of_values(fields):
+        raise RecordingDamaged(f"{path}: its values do not agree with its checksum; {_COPY}")
+    try:
+        # As JSON: of Python values the strict check asks for the dataclass itself.
+        _HEADER.validate_json(json.dumps(fields), strict=True, extra="forbid")
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise RecordingDamaged(f"{path}: {key!r}: {first['msg'].lower()}; {_COPY}") from error
+    return RunHeader(**fields)
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(name)
+
+
+_HEADER = TypeAdapter(RunHeader)
+_COPY = "take the file from a copy of the run"

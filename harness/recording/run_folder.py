@@ -2,20 +2,20 @@
 
 import datetime as dt
 import importlib.metadata
-import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from harness.basics.clock import ClockOffset
 from harness.basics.errors import RecordingDamaged, WrongUse
 from harness.basics.mesh import Mesh
+from harness.basics.npz_file import read_arrays, write_arrays
+from harness.basics.whole_file import make_folder, removed_on_failure, write_bytes_whole
 from harness.bench.acquisition import AcquisitionCalibration
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.sensor import sensor_path, shipped_sensors
@@ -109,32 +109,47 @@ def create_run(
     """
     of = known_file(scene, mesh)
     require_unused(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    np.savez(folder / OBJECT, vertices=mesh.vertices, faces=mesh.faces)
+    with removed_on_failure(folder):
+        make_folder(folder)
+        carried = _carried(folder, scene, station, mesh, calibration, acquisition, of)
+        header = RunHeader(
+            experiment=experiment,
+            scene=scene.model_dump(mode="json", by_alias=True),
+            station=station.model_dump(mode="json", by_alias=True),
+            plan=plan,
+            files={name: _hash(folder / name) for name in carried},
+            versions=versions(),
+            seed=seed,
+            mock=mock,
+            clock_offset_ns=round(ClockOffset.measure().seconds * 1e9),
+            created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        )
+        return Recording.create(folder, header)
+
+
+def _carried(
+    folder: Path,
+    scene: SceneFile,
+    station: Station,
+    mesh: Mesh,
+    calibration: TactileCalibration,
+    acquisition: AcquisitionCalibration | None,
+    of: ObjectFile | None,
+) -> list[str]:
+    """Write the files that a run carries; their names within its folder."""
+    write_arrays(folder / OBJECT, {"vertices": mesh.vertices, "faces": mesh.faces})
     save_calibration(calibration, folder / CALIBRATION)
     carried = [OBJECT, CALIBRATION]
     if acquisition is not None:
         acquisition.save(folder / ACQUISITION)
         carried.append(ACQUISITION)
     if station.gel.make not in shipped_sensors():
-        shutil.copyfile(sensor_path(station.gel.make), folder / SENSOR)
+        write_bytes_whole(folder / SENSOR, sensor_path(station.gel.make).read_bytes())
         carried.append(SENSOR)
     if of is not None:
         copied(of, folder / OBJECTFILE, of.description.files_of(senses_of(scene)))
         carried.append(_DESCRIBED)
-    header = RunHeader(
-        experiment=experiment,
-        scene=scene.model_dump(mode="json", by_alias=True),
-        station=station.model_dump(mode="json", by_alias=True),
-        plan=plan,
-        files={name: _hash(folder / name) for name in carried},
-        versions=versions(),
-        seed=seed,
-        mock=mock,
-        clock_offset_ns=round(ClockOffset.measure().seconds * 1e9),
-        created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
-    )
-    return Recording.create(folder, header)
+    return carried
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,21 +161,24 @@ class RunFiles:
     @cached_property
     def scene(self) -> SceneFile:
         """As it was resolved when the run was made."""
-        return scene_from_json(self.recording.header.scene, f"{self.recording.folder}/run.json")
+        with _of_run():
+            return scene_from_json(self.recording.header.scene, self._where)
 
     @cached_property
     def station(self) -> Station:
         """As it was resolved when the run was made; a make of one's own is read from the run's folder."""
         tree = self.recording.header.station
-        if SENSOR in self.recording.header.files:
-            tree = {**tree, "gel": {**tree["gel"], "make": str(self._checked(SENSOR).resolve())}}
-        return station_from_json(tree, f"{self.recording.folder}/run.json")
+        gel = tree.get("gel")
+        if SENSOR in self.recording.header.files and isinstance(gel, dict):
+            tree = {**tree, "gel": {**gel, "make": str(self._checked(SENSOR).resolve())}}
+        with _of_run():
+            return station_from_json(tree, self._where)
 
     @cached_property
     def mesh(self) -> Mesh:
         """The object as the estimator knows it."""
-        with np.load(self._checked(OBJECT), allow_pickle=False) as archive:
-            return Mesh(archive["vertices"], archive["faces"])
+        arrays = read_arrays(self._checked(OBJECT), "an object", ("vertices", "faces"))
+        return Mesh(arrays["vertices"], arrays["faces"])
 
     @cached_property
     def calibration(self) -> TactileCalibration:
@@ -195,12 +213,25 @@ class RunFiles:
         carried = _DESCRIBED in self.recording.header.files
         return network_levels(self.scene, self.objectfile.description) if carried else {}
 
+    @property
+    def _where(self) -> str:
+        return f"{self.recording.folder}/run.json"
+
     def _checked(self, name: str) -> Path:
         path = self.recording.folder / name
         wanted = self.recording.header.files.get(name)
         if not path.exists() or _hash(path) != wanted:
             raise RecordingDamaged(f"{path} is missing or is not the file this run was recorded with")
         return path
+
+
+@contextmanager
+def _of_run() -> Iterator[None]:
+    """What would be an operator's mistake in a file of theirs is damage in one that a run wrote."""
+    try:
+        yield
+    except WrongUse as error:
+        raise RecordingDamaged(str(error)) from error
 
 
 def versions() -> dict[str, str]:

@@ -1,21 +1,21 @@
 """One step of a run as one MCAP file: on disk whole, or not at all."""
 
 import json
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import RecordingDamaged
-from harness.basics.whole_file import sync_folder
+from harness.basics.whole_file import write_bytes_whole
 from harness.bench.reading import Channel, Reading
+from harness.recording.checksums import UNSUMMED_LIBRARY, has_checksum, is_intact, with_checksum
 from harness.recording.codecs import codec_of
 
 
@@ -51,20 +51,20 @@ class StepRecord:
 
 def write_step(path: Path, record: StepRecord, clock_offset_ns: int) -> None:
     """Write beside ``path``, flush to the disk, then rename: a crash leaves the whole file or none."""
-    part = path.with_name(f".{path.name}.part")
-    with part.open("wb") as stream:
-        # JPEG does not compress again; the numbers are few.
-        writer = Writer(stream, compression=CompressionType.NONE)
-        writer.start(profile="", library="touchstone")
-        for reading in record.readings.values():
-            _write_reading(writer, reading, clock_offset_ns)
-        described = {"step": asdict(record.step), "seconds": record.seconds}
-        writer.add_metadata("touchstone.step", {"json": json.dumps(described, allow_nan=False)})
-        writer.finish()  # type: ignore[no-untyped-call]  # mcap leaves it unannotated
-        stream.flush()
-        os.fsync(stream.fileno())
-    part.replace(path)
-    sync_folder(path.parent)
+    write_bytes_whole(path, with_checksum(_encoded(record, clock_offset_ns)))
+
+
+def _encoded(record: StepRecord, clock_offset_ns: int) -> bytes:
+    stream = BytesIO()
+    # JPEG does not compress again; the numbers are few.
+    writer = Writer(stream, compression=CompressionType.NONE)
+    writer.start(profile="", library=UNSUMMED_LIBRARY)
+    for reading in record.readings.values():
+        _write_reading(writer, reading, clock_offset_ns)
+    described = {"step": asdict(record.step), "seconds": record.seconds}
+    writer.add_metadata("touchstone.step", {"json": json.dumps(described, allow_nan=False)})
+    writer.finish()  # type: ignore[no-untyped-call]  # mcap leaves it unannotated
+    return stream.getvalue()
 
 
 def _write_reading(writer: Writer, reading: Reading, clock_offset_ns: int) -> None:
@@ -88,23 +88,51 @@ def _write_reading(writer: Writer, reading: Reading, clock_offset_ns: int) -> No
         )
 
 
-def read_step(path: Path, clock_offset_ns: int) -> StepRecord:
-    """The step of a file; ``RecordingDamaged`` naming the file where it does not read back."""
+def read_step(path: Path, clock_offset_ns: int, summed: bool = True) -> StepRecord:
+    """The step of a file.
+
+    Args:
+        path: of the file.
+        clock_offset_ns: wall clock minus bench clock.
+        summed: whether the file must carry a checksum; only runs of schema 1 hold files without.
+
+    Raises:
+        RecordingDamaged: missing, or other bytes than were written; the file is named.
+    """
     try:
-        with path.open("rb") as stream:
-            reader = make_reader(stream, validate_crcs=True)
-            described = next(json.loads(m.metadata["json"]) for m in reader.iter_metadata())
-            messages = list(reader.iter_messages(log_time_order=False))
-    except (McapError, StopIteration, KeyError, ValueError, OSError) as error:
-        raise RecordingDamaged(
-            f"{path}: not a complete step ({type(error).__name__}: {error}); "
-            "delete this file and every later step, then resume the run"
-        ) from error
-    step = Step(**described["step"])
-    readings = _readings(
-        ((c.metadata["channel"], m.log_time, m.data) for _, c, m in messages), clock_offset_ns
+        data = path.read_bytes()
+    except OSError as error:
+        raise RecordingDamaged(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+    return step_of(data, path, clock_offset_ns, summed)
+
+
+def step_of(data: bytes, path: Path, clock_offset_ns: int, summed: bool = True) -> StepRecord:
+    """The step of a file's bytes; as ``read_step`` otherwise."""
+    if (summed or has_checksum(data)) and not is_intact(data):
+        raise _damaged(path, "its bytes do not agree with its checksum")
+    try:
+        return _decoded(data, clock_offset_ns)
+    # Without a checksum the libraries that decode a file meet any bytes, and fail on them in any way.
+    except Exception as error:
+        raise _damaged(path, "it does not decode") from error
+
+
+def _damaged(path: Path, why: str) -> RecordingDamaged:
+    return RecordingDamaged(
+        f"{path}: not a step as it was recorded: {why}; delete this file and every later step, then resume "
+        "the run"
     )
-    return StepRecord(step, readings, float(described["seconds"]))
+
+
+def _decoded(data: bytes, clock_offset_ns: int) -> StepRecord:
+    reader = make_reader(BytesIO(data), validate_crcs=True)
+    described = next(json.loads(m.metadata["json"]) for m in reader.iter_metadata())
+    messages = [
+        (channel.metadata["channel"], message.log_time, message.data)
+        for _, channel, message in reader.iter_messages(log_time_order=False)
+    ]
+    step = Step(**described["step"])
+    return StepRecord(step, _readings(messages, clock_offset_ns), float(described["seconds"]))
 
 
 def _readings(messages: Iterable[tuple[str, int, bytes]], clock_offset_ns: int) -> dict[str, Reading]:

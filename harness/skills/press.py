@@ -159,7 +159,7 @@ class PressPerformer:
 
     def steps(self, recording: Recording) -> Iterator[Step]:
         """The planned contacts that are not yet on the disk."""
-        for index, parameters in enumerate(recording.header.plan[self.plan_key]):
+        for index, parameters in enumerate(recording.planned(self.plan_key)):
             if index >= recording.committed:
                 yield Step(index, "press", parameters)
 

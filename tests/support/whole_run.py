@@ -10,6 +10,7 @@ from typing import Any
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station import RunContext
 from harness.bench.station_file import load_station, station_path
+from harness.recording.checksums import SUM, sum_of_values
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
@@ -56,7 +57,7 @@ def edited(recording: Recording, change: Callable[[dict[str, Any]], None]) -> Re
     path = recording.folder / "run.json"
     tree = json.loads(path.read_text())
     change(tree)
-    path.write_text(json.dumps(tree))
+    path.write_text(json.dumps({**tree, SUM: sum_of_values(tree)}))
     return Recording(recording.folder)
 
 

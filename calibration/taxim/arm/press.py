@@ -63,7 +63,7 @@ class BallPresses:
         """
         self._settings = settings_of(dict(recording.header.plan))
         self._watch = PressWatch.of(recording, self._ball)
-        for index, planned in enumerate(recording.header.plan["steps"]):
+        for index, planned in enumerate(recording.planned("steps")):
             if index >= recording.committed:
                 self._watch.require_sense(MISSES)
                 yield Step(index, planned["kind"], planned["parameters"])

@@ -15,8 +15,8 @@ from harness.basics.arrays import ByteArray, FloatArray, block_means, read_only
 from harness.basics.errors import CalibrationRefused, RecordingDamaged
 from harness.basics.geometry import rotation_from_quaternion, transform
 from harness.bench.reading import Reading
-from harness.bench.station_file import station_from_json
 from harness.recording.recording import Recording
+from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 
 NAME = "calibrate-taxim"
@@ -165,7 +165,7 @@ def press_name(step: int) -> str:
 
 def _on_gel(poses: Reading, recording: Recording) -> FloatArray:
     """``(2,)`` m, mean over the packets that came with the picture."""
-    station = station_from_json(recording.header.station, f"{recording.folder}/run.json")
+    station = RunFiles(recording).station
     ball = np.asarray(recording.header.plan["ball_in_base_m"], dtype=np.float64)
     each = [
         ball_on_gel(transform(rotation_from_quaternion(pose[3:]), pose[:3]), station.flange_from_gel, ball)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused
-from harness.basics.npz_file import read_arrays
+from harness.basics.npz_file import read_arrays, write_arrays
 from harness.sim.gel.gel import GelSkirt
 
 SCHEMA = 1
@@ -155,8 +155,7 @@ def save_calibration(calibration: TactileCalibration, path: Path) -> None:
         path: ending in ``.npz``.
     """
     text = json.dumps({"header": asdict(calibration.header), "sha256": calibration.sha256}, sort_keys=True)
-    arrays: dict[str, Any] = dict(calibration.arrays)
-    np.savez_compressed(path, header=np.array(text), **arrays)
+    write_arrays(path, {"header": np.array(text), **calibration.arrays}, compressed=True)
 
 
 def load_calibration(path: Path) -> TactileCalibration:

@@ -77,7 +77,7 @@ class Exploration:
 
     def steps(self, recording: Recording) -> Iterator[Step]:
         """Those that are not on the disk; each contact is planned on what was read before it."""
-        planned = recording.header.plan[PLAN_KEY]
+        planned = recording.planned(PLAN_KEY)
         for index in range(recording.committed, len(planned)):
             if self._explorer.is_sure(recording, index):
                 self._say(f"{self._enough}; no more contacts are made")

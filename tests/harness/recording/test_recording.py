@@ -1,69 +1,23 @@
 """A step is on disk whole or not at all, and reads back to the bit."""
 
+import errno
 import json
 import os
-import signal
 import subprocess
 import sys
 import textwrap
 import time
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.basics.errors import RecordingDamaged, WrongUse
-from harness.bench.reading import Channel, Reading
-from harness.recording.codecs import decode_jpeg
-from harness.recording.recording import Recording, RunHeader
+from harness.recording.recording import Recording
 from harness.recording.step_file import Step, StepRecord, read_step, write_step
-
-OFFSET_NS = 1_790_000_000_123_456_789
-
-
-def header(**changes: object) -> RunHeader:
-    fields: dict[str, object] = {
-        "experiment": "test",
-        "scene": {},
-        "station": {},
-        "plan": {},
-        "files": {},
-        "versions": {},
-        "seed": 1,
-        "mock": None,
-        "clock_offset_ns": OFFSET_NS,
-        "created": "2026-01-01T00:00:00+00:00",
-    }
-    return RunHeader(**{**fields, **changes})  # type: ignore[arg-type]
-
-
-def joints(values: list[list[float]], start: float = 10.0) -> Reading:
-    channel = Channel("arm.joints", "rad", (6,), "float64", "", 500.0)
-    return Reading(channel, np.arange(len(values), dtype=np.float64) * 0.002 + start, np.array(values))
-
-
-def poses(values: list[list[float]]) -> Reading:
-    channel = Channel("arm.base_from_flange", "m", (7,), "float64", "base", 500.0)
-    return Reading(channel, np.arange(len(values), dtype=np.float64) * 0.002 + 1.0, np.array(values))
-
-
-def wrenches(values: list[list[float]]) -> Reading:
-    channel = Channel("arm.wrench", "N", (6,), "float64", "base")
-    return Reading(channel, np.arange(len(values), dtype=np.float64) * 0.002 + 1.0, np.array(values))
-
-
-def images(count: int) -> Reading:
-    rng = np.random.default_rng(0)
-    pictures = rng.integers(0, 255, (count, 12, 16, 3), dtype=np.uint8)
-    jpegs = tuple(cv2.imencode(".jpg", picture)[1].tobytes() for picture in pictures)
-    channel = Channel("gel.image", "count", (12, 16, 3), "uint8", "gel", 25.0)
-    return Reading(
-        channel, np.arange(count, dtype=np.float64) * 0.04, np.array([decode_jpeg(j) for j in jpegs]), jpegs
-    )
-
+from tests.samples.recorded_step import OFFSET_NS, images, joints, poses, sample_header, wrenches
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -110,13 +64,13 @@ def test_not_a_number_never_reaches_the_disk(tmp_path: Path) -> None:
 
 
 def test_a_run_is_not_overwritten(tmp_path: Path) -> None:
-    Recording.create(tmp_path / "run", header())
+    Recording.create(tmp_path / "run", sample_header())
     with pytest.raises(WrongUse, match="holds a run already"):
-        Recording.create(tmp_path / "run", header())
+        Recording.create(tmp_path / "run", sample_header())
 
 
 def test_steps_are_committed_in_order_and_counted(tmp_path: Path) -> None:
-    recording = Recording.create(tmp_path / "run", header())
+    recording = Recording.create(tmp_path / "run", sample_header())
     for index in range(3):
         recording.commit(Step(index, "press", {"n": index}), [joints([[float(index)] * 6])], 0.1)
     again = Recording(tmp_path / "run")
@@ -125,7 +79,7 @@ def test_steps_are_committed_in_order_and_counted(tmp_path: Path) -> None:
 
 
 def test_a_truncated_step_is_named(tmp_path: Path) -> None:
-    recording = Recording.create(tmp_path / "run", header())
+    recording = Recording.create(tmp_path / "run", sample_header())
     recording.commit(Step(0, "press", {}), [joints([[0.0] * 6] * 50)], 0.1)
     path = tmp_path / "run" / "steps" / "000.mcap"
     path.write_bytes(path.read_bytes()[:-40])
@@ -134,7 +88,7 @@ def test_a_truncated_step_is_named(tmp_path: Path) -> None:
 
 
 def test_a_missing_step_is_named(tmp_path: Path) -> None:
-    recording = Recording.create(tmp_path / "run", header())
+    recording = Recording.create(tmp_path / "run", sample_header())
     for index in range(3):
         recording.commit(Step(index, "press", {}), [joints([[0.0] * 6])], 0.1)
     (tmp_path / "run" / "steps" / "001.mcap").unlink()
@@ -143,7 +97,7 @@ def test_a_missing_step_is_named(tmp_path: Path) -> None:
 
 
 def test_a_future_schema_is_refused(tmp_path: Path) -> None:
-    Recording.create(tmp_path / "run", header())
+    Recording.create(tmp_path / "run", sample_header())
     path = tmp_path / "run" / "run.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "schema": 99}))
     with pytest.raises(RecordingDamaged, match="schema 99"):
@@ -167,11 +121,56 @@ while True:
 
 
 def test_kill_at_any_moment_leaves_only_whole_steps(tmp_path: Path) -> None:
-    Recording.create(tmp_path / "run", header())
-    for pause in (0.35, 0.41, 0.47, 0.53):
+    recording = Recording.create(tmp_path / "run", sample_header())
+    for pause in (0.0, 0.007, 0.019):
+        before = recording.committed
         process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(WRITER), str(tmp_path / "run")])
-        time.sleep(pause)
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait()
+        try:
+            while recording.committed == before and process.poll() is None:
+                time.sleep(0.001)
+            time.sleep(pause)
+        finally:
+            process.kill()
+            process.wait()
+        assert recording.committed > before
         for index, record in enumerate(Recording(tmp_path / "run").steps()):
             assert (record.readings["arm.joints"].values == index).all()
+
+
+def test_a_step_that_fails_to_flush_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recording = Recording.create(tmp_path / "run", sample_header())
+
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match=r"No space left on device: '.*000\.mcap'"):
+        recording.commit(Step(0, "press", {}), [joints([[0.0] * 6])], 0.1)
+    assert list((tmp_path / "run" / "steps").iterdir()) == []
+
+
+def test_steps_are_committed_in_order_alone(tmp_path: Path) -> None:
+    recording = Recording.create(tmp_path / "run", sample_header())
+    recording.commit(Step(0, "press", {}), [joints([[0.0] * 6])], 0.1)
+    for index in (0, 2):
+        with pytest.raises(ValueError, match=f"step {index} cannot follow 1"):
+            recording.commit(Step(index, "press", {}), [joints([[1.0] * 6])], 0.1)
+    assert [record.readings["arm.joints"].values[0, 0] for record in recording.steps()] == [0.0]
+
+
+def test_a_step_of_another_index_is_refused(tmp_path: Path) -> None:
+    recording = Recording.create(tmp_path / "run", sample_header())
+    for index in range(2):
+        recording.commit(Step(index, "press", {}), [joints([[0.0] * 6])], 0.1)
+    steps = tmp_path / "run" / "steps"
+    (steps / "000.mcap").write_bytes((steps / "001.mcap").read_bytes())
+    with pytest.raises(RecordingDamaged, match=r"000\.mcap says it is step 1"):
+        recording.steps()
+
+
+def test_a_folder_with_steps_and_no_header_takes_no_new_run(tmp_path: Path) -> None:
+    recording = Recording.create(tmp_path / "run", sample_header())
+    recording.commit(Step(0, "press", {}), [joints([[0.0] * 6])], 0.1)
+    (tmp_path / "run" / "run.json").unlink()
+    with pytest.raises(WrongUse, match="holds a run already"):
+        Recording.create(tmp_path / "run", sample_header())

@@ -26,6 +26,7 @@ from harness.recording.recording import Recording
 from harness.recording.session import Quiet
 from mocks.world.gap_draw import GapDraw
 from tests.support.arm_presses import RADIUS, Creeping, begun, gap_of_aspect, opened, perform_on, performed
+from tests.support.whole_run import edited
 
 
 @pytest.fixture(scope="module")
@@ -287,8 +288,7 @@ def test_a_folder_reads_without_arm_truth_or_bench(tmp_path: Path, done: Recordi
 
 def test_a_run_of_another_experiment_is_refused(tmp_path: Path, done: Recording) -> None:
     shutil.copytree(done.folder, tmp_path / "other")
-    path = tmp_path / "other" / "run.json"
-    path.write_text(json.dumps({**json.loads(path.read_text()), "experiment": "contact-localization"}))
+    edited(Recording(tmp_path / "other"), lambda header: header.update(experiment="contact-localization"))
     with pytest.raises(CalibrationRefused, match="contact-localization"):
         read_arm_run(tmp_path / "other")
 
