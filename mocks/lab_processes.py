@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection
 from harness.basics.errors import BenchFault
 from mocks.faults import Fault
 
-ARM_PORTS = (29999, 30001, 30002, 30003, 30004)
+ARM_PORTS = (29999, 30001, 30002, 30003, 30004, 30011)
 GEL_PORT = 8080
 CAMERA_PORT = 8081
 

@@ -42,10 +42,12 @@ class HttpCamera:
         return self._stream.read(count, timeout)
 
     def health(self) -> Health:
-        """Rate and drops since opening; the age of a frame on arrival cannot be known."""
+        """Rate and drops since opening, and a failure at present; how old frames arrive cannot be known."""
         stream = self._stream
         identity = f"{self._identity} at {stream.url}"
-        return Health(stream.name, identity, stream.rate, stream.drops, None, stream.detail)
+        return Health(
+            stream.name, identity, stream.rate, stream.drops, None, stream.detail, failure=stream.failure
+        )
 
 
 def gelsight(

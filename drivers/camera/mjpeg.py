@@ -62,6 +62,8 @@ class MjpegStream:
         self._missed = 0
         self._reopened = 0
         self._due = 0.0
+        self._stalled = False
+        self._whole = 0.0
 
     def open(self) -> None:
         """Connect and wait for the first whole frame; does nothing if already open.
@@ -78,6 +80,7 @@ class MjpegStream:
                 "its cable, and the address and port in the station"
             )
         self._closing.clear()
+        self._stalled, self._whole = False, now()
         self._thread = threading.Thread(target=self._drain, args=(capture,), name=self.name, daemon=True)
         self._thread.start()
         try:
@@ -121,6 +124,16 @@ class MjpegStream:
     def detail(self) -> str:
         """What happened to the stream since opening, in words."""
         return f"stalled and opened again {self._reopened} times" if self._reopened else ""
+
+    @property
+    def failure(self) -> str:
+        """Why no frame comes at present, in words; empty while frames come."""
+        if not self._stalled:
+            return ""
+        return (
+            f"{self.name} sent no whole frame for {now() - self._whole:.1f} s (limit {READ_TIMEOUT:g} s); "
+            f"the stream at {self.url} has stalled: check the camera's power and cable"
+        )
 
     def _recent_times(self) -> list[float]:
         with self._arrived:
@@ -166,6 +179,7 @@ class MjpegStream:
                 continue
             # After one timeout a capture is dead for good, although it calls itself open.
             capture.release()
+            self._stalled = True
             self._reopened += 1
             capture = self._reconnect()
             if capture is None:
@@ -182,10 +196,13 @@ class MjpegStream:
     def _keep(self, frame: Frame) -> None:
         if _END_OF_IMAGE not in frame.jpeg[-16:]:
             self._damaged += 1
+            self._stalled = self._stalled or frame.time - self._whole > READ_TIMEOUT
             return
+        self._whole = frame.time
         with self._arrived:
             self._missed += self._missing_before(frame)
             self._frames.append(frame)
+            self._stalled = False
             self._arrived.notify_all()
 
     def _missing_before(self, frame: Frame) -> int:

@@ -177,6 +177,8 @@ class DataqHammer:
             raise BenchFault(
                 f"{self._name}: the box at {link.port} states the sample clock {dividend!r}, no number"
             )
+        for reset in self._model.resets:
+            link.ask(reset)
         for slot in range(_CHANNELS):
             link.ask(f"slist {slot} {slot}")
         link.ask(f"srate {divisor(int(dividend), self._rate, _CHANNELS, self._model)}")

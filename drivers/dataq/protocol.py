@@ -31,12 +31,15 @@ class BoxModel:
         bits: of the converter; words of fewer than 16 are left-justified.
         volts: full scale, either sign.
         divisors: least and greatest that ``srate`` takes.
+        resets: commands that undo what another program may have left on the box: text for binary, and
+            the decimation of a model that has it.
     """
 
     number: str
     bits: int
     volts: float
     divisors: tuple[int, int]
+    resets: tuple[str, ...]
 
     @property
     def full_scale(self) -> int:
@@ -45,8 +48,8 @@ class BoxModel:
 
 
 MODELS = {
-    "DI-1110": BoxModel("1110", 12, 10.0, (375, 65535)),
-    "DI-2108": BoxModel("2108", 16, 10.0, (375, 65535)),
+    "DI-1110": BoxModel("1110", 12, 10.0, (375, 65535), ("encode 0",)),
+    "DI-2108": BoxModel("2108", 16, 10.0, (375, 65535), ("encode 0", "dec 1", "deca 1")),
 }
 
 

@@ -17,12 +17,12 @@ import numpy as np
 from drivers.ur import paths, pipe, safety
 from drivers.ur import state as ur_state
 from drivers.ur import words as ur_words
-from drivers.ur.process import rate_of
+from drivers.ur.process import Alarm, Alarmed, rate_of
 from drivers.ur.safety import SafetyLimits
 from drivers.ur.session import UrSession
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
-from harness.basics.errors import BenchFault, LimitExceeded, SafetyStop, TouchstoneError
+from harness.basics.errors import BenchFault, LimitExceeded, MotionEnded, SafetyStop, TouchstoneError
 from harness.basics.geometry import translation, vector_from_rotation
 from harness.bench.device import ArmState, Health
 from harness.bench.reading import Reading
@@ -45,6 +45,8 @@ class UrArm:
         tool_points: m in the flange's frame, the points that the workspace and speed limits are for.
         lock_folder: where the lock file lies; None for the computer's temporary folder.
         command: what to run as the child process; None for ``drivers.ur.child``.
+        alarm: says why a motion must end, empty while all is well: a motion that began without is stopped,
+            and no search for contact begins with one. An arm may move away from where it learned of it.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class UrArm:
         tool_points: Sequence[Sequence[float]] = ((0.0, 0.0, 0.0),),
         lock_folder: Path | None = None,
         command: Sequence[str] | None = None,
+        alarm: Alarm = lambda: "",
     ) -> None:
         self.address = address
         self.model = model
@@ -65,6 +68,7 @@ class UrArm:
         self._lock_folder = lock_folder
         child = [sys.executable, "-m", "drivers.ur.child", "--address", address, "--model", model]
         self._command = command or [*child, "--rate", f"{rate:g}", "--patience", f"{limits.patience:g}"]
+        self._alarm = alarm
         self._session: UrSession | None = None
         self._contact: FloatArray | None = None
         self._busy = threading.Lock()
@@ -73,7 +77,7 @@ class UrArm:
         """Connect; raises ``BenchFault`` naming the cable or the switch to look at.
 
         Raises:
-            SafetyStop: the address is not a loopback address.
+            SafetyStop: the address is not a loopback address, or what answers there is no mock.
             ProtectiveStop: the controller has stopped the arm.
         """
         if self._session is not None:
@@ -123,6 +127,7 @@ class UrArm:
             LimitExceeded: outside the limits; nothing was sent.
             SafetyStop: stopped by force or by request.
             ProtectiveStop: the controller stopped the arm.
+            MotionEnded: there was an alarm; the arm is stopped and may move away.
             BenchFault: the controller or the link failed; the arm is stopped.
         """
         what = "the joint motion"
@@ -162,6 +167,8 @@ class UrArm:
         safety.within(f"{what}, force", force, limits.force_press, "N", "ask for a lighter touch")
         safety.within(f"{what}, travel", travel, limits.travel, "m", "approach closer first")
         safety.within(f"{what}, speed", speed, limits.speed_near, "m/s", "search more slowly")
+        if reason := self._alarm():
+            raise MotionEnded(f"{what} was not begun: {reason}")
         with self._motion() as (session, epoch):
             state = self.state()
             touched = abs(float(state.wrench[:3] @ axis)) >= force
@@ -178,17 +185,14 @@ class UrArm:
 
         Raises:
             SafetyStop: the flange is still within half of ``limits.near`` of the last contact.
-            BenchFault: the arm moves, or the sensor did not go to zero.
+            BenchFault: the arm moves, something pulls at the tool, or this computer is too busy to see.
         """
         with self._motion() as (session, _):
             self._require_clear()
             session.ask({"do": "zero_force"}, ANSWER_WITHIN)
             limit = self.limits.force_press / 2
             if not session.comes_true(lambda packet: ur_state.force(packet) < limit, SEEN_WITHIN):
-                raise BenchFault(
-                    f"the force sensor reads {ur_state.force(session.packet()):.1f} N after it was zeroed "
-                    f"(limit {limit:g} N); check that nothing pulls at the tool, and the payload set"
-                )
+                raise ur_state.not_zeroed(session.packet(), limit, SEEN_WITHIN)
 
     def set_digital_output(self, index: int, on: bool) -> None:
         """Switch a tool digital output (0 or 1), and see it switched.
@@ -260,11 +264,15 @@ class UrArm:
             "force_any": self.limits.force_any,
             **details,
         }
+        alarm = None if self._alarm() else self._alarm
         try:
-            arrived = bool(session.ask(message, allowed + KILL_SPARE, beat=True))
+            arrived = bool(session.ask(message, allowed + KILL_SPARE, beat=True, alarm=alarm))
             session.comes_true(lambda packet: not packet[pipe.FIELDS["moving"]][0], SEEN_WITHIN)
         except TouchstoneError:
             raise
+        except Alarmed as reason:
+            session.stop()
+            raise MotionEnded(f"{what} was stopped: {reason}") from reason
         except BaseException:
             session.stop()
             raise

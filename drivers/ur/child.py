@@ -17,6 +17,7 @@ from drivers.ur import state as ur_state
 from drivers.ur.link import PATIENCE, Link
 from drivers.ur.motion import Motion, Outcome
 from drivers.ur.parent import Parent
+from drivers.ur.program_watch import foreign_program_text
 from drivers.ur.safety import require_loopback
 from drivers.ur.stream import Stream
 from drivers.ur.watchdog import Watchdog
@@ -68,7 +69,8 @@ class Child:
         message = self._parent.next(TICK if self._motion else REST_TICK)
         if message is not None:
             self._serve(message)
-        self._check_link()
+        self._stream.require_younger((LOST_MOVING if self._motion else LOST_AT_REST) * self._patience)
+        self._check_programs()
         self._check_safety()
         self._check_script()
         if self._motion is not None:
@@ -145,7 +147,7 @@ class Child:
             raise self._latched
         if self._motion is not None:
             raise BenchFault(f"the arm was asked to {what} during a motion; wait for it to end")
-        if not self._becomes_fresh(LOST_MOVING * self._patience):
+        if not self._stream.becomes_younger(STALE * self._patience, LOST_MOVING * self._patience):
             raise BenchFault(
                 f"the arm was asked to {what}, but its state is {1e3 * self._stream.age:.0f} ms old "
                 f"(limit {1e3 * STALE * self._patience:.0f} ms); check this computer's load and the network"
@@ -159,31 +161,25 @@ class Child:
             time.sleep(TICK)
         return self._stream.at_rest
 
-    def _becomes_fresh(self, seconds: float) -> bool:
-        """Whether the arm's state is, or within some seconds becomes, fresh enough to command on."""
-        end = now() + seconds
-        while not self._is_fresh() and now() < end:
-            time.sleep(TICK)
-        return self._is_fresh()
-
-    def _is_fresh(self) -> bool:
-        return self._stream.age <= STALE * self._patience
-
     # What goes on meanwhile
 
     def _watch(self, motion: Motion) -> None:
         late = self._parent.late
         if late > BEAT_LATE * self._patience and not motion.stopping:
+            limit = 1e3 * BEAT_LATE * self._patience
             text = (
-                f"{motion.what} was stopped: the program that asked for it fell behind by {1e3 * late:.0f} ms"
+                f"{motion.what} was stopped: the program that asked for it was frozen or this computer too "
+                f"busy: it fell behind by {1e3 * late:.0f} ms (limit {limit:.0f} ms); see what held it up, "
+                "then open the arm again"
             )
-            motion.stop(self._link, Outcome(error=BenchFault(text)))
+            motion.stop(self._link, Outcome(error=BenchFault(text), latch=True))
         outcome = motion.look(self._link, self._stream)
         if outcome is None:
             return
+        if outcome.latch and outcome.error is not None:
+            self._latch(outcome.error)
+            return
         self._end_motion()
-        if outcome.latch:
-            self._latched = outcome.error
         if outcome.error is not None:
             self._parent.refuse(motion.id, outcome.error)
         else:
@@ -199,10 +195,23 @@ class Child:
         safety = self._stream.safety
         if safety in ("normal", "reduced") or isinstance(self._latched, ProtectiveStop):
             return
-        during = f"during {self._motion.what}" if self._motion is not None else "at rest"
-        self._latched = ProtectiveStop(ur_state.stopped_by_controller(self._stream.newest, during))
+        self._latch(ProtectiveStop(ur_state.stopped_by_controller(self._stream.newest, self._during)))
+
+    def _check_programs(self) -> None:
+        """Latch a program that somebody else started; the link has ended it already."""
+        program = self._link.foreign_program()
+        if program and self._latched is None:
+            self._latch(SafetyStop(foreign_program_text(self._link.address, program, self._during)))
+
+    @property
+    def _during(self) -> str:
+        return f"during {self._motion.what}" if self._motion is not None else "at rest"
+
+    def _latch(self, error: TouchstoneError) -> None:
+        """Refuse the motion and all later ones, and end the program."""
+        self._latched = error
         if self._motion is not None:
-            self._parent.refuse(self._motion.id, self._latched)
+            self._parent.refuse(self._motion.id, error)
             self._end_motion()
         with contextlib.suppress(BenchFault):
             self._link.halt()
@@ -210,26 +219,27 @@ class Child:
     def _check_script(self) -> None:
         """Start the script again if this computer's own delay let the watchdog end it; at rest only.
 
-        A motion it was cut out of has failed, and was told so.
+        A motion that it was cut out of is latched, and so is an end that somebody else made.
         """
         self._watchdog.look()
-        if self._watchdog.bit and not self._motion and not self._latched and self._stream.at_rest:
+        if self._motion or self._latched or self._link.program_running():
+            return
+        if not self._watchdog.bit:
+            self._latch_the_end()
+        elif self._stream.at_rest:
             self._link.revive()
             self._watchdog.start()
             self._stream.restarts += 1
 
-    def _check_link(self) -> None:
-        if self._stream.failure:
-            raise BenchFault(self._stream.failure)
-        limit = (LOST_MOVING if self._motion else LOST_AT_REST) * self._patience
-        if self._stream.age > limit:
-            raise BenchFault(
-                f"no state arrived from the arm for {self._stream.age:.1f} s (limit {limit:g} s); "
-                "check the network cable of the control box"
-            )
+    def _latch_the_end(self) -> None:
+        """Of a script at rest, once the state says what ended it; the controller's stops latch themselves."""
+        if not self._link.state_is_older():
+            cause = self._link.why()
+            if not isinstance(cause, ProtectiveStop):
+                self._latch(cause)
 
     def _kick(self) -> None:
-        if self._is_fresh():
+        if self._stream.age <= STALE * self._patience:
             self._watchdog.kick()
 
     # The end

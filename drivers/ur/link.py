@@ -7,28 +7,22 @@ import itertools
 import time
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Final
 
 from drivers.ur import dashboard, pipe
 from drivers.ur import words as ur_words
+from drivers.ur.controller_check import ControllerLink, checked_controller
+from drivers.ur.program_watch import OWN, ProgramWatch, foreign_program_text
 from drivers.ur.rtde_stream import RtdeStream
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
-from harness.basics.errors import BenchFault, ProtectiveStop, TouchstoneError
+from harness.basics.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
 
 PATIENCE: Final = 0.1  # s that the watchdog waits for a kick
+LATELY: Final = 0.2  # s before the script's end in which a late kick may be what ended it
 DECELERATION: Final = 10.0  # m/s^2; 25 ms from the free speed of 0.25 m/s
 NO_OFFSET: Final = [0.0] * 6
-
-
-@dataclass(frozen=True)
-class ControllerLink:
-    """What the controller says it is."""
-
-    model: str
-    serial: str
-    version: str
+START_WITHIN: Final = 2.0  # s for the uploaded script to run, and to be named
 
 
 class Link:
@@ -41,6 +35,8 @@ class Link:
         self._stream: Any = None
         self._newest: FloatArray | None = None
         self._halted = False
+        self._ended: float | None = None  # s on the bench clock, of the first packet without the script
+        self._programs: ProgramWatch | None = None
         self._kicks: deque[float] = deque([now()], maxlen=50)
         self._control: Any = None
         self._io: Any = None
@@ -50,7 +46,10 @@ class Link:
 
         The packets must be read from then on; ``arm`` comes next.
         """
-        identity = self._check_controller(model)
+        identity = checked_controller(self.address, model)
+        self._programs = ProgramWatch(self.address, self.halt)
+        self._programs.expect()
+        self._programs.start()
         from rtde_io import RTDEIOInterface
 
         self._control = self._constructed("control", self._make_control)
@@ -70,12 +69,23 @@ class Link:
             )
         hertz = 1.0 / self.patience
         self._check(self._control.setWatchdog(hertz), f"arm the watchdog at {hertz:g} Hz")
+        self._kicks.clear()  # nothing waited for a kick before
+        self._kicks.append(now())
 
     def packets(self) -> Iterator[FloatArray | None]:
         """Each packet as it arrives; None whenever there was none for a moment."""
         for packet in self._stream.packets():
-            self._newest = self._newest if packet is None else packet
+            if packet is not None:
+                self._note_the_end(packet)
+                self._newest = packet
             yield packet
+
+    def _note_the_end(self, packet: FloatArray) -> None:
+        """When the program ended: a kick that it met hangs in the library, and says nothing of that."""
+        if int(packet[pipe.FIELDS["runtime_state"]][0]) == ur_words.PLAYING:
+            self._ended = None
+        elif self._ended is None:
+            self._ended = float(packet[pipe.FIELDS["time"]][0])
 
     def kick(self) -> None:
         """Tell the watchdog that this program is well.
@@ -88,9 +98,10 @@ class Link:
         self._control.kickWatchdog()
 
     def longest_silence(self) -> float:
-        """Seconds, the longest that the watchdog had to wait of late."""
-        times = [*self._kicks, now()]
-        return max(later - earlier for earlier, later in itertools.pairwise(times))
+        """Seconds, the longest that the watchdog had to wait in the last moments of the program."""
+        end = now() if self._ended is None else self._ended
+        gaps = itertools.pairwise([*(kick for kick in self._kicks if kick < end), end])
+        return max(later - earlier for earlier, later in gaps if later > end - LATELY)
 
     def start_joints(self, joints: list[float], speed: float, acceleration: float) -> None:
         """Start a joint motion and return."""
@@ -140,8 +151,25 @@ class Link:
         if self.program_running() and not self._halted:
             self._control.stopScript()
 
+    def foreign_program(self) -> str:
+        """The program that somebody else started, which is stopped already; empty where nobody did.
+
+        Raises:
+            BenchFault: the controller does not name its programs any more.
+        """
+        programs = self._watched
+        if programs.failure and not programs.foreign:
+            raise BenchFault(programs.failure)
+        return programs.foreign
+
+    @property
+    def _watched(self) -> ProgramWatch:
+        assert self._programs is not None, "set by connect"
+        return self._programs
+
     def revive(self) -> None:
         """Upload the script again; only for an arm at rest whose script this program let die."""
+        self._watched.expect()
         self._check(self._control.reuploadScript(), "upload the control script again")
         self.arm()
 
@@ -157,43 +185,31 @@ class Link:
             f"the controller says: safety {words}, program {ur_words.RUNTIME_STATES.get(state, 'unknown')}, "
             f"robot {ur_words.ROBOT_MODES.get(mode, 'unknown')}"
         )
+        if words not in ur_words.MAY_MOVE:
+            return ProtectiveStop(text)
+        return BenchFault(text + self._who_ended_it(state))
+
+    def _who_ended_it(self, state: int) -> str:
+        """Why the program does not run, in words; empty where it does and was always fed in time."""
+        silence = self.longest_silence()
         # Also of a program that plays: it may have been started again, or its last packet be old.
-        if self.longest_silence() > 0.8 * self.patience:
-            silence = 1e3 * self.longest_silence()
-            text += f", its watchdog kept waiting for {silence:.0f} ms (limit {1e3 * self.patience:.0f} ms)"
-        return BenchFault(text) if words in ur_words.MAY_MOVE else ProtectiveStop(text)
+        if silence > 0.8 * self.patience:
+            return (
+                f"; this computer was too busy: the watchdog waited for {1e3 * silence:.0f} ms (limit "
+                f"{1e3 * self.patience:.0f} ms): close what else runs on it, then open the arm again"
+            )
+        if state in ur_words.ENDED:
+            done = "paused" if state in ur_words.PAUSED else "stopped"
+            return (
+                f"; somebody {done} the program, at the pendant or through the dashboard: ask who, then open "
+                "the arm again"
+            )
+        return ""
 
     def _check(self, accepted: object, what: str) -> None:
         if accepted is not True:
             cause = self.why()
             raise type(cause)(f"could not {what}: {cause}")
-
-    def _check_controller(self, model: str) -> ControllerLink:
-        """Model, remote control, power and safety; then end whatever program runs there.
-
-        A script left by a client that died keeps RTDEControlInterface's constructor waiting for
-        minutes; the dashboard ends it at once.
-        """
-        from dashboard_client import DashboardClient
-
-        board = DashboardClient(self.address)
-        try:
-            board.connect(2000)
-            identity = ControllerLink(
-                board.getRobotModel().strip(),
-                board.getSerialNumber().strip(),
-                board.polyscopeVersion().strip(),
-            )
-            remote, mode, safety = board.isInRemoteControl(), board.robotmode(), board.safetystatus()
-            _check_model(identity, model, self.address)
-            _check_ready(remote, mode, safety, self.address)
-            board.stop()
-        except RuntimeError as error:
-            raise BenchFault(
-                f"the dashboard of the arm at {self.address} does not answer as a UR controller's should "
-                f"({error}); check the address and the network cable of the control box"
-            ) from error
-        return identity
 
     def _make_control(self) -> object:
         from rtde_control import RTDEControlInterface
@@ -224,36 +240,22 @@ class Link:
         )
 
     def _wait_until_running(self) -> None:
-        end = now() + 2.0
-        while not self.program_running():
+        """Until the script runs, and the controller has named it as started."""
+        end = now() + START_WITHIN
+        while self._watched.awaits or not self.program_running():
+            if self.foreign_program():
+                raise SafetyStop(
+                    foreign_program_text(self.address, self.foreign_program(), "as it was opened")
+                )
             if now() > end:
-                cause = self.why()
-                raise type(cause)(f"the control script does not run on the controller: {cause}")
+                raise self._not_started()
             time.sleep(0.01)
 
-
-def _check_model(identity: ControllerLink, model: str, address: str) -> None:
-    """The dashboard names an e-Series arm without its e."""
-    if identity.model.lower().rstrip("e") != model.lower().rstrip("e"):
-        raise BenchFault(
-            f"the station says {model}; the controller at {address} is a {identity.model} "
-            f"(serial {identity.serial}): correct the station file or the address"
-        )
-
-
-def _check_ready(remote: bool, mode: str, safety: str, address: str) -> None:
-    if not remote:
-        raise BenchFault(
-            f"the arm at {address} is in local control; switch it to remote control at the top right "
-            "of the pendant"
-        )
-    if not any(word in safety.upper() for word in ("NORMAL", "REDUCED")):
-        raise ProtectiveStop(
-            f"the arm at {address} is stopped ({safety}); look at the pendant for the cause, clear it "
-            "and release the stop there"
-        )
-    if "RUNNING" not in mode.upper():
-        raise BenchFault(
-            f"the arm at {address} is not powered ({mode}); switch it on and release the brakes "
-            "at the pendant"
-        )
+    def _not_started(self) -> TouchstoneError:
+        if self.program_running():
+            return BenchFault(
+                f"the controller at {self.address} did not name its program '{OWN}' as it started (limit "
+                f"{START_WITHIN:g} s), so one of somebody else would go unnoticed; update PolyScope"
+            )
+        cause = self.why()
+        return type(cause)(f"the control script does not run on the controller: {cause}")

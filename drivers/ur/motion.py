@@ -35,7 +35,7 @@ class Outcome:
     Attributes:
         value: what the caller is told.
         error: what is raised instead.
-        latch: whether the arm stays stopped.
+        latch: whether the program is ended and the arm stays stopped until it is opened again.
     """
 
     value: bool = True
@@ -125,11 +125,7 @@ class Motion:
         if self._outcome is not None:
             return self._stopped(link, stream)
         if not link.program_running():
-            self._cut = now() if self._cut is None else self._cut
-            if link.state_is_older() and now() - self._cut < CAUSE_WITHIN:
-                return None
-            cause = link.why()
-            return Outcome(error=type(cause)(f"{self.what} was cut short: {cause}"))
+            return self._cut_short(link)
         if now() > self.deadline:
             text = (
                 f"{self.what} did not end in the time it should take; check the speed slider at the pendant"
@@ -137,6 +133,14 @@ class Motion:
             self.stop(link, Outcome(error=BenchFault(text)))
             return None
         return self._progress(link, stream)
+
+    def _cut_short(self, link: Link) -> Outcome | None:
+        """The program ended or was paused under the motion: nothing may take it up again."""
+        self._cut = now() if self._cut is None else self._cut
+        if link.state_is_older() and now() - self._cut < CAUSE_WITHIN:
+            return None
+        cause = link.why()
+        return Outcome(error=type(cause)(f"{self.what} was cut short: {cause}"), latch=True)
 
     def _heed_force(self, link: Link, stream: Stream) -> None:
         trip = stream.trip
@@ -182,7 +186,9 @@ class Motion:
         count, running = link.progress()
         self._began = self._began or count != self._count
         if not self._began and now() > self._since + START_WITHIN:
-            return Outcome(error=BenchFault(f"{self.what} was accepted but did not begin: {link.why()}"))
+            # It may begin yet, with nobody watching.
+            text = f"{self.what} was accepted but did not begin: {link.why()}"
+            return Outcome(error=BenchFault(text), latch=True)
         if not self._began or running:
             return None
         self._ended = self._ended or now()

@@ -8,7 +8,7 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, Any, Final
 
@@ -38,6 +38,14 @@ class DeadlineMissed(Exception):
 
 class ChildLost(Exception):
     """The child ended, or said that it cannot go on; the text is the reason."""
+
+
+class Alarmed(Exception):
+    """Something else failed while a motion was waited for; the text says what."""
+
+
+Alarm = Callable[[], str]
+"""Why a motion must end, in words; empty while all is well."""
 
 
 class _Pending:
@@ -103,15 +111,19 @@ class ChildProcess:
         """The value of the child's first reply, which says that it is connected."""
         return self._await(0, self._pending[0], seconds, beat=False)
 
-    def request(self, message: pipe.Message, seconds: float, *, beat: bool = False) -> Any:
+    def request(
+        self, message: pipe.Message, seconds: float, *, beat: bool = False, alarm: Alarm | None = None
+    ) -> Any:
         """Send a request and wait for its value.
 
         Args:
             message: without its id.
             seconds: the deadline.
             beat: send heartbeats meanwhile, which keep a motion alive.
+            alarm: asked with every heartbeat.
 
         Raises:
+            Alarmed: by ``alarm``; the request goes on.
             DeadlineMissed: no reply in time; the child should be killed.
             ChildLost: the child is gone.
             TouchstoneError: the child's refusal.
@@ -119,7 +131,7 @@ class ChildProcess:
         number = next(self._ids)
         pending = self._pending[number] = _Pending()
         self._send({**message, "id": number})
-        return self._await(number, pending, seconds, beat=beat)
+        return self._await(number, pending, seconds, beat=beat, alarm=alarm)
 
     def tell(self, message: pipe.Message) -> int:
         """Send a request without waiting; its id, for ``answered``."""
@@ -175,11 +187,15 @@ class ChildProcess:
         except (pipe.PipeBroken, ValueError) as error:
             raise ChildLost(self._lost or str(error)) from error
 
-    def _await(self, number: int, pending: _Pending, seconds: float, *, beat: bool) -> Any:
+    def _await(
+        self, number: int, pending: _Pending, seconds: float, *, beat: bool, alarm: Alarm | None = None
+    ) -> Any:
         end = time.monotonic() + seconds
         while not pending.done.wait(BEAT_PERIOD):
             if time.monotonic() > end:
                 raise DeadlineMissed(f"the arm's process gave no answer within {seconds:.1f} s")
+            if alarm is not None and (reason := alarm()):
+                raise Alarmed(reason)
             if beat:
                 self._send({"do": "beat"})
         reply = pending.reply

@@ -74,7 +74,7 @@ class RtdeStream:
         """Every ``(pipe.WIDTH,)`` packet, and None whenever the line was silent for a moment.
 
         Raises:
-            BenchFault: the controller closed the connection.
+            BenchFault: the controller closed the connection, or sent a number that is not finite.
         """
         time = now()
         while True:
@@ -147,4 +147,16 @@ def _packet(payload: bytes, time: float) -> FloatArray:
     packet = np.zeros(pipe.WIDTH)
     packet[_COLUMNS] = _SAMPLE.unpack(payload)[1:]
     packet[pipe.FIELDS["time"]] = time
+    if not np.isfinite(packet).all():
+        raise BenchFault(_not_finite(packet))
     return packet
+
+
+def _not_finite(packet: FloatArray) -> str:
+    name, ours = next(
+        (name, ours) for name, _, ours in _FIELDS if not np.isfinite(packet[pipe.FIELDS[ours]]).all()
+    )
+    return (
+        f"the controller sent the {name} {packet[pipe.FIELDS[ours]].tolist()}, where numbers must be finite: "
+        "nothing guards the arm without them; look at the pendant's log, and restart the controller"
+    )

@@ -20,7 +20,13 @@ Triple = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 
 TURN: Final = 2 * math.pi
+MOCK_YEAR: Final = "0000"  # a serial number begins with the year of making; no arm was made in this one
 ROUND_OFF: Final = 1e-9  # a limit itself is allowed, whatever the last bit of a product says
+
+_NOT_COMPLETE: Final = (
+    "because the safety chapter of this driver (twin-checked motion, operator's yes, protective-stop "
+    "recovery) is not complete; it will not move a real arm"
+)
 
 
 @dataclass(frozen=True)
@@ -105,8 +111,27 @@ def require_loopback(address: str) -> None:
     if not loopback:
         raise SafetyStop(
             f"the arm at '{address}' was not connected: only a mock controller on a loopback address "
-            "(127.0.0.0/8 or ::1) is accepted, because the safety chapter of this driver (twin-checked "
-            "motion, operator's yes, protective-stop recovery) is not complete; it will not move a real arm"
+            f"(127.0.0.0/8 or ::1) is accepted, {_NOT_COMPLETE}"
+        )
+
+
+def require_mock(address: str, serial: str) -> None:
+    """Refuse a controller that does not identify itself as a mock: a loopback address proves nothing.
+
+    A relay or a tunnel on this computer answers for an arm elsewhere.
+
+    Args:
+        address: where it answers.
+        serial: as its dashboard states it.
+
+    Raises:
+        SafetyStop: ``serial`` is not of the kind that only mocks have.
+    """
+    if not (serial.isdigit() and serial.startswith(MOCK_YEAR)):
+        raise SafetyStop(
+            f"the arm at {address} was not connected: its serial number is '{serial[:40]}', and a mock's "
+            f"begins with {MOCK_YEAR}, so this may be a real arm behind a relay; only a mock is accepted, "
+            f"{_NOT_COMPLETE}"
         )
 
 

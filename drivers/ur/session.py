@@ -11,13 +11,13 @@ from typing import Any, Final, NoReturn
 from drivers.ur import dashboard, pipe
 from drivers.ur import lock as arm_lock
 from drivers.ur.link import PATIENCE
-from drivers.ur.process import ChildLost, ChildProcess, DeadlineMissed
-from drivers.ur.safety import require_loopback
+from drivers.ur.process import Alarm, ChildLost, ChildProcess, DeadlineMissed
+from drivers.ur.safety import require_loopback, require_mock
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault, ProtectiveStop, TouchstoneError
 
-PORTS: Final = {30004: "RTDE", 29999: "dashboard", 30003: "script"}
+PORTS: Final = {30004: "RTDE", 29999: "dashboard", 30003: "script", 30011: "message"}
 OPEN_WITHIN: Final = 20.0  # s
 FIRST_PACKET_WITHIN: Final = 2.0  # s
 CLOSE_WITHIN: Final = 3.0  # s
@@ -29,8 +29,8 @@ STALE: Final = 5.0  # of the watchdog's patience
 class UrSession:
     """From connected to closed; after a failure it stays latched and only closes.
 
-    Raises: on construction, ``SafetyStop`` for an address that is not loopback, ``ProtectiveStop``
-        where the controller has stopped the arm, ``BenchFault`` for all else.
+    Raises: on construction, ``SafetyStop`` for an address that is not loopback or a controller that is
+        no mock, ``ProtectiveStop`` where the controller has stopped the arm, ``BenchFault`` for all else.
     """
 
     def __init__(
@@ -52,6 +52,7 @@ class UrSession:
         try:
             for port, name in PORTS.items():
                 _require_port(address, port, name)
+            require_mock(address, dashboard.ask(address, "get serial number"))
             self._process = ChildProcess(command, rate, keep=(self._lock,))
             self.controller: list[str] = self._ready(self._process)
         except BaseException:
@@ -74,22 +75,30 @@ class UrSession:
             self._lock = -1
 
     def packet(self) -> FloatArray:
-        """The newest packet; raises ``BenchFault`` where it is stale."""
+        """The newest packet; raises ``BenchFault`` where it is stale, and latches."""
         packet = self.process.newest()
         age = float("inf") if packet is None else now() - float(packet[0])
         if packet is None or age > self._stale:
             why = self.process.lost or "its stream stalled"
-            raise BenchFault(
+            fault = BenchFault(
                 f"the state of the arm at {self.address} is {age:.2f} s old (limit {self._stale:g} s): "
-                f"{why}; check the network cable of the control box"
+                f"{why}; check this computer's load and the network cable of the control box"
             )
+            self.latched = self.latched or fault
+            raise fault
         return packet
 
-    def ask(self, message: pipe.Message, seconds: float, *, beat: bool = False) -> Any:
-        """A request to the child; a missed deadline or a lost child stops the arm and latches."""
+    def ask(
+        self, message: pipe.Message, seconds: float, *, beat: bool = False, alarm: Alarm | None = None
+    ) -> Any:
+        """A request to the child; a missed deadline or a lost child stops the arm and latches.
+
+        Raises:
+            Alarmed: by ``alarm``; nothing was stopped yet.
+        """
         self.require_unlatched()
         try:
-            return self.process.request(message, seconds, beat=beat)
+            return self.process.request(message, seconds, beat=beat, alarm=alarm)
         except DeadlineMissed as error:
             self._fault(str(error))
         except ChildLost as error:

@@ -66,6 +66,20 @@ def force(packet: FloatArray) -> float:
     return float(np.linalg.norm(packet[pipe.FIELDS["wrench"]][:3]))
 
 
+def not_zeroed(packet: FloatArray, limit: float, seconds: float) -> BenchFault:
+    """Why no packet of the last ``seconds`` shows a force below ``limit`` N, after the sensor was zeroed."""
+    pull = force(packet)
+    if pull < limit:
+        return BenchFault(
+            "the force sensor was zeroed, but this computer was too busy to see it: no state of the arm "
+            f"came within {seconds:g} s; close what else runs on it, then zero the sensor again"
+        )
+    return BenchFault(
+        f"something pulls at the tool: the force sensor reads {pull:.1f} N after it was zeroed (limit "
+        f"{limit:g} N); free the tool and its cables, and check the payload set at the pendant"
+    )
+
+
 def detail(packet: FloatArray) -> str:
     """Safety state and anything unusual since opening, in words."""
     words = ur_words.safety_words(int(packet[pipe.FIELDS["safety_bits"]][0]))

@@ -1,6 +1,7 @@
 """The arm's state in the child, packet by packet, and the force guard that reads each one."""
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -14,6 +15,7 @@ from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 
 AT_REST: Final = 1e-3  # rad/s of the fastest joint
+LOOK_PERIOD: Final = 0.002  # s
 CONTACT_PACKETS: Final = 2  # in a row above the threshold; one alone may be noise
 
 
@@ -87,6 +89,23 @@ class Stream:
     def age(self) -> float:
         """Seconds since a packet last arrived."""
         return now() - self.changed
+
+    def becomes_younger(self, age: float, seconds: float) -> bool:
+        """Whether the state is, or within some ``seconds`` becomes, at most ``age`` s old."""
+        end = now() + seconds
+        while self.age > age and now() < end:
+            time.sleep(LOOK_PERIOD)
+        return self.age <= age
+
+    def require_younger(self, age: float) -> None:
+        """Raise ``BenchFault`` where the stream has failed, or the state is more than ``age`` s old."""
+        if self.failure:
+            raise BenchFault(self.failure)
+        if self.age > age:
+            raise BenchFault(
+                f"no state arrived from the arm for {self.age:.1f} s (limit {age:g} s); "
+                "check the network cable of the control box"
+            )
 
     @property
     def safety(self) -> str:

@@ -2,12 +2,11 @@
 
 from typing import Final
 
-from drivers.ur.link import Link
+from drivers.ur.link import LATELY, Link
 from harness.basics.clock import now
 
 KICK_PERIOD: Final = 0.02  # s; five kicks in the 0.1 s that the watchdog waits at a real bench
 LATE: Final = 0.8  # of the watchdog's patience between two kicks: it may have ended the script
-LATELY: Final = 0.2  # s
 
 
 class Watchdog:

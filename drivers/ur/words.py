@@ -24,6 +24,8 @@ RUNTIME_STATES: Final = {
 }
 RUNNING: Final = 7
 PLAYING: Final = 2
+PAUSED: Final = frozenset({3, 4})
+ENDED: Final = frozenset({0, 1, 3, 4})
 TOOL_OUTPUT_BIT: Final = 16
 
 _SAFETY: Final = (

@@ -20,6 +20,10 @@ class BenchFault(TouchstoneError):
     """An instrument did not do what it was asked."""
 
 
+class MotionEnded(BenchFault):
+    """Another instrument failed while the arm moved: the arm was stopped, is well and may move away."""
+
+
 class NotTouched(BenchFault):
     """The gel travelled its whole approach and met nothing."""
 

@@ -46,6 +46,7 @@ class Health:
         drops: samples lost since opening.
         latency: s, median age of a sample on arrival; None where it cannot be known.
         detail: anything worth a sentence.
+        failure: why nothing comes from it at present; empty while something does.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Health:
     drops: int
     latency: float | None
     detail: str = ""
+    failure: str = ""
 
 
 class Arm(Protocol):

@@ -122,8 +122,8 @@ def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterato
             where = addressed(station, started)
         else:
             where = station
-        arm = make_arm(where)
         gel = make_gel(where)
+        arm = make_arm(where, alarm=lambda: gel.health().failure)
         camera = make_camera(where) if scene.sensors.camera else None
         hammer = make_hammer(where) if scene.sensors.sound else None
         microphone = make_microphone(where) if scene.sensors.sound else None
@@ -165,8 +165,13 @@ def _surround(stack: ExitStack, environment: Mapping[str, str]) -> None:
     stack.callback(restore)
 
 
-def make_arm(station: Station) -> Arm:
-    """The arm's driver, not yet open; its limits hold for the flange, the gel's housing and the hammer."""
+def make_arm(station: Station, alarm: Callable[[], str] = lambda: "") -> Arm:
+    """The arm's driver, not yet open; its limits hold for the flange, the gel's housing and the hammer.
+
+    Args:
+        station: whose.
+        alarm: why a motion must end, in words; empty while all is well.
+    """
     section = station.arm
     made: Arm = loaded(INSTRUMENTS[section.kind])(
         address=section.address,
@@ -174,6 +179,7 @@ def make_arm(station: Station) -> Arm:
         limits=loaded(LIMITS[section.kind])(**section.safety.model_dump()),
         rate=section.rate,
         tool_points=station.tool_points.tolist(),
+        alarm=alarm,
     )
     return made
 

@@ -5,13 +5,14 @@ Everything a step needs is in its parameters, planned and rehearsed before the f
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import BenchFault, NotTouched
+from harness.basics.errors import BenchFault, MotionEnded, NotTouched
 from harness.basics.geometry import transform
 from harness.bench.device import Arm
 from harness.bench.reading import Reading
@@ -171,11 +172,7 @@ class PressPerformer:
         self._travel(motion, bench)
         arm.zero_force()
         began = arm.state().time
-        met = self._touch(step, motion, bench)
-        moved = self._press(motion, arm, began) if met else math.inf
-        bench.pause(SETTLE)
-        bench.mark(step.index, PRESS)
-        image = self._read(bench, motion)
+        image, moved = self._contact(step, motion, bench, began)
         history = arm.history(arm.state().time - began)
         self._line(arm, motion.base_from_stand_off, "retreat")
         read = (image, *history)
@@ -230,12 +227,25 @@ class PressPerformer:
         )
         return touched - float(motion.base_from_stand_off[:3, 3] @ motion.axis) - motion.search
 
-    def _read(self, bench: Bench, motion: ContactMotion) -> Reading:
-        """The frames; where the camera fails the arm is well, and does not stay pressed on the object."""
+    def _contact(
+        self, step: Step, motion: ContactMotion, bench: Bench, began: float
+    ) -> tuple[Reading, float]:
+        """Touch, press and read; the frames, and m by which the touch was farther than planned."""
+        with self._retreat_after(MotionEnded, motion, bench.arm):
+            met = self._touch(step, motion, bench)
+            moved = self._press(motion, bench.arm, began) if met else math.inf
+        bench.pause(SETTLE)
+        bench.mark(step.index, PRESS)
+        with self._retreat_after(BenchFault, motion, bench.arm):
+            return bench.gel.read(FRAMES_PER_CONTACT, timeout=3.0), moved
+
+    @contextmanager
+    def _retreat_after(self, failure: type[BenchFault], motion: ContactMotion, arm: Arm) -> Iterator[None]:
+        """Where the camera fails the arm is well, and does not stay pressed on the object."""
         try:
-            return bench.gel.read(FRAMES_PER_CONTACT, timeout=3.0)
-        except BenchFault:
-            self._line(bench.arm, motion.base_from_stand_off, "retreat")
+            yield
+        except failure:
+            self._line(arm, motion.base_from_stand_off, "retreat")
             raise
 
     def _touch(self, step: Step, motion: ContactMotion, bench: Bench) -> bool:

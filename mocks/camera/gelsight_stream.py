@@ -18,6 +18,7 @@ import cv2
 from harness.basics.arrays import ByteArray
 from harness.basics.clock import now
 from mocks.faults import ActiveFault, saturated
+from mocks.loopback import require_own_address
 
 BOUNDARY = b"boundarydonotcross"
 _HEAD = (
@@ -63,10 +64,13 @@ class MjpegServer:
         port: 0 for any that is free.
         view: what to show.
         rate: frames a second.
+
+    Raises:
+        WrongUse: another computer could reach ``host``.
     """
 
     def __init__(self, host: str, port: int, view: StreamedView, rate: float = 25.0) -> None:
-        self._listener = socket.create_server((host, port))
+        self._listener = socket.create_server((require_own_address(host), port))
         self.port: int = self._listener.getsockname()[1]
         self.fault = ActiveFault()
         self._view = view

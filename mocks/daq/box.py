@@ -143,7 +143,9 @@ class DaqBox:
 
     @property
     def _scan_rate(self) -> float:
-        return self._speed * self._instrument.aggregate_rate / len(self._instrument.scan_list)
+        """Scans a second that leave."""
+        scans = self._speed * self._instrument.aggregate_rate / len(self._instrument.scan_list)
+        return scans / self._instrument.decimation
 
     def _until_packet(self) -> float:
         """Seconds until the last of the next few packets is full, which then leaves at once."""
@@ -187,7 +189,7 @@ class DaqBox:
             count = min(step, due - self._taken)
             self._memory.push(self._words(count))
             self._taken += count
-            self._numbered += count
+            self._numbered += count * self._instrument.decimation
             self._let_out()
         self._let_out()
         self._lost.value = self._memory.lost
@@ -197,7 +199,8 @@ class DaqBox:
 
     def _words(self, count: int) -> bytes:
         """``count`` scans as the instrument sends them."""
-        counts = self._source(self._numbered, count)
+        step = self._instrument.decimation
+        counts = self._source(self._numbered, count * step)[step - 1 :: step]
         words = np.zeros((count, len(self._instrument.scan_list)), "<i2")
         for slot, wired in enumerate(self._instrument.scan_list):
             if wired < counts.shape[1]:
@@ -205,6 +208,8 @@ class DaqBox:
         limit = 1 << (self._model.bits - 1)
         if words.min() < -limit or words.max() >= limit:
             raise ValueError(f"the source gave counts that a {self._model.bits}-bit converter cannot say")
+        if self._instrument.as_text:
+            return b"".join(b",".join(b"%d" % word for word in scan) + b"\r" for scan in words)
         return (words << (16 - self._model.bits)).astype("<i2").tobytes()
 
     def _let_out(self) -> None:

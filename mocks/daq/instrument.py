@@ -15,6 +15,9 @@ _MAKER = "DATAQ"
 _INPUTS = range(11)  # analogue 0 to 7, counter 8, rate 9, digital word 10
 _PACKETS = range(8)
 _COLOURS = range(8)
+_ENCODINGS = range(2)
+_DECIMATIONS = range(1, 513)
+_ALGORITHMS = range(4)
 _INFO_QUESTIONS = range(10)
 
 
@@ -27,17 +30,19 @@ class MockedBoxModel:
         bits: of its converter; fewer than 16 leave it left-justified in 16.
         dividend: Hz; the scan list's rate is this over the divisor of ``srate``.
         divisors: that ``srate`` takes, least and greatest.
+        decimates: whether it has ``dec`` and ``deca``.
     """
 
     name: str
     bits: int
     dividend: int
     divisors: tuple[int, int]
+    decimates: bool
 
 
 MODELS = {
-    "DI-1110": MockedBoxModel("1110", 12, 60_000_000, (375, 65535)),
-    "DI-2108": MockedBoxModel("2108", 16, 60_000_000, (375, 65535)),
+    "DI-1110": MockedBoxModel("1110", 12, 60_000_000, (375, 65535), decimates=False),
+    "DI-2108": MockedBoxModel("2108", 16, 60_000_000, (375, 65535), decimates=True),
 }
 
 
@@ -54,6 +59,8 @@ class CommandInterpreter:
         scan_list: inputs, by slot.
         divisor: of ``srate``.
         packet: bytes that leave at once.
+        as_text: whether samples leave as lines of decimal numbers.
+        decimation: scans that are taken for each that leaves; the last of them does, whatever ``deca`` says.
     """
 
     def __init__(self, model: MockedBoxModel, serial: str, echoes_start: bool = False) -> None:
@@ -61,6 +68,8 @@ class CommandInterpreter:
         self.scan_list: list[int] = [0]
         self.divisor = model.divisors[1]
         self.packet = 16
+        self.as_text = False
+        self.decimation = 1
         self._model = model
         self._serial = serial
         self._echoes_start = echoes_start
@@ -71,6 +80,9 @@ class CommandInterpreter:
             "srate": self._srate,
             "ps": self._ps,
             "led": self._led,
+            "encode": self._encode,
+            "dec": self._dec,
+            "deca": self._deca,
             "start": self._start,
             "stop": self._stop,
         }
@@ -134,6 +146,25 @@ class CommandInterpreter:
     def _led(self, arguments: list[str]) -> str | None:
         wanted = _whole(arguments, 1)
         return None if wanted is None or wanted[0] not in _COLOURS else ""
+
+    def _encode(self, arguments: list[str]) -> str | None:
+        wanted = _whole(arguments, 1)
+        if wanted is None or self.scanning or wanted[0] not in _ENCODINGS:
+            return None
+        self.as_text = wanted[0] == 1
+        return ""
+
+    def _dec(self, arguments: list[str]) -> str | None:
+        wanted = _whole(arguments, 1)
+        if not self._model.decimates or wanted is None or self.scanning or wanted[0] not in _DECIMATIONS:
+            return None
+        self.decimation = wanted[0]
+        return ""
+
+    def _deca(self, arguments: list[str]) -> str | None:
+        wanted = _whole(arguments, 1)
+        accepted = self._model.decimates and wanted is not None and wanted[0] in _ALGORITHMS
+        return "" if accepted and not self.scanning else None
 
     def _start(self, arguments: list[str]) -> str | None:
         if arguments != ["0"] and arguments:

@@ -1,12 +1,12 @@
 """What can be made to go wrong with a controller, on cue."""
 
+from collections.abc import Callable, Iterable
 from typing import Final
 
+from mocks.ur.connection import Connection
 from mocks.ur.controller import Controller
-from mocks.ur.dashboard import DashboardConnection
 from mocks.ur.hooks import Cue
 from mocks.ur.rtde_server import RtdeServer
-from mocks.ur.script_server import ScriptServer
 
 KINDS: Final = (
     "none",
@@ -18,9 +18,11 @@ KINDS: Final = (
     "local_control",
     "remote_control",
     "kill_program",
+    "broken_force_sensor",
 )
 """none: every lasting fault ends. drop: connections are reset, and refused for as long as it lasts.
-freeze: the real-time exchange neither sends nor reads, as with a loose cable; the arm goes on."""
+freeze: the real-time exchange neither sends nor reads, as with a loose cable; the arm goes on.
+broken_force_sensor: its readings are no numbers."""
 
 
 class Faults:
@@ -29,21 +31,18 @@ class Faults:
     Args:
         controller: that fails.
         rtde: its port 30004.
-        scripts: its ports 30001 to 30003.
-        dashboards: connections of its port 29999.
+        others: open connections of its other ports.
     """
 
     def __init__(
         self,
         controller: Controller,
         rtde: RtdeServer,
-        scripts: ScriptServer,
-        dashboards: set[DashboardConnection],
+        others: Callable[[], Iterable[Connection]],
     ) -> None:
         self._controller = controller
         self._rtde = rtde
-        self._scripts = scripts
-        self._dashboards = dashboards
+        self._others = others
         self._until: float | None = None
 
     def begin(self, cue: Cue) -> str:
@@ -68,6 +67,9 @@ class Faults:
             case "kill_program":
                 controller.complain("program killed")
                 controller.player.stop()
+            case "broken_force_sensor":
+                controller.robot.force.broken = True
+                self._last(cue.seconds)
             case _:
                 return f"a controller has no fault {cue.kind!r}; it has {', '.join(KINDS)}"
         return f"begun: {cue.kind}"
@@ -80,10 +82,8 @@ class Faults:
     def _drop(self, seconds: float | None) -> None:
         """Without a duration connections may come back at once: a cable that was pulled and put back."""
         self._rtde.drop()
-        for script in list(self._scripts.connections):
-            script.abort()
-        for dashboard in list(self._dashboards):
-            dashboard.abort()
+        for connection in self._others():
+            connection.abort()
         if seconds is not None:
             self._rtde.refusing = True
             self._last(seconds)
@@ -94,4 +94,5 @@ class Faults:
     def _clear(self) -> None:
         self._rtde.frozen = False
         self._rtde.refusing = False
+        self._controller.robot.force.broken = False
         self._until = None

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from mocks.loopback import require_own_address
+
 Six = tuple[float, float, float, float, float, float]
 Matrix = tuple[tuple[float, float, float, float], ...]
 """A homogeneous transform, four rows of four."""
@@ -65,7 +67,7 @@ class ControllerConfig:
         host: the loopback address that its ports are bound to.
         model: ``"ur3e"``, ``"ur5e"`` or ``"ur10e"``.
         joints: rad at power-on.
-        serial: of the arm, digits.
+        serial: of the arm, digits; a real arm's begins with its year of making, a mock's with 0000.
         polyscope: the software version it reports, (major, minor, bugfix, build).
         seed: of the force sensor's bias and noise.
         force_noise: N, standard deviation of each force reading.
@@ -74,12 +76,15 @@ class ControllerConfig:
             a tenth of it, in N m.
         contact_force: N against the direction of motion at which ``tool_contact`` says contact.
         remote: whether the pendant is in remote control.
+
+    Raises:
+        WrongUse: ``host`` is not a loopback address.
     """
 
     host: str
     model: str = "ur5e"
     joints: Six = HOME
-    serial: str = "20225500001"
+    serial: str = "00005500001"
     polyscope: tuple[int, int, int, int] = (5, 12, 4, 1101661)
     seed: int = 0
     force_noise: float = 0.05
@@ -87,3 +92,6 @@ class ControllerConfig:
     force_bias: float = 1.0
     contact_force: float = 3.0
     remote: bool = True
+
+    def __post_init__(self) -> None:
+        require_own_address(self.host)

@@ -33,6 +33,7 @@ class Player:
     Attributes:
         state: of the main program.
         name: of the main program, the last one where none runs.
+        listeners: are called with ``"STARTED"`` or ``"STOPPED"`` and the name of a main program.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class Player:
         self._secondary: list[Process] = []
         self.state = RuntimeState.STOPPED
         self.name = ""
+        self.listeners: list[Callable[[str, str], None]] = []
 
     def translate(self, text: str) -> Program:
         """A program's functions; slow, so not for the controller's cycle. The newest texts are remembered.
@@ -74,6 +76,7 @@ class Player:
         self._main = Process(program.main, self._enter, self._robot.mover.release)
         self.name = program.name
         self.state = RuntimeState.PLAYING
+        self._announce("STARTED")
 
     def step(self) -> None:
         """One cycle of every program."""
@@ -116,6 +119,11 @@ class Player:
         self.state = RuntimeState.STOPPED
         self._robot.watchdog = None
         self._robot.mover.brake(PROGRAM_STOP)
+        self._announce("STOPPED")
+
+    def _announce(self, event: str) -> None:
+        for listener in self.listeners:
+            listener(event, self.name)
 
     def _enter(self, thread: int) -> None:
         self._robot.thread = thread

@@ -18,6 +18,10 @@ PROTOCOL: Final = 2
 SLOWEST: Final = 1 << 22
 """Bytes that a client may leave unread before it is dropped: some ten seconds of everything."""
 
+LARGEST_RECIPE: Final = 16 << 10
+"""Bytes of one packet's values, and of the names and of the types of a recipe: all the variables of the
+guide at once need some 8,000 of names. Where a real controller ends is not documented."""
+
 _FIRST_RECIPE: Final = b"\x01"
 _FREQUENCY: Final = struct.Struct(">d")
 _VERSION: Final = struct.Struct(">H")
@@ -34,6 +38,8 @@ class OutputRecipe:
             (OUTPUTS[name].read, OUTPUTS[name].type in wire.SCALARS) for name in names if name in OUTPUTS
         ]
         self._layout = wire.layout([name for name in self.types if name != wire.NOT_FOUND])
+        if self._layout.size > LARGEST_RECIPE:
+            raise BadPacket(f"a recipe of {self._layout.size} bytes; {LARGEST_RECIPE} fit a packet")
 
     def due(self, cycle: int) -> bool:
         """Whether a packet belongs to this cycle."""
@@ -206,7 +212,7 @@ class RtdeConnection(Connection):
         if self._protocol != PROTOCOL or len(payload) < _FREQUENCY.size:
             raise BadPacket("outputs are set up in protocol version 2 only, with a frequency")
         (frequency,) = _FREQUENCY.unpack_from(payload)
-        names = wire.names_in(payload[_FREQUENCY.size :])
+        names = _names(payload[_FREQUENCY.size :])
         if not 1.0 <= frequency <= CYCLES_PER_SECOND:
             self.send(wire.text_message(f"frequency {frequency} Hz is not between 1 and {CYCLES_PER_SECOND}"))
             frequency = 0.0
@@ -217,7 +223,7 @@ class RtdeConnection(Connection):
         self.send(packet(Kind.SETUP_OUTPUTS, bytes((recipe.valid,)) + ",".join(recipe.types).encode()))
 
     def _set_up_inputs(self, payload: bytes) -> None:
-        names = wire.names_in(payload)
+        names = _names(payload)
         claims = self._server.claims
         types = []
         for name in names:
@@ -240,3 +246,14 @@ class RtdeConnection(Connection):
             self.send(wire.text_message(f"there is no input recipe {number}"))
             return
         self._inputs[number].apply(self._server.controller, payload[1:])
+
+
+def _names(payload: bytes) -> list[str]:
+    """Variable names; ``BadPacket`` where the answer with their types would not fit a packet."""
+    names = wire.names_in(payload)
+    longest = len(names) * (1 + len(wire.NOT_FOUND))
+    if max(len(payload), longest) > LARGEST_RECIPE:
+        raise BadPacket(
+            f"a recipe of {len(names)} names; its types, up to {longest} bytes, do not fit a packet"
+        )
+    return names

@@ -1,7 +1,7 @@
 """Run a mocked UR controller on a loopback address until told to stop.
 
-Ports: 29999 dashboard, 30001 to 30003 programs, 30004 real-time data exchange. ``serve`` blocks;
-give it a process of its own. ::
+Ports: 29999 dashboard, 30001 to 30003 programs, 30004 real-time data exchange, 30011 messages.
+``serve`` blocks; give it a process of its own. ::
 
     serve(
         ControllerConfig(host="127.0.0.2"),
@@ -29,12 +29,14 @@ from mocks.ur.controller import Controller
 from mocks.ur.dashboard import Dashboard, DashboardConnection
 from mocks.ur.faults import Faults
 from mocks.ur.hooks import CYCLE, ContactModel, ControllerConfig, Cue, OnCycle, OnOutputs
+from mocks.ur.primary_server import PrimaryConnection, PrimaryServer
 from mocks.ur.rtde_server import RtdeConnection, RtdeServer
 from mocks.ur.script_server import ScriptConnection, ScriptServer
 
 DASHBOARD_PORT: Final = 29999
 SCRIPT_PORTS: Final = (30001, 30002, 30003)
 RTDE_PORT: Final = 30004
+PRIMARY_PORT: Final = 30011
 
 _CUES_EVERY: Final = 5
 _STOP_EVERY: Final = 25
@@ -95,15 +97,16 @@ async def _serve(
     on_ready: Callable[[], None],
     answer: Callable[[str], None],
 ) -> None:
-    rtde, scripts = RtdeServer(controller), ScriptServer(controller)
+    rtde, scripts, primary = RtdeServer(controller), ScriptServer(controller), PrimaryServer(controller)
     dashboard, dashboards = Dashboard(controller), set[DashboardConnection]()
-    faults = Faults(controller, rtde, scripts, dashboards)
+    faults = Faults(controller, rtde, lambda: {*scripts.connections, *primary.connections, *dashboards})
     async with contextlib.AsyncExitStack() as stack:
         stack.push_async_callback(scripts.close)
         await _listen(stack, controller, DASHBOARD_PORT, lambda: DashboardConnection(dashboard, dashboards))
         for port in SCRIPT_PORTS:
             await _listen(stack, controller, port, lambda: ScriptConnection(scripts))
         await _listen(stack, controller, RTDE_PORT, lambda: RtdeConnection(rtde))
+        await _listen(stack, controller, PRIMARY_PORT, lambda: PrimaryConnection(primary))
         on_ready()
         schedule = _Schedule()
         while schedule.count % _STOP_EVERY or not should_stop():

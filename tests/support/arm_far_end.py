@@ -1,4 +1,4 @@
-"""A mocked controller with a springy floor: ``python arm_far_end.py HOST``; ends with its input.
+"""A mocked controller with a springy floor: ``python arm_far_end.py HOST SERIAL``; ends with its input.
 
 It takes ``{"cue": {"kind": ..., "seconds": ...}}`` and ``{"where": true}`` on standard input, a
 line each, and answers each with a line.
@@ -37,6 +37,10 @@ class FarEnd:
         self.closed = False
         self.cues: queue.SimpleQueue[Cue] = queue.SimpleQueue()
         self.where: dict[str, Any] = {}
+        self.outputs = 0
+
+    def switch(self, bits: int, /) -> None:
+        self.outputs = bits
 
     def cycle(self, time: float, joints: Sequence[float], base_from_flange: Any, /) -> None:
         self.where = {"time": time, "joints": list(joints), "pose": [list(row) for row in base_from_flange]}
@@ -49,7 +53,7 @@ class FarEnd:
             request = json.loads(line)
             if "cue" in request:
                 self.cues.put(Cue(**request["cue"]))
-            say(self.where)
+            say({**self.where, "outputs": self.outputs})
         self.closed = True
 
 
@@ -61,12 +65,13 @@ def main() -> None:
     far_end = FarEnd()
     threading.Thread(target=far_end.listen, daemon=True).start()
     serve(
-        ControllerConfig(host=sys.argv[1], joints=JOINTS, force_bias=2.0),
+        ControllerConfig(host=sys.argv[1], serial=sys.argv[2], joints=JOINTS, force_bias=2.0),
         contact=Floor(),
         on_cycle=far_end.cycle,
         should_stop=lambda: far_end.closed,
         cues=far_end.next_cue,
         on_ready=lambda: say({"ready": True}),
+        on_outputs=far_end.switch,
     )
 
 

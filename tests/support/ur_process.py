@@ -21,7 +21,7 @@ TURN = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 PLANE = 0.40
 """m: height of the surface that the controller's tool can touch."""
 
-PORTS = (29999, 30001, 30002, 30003, 30004)
+PORTS = (29999, 30001, 30002, 30003, 30004, 30011)
 READY_WITHIN = 20.0
 
 

@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,12 +13,19 @@ import pytest
 
 from drivers.ur import dashboard
 from drivers.ur.arm import UrArm
-from harness.basics.arrays import FloatArray
 from harness.basics.errors import BenchFault, ProtectiveStop, SafetyStop
 from harness.basics.geometry import translation
-from tests.support.arm_bench import DOWN, FLOOR, READY, FarEnd, child_pid, make_arm
-
-FAR: FloatArray = READY + np.array([0.6, 0, 0, 0, 0, 0])
+from tests.support.arm_bench import (
+    DOWN,
+    FAR,
+    FLOOR,
+    READY,
+    FarEnd,
+    InFlight,
+    child_pid,
+    comes_to_rest,
+    make_arm,
+)
 
 
 @pytest.fixture
@@ -46,39 +52,9 @@ def patient_arm(far_end: FarEnd, tmp_path: Path) -> Iterator[UrArm]:
     arm.close()
 
 
-class InFlight:
-    """A long joint motion in a thread, and how it ended."""
-
-    def __init__(self, arm: UrArm) -> None:
-        self.error: Exception | None = None
-        self._thread = threading.Thread(target=self._move, args=(arm,))
-        self._thread.start()
-        while np.abs(arm.state().joint_speeds).max() < 0.1:
-            assert self._thread.is_alive(), f"the motion ended before it was seen to begin: {self.error!r}"
-            time.sleep(0.005)
-
-    def _move(self, arm: UrArm) -> None:
-        try:
-            arm.move_joints(FAR, 0.3, 1.5)
-        except Exception as error:  # noqa: BLE001 - it is looked at by the test
-            self.error = error
-
-    def join(self) -> Exception | None:
-        self._thread.join()
-        return self.error
-
-
-def comes_to_rest(far_end: FarEnd, within: float) -> bool:
-    """Whether the controller's own joints stop changing within some seconds, short of the target."""
-    end = time.monotonic() + within
-    before = far_end.joints()
-    while time.monotonic() < end:
-        time.sleep(0.05)
-        after = far_end.joints()
-        if np.array_equal(before, after):
-            return bool(np.abs(after - FAR).max() > 0.05)
-        before = after
-    return False
+def environment() -> dict[str, str]:
+    """For a program of its own that drives the arm with what the tests are made of."""
+    return {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
 
 
 def gone(pid: int, within: float = 3.0) -> bool:
@@ -96,7 +72,7 @@ def test_a_protective_stop_is_seen_latched_and_never_resumed(patient_arm: UrArm,
     assert isinstance(error, ProtectiveStop)
     assert "during the joint motion: protective stop; flange at (" in str(error)
     assert arm.state().safety == "protective stop"
-    assert comes_to_rest(far_end, 1.0)
+    assert comes_to_rest(far_end, 1.0, FAR)
     with pytest.raises(ProtectiveStop):
         arm.move_joints(READY, 0.1, 1.0)
     with pytest.raises(ProtectiveStop):
@@ -104,6 +80,25 @@ def test_a_protective_stop_is_seen_latched_and_never_resumed(patient_arm: UrArm,
     arm.close()
     with pytest.raises(ProtectiveStop, match="release the stop"):
         arm.open()
+
+
+def test_a_protective_stop_that_is_released_at_the_pendant_resumes_nothing(
+    patient_arm: UrArm, far_end: FarEnd
+) -> None:
+    """The release is under this driver's hands: it stays open, and its program must be gone by then."""
+    motion = InFlight(patient_arm)
+    far_end.cue("protective_stop")
+    assert isinstance(motion.join(), ProtectiveStop)
+    assert comes_to_rest(far_end, 1.0, FAR)
+    resting = far_end.joints()
+    while far_end.ask("unlock protective stop") != "Protective stop releasing":
+        time.sleep(0.1)
+    assert far_end.ask("play") == "Failed to execute: play"
+    assert far_end.ask("running") == "Program running: false"
+    time.sleep(0.3)
+    assert np.array_equal(far_end.joints(), resting)
+    with pytest.raises(ProtectiveStop):
+        patient_arm.move_joints(READY, 0.1, 1.0)
 
 
 def test_a_protective_stop_at_rest_is_latched_too(patient_arm: UrArm, far_end: FarEnd) -> None:
@@ -123,7 +118,7 @@ def test_killing_the_child_in_flight_stops_the_arm(arm: UrArm, far_end: FarEnd) 
     error = motion.join()
     assert isinstance(error, BenchFault)
     assert "open it again" in str(error)
-    assert comes_to_rest(far_end, 1.0)
+    assert comes_to_rest(far_end, 1.0, FAR)
     assert gone(pid)
     arm.close()
     arm.open()
@@ -137,7 +132,7 @@ def test_the_watchdog_alone_stops_the_arm_of_a_frozen_child(
     pid = child_pid(arm)
     motion = InFlight(arm)
     os.kill(pid, signal.SIGSTOP)
-    assert comes_to_rest(far_end, 1.0)
+    assert comes_to_rest(far_end, 1.0, FAR)
     os.kill(pid, signal.SIGKILL)
     assert isinstance(motion.join(), BenchFault)
 
@@ -149,7 +144,7 @@ def test_a_stop_while_the_child_is_frozen_goes_through_the_dashboard(arm: UrArm,
     began = time.monotonic()
     arm.stop()
     assert time.monotonic() - began < 0.5
-    assert comes_to_rest(far_end, 0.5)
+    assert comes_to_rest(far_end, 0.5, FAR)
     os.kill(pid, signal.SIGKILL)
     assert isinstance(motion.join(), BenchFault)
     with pytest.raises(BenchFault, match="open it again"):
@@ -160,26 +155,20 @@ def test_killing_the_program_in_flight_stops_the_arm_and_leaves_no_process(
     far_end: FarEnd, tmp_path: Path
 ) -> None:
     program = (
-        "import sys; from pathlib import Path; from tests.support.arm_bench import make_arm, child_pid; "
-        "from test_arm_faults import FAR\n"
+        "import sys; from pathlib import Path; from tests.support.arm_bench import FAR, make_arm, child_pid\n"
         "arm = make_arm(sys.argv[1], Path(sys.argv[2])); arm.open()\n"
         "sys.stdout.write(f'{child_pid(arm)}\\n'); sys.stdout.flush()\n"
         "arm.move_joints(FAR, 0.3, 1.5)"
     )
-    tests = Path(__file__).resolve().parents[1]
-    path = os.pathsep.join(str(folder) for folder in (tests.parent, tests, tests / "wire"))
-    with subprocess.Popen(
-        [sys.executable, "-c", program, far_end.address, str(tmp_path)],
-        stdout=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": path},
-    ) as running:
+    command = [sys.executable, "-c", program, far_end.address, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment()) as running:
         assert running.stdout is not None
         pid = int(running.stdout.readline())
         before = far_end.joints()
         while np.abs(far_end.joints() - before).max() < 0.02:
             time.sleep(0.01)
         running.kill()
-    assert comes_to_rest(far_end, 1.0)
+    assert comes_to_rest(far_end, 1.0, FAR)
     assert gone(pid)
     arm = make_arm(far_end.address, tmp_path)
     arm.open()
@@ -193,7 +182,7 @@ def test_a_dropped_connection_in_flight_is_a_fault(arm: UrArm, far_end: FarEnd) 
     error = motion.join()
     assert isinstance(error, BenchFault)
     assert "cable" in str(error)
-    assert comes_to_rest(far_end, 1.0)
+    assert comes_to_rest(far_end, 1.0, FAR)
     assert gone(pid)
 
 
@@ -218,10 +207,33 @@ def test_beyond_the_hard_limit_the_arm_stays_stopped(far_end: FarEnd, tmp_path: 
     arm.close()
 
 
-def test_a_program_stopped_at_the_pendant_is_not_started_again(arm: UrArm, far_end: FarEnd) -> None:
-    dashboard.stop(far_end.address)
+@pytest.mark.parametrize(("command", "done"), [("stop", "stopped"), ("pause", "paused")])
+def test_a_program_ended_at_the_pendant_is_named_latches_and_is_not_taken_up_again(
+    patient_arm: UrArm, far_end: FarEnd, command: str, done: str
+) -> None:
+    arm = patient_arm
+    motion = InFlight(arm)
+    far_end.ask(command)
+    error = motion.join()
+    assert isinstance(error, BenchFault)
+    assert f"program {done}" in str(error)
+    assert f"somebody {done} the program, at the pendant" in str(error)
+    assert comes_to_rest(far_end, 1.0, FAR)
+    assert far_end.ask("play") == "Failed to execute: play"
+    resting = far_end.joints()
+    with pytest.raises(BenchFault, match=f"somebody {done} the program"):
+        arm.move_joints(READY, 0.2, 1.5)
+    assert np.array_equal(far_end.joints(), resting)
+
+
+@pytest.mark.parametrize(("command", "done"), [("stop", "stopped"), ("pause", "paused")])
+def test_a_program_ended_at_the_pendant_at_rest_latches_too(
+    arm: UrArm, far_end: FarEnd, command: str, done: str
+) -> None:
+    far_end.ask(command)
     time.sleep(0.3)
-    with pytest.raises(BenchFault, match="program stopped"):
+    assert far_end.ask("play") == "Failed to execute: play"
+    with pytest.raises(BenchFault, match=f"somebody {done} the program"):
         arm.move_joints(FAR, 0.1, 1.0)
 
 
@@ -244,12 +256,54 @@ def test_a_delay_at_rest_that_wakes_the_watchdog_is_mended_and_told(arm: UrArm) 
     assert "restarted 1 times" in arm.health().detail
 
 
-def test_a_delay_in_flight_fails_the_motion_and_only_that(arm: UrArm, far_end: FarEnd) -> None:
+def test_a_delay_in_flight_fails_the_motion_and_latches(arm: UrArm, far_end: FarEnd) -> None:
     motion = InFlight(arm)
     freeze(child_pid(arm), 0.25)
     error = motion.join()
     assert isinstance(error, BenchFault)
-    assert "watchdog kept waiting" in str(error)
-    assert comes_to_rest(far_end, 1.0)
+    assert "this computer was too busy: the watchdog waited for" in str(error)
+    assert comes_to_rest(far_end, 1.0, FAR)
     time.sleep(0.6)
+    resting = far_end.joints()
+    with pytest.raises(BenchFault, match="open the arm again"):
+        arm.move_joints(READY, 0.2, 1.5)
+    assert np.array_equal(far_end.joints(), resting)
+    arm.close()
+    arm.open()
     arm.move_joints(READY, 0.2, 1.5)
+
+
+FROZEN = """
+import sys
+from pathlib import Path
+from drivers.ur.arm import UrArm
+from harness.basics.errors import TouchstoneError
+from tests.support.arm_bench import FAR, READY, make_arm
+
+arm = make_arm(sys.argv[1], Path(sys.argv[2]))
+arm.open()
+for target in (FAR, READY):
+    try:
+        arm.move_joints(target, 0.3, 1.5)
+    except TouchstoneError as error:
+        print(f"{type(error).__name__}: {error}", flush=True)
+arm.close()
+"""
+
+
+def test_a_frozen_program_stops_its_motion_and_may_not_move_again(far_end: FarEnd, tmp_path: Path) -> None:
+    command = [sys.executable, "-c", FROZEN, far_end.address, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment()) as running:
+        assert running.stdout is not None
+        before = far_end.joints()
+        while np.abs(far_end.joints() - before).max() < 0.02:
+            time.sleep(0.01)
+        running.send_signal(signal.SIGSTOP)
+        assert comes_to_rest(far_end, 1.5, FAR)
+        resting = far_end.joints()
+        running.send_signal(signal.SIGCONT)
+        first, second = (line.decode() for line in running.stdout)
+    assert "BenchFault" in first
+    assert "was frozen or this computer too busy" in first
+    assert second == first
+    assert np.array_equal(far_end.joints(), resting)

@@ -1,6 +1,5 @@
 """The arm driver, unchanged, moves a mocked controller through ur_rtde."""
 
-import itertools
 import threading
 import time
 from collections.abc import Iterator
@@ -113,10 +112,15 @@ def test_a_stop_from_another_thread_ends_a_motion_within_150_ms(arm: UrArm) -> N
     arm.move_joints(target, 0.3, 1.5)
 
 
-def test_a_stop_at_rest_changes_nothing(arm: UrArm) -> None:
+def test_a_stop_at_rest_changes_nothing(arm: UrArm, far_end: FarEnd) -> None:
+    joints, program, outputs = far_end.joints(), far_end.ask("programstate"), far_end.outputs()
     arm.stop()
     arm.stop()
+    assert np.array_equal(far_end.joints(), joints)
+    assert far_end.ask("programstate") == program == "PLAYING rtde_control"
+    assert far_end.outputs() == outputs
     arm.move_joints(READY + 0.01, 0.2, 2.0)
+    assert np.abs(far_end.joints() - READY - 0.01).max() < 1e-6
 
 
 def test_contact_is_found_and_the_arm_rests_there(arm: UrArm) -> None:
@@ -163,9 +167,14 @@ def test_pressing_beyond_the_limit_stops_the_arm_and_lets_it_retreat(arm: UrArm)
     assert np.linalg.norm(arm.state().wrench[:3]) < 1.0
 
 
-def test_a_digital_output_switches(arm: UrArm) -> None:
-    for index, on in itertools.product((0, 1), (True, True, False)):
+def test_a_digital_output_switches(arm: UrArm, far_end: FarEnd) -> None:
+    """The tool's outputs are bits 16 and 17; switching one leaves the other, and all others, as they are."""
+    expected = far_end.outputs()
+    for index, on in ((0, True), (0, True), (1, True), (0, False), (0, False), (1, False)):
+        bit = 1 << (16 + index)
+        expected = expected | bit if on else expected & ~bit
         arm.set_digital_output(index, on)
+        assert far_end.outputs() == expected
 
 
 def test_limits_refuse_before_anything_moves(arm: UrArm, far_end: FarEnd) -> None:

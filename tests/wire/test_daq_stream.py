@@ -181,6 +181,19 @@ def test_a_box_left_scanning_is_quieted_and_the_port_is_one_programs(bench: Benc
         assert flag(by_name(hammer.capture(lambda: None, 0.1, 0.1, 0.3)), "silent") == 1.0
 
 
+@pytest.mark.parametrize("left", [b"encode 1\r", b"dec 100\r", b"dec 2\rdeca 3\r"])
+def test_what_another_program_left_on_the_box_is_undone(bench: Bench, left: bytes) -> None:
+    from serial import Serial
+
+    with Serial(bench.box.port, timeout=2.0) as port:
+        port.write(left)
+        assert port.read(len(left)).startswith(left[:6])
+    with opened(bench) as hammer:
+        counts = counts_of(by_name(hammer.capture(lambda: None, 0.1, 0.1, 0.2)))
+        assert hammer.health().rate == pytest.approx(RATE, rel=2e-3)
+    assert np.abs(np.median(counts, axis=0) - OFFSETS).max() <= 2
+
+
 def test_another_boxs_serial_number_is_refused(bench: Bench) -> None:
     with pytest.raises(BenchFault, match=r"'mock-2108'; the station says '12345678'"):
         opened(bench, serial="12345678").__enter__()

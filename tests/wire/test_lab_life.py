@@ -25,7 +25,7 @@ from harness.bench.station_file import Station
 from harness.objects.household import build
 
 ROOT = Path(__file__).parents[2]
-PORTS = (29999, 30001, 30002, 30003, 30004, 8080, 8081)
+PORTS = (29999, 30001, 30002, 30003, 30004, 30011, 8080, 8081)
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="loopback addresses 127.x.y.z need Linux")
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from mocks.ur.variables import OUTPUTS
 from tests.support.ur_process import PORTS, UrProcess, is_free, wait_until
 
 ROOT = str(Path(__file__).resolve().parents[2])
@@ -95,6 +96,38 @@ def test_packets_come_on_the_grid_of_cycles(client: Client, frequency: float, cy
     assert client.ask(ord("P")) == b"\1"
 
 
+@pytest.mark.parametrize(
+    ("kind", "name"), [("O", "actual_q"), ("O", "no_such_variable"), ("I", "input_double_register_1")]
+)
+def test_a_recipe_that_fits_no_packet_ends_its_connection_and_nothing_else(
+    mock: UrProcess, client: Client, kind: str, name: str
+) -> None:
+    greedy = Client(mock.host)
+    greedy.ask(ord("V"), b"\0\2")
+    names = ",".join([name] * min(1500, 65_000 // (1 + len(name)))).encode()
+    # 1,500 vectors make a packet of 72,000 bytes; a header counts to 65,535.
+    greedy.send(ord(kind), (struct.pack(">d", 500.0) if kind == "O" else b"") + names)
+    assert b"fit a packet" in greedy.bytes.read()
+    greedy.close()
+    _assert_alive(client)
+
+
+def test_a_recipe_of_every_variable_is_served(client: Client) -> None:
+    types = client.outputs(",".join(OUTPUTS)).split(b",")
+    assert len(types) == len(OUTPUTS)
+    assert client.ask(ord("S")) == b"\1"
+    assert client.receive(ord("U"))[0] == 1
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.0.0.1", "localhost.example"])  # noqa: S104
+def test_an_address_that_others_can_reach_is_not_served(host: str) -> None:
+    command = [sys.executable, "-m", "tests.support.ur_controller", "--host", host]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert f"asked to serve on '{host}'" in done.stderr
+    assert "loopback addresses" in done.stderr
+
+
 @pytest.mark.parametrize("frequency", [0.0, -1.0, 501.0, float("nan")])
 def test_a_frequency_out_of_range_is_refused(client: Client, frequency: float) -> None:
     assert client.outputs("timestamp", frequency)[0] == 0
@@ -167,6 +200,7 @@ def test_random_bytes_never_stop_the_cycle(mock: UrProcess, client: Client, port
         "def f():\n movej(7)\nend\n",
         "def f():\n x = [1, 2]\n x[2] = 0\nend\n",
         "def f():\n write_output_integer_register(0, 3000000000)\nend\n",
+        "def f():\n x = [1, 2]\n while True:\n  x = [x, x]\n  sync()\n end\nend\n",
         "import os\n",
         "__import__('os')\n",
         "open('x')\n",

@@ -23,6 +23,7 @@ class ForceSensor:
     Attributes:
         raw: ``(6,)`` N and N m in the flange's frame, bias included.
         base: ``(6,)`` N and N m at the flange, in base, as exerted plus noise: no bias.
+        broken: whether ``at_tcp`` reads no numbers.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
@@ -34,6 +35,7 @@ class ForceSensor:
         self._zero = [0.0] * 6
         self._noise = random.Random()
         self._recent: deque[Vector] = deque(maxlen=RECENT)
+        self.broken = False
         self.raw: Six = NO_WRENCH
         self.base: Six = NO_WRENCH
         self.begin_motion(0)
@@ -63,6 +65,8 @@ class ForceSensor:
 
     def at_tcp(self, base_from_flange: Matrix, flange_from_tcp: Matrix) -> Six:
         """``actual_TCP_force``: N and N m at the tool centre point, in base."""
+        if self.broken:
+            return (math.nan,) * 6
         a, b, c, d, e, g = (part - zero for part, zero in zip(self.raw, self._zero, strict=True))
         turned = _turned(base_from_flange, (a, b, c, d, e, g))
         arm = poses.rotated(base_from_flange, poses.translation(flange_from_tcp))

@@ -1,5 +1,6 @@
 """A program at work: its threads, each resumed once a cycle, and the variables they share."""
 
+import time
 import traceback
 from collections.abc import Callable, Generator
 from typing import Any, Final
@@ -11,6 +12,10 @@ Steps = Generator[None, None, Any]
 
 BUDGET: Final = 20_000
 """Loop turns and calls of one thread within one cycle; the controller too ends a loop that takes no time."""
+
+LONGEST_TURN: Final = 0.05
+"""s of computing of one thread within one cycle: turns may be few and each of them long. Of this thread's own
+time, so that a busy machine ends no program."""
 
 
 class Halted(Exception):
@@ -26,17 +31,18 @@ class Task:
 
     def __init__(self, number: int) -> None:
         self.number = number
-        self._left = BUDGET
+        self.renew()
 
     def spend(self) -> None:
         """Count one turn; ``ScriptError`` where a cycle's worth is used up."""
         self._left -= 1
-        if self._left < 0:
+        if self._left < 0 or time.thread_time() > self._until:
             raise ScriptError("a loop that takes no time: 'sync()' is missing")
 
     def renew(self) -> None:
         """A new cycle begins."""
         self._left = BUDGET
+        self._until = time.thread_time() + LONGEST_TURN
 
 
 class CallFrame:

@@ -11,6 +11,8 @@ INT32: Final = 2**31
 """Whole numbers from here on become floating-point ones, as whole numbers are 32 bits wide."""
 
 LONGEST_STRING: Final = 10_000
+LARGEST_LIST: Final = 10_000
+"""Values in a list, those in the lists within it included."""
 
 
 class PoseValue(list[float]):
@@ -18,8 +20,30 @@ class PoseValue(list[float]):
 
 
 def copied(value: Any) -> Any:
-    """Lists are values: a second name for one is a copy."""
-    return type(value)(copied(item) for item in value) if isinstance(value, list) else value
+    """Lists are values: a second name for one is a copy.
+
+    Raises:
+        ScriptError: it holds more than ``LARGEST_LIST`` values.
+    """
+    if not isinstance(value, list):
+        return value
+    _count(value, 0)
+    return _copy(value)
+
+
+def _count(value: list[Any], before: int) -> int:
+    """Values in a list and before it; a list that doubles is given up before it fills the memory."""
+    total = before + len(value)
+    if total > LARGEST_LIST:
+        raise ScriptError(f"a list of more than {LARGEST_LIST} values")
+    for part in value:
+        if isinstance(part, list):
+            total = _count(part, total)
+    return total
+
+
+def _copy(value: Any) -> Any:
+    return type(value)(_copy(part) for part in value) if isinstance(value, list) else value
 
 
 def make_pose(*items: Any) -> PoseValue:

@@ -24,8 +24,10 @@ def package(kind: str, payload: bytes) -> bytes:
     return struct.pack(">HB", 3 + len(payload), ord(kind)) + payload
 
 
-def sample(number: int) -> bytes:
+def sample(number: int, **changed: float) -> bytes:
     values = [100.0 + number, *(float(i) for i in range(24))]
+    for place, value in changed.items():
+        values[int(place.removeprefix("at"))] = value
     return package("U", struct.pack(">B25dIIIiQ", 1, *values, 5, 3, 2, 7, 1 << 17))
 
 
@@ -100,6 +102,33 @@ def test_every_packet_arrives_in_order_however_the_bytes_are_cut(
     assert packets[7, pipe.FIELDS["robot_mode"]][0] == 7
     assert packets[7, pipe.FIELDS["output_bits"]][0] == 1 << 17
     assert np.all(np.diff(packets[:, 0]) >= 0)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize(
+    ("place", "name"),
+    [
+        (0, "timestamp"),
+        (3, "actual_q"),
+        (12, "actual_qd"),
+        (13, "actual_TCP_pose"),
+        (19, "actual_TCP_force"),
+        (24, "actual_TCP_force"),
+    ],
+)
+def test_a_number_that_is_not_finite_is_refused_where_it_enters(
+    serve: Callable[[Conversation], str], place: int, name: str, value: float
+) -> None:
+    def conversation(link: socket.socket) -> None:
+        agree(link)
+        link.sendall(sample(0) + sample(1, **{f"at{place}": value}) + sample(2))
+
+    stream = RtdeStream(serve(conversation), 500.0)
+    packets = stream.packets()
+    assert next(packet for packet in packets if packet is not None)[1] == 100.0
+    with pytest.raises(BenchFault, match=f"sent the {name} "):
+        next(packets)
+    stream.close()
 
 
 def test_a_closed_connection_names_the_cable(serve: Callable[[Conversation], str]) -> None:

@@ -159,6 +159,23 @@ def test_speed_is_of_the_tool_point_and_the_message_says_what_would_do() -> None
         safety.check_path(LIMITS, path, None, "joint motion")
 
 
+@pytest.mark.parametrize(("share", "passes"), [(0.999, True), (1.02, False)])
+def test_the_joints_and_the_tool_are_each_held_to_their_own_speed(share: float, passes: bool) -> None:
+    wrist = READY + np.array([0, 0, 0, 0, 0, 2.5])  # about an axis through the flange: no tool point moves
+    base = READY + np.array([0.5, 0, 0, 0, 0, 0])
+    reach = float(np.hypot(*kinematics.forward(MODEL, READY)[:2, 3]))
+    for target, speed, words in (
+        (wrist, LIMITS.joint_speed, "a joint would turn"),
+        (base, LIMITS.speed / reach, "a tool point would move"),
+    ):
+        path = paths.joint_path(MODEL, FLANGE, READY, target, share * speed, 2.0)
+        if passes:
+            safety.check_path(LIMITS, path, None, "joint motion")
+        else:
+            with pytest.raises(LimitExceeded, match=words):
+                safety.check_path(LIMITS, path, None, "joint motion")
+
+
 def test_a_way_too_short_to_reach_the_speed_is_judged_by_the_speed_it_reaches() -> None:
     beside = READY + np.array([0.01, 0, 0, 0, 0, 0])
     path = paths.joint_path(MODEL, FLANGE, READY, beside, 1.5, 2.0)

@@ -11,11 +11,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from drivers.ur import arm as ur_arm
+from drivers.ur import paths
 from drivers.ur import session as ur_session
 from drivers.ur.arm import UrArm
 from drivers.ur.safety import SafetyLimits
@@ -31,13 +33,13 @@ NUMBERS = itertools.count(1)
 
 
 class FarEnd:
-    """The three ports of a controller, of which only the dashboard answers."""
+    """The four ports of a controller, of which only the dashboard answers."""
 
     def __init__(self) -> None:
         self.address = f"127.{60 + os.getpid() % 60}.{os.getpid() // 60 % 250}.{next(NUMBERS)}"
         self.heard: list[str] = []
         self.dashboard_answers = True
-        self._ports = [socket.create_server((self.address, port)) for port in (30004, 29999, 30003)]
+        self._ports = [socket.create_server((self.address, port)) for port in (30004, 29999, 30003, 30011)]
         threading.Thread(target=self._serve, args=(self._ports[1],), daemon=True).start()
 
     def _serve(self, listener: socket.socket) -> None:
@@ -49,7 +51,10 @@ class FarEnd:
             with contextlib.suppress(OSError), link, link.makefile("rwb") as lines:
                 lines.write(b"Connected: Universal Robots Dashboard Server\n")
                 lines.flush()
-                if command := lines.readline().decode().strip():
+                command = lines.readline().decode().strip()
+                if command == "get serial number":
+                    lines.write(b"00005500001\n")
+                elif command:
                     self.heard.append(command)
                     lines.write(b"Stopped\n")
 
@@ -327,22 +332,28 @@ def test_another_model_than_the_station_says_is_noticed(make_arm: MakeArm) -> No
 
 
 DOWN: FloatArray = np.array([0.0, 0.0, -1.0])
+WRIST: FloatArray = READY + 0.002 * np.eye(6)[5]
+"""rad; so near that no speed is reached, about an axis through the flange: only the request is too fast."""
+REACH: float = float(np.hypot(*kinematics.forward("ur5e", READY)[:2, 3]))
+"""m from the first joint's axis."""
+
 BEYOND: dict[str, Callable[[UrArm], object]] = {
     "five joints": lambda arm: arm.move_joints(READY[:5], 0.2, 1.0),
     "not finite": lambda arm: arm.move_joints(READY * np.nan, 0.2, 1.0),
-    "joint speed": lambda arm: arm.move_joints(NEAR_BY, 2.0, 1.0),
-    "joint acceleration": lambda arm: arm.move_joints(NEAR_BY, 0.2, 9.0),
+    "joint speed": lambda arm: arm.move_joints(WRIST, 1.05 * LIMITS.joint_speed, 1.0),
+    "joint acceleration": lambda arm: arm.move_joints(WRIST, 0.2, 1.05 * LIMITS.joint_acceleration),
+    "joint step": lambda arm: arm.move_joints(READY + 1.05 * LIMITS.joint_step * np.eye(6)[5], 0.1, 1.0),
     "no speed": lambda arm: arm.move_joints(NEAR_BY, 0.0, 1.0),
-    "tool speed": lambda arm: arm.move_joints(READY + 0.4 * np.eye(6)[0], 1.2, 2.0),
+    "tool speed": lambda arm: arm.move_joints(READY + 0.4 * np.eye(6)[0], 1.05 * LIMITS.speed / REACH, 2.0),
     "joint range": lambda arm: arm.move_joints(READY + 7.0 * np.eye(6)[5], 0.1, 1.0),
-    "line speed": lambda arm: arm.move_line(here(arm), 0.3, 1.0),
-    "line acceleration": lambda arm: arm.move_line(here(arm), 0.1, 5.0),
+    "line speed": lambda arm: arm.move_line(here(arm), 1.05 * LIMITS.speed, 1.0),
+    "line acceleration": lambda arm: arm.move_line(here(arm), 0.1, 1.05 * LIMITS.acceleration),
     "below the table": lambda arm: arm.move_line(translation(np.array([0, 0, -0.6])) @ here(arm), 0.1, 1.0),
     "out of reach": lambda arm: arm.move_line(translation(np.array([-0.8, 0, 0])) @ here(arm), 0.1, 1.0),
     "not rigid": lambda arm: arm.move_line(2 * here(arm), 0.1, 1.0),
-    "contact speed": lambda arm: arm.move_until_contact(DOWN, 0.1, 3.0, 0.05),
-    "contact force": lambda arm: arm.move_until_contact(DOWN, 0.01, 15.0, 0.05),
-    "contact travel": lambda arm: arm.move_until_contact(DOWN, 0.01, 3.0, 0.5),
+    "contact speed": lambda arm: arm.move_until_contact(DOWN, 1.05 * LIMITS.speed_near, 3.0, 0.05),
+    "contact force": lambda arm: arm.move_until_contact(DOWN, 0.01, 1.05 * LIMITS.force_press, 0.05),
+    "contact travel": lambda arm: arm.move_until_contact(DOWN, 0.01, 3.0, 1.05 * LIMITS.travel),
     "contact direction": lambda arm: arm.move_until_contact(2 * DOWN, 0.01, 3.0, 0.05),
     "output": lambda arm: arm.set_digital_output(2, True),
 }
@@ -359,6 +370,25 @@ def test_nothing_beyond_the_limits_is_sent(make_arm: MakeArm, tmp_path: Path) ->
         with pytest.raises(LimitExceeded):
             ask(arm)
     assert sent(tmp_path) == []
+
+
+def test_a_stop_while_a_motion_is_planned_is_later_than_the_motion(
+    make_arm: MakeArm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The request carries the count of stops at its beginning; the child begins none of before a stop."""
+    arm = make_arm("good")
+    arm.open()
+    planned = paths.joint_path
+
+    def interrupted(*arguments: Any) -> paths.Path:
+        arm.stop()
+        return planned(*arguments)
+
+    monkeypatch.setattr(paths, "joint_path", interrupted)
+    move(arm)
+    lines = (tmp_path / "requests").read_text().splitlines()
+    epochs = {request["do"]: request["epoch"] for request in map(json.loads, lines)}
+    assert epochs["move"] < epochs["stop"]
 
 
 def test_a_target_where_the_arm_is_sends_nothing(make_arm: MakeArm, tmp_path: Path) -> None:
@@ -383,5 +413,5 @@ def test_a_search_that_begins_in_contact_ends_there(make_arm: MakeArm, tmp_path:
 def test_a_sensor_that_does_not_go_to_zero_is_a_fault(make_arm: MakeArm) -> None:
     arm = make_arm("pulled")
     arm.open()
-    with pytest.raises(BenchFault, match=r"reads 7\.0 N after it was zeroed"):
+    with pytest.raises(BenchFault, match=r"something pulls at the tool.* reads 7\.0 N"):
         arm.zero_force()

@@ -13,13 +13,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.ur import dashboard, pipe
 from drivers.ur import motion as ur_motion
-from drivers.ur import pipe
 from drivers.ur import words as ur_words
 from drivers.ur.child import Child
 from drivers.ur.motion import CAUSE_WITHIN, Motion, Outcome
 from drivers.ur.stream import Guard, Stream
 from harness.basics.arrays import FloatArray
+from harness.basics.clock import now
 from harness.basics.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -338,6 +339,81 @@ def test_beyond_the_hard_limit_the_arm_is_stopped_twice_and_latched() -> None:
     assert "26.0 N" in str(outcome.error)
 
 
+def test_where_the_brake_hangs_the_program_is_ended_through_the_dashboard(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ended = threading.Event()
+
+    def stop(address: str) -> bool:
+        ended.set()
+        return address == ScriptedLink.address
+
+    class Hanging(ScriptedLink):
+        def brake(self) -> None:
+            self.done.append("brake" if ended.wait(5.0) else "brake that hung")
+
+    monkeypatch.setattr(dashboard, "stop", stop)
+    rig = Rig()
+    link: Any = Hanging()
+    rig.link = link
+    rig.begin()
+    rig.feed(force=26.0, speed=0.1)
+    rig.look()
+    assert link.done == ["brake", "halt"]
+
+
+def test_the_watchdog_is_kicked_on_a_fresh_state_only() -> None:
+    kicks: list[float] = []
+
+    class Kicked(ScriptedLink):
+        patience = 0.1
+
+        def kick(self) -> None:
+            kicks.append(now())
+
+    link: Any = Kicked()
+    child = Child(link, -1, os.open(os.devnull, os.O_WRONLY))
+    for age, expected in ((0.2, 0), (0.0, 1)):
+        child._watchdog._kicked = now() - 0.05
+        child._stream._accept(a_packet(now() - age), 0.002)
+        child._kick()
+        assert len(kicks) == expected
+    os.close(child._parent._replies)
+
+
+def test_a_motion_asked_for_before_a_stop_is_not_begun() -> None:
+    class Patient(ScriptedLink):
+        patience = 0.1
+
+    link: Any = Patient()
+    requests, into = os.pipe()
+    out, replies = os.pipe()
+    child = Child(link, requests, replies)
+    child._parent.listen()
+    move = {**_bare(), "do": "move", "joints": [0.0] * 6}
+    for message in ({"do": "stop", "id": 1, "epoch": 1}, {**move, "id": 2, "epoch": 0}):
+        os.write(into, pipe.message_frame(message))
+    for _ in range(2):
+        request = child._parent.next(5.0)
+        assert request is not None
+        child._stream._accept(a_packet(now()), 0.002)
+        child._serve(request)
+    assert link.done == []
+    os.write(into, pipe.message_frame({**move, "id": 3, "epoch": 1}))
+    request = child._parent.next(5.0)
+    assert request is not None
+    child._stream._accept(a_packet(now()), 0.002)
+    child._serve(request)
+    assert link.done == ["joints"], "one asked for after it is"
+    os.close(replies)
+    answers = [
+        pipe.unpack_message(payload) for kind, payload in pipe.read_frames(out) if kind == pipe.MESSAGE
+    ]
+    assert [answer["id"] for answer in answers] == [1, 2]
+    assert "a stop was requested before" in answers[1]["text"]
+    os.close(out)
+
+
 def test_an_arm_that_does_not_come_to_rest_is_stopped_through_the_dashboard(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -467,7 +543,7 @@ def test_joints_are_asked_for_again_only_where_a_late_kick_ended_the_script(case
     else:
         with pytest.raises(RuntimeError, match="did not succeed"):
             child._reachable([0.0] * 6, [0.0] * 6)
-        assert link.done == (["revive"] if case == "late twice" else [])
+        assert link.done == {"late twice": ["revive"], "not late": ["halt"], "not at rest": []}[case]
     os.close(out)
     os.close(replies)
 

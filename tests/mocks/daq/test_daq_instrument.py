@@ -21,6 +21,9 @@ def box(model: str = "DI-2108", echoes_start: bool = False) -> CommandInterprete
         (b"srate 600\r", b"srate 600\r\0"),
         (b"ps 5\r", b"ps 5\r\0"),
         (b"led 2\r", b"led 2\r\0"),
+        (b"encode 1\r", b"encode 1\r\0"),
+        (b"dec 500\r", b"dec 500\r\0"),
+        (b"deca 3\r", b"deca 3\r\0"),
         (b"stop\r", b"stop\r\0"),
     ],
 )
@@ -38,11 +41,26 @@ def test_a_command_is_answered_by_itself_and_its_value(command: bytes, answer: b
         b"ps 8\r",
         b"slist 2 0\r",
         b"slist 0 11\r",
+        b"encode 2\r",
+        b"dec 0\r",
+        b"dec 513\r",
+        b"deca 4\r",
         b"x\r",
     ],
 )
 def test_what_the_box_does_not_know_is_not_answered(command: bytes) -> None:
     assert box().take(command) == b""
+
+
+@pytest.mark.parametrize("command", [b"dec 1\r", b"deca 1\r"])
+def test_the_small_model_does_not_decimate(command: bytes) -> None:
+    assert box("DI-1110").take(command) == b""
+
+
+def test_what_a_program_sets_stays_when_the_scan_ends() -> None:
+    instrument = box()
+    instrument.take(b"encode 1\rdec 100\rstart 0\rstop\r")
+    assert (instrument.as_text, instrument.decimation) == (True, 100)
 
 
 def test_a_command_may_come_in_pieces() -> None:

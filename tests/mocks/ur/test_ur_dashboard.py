@@ -15,7 +15,7 @@ CONFIG = ControllerConfig(host="127.0.0.2")
         ("robotmode", "Robotmode: RUNNING"),
         ("SAFETYSTATUS", "Safetystatus: NORMAL"),
         ("PolyscopeVersion", "URSoftware 5.12.4.1101661 (Mar 22 2022)"),
-        ("get serial number", "20225500001"),
+        ("get serial number", "00005500001"),
         ("get robot model", "UR5"),
         ("programState", "STOPPED unnamed"),
         ("stop", "Stopped"),

@@ -1,12 +1,13 @@
 """URScript: its grammar, its values, its threads."""
 
+import time
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from mocks.ur.urscript.errors import ScriptError
-from mocks.ur.urscript.process import Process
+from mocks.ur.urscript.process import LONGEST_TURN, Process
 from mocks.ur.urscript.program import translate
 from mocks.ur.urscript.tokens import whole_length
 from mocks.ur.urscript.values import PoseValue
@@ -211,6 +212,34 @@ def test_halt_ends_it_at_once() -> None:
 def test_bad_programs_say_what_and_where(text: str, complaint: str) -> None:
     with pytest.raises(ScriptError, match=complaint):
         Bench(text).run()
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "x = [1, 2] while True: x = [x, x] sync() end",
+        "x = [0] while True: x[0] = [x, x] sync() end",
+        "def twice(y): return [y, y] end x = [1] while True: x = twice(x) sync() end",
+        "x = [1, 2] while True: x = [[x, x], [x, x], [x, x], [x, x], [x, x]] end",
+    ],
+)
+def test_lists_do_not_grow_without_end(body: str) -> None:
+    with pytest.raises(ScriptError, match=r"a list of more than 10000 values"):
+        Bench(f"def f():\n {body}\nend").run()
+
+
+def test_a_list_may_hold_thousands() -> None:
+    thousand = "[" + ", ".join(["7"] * 1000) + "]"
+    assert values_of(f"x = [{', '.join([thousand] * 9)}] y = x say(y[8, 999])") == [7]
+
+
+def test_few_turns_that_take_long_end_the_program_within_its_cycle() -> None:
+    thousand = "[" + ", ".join(["7"] * 1000) + "]"
+    bench = Bench(f"def f():\n x = [{', '.join([thousand] * 9)}]\n while True: y = x end\nend")
+    began = time.thread_time()
+    with pytest.raises(ScriptError, match="takes no time"):
+        bench.run()
+    assert time.thread_time() - began < 20 * LONGEST_TURN, "20,000 turns take some twenty seconds"
 
 
 def test_whole_numbers_do_not_grow_without_end() -> None:
