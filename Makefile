@@ -8,7 +8,10 @@ DEV := $(VENV)/.installed-dev
 # A microphone on a sound card, and a sound card to test it with; all else works without.
 SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 
-.PHONY: help install demo demo-shape test slow hunt lint types contracts reference bench tables sound clean
+# Objects of ours and what each is made of.
+OBJECTS := mug:ceramic bowl:ceramic plate:ceramic pitcher:ceramic tray:wood wrench:steel
+
+.PHONY: help install demo demo-shape objectfiles test slow hunt lint types contracts reference bench tables sound clean
 
 help: ## what can be asked for
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -42,6 +45,14 @@ demo: $(RUN) ## localize a contact on the mocked bench, and write the report
 
 demo-shape: $(RUN) ## a picture, four presses where they say most, and the shape of an object never drawn
 	@$(BIN)/touchstone demo shape-reconstruction
+
+objectfiles: $(RUN) ## objects/ anew: networks of the sound, touch and look of our six objects (half an hour)
+	@rm -rf build/objects && mkdir -p build/objects
+	@for each in $(OBJECTS); do for part in audio touch vision; do \
+	  $(BIN)/touchstone object build builtin:$${each%:*} --material $${each#*:} --only $$part \
+	    --profile shipped --threads 1 --licence Apache-2.0 --out build/objects/$${each%:*} || exit; \
+	done; done
+	@rm -rf objects && mv build/objects objects
 
 test: $(DEV) sound lint types contracts ## everything CI checks
 	@$(BIN)/python -m pytest -m "not benchmark and not slow" -n auto --dist loadscope

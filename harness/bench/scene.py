@@ -27,6 +27,7 @@ from harness.bench.experiments import loaded, section_models
 from harness.bench.scene_objectfile import (
     OBJECTFILE,
     holds_objectfile,
+    objectfile_folder,
     require_objectfile,
     with_objectfile,
 )
@@ -78,8 +79,9 @@ class SceneObject(StrictModel):
         sizes: m, from and to: the longest side that a hidden size may have; None for half to twice the
             drawing's, within 5 to 45 cm, what this bench's arm can reach around.
         wall: m, of an object whose mesh is only its outside; None for what the mesh says.
-        objectfile: folder of its ObjectFile, found as ``mesh`` is; None where it has none. Without ``mesh``
-            it is the object: its surface, its material and its networks.
+        objectfile: folder of its ObjectFile, found as ``mesh`` is, or the name of one that comes with the
+            program; None where it has none. Without ``mesh`` it is the object: its surface, its material and
+            its networks.
         pose: nominal.
     """
 
@@ -318,17 +320,18 @@ def scene_from_options(
     """The scene that ``run --object FILE --material M --units mm --wall 2mm`` means.
 
     Args:
-        mesh: file, relative to the working directory, ``"builtin:mug"``, or the folder of an ObjectFile.
+        mesh: file, relative to the working directory, ``"builtin:mug"``, or an ObjectFile: its folder, or the
+            name of one that comes with the program.
         material: None only for a built-in object and for an ObjectFile.
         units: of the file's numbers.
         wall: a length with its unit.
-        objectfile: folder, relative to the working directory.
+        objectfile: folder, relative to the working directory, or such a name.
 
     Raises:
         WrongUse: an option that cannot be, or no such file.
     """
     given = {"mesh": mesh, "material": material, "units": units, "wall": wall, "objectfile": objectfile}
-    if holds_objectfile(Path(mesh)):
+    if holds_objectfile(objectfile_folder(mesh, Path.cwd())):
         _require_one(mesh, objectfile)
         given |= {"mesh": None, "objectfile": mesh}
     elif material is None and not mesh.startswith(BUILTIN):
@@ -379,7 +382,7 @@ def _with_files_found(scene: SceneFile, folder: Path, where: str) -> SceneFile:
             raise WrongUse(f"{where}: 'object.mesh': there is no file {path}; {own}")
         found["mesh"] = str(path)
     if named.objectfile is not None:
-        path = (folder / named.objectfile).resolve()
+        path = objectfile_folder(named.objectfile, folder)
         require_objectfile(path, where)
         found["objectfile"] = str(path)
     return scene.model_copy(update={"object": named.model_copy(update=found)}) if found else scene

@@ -1,4 +1,8 @@
-"""An ObjectFile as the object of a scene: its folder stands for mesh, name and material."""
+"""An ObjectFile as the object of a scene: its folder stands for mesh, name and material.
+
+Those that come with the program lie in ``objects/`` of the checkout, beside scenes and stations, and are
+found by their names alone, as stations are.
+"""
 
 import json
 from collections.abc import Mapping
@@ -13,18 +17,40 @@ OBJECTFILE = "objectfile:"
 
 _OF_A_MESH = ("material", "units", "wall")
 
+_SHIPPED = Path(__file__).parents[2] / "objects"
+
 
 def holds_objectfile(folder: Path) -> bool:
     """Whether a path is the folder of an ObjectFile."""
     return (folder / DESCRIPTION).is_file()
 
 
+def shipped_objectfiles() -> dict[str, Path]:
+    """Folders of the ObjectFiles in ``objects/``, here or in the checkout, by their names."""
+    found = (path for folder in (_SHIPPED, Path.cwd() / "objects") for path in sorted(folder.glob("*")))
+    return {path.name: path.resolve() for path in found if holds_objectfile(path)}
+
+
+def objectfile_folder(named: str, beside: Path) -> Path:
+    """The folder that a text means: a path, or the name of an ObjectFile in ``objects/``.
+
+    Args:
+        named: what is at that path comes before what has that name.
+        beside: the folder that a path is relative to.
+    """
+    path = (beside / named).resolve()
+    return path if path.exists() else shipped_objectfiles().get(named, path)
+
+
 def require_objectfile(folder: Path, where: str) -> None:
     """Refuse a folder that is none; ``WrongUse`` says where it was named."""
     if not holds_objectfile(folder):
         make = "make one with `touchstone object build`, or leave the key out"
+        own = (
+            f"those that come with the program have the names {', '.join(shipped_objectfiles()) or '(none)'}"
+        )
         kind = f"ObjectFile {folder}, a folder with {DESCRIPTION} in it"
-        raise WrongUse(f"{where}: 'object.objectfile': there is no {kind}; {make}")
+        raise WrongUse(f"{where}: 'object.objectfile': there is no {kind}; {own}; {make}")
 
 
 def with_objectfile(tree: Any, folder: Path, where: str) -> Any:
@@ -47,7 +73,7 @@ def with_objectfile(tree: Any, folder: Path, where: str) -> Any:
             raise WrongUse(
                 f"{where}: 'object.{key}' is of a mesh, and an ObjectFile says its own; leave it out"
             )
-    path = (folder / named["objectfile"]).resolve()
+    path = objectfile_folder(named["objectfile"], folder)
     require_objectfile(path, where)
     name, material = _described(path / DESCRIPTION)
     return {**tree, "object": {**named, "mesh": OBJECTFILE + name, "material": material}}

@@ -30,7 +30,7 @@ def explain(
     Try: touchstone explain scenes/mug_touch.toml
     """
     from harness.bench.scene import load_scene, scene_from_options
-    from harness.bench.scene_objectfile import holds_objectfile
+    from harness.bench.scene_objectfile import holds_objectfile, objectfile_folder
     from harness.bench.station_file import load_station, station_path
     from harness.effects.catalogue import EFFECTS
     from harness.effects.explain import as_json, as_table, scene_plan
@@ -38,7 +38,8 @@ def explain(
     from harness.effects.file_levels import scene_levels
     from harness.effects.plan import default_accuracy
 
-    wanted = scene_from_options(str(scene)) if holds_objectfile(scene) else load_scene(scene)
+    is_object = holds_objectfile(objectfile_folder(str(scene), Path.cwd()))
+    wanted = scene_from_options(str(scene)) if is_object else load_scene(scene)
     sensor = load_station(station_path(station)).gel.sensor
     accuracy = default_accuracy(EFFECTS).with_(scene_levels(wanted)).with_texts(level or [])
     plan = scene_plan(wanted, sensor, accuracy)

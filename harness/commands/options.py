@@ -25,7 +25,10 @@ SceneOption = Annotated[
 Object = Annotated[
     str | None,
     typer.Option(
-        "--object", help="A mesh file, or builtin:mug and so on: a scene without a file.", metavar="FILE"
+        "--object",
+        help="A mesh file, builtin:mug and so on, or an ObjectFile: its folder, or the name of one that "
+        "comes with the program, as mug.",
+        metavar="FILE",
     ),
 ]
 Material = Annotated[

@@ -20,12 +20,15 @@ from harness.effects.file_levels import NETWORK, scene_levels
 from harness.effects.plan import Plan, default_accuracy
 from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment.experiment import Experiment, Scored
+from harness.experiment.scene_picture import camera_gives, camera_sources, require_white_lamps
+from harness.objectfile.vision.settings import Rendered
 from harness.recording.run_folder import RunFiles
+from harness.sim.light.direct_image import DirectImage
 from harness.sim.optics.lit_calibration import shadow_of
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 CARRIED = ("object.mesh", "object.wall", "object.material", "sensor", "sensor.calibration", "seed")
-"""Sources that every run's folder carries."""
+"""Sources that every run's folder carries; a camera's are ``scene_picture.camera_gives``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +46,16 @@ class Comparison:
     notes: tuple[str, ...] = ()
 
     def observed(self) -> dict[str, dict[str, Any]]:
-        """Every wanted quantity as JSON values: shape and range of an array, its parts of a mapping."""
+        """Every wanted quantity in JSON: shape and range of an array, parts of a mapping or a picture."""
         return {name: _described(self.evaluation[name]) for name in self.plan.wanted}
 
     def arrays(self) -> dict[str, AnyArray]:
-        """Every wanted quantity that is an array, or a mapping of them, by name."""
+        """Every wanted quantity that is an array, a mapping of them or a picture, by name."""
         found: dict[str, AnyArray] = {}
         for name in self.plan.wanted:
             value = self.evaluation[name]
-            parts = value.items() if isinstance(value, Mapping) else [("", value)]
-            for part, array in parts:
+            parts = _parts(value)
+            for part, array in [("", value)] if parts is None else parts.items():
                 if isinstance(array, np.ndarray):
                     found[f"{name}.{part}" if part else name] = array
         return found
@@ -65,15 +68,18 @@ def require_sources(
 
     Raises:
         WrongUse: naming what is missing and which observed quantity needs it; or ``observe`` names something
-            that nothing computes, that the scene rules out or that is not built.
+            that nothing computes, that the scene rules out or that is not built; or a picture under
+            coloured lamps.
     """
     levels = default_accuracy(EFFECTS).with_(scene_levels(scene))
     plan = scene_plan(scene, station.gel.sensor, levels)
-    given = {*CARRIED, *experiment.gives}
+    given = {*CARRIED, *experiment.gives, *camera_gives(scene, station)}
     if shadow_of(calibration) is not None:
         given.add("sensor.shadow_table")
     if scene.object.objectfile is not None:
         given.add("object.file")
+    if "camera.lights" in plan.sources:
+        require_white_lamps(scene)
     missing = [name for name in plan.sources if name not in given]
     if missing:
         raise WrongUse(
@@ -127,12 +133,20 @@ def _carried(run: RunFiles, plan: Plan) -> dict[str, Any]:
         sources["sensor.shadow_table"] = shadow
     if "object.file" in plan.sources:
         sources["object.file"] = run.objectfile
-    return sources
+    return sources | camera_sources(run.scene, run.station, run.mesh, plan.sources)
+
+
+def _parts(value: Any) -> Mapping[str, Any] | None:
+    """Of a mapping, and of a picture: linear light and coverage; None of what is one thing."""
+    if isinstance(value, DirectImage | Rendered):
+        return {"colour": value.image.colour, "coverage": value.image.alpha}
+    return value if isinstance(value, Mapping) else None
 
 
 def _described(value: Any) -> dict[str, Any]:
-    if isinstance(value, Mapping):
-        return {"parts": {str(name): _described(part) for name, part in value.items()}}
+    parts = _parts(value)
+    if parts is not None:
+        return {"parts": {str(name): _described(part) for name, part in parts.items()}}
     if not isinstance(value, np.ndarray):
         return {"kind": type(value).__name__}
     said: dict[str, Any] = {"shape": list(value.shape), "dtype": str(value.dtype)}

@@ -1,10 +1,12 @@
 """Whether a network answers as it did when it was made: another's does not, whatever its hash."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused
-from harness.objectfile.entries import NetworkEntry, Sampled, SelfTest, Tensor, Whole
+from harness.objectfile.entries import Input, NetworkEntry, Sampled, SelfTest, Tensor, Whole
 from harness.objectfile.runtime import Network
 
 
@@ -31,12 +33,30 @@ def require_self_test(network: Network, test: SelfTest) -> float:
     Raises:
         DataRefused: it is more than the tolerance, or the test is none.
     """
-    asked = zip(network.inputs, test.inputs, strict=True)
-    outputs = network({item.name: queries_of(item, kept, test.rows) for item, kept in asked})
+    return require_answers(network.name, network(all_queries(network.inputs, test)), test)
+
+
+def all_queries(inputs: Sequence[Input], test: SelfTest) -> dict[str, AnyArray]:
+    """The queries of a self-test, by the names of a network's inputs; errors as of ``queries_of``."""
+    named = zip(inputs, test.inputs, strict=True)
+    return {item.name: queries_of(item, values, test.rows) for item, values in named}
+
+
+def require_answers(name: str, outputs: Mapping[str, AnyArray], test: SelfTest) -> float:
+    """The greatest difference of a network's outputs from those of its self-test, as ``require_self_test``.
+
+    Args:
+        name: of the network's file, for messages.
+        outputs: of its queries, all of them or some.
+        test: with what they were when the network was made.
+
+    Raises:
+        DataRefused: it is more than the tolerance, or the test is none.
+    """
     worst = max(_gap(outputs[kept.name].ravel(), kept) for kept in test.outputs if kept.name in outputs)
     if not worst <= test.tolerance:
         raise DataRefused(
-            f"{network.name} differs from what it gave when it was made by {worst:.2g} of the greatest "
+            f"{name} differs from what it gave when it was made by {worst:.2g} of the greatest "
             f"number, where {test.tolerance:g} is allowed: another onnxruntime that computes otherwise, or "
             "another object's network; build the object again"
         )

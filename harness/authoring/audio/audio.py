@@ -105,12 +105,13 @@ def _made(
     nodes = SoundSamples(modes.points[split.trained], modes.shapes[split.trained])
     number = wave_number(modes)
     fitted = fit_enough_waves(nodes, np.arange(len(nodes.points)), number, spec, seed)
-    return waves_graph(fitted.network), {
+    return waves_graph(fitted.network, spec.storage), {
         "network": "waves",
         "width": len(fitted.network.phases),
         "wave_number_rad_per_m": number,
         "reach": fitted.reach,
         "ridge": fitted.readout.ridge,
+        "storage": spec.storage,
         "expected_relative_error": fitted.readout.expected,
     }
 

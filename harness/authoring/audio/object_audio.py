@@ -111,6 +111,7 @@ def build_audio(
         near_surface=_NEAR * mesh.diagonal,
         provenance=provenance_of(wanted, "audio", audio.settings, (source,)),
         graph=audio.graph,
+        table=chosen.table,
         measured={"network": audio.errors["network"], "table": audio.errors["table_float16"]},
     )
     with timed(seconds, "export"):

@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 from harness.basics.errors import WrongUse
 from harness.basics.toml_file import nearest
+from harness.objectfile.graph import Storage
 
 REACHES = (0.7, 1.0, 1.4)
 """Standard deviations of the waves' vectors along an axis that are tried, of the object's wave number."""
@@ -19,11 +20,13 @@ class WavesSpec:
         width: waves.
         reaches: that are tried.
         widest: waves at most, where those of ``width`` are too few; they are doubled up to there.
+        storage: of the linear layer in the file.
     """
 
     width: int
     reaches: tuple[float, ...] = REACHES
     widest: int = 0
+    storage: Storage = "float32"
 
 
 @dataclass(frozen=True)
@@ -58,21 +61,25 @@ class AudioProfile:
     Attributes:
         network: that is made.
         sounds: held-out nodes whose sounds are compared.
+        table: whether the exact shapes are written beside the network.
     """
 
     network: WavesSpec | PerceptronSpec
     sounds: int
+    table: bool = True
 
 
 _SMALL = PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epochs=300)
 
 PROFILES: Mapping[str, AudioProfile] = MappingProxyType({
     "smoke": AudioProfile(WavesSpec(768, (1.0,)), sounds=8),
+    "shipped": AudioProfile(WavesSpec(1536, widest=3072, storage="float16"), sounds=40, table=False),
     "standard": AudioProfile(WavesSpec(1536, widest=3072), sounds=40),
     "small": AudioProfile(_SMALL, sounds=40),
     "paper": AudioProfile(PerceptronSpec(epochs=120), sounds=40),
 })  # fmt: skip
-"""``smoke`` and ``standard`` need no torch; ``paper`` is the network of ObjectFolder 2.0, ``small`` one
+"""``smoke``, ``shipped`` and ``standard`` need no torch; ``shipped`` is ``standard`` in the fewest bytes, of
+the files that come with the program; ``paper`` is the network of ObjectFolder 2.0, ``small`` one
 trunk for all three directions."""
 
 

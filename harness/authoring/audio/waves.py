@@ -17,6 +17,7 @@ from harness.authoring.audio.data import SoundSamples
 from harness.authoring.audio.profiles import WavesSpec
 from harness.authoring.audio.readout import Readout, error_shares, solve_readout
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
+from harness.objectfile.graph import Storage
 
 ENOUGH = 0.01
 """Mean relative error that is foretold at which waves are no longer doubled: a third of the most that a
@@ -78,6 +79,7 @@ def fit_waves(
     width: int,
     seed: int,
     reaches: tuple[float, ...],
+    storage: Storage = "float32",
 ) -> FittedWaves:
     """The network of the reach that predicts best what it was not shown.
 
@@ -88,6 +90,7 @@ def fit_waves(
         width: waves.
         seed: of their vectors and phases.
         reaches: that are tried, such as ``audio_profiles.REACHES``.
+        storage: of the linear layer in the file.
     """
     targets = samples.shapes.reshape(len(samples.points), -1)
     low, high = samples.points.min(axis=0), samples.points.max(axis=0)
@@ -96,7 +99,8 @@ def fit_waves(
     for reach in reaches:
         vectors, phases = _waves(width, reach * number / factor, seed)
         empty = Waves(shift, factor, vectors, phases, np.zeros((width + 4, 0)))
-        readout = solve_readout(empty.features, samples.points, targets, measured, error_shares(targets))
+        shares = error_shares(targets)
+        readout = solve_readout(empty.features, samples.points, targets, measured, shares, storage)
         network = Waves(shift, factor, vectors, phases, readout.weights)
         found.append(FittedWaves(network, reach, readout))
     return min(found, key=lambda one: one.readout.expected)
@@ -114,14 +118,14 @@ def fit_enough_waves(
         samples: to learn.
         measured: samples by which is chosen.
         number: rad/m, the object's wave number.
-        spec: how many waves, and what reaches are tried of the fewest.
+        spec: how many waves, how they are stored, and what reaches are tried of the fewest.
         seed: of vectors and phases.
     """
     width = spec.width
-    best = fit_waves(samples, measured, number, width, seed, spec.reaches)
+    best = fit_waves(samples, measured, number, width, seed, spec.reaches, spec.storage)
     while best.readout.expected > ENOUGH and (width := 2 * width) <= spec.widest:
         reaches = (best.reach, 2.0**0.5 * best.reach)
-        wider = fit_waves(samples, measured, number, width, seed, reaches)
+        wider = fit_waves(samples, measured, number, width, seed, reaches, spec.storage)
         best = min(best, wider, key=lambda one: one.readout.expected)
     return best
 

@@ -68,7 +68,7 @@ def build_vision(
     report("reading the mesh and its colours", 0.0)
     source = source_of(wanted.mesh, wanted.licence)
     taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
-    look = appearance_of(wanted.mesh, taken.units)
+    look = appearance_of(wanted.mesh, taken.units, edge=chosen.edge)
     created = created_object(wanted.mesh, wanted.licence, wanted.material, taken.mesh, out, source)
     read = time.perf_counter() - begun
     vision = author_vision(look, chosen, wanted.seed, out, report, threads)

@@ -62,6 +62,8 @@ class VisionProfile:
         side: pixels of those pictures.
         samples: a side of a pixel of the reference.
         finish: what they learn from pictures then; None for nothing.
+        edge: m between vertices of a built-in object, of which pictures are drawn. At that of touch and
+            sound, 3 mm, the object's mesh serves and no finer one is written beside it.
     """
 
     networks: CellsSpec
@@ -70,6 +72,7 @@ class VisionProfile:
     side: int = 256
     samples: int = 4
     finish: CellsFinish | None = None
+    edge: float = 1.5e-3
 
     def __post_init__(self) -> None:
         if self.strict is not None and self.strict.size.kind != "osf":
@@ -91,6 +94,11 @@ _COMPACT = NetworkSize(width=32, octaves=6, turns=3, kind="osf-v")
 
 VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
     "smoke": VisionProfile(CellsSpec(_COMPACT, places=1_500_000), pictures=4),
+    "shipped": VisionProfile(
+        CellsSpec(_COMPACT, cells=12, places=1_500_000, steps=6000),
+        pictures=4,
+        edge=3e-3,
+    ),
     "standard": VisionProfile(
         CellsSpec(_COMPACT, places=4_000_000, steps=20_000, batch=128),
         pictures=12,
@@ -102,8 +110,9 @@ VISION_PROFILES: Mapping[str, VisionProfile] = MappingProxyType({
         strict=CellsSpec(PAPER, places=8_000_000),
     ).finished(),
 })  # fmt: skip
-"""``paper`` has networks of ObjectFolder 2.0's size, finished on pictures as those are; its strict ones are
-those, told no more. None of them needs torch."""
+"""None of them needs torch. ``shipped`` takes the fewest bytes, of the files that come with the program.
+``paper`` has networks of ObjectFolder 2.0's size, finished on pictures as those are; its strict ones are
+those, told no more."""
 
 
 def vision_profile(name: str) -> VisionProfile:

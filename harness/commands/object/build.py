@@ -29,7 +29,10 @@ def build(
     only: Annotated[str, typer.Option(help="Which modality: audio, touch or vision.")] = "audio",
     profile: Annotated[
         str,
-        typer.Option(help="smoke or standard (no torch), small (of audio), or paper: networks of its size."),
+        typer.Option(
+            help="smoke, shipped (of the fewest bytes) or standard (no torch), small (of audio), or paper: "
+            "networks of its size."
+        ),
     ] = "standard",
     units: Annotated[
         str | None, typer.Option(help="Of the file's numbers: m, cm, mm or in.", metavar="U")
@@ -82,7 +85,7 @@ def build(
     whose cameras and lights were kept back. A stopped training goes on when it is called again. --finish
     is for what no place of the surface tells by itself, as shadows to networks that are told no visibility.
 
-    Try: touchstone object build builtin:bowl --material ceramic --profile smoke --out objects/bowl
+    Try: touchstone object build builtin:bowl --material ceramic --profile smoke --out my/bowl
     """
     from harness.authoring.object_source import PartRequest
     from harness.basics.errors import WrongUse

@@ -131,13 +131,13 @@ def _scene(what: str, units: str | None, gel: "Gel", objectfile: Path | None = N
     """A table with nothing on it but what is touched; touch does not depend on its material."""
     from harness.basics.toml_file import validate
     from harness.bench.scene import BUILTIN, SceneFile, scene_from_options
-    from harness.bench.scene_objectfile import holds_objectfile
+    from harness.bench.scene_objectfile import holds_objectfile, objectfile_folder
 
     if what.endswith(".npy"):
         tree = {"schema": 1, "object": {"mesh": what, "material": "steel"}}
         scene = validate(tree, SceneFile, "the options")
     else:
-        says_its_own = what.startswith(BUILTIN) or holds_objectfile(Path(what))
+        says_its_own = what.startswith(BUILTIN) or holds_objectfile(objectfile_folder(what, Path.cwd()))
         material = None if says_its_own else "steel"
         named = None if objectfile is None else str(objectfile)
         scene = scene_from_options(what, material, units, objectfile=named)

@@ -22,7 +22,7 @@ def demo(
         str, typer.Argument(help=f"What to run: {', '.join(RUNNABLE)}.", metavar="NAME")
     ] = DEFAULT,
     object_: Annotated[
-        str, typer.Option("--object", help="A built-in object: mug, bowl, plate, pitcher, tray, wrench.")
+        str, typer.Option("--object", help="An object of ours: mug, bowl, plate, pitcher, tray, wrench.")
     ] = "mug",
     objectfile: options.ObjectFileOption = None,
     level: options.LevelOption = None,
@@ -35,8 +35,9 @@ def demo(
     A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object a few times; where sound
     is asked for it strikes it with a mocked hammer (over a serial line), and where a picture is, a mocked
     camera looks first. The drivers are those of a real bench. The estimates are made from the recording
-    alone. The object's modes are computed the first time and kept; with --objectfile and
-    --level sound.shapes=network they come from its ObjectFile, and nothing is solved.
+    alone. What they are compared with comes from the ObjectFile of the object that lies in objects/: its
+    networks stand for finite elements and rasteriser. Where there is none, or with --objectfile, or for an
+    unknown shape, the object is a mesh.
 
     Try: touchstone demo shape-reconstruction
     """
@@ -44,9 +45,10 @@ def demo(
         "mock bench: a UR5e's controller, a GelSight's stream and what else the run reads, each at the far "
         "end of its cable, with a reality gap of their own"
     )
+    folder = None if objectfile is not None else _objectfile(experiment, object_)
     return run(
         experiment,
-        object_=f"builtin:{object_}",
+        object_=f"builtin:{object_}" if folder is None else str(folder),
         objectfile=objectfile,
         level=level,
         seed=seed,
@@ -54,3 +56,18 @@ def demo(
         json=json,
         **_OPTIONS.get(experiment, {}),
     )
+
+
+def _objectfile(experiment: str, name: str) -> Path | None:
+    """The folder of the object's own ObjectFile, and a line that says so; None where the run takes a mesh."""
+    from harness.bench.scene_objectfile import shipped_objectfiles
+
+    folder = shipped_objectfiles().get(name)
+    if folder is None or experiment == "shape-reconstruction":
+        return None
+    CONSOLE.print(
+        f"the object is the ObjectFile {folder}: its networks stand for finite elements and rasteriser. "
+        f"`touchstone explain {name}` says how far off they are",
+        markup=False,
+    )
+    return folder

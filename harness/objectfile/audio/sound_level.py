@@ -18,7 +18,9 @@ from harness.objectfile.entries import AudioEntry
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import require_same
 from harness.objectfile.surface_file import mesh_from_ply
+from harness.sim.modal.modal import default_edge
 from harness.sim.modal.modes import Modes, dampings
+from harness.sim.solid.finer_surface import with_edges_below
 
 _SAME = 5e-5
 """Relative distance of frequencies that are not parted: as the solver has it of their squares, 1e-4."""
@@ -63,15 +65,14 @@ def modes_from(
 
 
 def _nodes(of: ObjectFile, entry: AudioEntry) -> Mesh:
-    """Where the network is asked: at the table's nodes, which are those of the elements.
+    """Where the network is evaluated: at the table's nodes, which are those of the elements.
 
-    A mesh may have faces as long as the object, over which no shape is linear.
+    Without a table, at the vertices of the object's mesh. It may have faces as long as the object, over which
+    no shape is linear; they are divided as finely as elements would be.
     """
     if entry.table is None:
-        raise DataRefused(
-            f"{of.folder} has no table, and so no surface fine enough to ask its network at; build it again "
-            "with `touchstone object build`, or take sound.shapes = elements"
-        )
+        highest = entry.frequencies_hz[-1]
+        return with_edges_below(of.mesh, default_edge(of.mesh, of.material, highest))
     return mesh_from_ply(of.read(entry.table.surface), entry.table.surface.file)
 
 

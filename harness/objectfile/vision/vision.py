@@ -1,17 +1,20 @@
 """The look of an ObjectFile: pictures of the object, at the levels that its networks can be asked."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.basics.toml_file import nearest
+from harness.objectfile.entries import NetworkEntry
 from harness.objectfile.file import ObjectFile
+from harness.objectfile.self_test import all_queries, require_answers
 from harness.objectfile.surface_file import mesh_from_ply
 from harness.objectfile.vision.network.graph import graph_block
 from harness.objectfile.vision.network.network import VisionModel
+from harness.objectfile.vision.network.plain import Query, evaluate
 from harness.objectfile.vision.render import VisionRenderer
 from harness.objectfile.vision.settings import LEVELS, Rendered, RenderSettings, VisionLevel
 from harness.objectfile.vision.view import require_outside, require_size
@@ -97,6 +100,7 @@ def open_vision(of: ObjectFile, threads: int | None = None) -> ObjectVision:
     shell = entry.shell
     renderer = VisionRenderer(data, surface, threads, shell.voxels_per_cell, shell.deep_voxels, name)
     require_described(renderer.model, graph_block(data, name), entry)
+    require_own_answers(renderer.model, entry.network)
     return ObjectVision(entry, surface, renderer)
 
 
@@ -132,3 +136,28 @@ def require_described(model: VisionModel, block: int, entry: VisionEntry) -> Non
                 f"{name}: its {what}: {held}, where object.json says {said}; they were not built together, "
                 "build again"
             )
+
+
+def require_own_answers(model: VisionModel, entry: NetworkEntry) -> float:
+    """The greatest difference from what the networks gave when they were made, of the greatest number.
+
+    They are evaluated in float64 by their weights, as pictures take them; nothing that runs graphs is loaded.
+
+    Raises:
+        DataRefused: it is more than the self-test's tolerance: another object's networks.
+    """
+    queries = all_queries(entry.inputs, entry.self_test)
+    blocks = ({name: array[row] for name, array in queries.items()} for row in range(entry.self_test.rows))
+    rows = [_evaluated(model, block) for block in blocks]
+    density, scattered = (np.stack(each) for each in zip(*rows, strict=True))
+    outputs = {"density": density[:, :, None], "scattered": scattered}
+    return require_answers(entry.file, outputs, entry.self_test)
+
+
+def _evaluated(model: VisionModel, block: Mapping[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
+    """Density and scattered light of the samples of one block."""
+    count = len(block["points"])
+    networks = np.full(count, block["network"][0])
+    extras = block.get("extras", np.zeros((count, 0)))
+    light: FloatArray = block["light"].astype(np.float64)
+    return evaluate(model, Query(networks, block["points"], block["views"], light, extras))

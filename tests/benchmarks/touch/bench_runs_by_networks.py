@@ -1,15 +1,19 @@
 """What an ObjectFile's networks cost and lose in contact localization, beside the simulation.
 
-``python tests/benchmarks/touch/bench_runs_by_networks.py FOLDER [--seeds 12] [--first-seed 0]`` performs
-runs with close and with spread contacts on the mocked bench in process, yaw known, gap on, and answers each
-by touch, by sound and by both: with the simulation, with both networks, and with the touch network alone.
-Errors in mm, a refused answer counted as a random one; seconds of CPU from readings to answer, the least of
-three.
+``python tests/benchmarks/touch/bench_runs_by_networks.py OBJECT ... [--seeds 12] [--first-seed 0]
+[--rows FILE]`` performs runs with close and with spread contacts on the mocked bench in process, yaw known,
+gap on, and answers each by touch, by sound and by both: with the simulation and with the networks. OBJECT is
+the folder of an ObjectFile, or the name of one that comes with the program. Errors in mm, a refused answer
+counted as a random one; seconds of CPU from readings to answer, the least of three. With ``--rows`` every
+answer is appended to a file of JSON lines, and a run that lies in it is not performed again: a table that was
+stopped goes on, and ``--seeds 0`` prints what there is.
 """
 
 import argparse
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
@@ -26,10 +30,10 @@ from harness.effects.sound_effects import SHAPES as SOUND
 from harness.effects.touch_file_effects import SHAPES as TOUCH
 
 LEVELS: Mapping[str, Setting] = {
-    "reference": {TOUCH.name: "reference", SOUND.name: "elements"},
+    "simulation": {TOUCH.name: "reference", SOUND.name: "elements"},
     "networks": {TOUCH.name: "network", SOUND.name: "network"},
-    "touch network": {TOUCH.name: "network", SOUND.name: "elements"},
 }
+SPACINGS = ("close", "spread")
 _REPEATS = 3
 
 
@@ -38,6 +42,8 @@ class AnsweredRun:
     """One run, answered at one choice of levels by one sense.
 
     Attributes:
+        object: its name.
+        seed: of the run.
         spacing: of its contacts.
         levels: a key of ``LEVELS``.
         sense: that answered.
@@ -46,6 +52,8 @@ class AnsweredRun:
         seconds: of CPU, of readings and answer.
     """
 
+    object: str
+    seed: int
     spacing: str
     levels: str
     sense: str
@@ -56,6 +64,7 @@ class AnsweredRun:
 
 def answered(case: Case) -> Iterator[AnsweredRun]:
     """A run at every choice of levels, by every sense."""
+    cell = case.cell
     for name, levels in LEVELS.items():
         for sense in SENSES.levels:
             setting: dict[str, Level] = {**levels, SENSES.name: sense}
@@ -67,42 +76,75 @@ def answered(case: Case) -> Iterator[AnsweredRun]:
             read = readings.shared[0] if needs_images(setting) else 0.0
             seconds = read + min(each.cpu for each in every)
             error = case.error_of(every[0], case.steps)
-            yield AnsweredRun(case.cell.spacing, name, sense, error, inside, seconds)
+            yield AnsweredRun(cell.object, cell.seed, cell.spacing, name, str(sense), error, inside, seconds)
+
+
+def answered_objects(named: Sequence[str], seeds: range, rows: Path | None) -> list[AnsweredRun]:
+    """Every run of every object, and those that a file holds already."""
+    console, station = Console(stderr=True), load_station(station_path("mock"))
+    found = [] if rows is None else rows_of(rows)
+    there = {(row.object, row.seed, row.spacing) for row in found}
+    for folder in named:
+        scene, models = scene_from_options(folder), dict[str, Models]()
+        for cell in cells([scene.object.name], seeds, SPACINGS, ["default"], ["known"], sound=True):
+            if (cell.object, cell.seed, cell.spacing) not in there:
+                new = list(answered(perform(cell, scene, station, models)))
+                found += new
+                _append(rows, new)
+                console.print(f"{cell.name} answered")
+    return found
+
+
+def rows_of(path: Path) -> list[AnsweredRun]:
+    """What a file of JSON lines holds; nothing where there is none yet."""
+    if not path.exists():
+        return []
+    return [AnsweredRun(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def _append(path: Path | None, new: Iterable[AnsweredRun]) -> None:
+    if path is not None:
+        with path.open("a", encoding="utf-8") as stream:
+            stream.writelines(f"{json.dumps(asdict(row))}\n" for row in new)
+
+
+def table_of(rows: list[AnsweredRun]) -> Table:
+    """Of every object and of all: errors, regions that hold, and the mean of seconds, by both levels."""
+    table = Table("object", "sense", "runs", "median, mm", "mean, mm", "of means", "in region", "CPU s")
+    objects = list(dict.fromkeys(row.object for row in rows))
+    for name in (*objects, "all"):
+        for sense in SENSES.levels:
+            of = [row for row in rows if name in (row.object, "all") and row.sense == sense]
+            if of:
+                table.add_row(name, str(sense), *_cells(of))
+    return table
+
+
+def _cells(rows: list[AnsweredRun]) -> list[str]:
+    """Of one sense: simulation / networks."""
+    parts = [[row for row in rows if row.levels == levels] for levels in LEVELS]
+    errors = [1e3 * np.array([row.error for row in part]) for part in parts]
+    means = [float(each.mean()) for each in errors]
+    return [
+        f"{len(parts[0])}",
+        " / ".join(f"{np.median(each):.2f}" for each in errors),
+        " / ".join(f"{mean:.2f}" for mean in means),
+        f"{means[1] / means[0]:.2f}",
+        " / ".join(f"{sum(row.inside for row in part)}" for part in parts),
+        " / ".join(f"{np.mean([row.seconds for row in part]):.2f}" for part in parts),
+    ]
 
 
 def main() -> None:
     """Perform, answer, and print a table."""
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("folder")
+    options.add_argument("objects", nargs="+")
     options.add_argument("--seeds", type=int, default=12)
     options.add_argument("--first-seed", type=int, default=0)
-    asked = options.parse_args()
-    scene, station = scene_from_options(asked.folder), load_station(station_path("mock"))
-    models: dict[str, Models] = {}
-    seeds = range(asked.first_seed, asked.first_seed + asked.seeds)
-    rows: list[AnsweredRun] = []
-    console = Console()
-    for cell in cells([scene.object.name], seeds, ["close", "spread"], ["default"], ["known"], sound=True):
-        rows += answered(perform(cell, scene, station, models))
-        console.print(f"{cell.name} answered")
-    console.print(table_of(rows))
-
-
-def table_of(rows: list[AnsweredRun]) -> Table:
-    """Median, mean and worst of errors, regions that hold, and the mean of seconds."""
-    table = Table("spacing", "sense", "levels", "runs", "median", "mean", "worst, mm", "in region", "CPU s")
-    for spacing in ("close", "spread"):
-        for sense in SENSES.levels:
-            for levels in LEVELS:
-                found = [
-                    row for row in rows if (row.spacing, row.sense, row.levels) == (spacing, sense, levels)
-                ]
-                errors = 1e3 * np.array([row.error for row in found])
-                numbers = (np.median(errors), errors.mean(), errors.max())
-                inside, seconds = sum(row.inside for row in found), np.mean([row.seconds for row in found])
-                said = [f"{number:.2f}" for number in numbers]
-                table.add_row(spacing, sense, levels, f"{len(found)}", *said, f"{inside}", f"{seconds:.2f}")
-    return table
+    options.add_argument("--rows", type=Path)
+    given = options.parse_args()
+    seeds = range(given.first_seed, given.first_seed + given.seeds)
+    Console(width=140).print(table_of(answered_objects(given.objects, seeds, given.rows)))
 
 
 if __name__ == "__main__":

@@ -123,3 +123,27 @@ def test_its_networks_stand_for_the_simulation_that_the_scene_calls_for(
     assert scene_levels(both) == levels
     assert scene_levels(neither) == {}
     assert scene_levels(scene_from_options("builtin:mug")) == {}
+
+
+def test_one_in_objects_is_found_by_its_name(
+    egg: ObjectFile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is at a path of that name comes first, and a mesh is still a mesh."""
+    shutil.copytree(egg.folder, tmp_path / "objects" / "ovum")
+    monkeypatch.chdir(tmp_path)
+    assert scene_from_options("ovum").object.objectfile == str(tmp_path / "objects" / "ovum")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    named = load_scene(written(elsewhere, 'objectfile = "ovum"')).object
+    assert named == scene_from_options("ovum").object
+    shutil.copytree(egg.folder, elsewhere / "ovum")
+    nearer = load_scene(written(elsewhere, 'objectfile = "ovum"')).object
+    assert nearer.objectfile == str(elsewhere / "ovum")
+    (tmp_path / "ovum").write_text("a mesh")
+    with pytest.raises(WrongUse, match="--object ovum needs --material"):
+        scene_from_options("ovum")
+
+
+def test_a_name_that_is_none_is_answered_with_those_that_are(tmp_path: Path) -> None:
+    with pytest.raises(WrongUse, match=r"there is no ObjectFile .*mugg.* have the names .*mug"):
+        load_scene(written(tmp_path, 'objectfile = "mugg"'))

@@ -153,7 +153,6 @@ def test_a_schema_of_the_future(copy: Path, sense: str) -> None:
     refused(copy, sense, "is of schema 2, this program reads 1; use the program that made it")
 
 
-@pytest.mark.parametrize("sense", ["audio", "touch"])
 def test_another_objects_network_of_the_same_size(copy: Path, sense: str) -> None:
     """Its hash is right, and so are its inputs and outputs: only its answers are another's."""
 

@@ -19,6 +19,7 @@ A network that there is not must be left out before: onnxruntime takes -1 for th
 from dataclasses import dataclass
 
 import numpy as np
+import onnx
 from onnx import ModelProto, TensorProto, helper, numpy_helper
 
 from harness.basics.arrays import AnyArray
@@ -215,8 +216,16 @@ def vision_model(data: bytes, name: str = FILE) -> VisionModel:
 
 
 def graph_block(data: bytes, name: str = FILE) -> int:
-    """Samples of one network that a file's graph is asked together; errors as of ``vision_model``."""
-    taken = declared(checked_graph(data, name)).get("points", ("", ()))[1]
+    """Samples of one network that a file's graph takes together.
+
+    Args:
+        data: of a file that ``vision_model`` has read, and so looked through.
+        name: of the file, for messages.
+
+    Raises:
+        DataRefused: its points are no blocks.
+    """
+    taken = declared(onnx.load_model_from_string(data)).get("points", ("", ()))[1]
     if len(taken) != 3 or not isinstance(taken[1], int):
         raise DataRefused(f"{name} takes points {taken}, not blocks of them; build it again")
     return taken[1]

@@ -13,7 +13,10 @@ from harness.authoring.audio.profiles import AudioProfile, WavesSpec, profile
 from harness.authoring.audio.readout import error_shares, solve_readout
 from harness.authoring.audio.waves import ENOUGH, FittedWaves, fit_enough_waves, fit_waves
 from harness.basics.errors import WrongUse
+from harness.objectfile.graph import Storage
 from harness.sim.modal.modes import Modes
+
+STORAGES: tuple[Storage, ...] = ("float16", "float32")
 
 SINGLE = 1e-5
 """Relative to the greatest number: what float32 loses where a graph and its arrays are the same."""
@@ -56,6 +59,20 @@ def test_waves_are_doubled_until_they_are_enough_or_as_many_as_may_be(egg: Modes
     assert made[20].readout.expected > ENOUGH >= made[640].readout.expected
     enough = len(made[640].network.phases)
     assert fitted_within(enough - 1).readout.expected > ENOUGH
+
+
+def test_weights_for_half_precision_are_chosen_for_it(egg: Modes) -> None:
+    """Those chosen for single precision cancel each other, and their roundings do not."""
+    split = split_nodes(len(egg.points))
+    samples = SoundSamples(egg.points[split.trained], egg.shapes[split.trained])
+    errors = {}
+    for storage in STORAGES:
+        network = fit_waves(
+            samples, np.arange(len(samples.points)), wave_number(egg), 300, 0, (1.0, 1.4), storage
+        ).network
+        found = opened(waves_graph(network, "float16"), 6)({"points": egg.points[split.held_out]})["gains"]
+        errors[storage] = float(np.median(relative_errors(found, egg.shapes[split.held_out])))
+    assert errors["float16"] < min(0.02, 0.5 * errors["float32"])
 
 
 def test_the_graph_of_waves_is_the_waves(egg: Modes) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import pytest
 
 from harness.authoring.audio.audio import author_audio
@@ -31,10 +32,11 @@ from harness.effects.plan import plan
 from harness.effects.scene_object import known_file
 from harness.objectfile.audio.audio import open_audio
 from harness.objectfile.audio.part import AudioPart, with_audio
+from harness.objectfile.audio.sound_level import modes_from
 from harness.objectfile.file import ObjectFile, create_object
 from harness.objectfile.surface_search import SurfaceSearch
 from harness.sim.modal import modal
-from harness.sim.modal.modal import from_arrays
+from harness.sim.modal.modal import default_edge, from_arrays
 from harness.sim.modal.modes import Modes, dampings
 from tests.samples.object_bench import PROVENANCE, egg
 
@@ -268,12 +270,24 @@ def test_what_was_stored_of_one_objectfile_is_not_served_for_another(
     assert calls(with_audio(other, part), "table") == 1
 
 
-def test_a_network_alone_is_refused_for_want_of_nodes(solved: Modes, of: ObjectFile, tmp_path: Path) -> None:
-    audio = of.description.audio
+def test_a_network_alone_is_evaluated_on_faces_as_short_as_elements(of: ObjectFile, tmp_path: Path) -> None:
+    """Of a mesh of long faces; a table, which it would need else, is not there."""
+    audio, coarse = of.description.audio, egg(subdivisions=1)
     assert audio is not None
-    said = of.description.model_copy(update={"audio": audio.model_copy(update={"table": None})})
-    with pytest.raises(DataRefused, match="no surface fine enough"):
-        modes_at(ObjectFile(of.folder, said), "network")
+    assert audio.network is not None
+    made = create_object(tmp_path / "coarse", "egg", coarse, PLASTIC, PROVENANCE)
+    graph = onnx.load_model_from_string(of.read(audio.network))
+    rates, near = np.array(audio.dampings_per_s), 0.1 * coarse.diagonal
+    alone = with_audio(
+        made, AudioPart(open_audio(of).as_modes(), rates, near, PROVENANCE, graph, table=False)
+    )
+    found = modes_from(alone, "network", coarse, PLASTIC, 16, 20e3)
+    corners = found.points[found.faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+    assert longest <= default_edge(coarse, PLASTIC, audio.frequencies_hz[-1])
+    assert len(found.points) > len(coarse.vertices)
+    wanted = open_audio(alone).at(found.points)[:, : len(found.frequencies)]
+    np.testing.assert_array_equal(found.shapes, wanted)
 
 
 _LOADING = """

@@ -1,0 +1,87 @@
+"""A run by an ObjectFile that comes with the program, with a scene camera: networks alone draw and sound."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.contact_localization.accuracy.benchmark_runs import Cell
+from experiments.contact_localization.answer import ContactAnswering
+from experiments.contact_localization.experiment import EXPERIMENT
+from experiments.contact_localization.section import Localization
+from harness.basics.errors import WrongUse
+from harness.bench.scene import Light, SceneFile, Sensors, scene_from_options
+from harness.bench.station_file import load_station, station_path
+from harness.effects import sound_effects
+from harness.experiment.begin import begin
+from harness.experiment.compare import compare
+from harness.experiment.experiment import Scored
+from harness.experiment.in_process import performed
+from harness.experiment.levels import chosen_levels
+from harness.experiment.object_modes import carried_by, object_modes
+from harness.recording.run_folder import RunFiles
+from harness.sim.gel import height_map, raster_kernels
+from harness.sim.light import direct_image
+
+STATION = load_station(station_path("mock"))
+CALLS = ("touch.image", "camera.image")
+
+
+def scene_with(colour: tuple[float, float, float] = (0.8, 0.8, 0.8)) -> SceneFile:
+    """A wrench that a camera sees under one lamp, and that is touched twice."""
+    scene = scene_from_options("wrench").with_section(Localization(contacts=2, spacing="spread"))
+    lamp = Light(position=("0 m", "0 m", "1.5 m"), colour=colour)  # type: ignore[arg-type]
+    update = {"observe": CALLS, "lights": (lamp,), "sensors": Sensors(touch=True, camera=True)}
+    return scene.model_copy(update=update)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> RunFiles:
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    cell = Cell("wrench", "spread", "default", "known", 3)
+    return RunFiles(performed(EXPERIMENT, cell, scene_with(), STATION, folder))
+
+
+@pytest.fixture
+def simulated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What was rasterised, followed by rays on the mesh and solved, call by call."""
+    calls: list[str] = []
+
+    def counted(name: str, kernel: Any) -> Any:
+        return lambda *given: (calls.append(name), kernel(*given))[1]
+
+    monkeypatch.setattr(height_map, "rasterise", counted("rasterised", raster_kernels.rasterise))
+    monkeypatch.setattr(sound_effects, "modes_of", lambda *_: calls.append("solved"))
+    monkeypatch.setattr(direct_image, "LitObject", lambda *_: calls.append("traced"))
+    return calls
+
+
+def test_networks_stand_for_every_simulation(run: RunFiles, simulated: list[str]) -> None:
+    accuracy = chosen_levels(EXPERIMENT.knobs, (), run.network_levels)
+    answering = ContactAnswering(run, accuracy)
+    for record in run.recording.steps():
+        answering.read(record)
+    scored = Scored(run, None, answering.answer(), None, accuracy, ())
+    comparison = compare(scored, EXPERIMENT.sources(scored))
+    modes = object_modes(run.scene, run.station, run.mesh, None, carried_by(run))
+    assert simulated == []
+    calls = comparison.evaluation.calls
+    assert {"object.vision", "camera.image", "object.touch_codes"} <= calls.keys()
+    assert not {"camera.seen", "object.lit"} & calls.keys()
+    picture = comparison.arrays()["camera.image.colour"]
+    camera = run.station.camera
+    assert camera is not None
+    assert picture.shape == (camera.rows, camera.columns, 3)
+    assert comparison.arrays()["camera.image.coverage"].max() > 0.99
+    assert np.isfinite(picture).all()
+    assert picture.max() > 0.01
+    assert comparison.observed()["camera.image"]["parts"].keys() == {"colour", "coverage"}
+    assert np.isfinite(modes.shapes).all()
+
+
+def test_a_coloured_lamp_is_refused_before_anything_moves(tmp_path: Any) -> None:
+    with pytest.raises(
+        WrongUse, match=r"lamp 1 of the scene has the colour \[1\.0, 0\.8, 0\.6\].*one number"
+    ):
+        begin(EXPERIMENT, scene_with((1.0, 0.8, 0.6)), STATION, 3, "default", tmp_path / "run")
+    assert not (tmp_path / "run").exists()
