@@ -5,12 +5,13 @@
 
 import importlib
 import json
+import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from inspect import cleandoc, signature
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -28,6 +29,9 @@ class Interrupted(TouchstoneError):
     def __init__(self, resumes: bool = False) -> None:
         kept = "; what was recorded is kept, go on with --resume" if resumes else ""
         super().__init__(f"interrupted{kept}")
+
+
+PROGRAM = "touchstone"
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,9 @@ COMMANDS = {
     ),
     "check": Command(
         "harness.commands.check:check", "Open every instrument of a station: rate, drops, latency."
+    ),
+    "camera": Command(
+        "harness.commands.camera:camera", "Write what a camera of the station sees now, as a picture."
     ),
     "mock-lab": Command(
         "harness.commands.mock_lab:mock_lab", "Keep a mocked bench running, to try drivers on."
@@ -166,7 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def invoke(arguments: list[str]) -> int:
     """Run the command line; the exit code instead of an exit."""
     try:
-        result = _app(_chosen(arguments))(arguments, standalone_mode=False)
+        result = _app(_chosen(_completed() or arguments))(arguments, standalone_mode=False, prog_name=PROGRAM)
     except TouchstoneError as error:
         return _report(str(error), error.exit_code, "--json" in arguments)
     except KeyboardInterrupt:
@@ -180,6 +187,11 @@ def invoke(arguments: list[str]) -> int:
     return result if isinstance(result, int) else 0
 
 
+def _completed() -> list[str]:
+    """The words that a shell asks to complete, whose command it wants the options of; else none."""
+    return os.environ.get("COMP_WORDS", "").split()[1:] if "_TOUCHSTONE_COMPLETE" in os.environ else []
+
+
 def _chosen(arguments: Sequence[str]) -> str | None:
     words = [word for word in arguments if not word.startswith("-")]
     candidates = (" ".join(words[:count]) for count in range(_MOST_WORDS, 0, -1))
@@ -188,14 +200,14 @@ def _chosen(arguments: Sequence[str]) -> str | None:
 
 def _app(chosen: str | None) -> typer.Typer:
     app = typer.Typer(
-        name="touchstone",
+        name=PROGRAM,
         help="Touch an object, compare it with its model, estimate, replay.",
         epilog=EPILOG,
         no_args_is_help=True,
-        add_completion=False,
         rich_markup_mode="rich",
         pretty_exceptions_enable=False,
     )
+    app.callback()(_root)
     groups = {name: typer.Typer(help=text, no_args_is_help=True) for name, text in GROUPS.items()}
     for name, command in commands().items():
         group, _, last = name.rpartition(" ")
@@ -207,6 +219,29 @@ def _app(chosen: str | None) -> typer.Typer:
         group, _, last = name.rpartition(" ")
         (groups[group] if group else app).add_typer(group_app, name=last)
     return app
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from harness.recording.run_folder import versions
+
+        for name, number in sorted(versions().items(), key=lambda row: not row[0].startswith(PROGRAM)):
+            sys.stdout.write(f"{name} {number}\n")
+        raise typer.Exit
+
+
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            help="Print the versions of all that numbers come from.",
+            callback=_print_version,
+            is_eager=True,
+        ),
+    ] = False,
+) -> None:
+    """Take what belongs to no command."""
 
 
 def load(target: str) -> Callable[..., Any]:

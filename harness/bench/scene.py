@@ -24,6 +24,7 @@ from harness.basics.quantities import (
 )
 from harness.basics.toml_file import StrictModel, nearest, read_toml, validate
 from harness.bench.experiments import loaded, section_models
+from harness.bench.named_files import named_file
 from harness.bench.scene_objectfile import (
     OBJECTFILE,
     holds_objectfile,
@@ -303,9 +304,13 @@ class SceneFile(StrictModel):
 def load_scene(path: Path) -> SceneFile:
     """A scene file, its mesh's and its ObjectFile's paths made absolute.
 
+    Args:
+        path: or the name of a scene in ``scenes/``, as ``mug_touch``.
+
     Raises:
         WrongUse: naming each mistake; or the mesh file or the ObjectFile does not exist.
     """
+    path = named_file(str(path), "scene")
     tree = with_objectfile(read_toml(path), path.parent, str(path))
     return _with_files_found(scene_from_json(tree, str(path)), path.parent, str(path))
 

@@ -112,16 +112,7 @@ def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterato
         SafetyStop: one of them refused for safety's sake.
     """
     with ExitStack() as stack:
-        lab = None
-        if station.mock is not None:
-            gap = gap_path(run.gap or station.mock.gap)
-            lab = MockLab(scene, station, run.mesh, run.seed, gap, run.truth)
-            stack.callback(lab.close)
-            started = lab.start()
-            _surround(stack, started.environment)
-            where = addressed(station, started)
-        else:
-            where = station
+        where, lab = wired(stack, station, scene, run)
         gel = make_gel(where)
         arm = make_arm(where, alarm=lambda: gel.health().failure)
         camera = make_camera(where) if scene.sensors.camera else None
@@ -133,6 +124,26 @@ def open_station(station: Station, scene: SceneFile, run: RunContext) -> Iterato
         stack.push(_Closing("arm, stopping", arm.stop))
         mark = _ignore_mark if lab is None else lab.mark
         yield Bench(arm, gel, camera, station, hammer, mark, lab=lab, microphone=microphone)
+
+
+def wired(
+    stack: ExitStack, station: Station, scene: SceneFile, run: RunContext
+) -> tuple[Station, MockLab | None]:
+    """The station with the addresses of its instruments, and the lab behind a mocked one.
+
+    Args:
+        stack: ends the lab.
+        station: to open.
+        scene: what a mocked world shows.
+        run: what the lab is for.
+    """
+    if station.mock is None:
+        return station, None
+    lab = MockLab(scene, station, run.mesh, run.seed, gap_path(run.gap or station.mock.gap), run.truth)
+    stack.callback(lab.close)
+    started = lab.start()
+    _surround(stack, started.environment)
+    return addressed(station, started), lab
 
 
 def addressed(station: Station, where: LabAddresses) -> Station:

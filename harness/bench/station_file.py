@@ -7,9 +7,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import WrongUse
 from harness.basics.geometry import apply
-from harness.basics.toml_file import StrictModel, load_toml, nearest, validate
+from harness.basics.toml_file import StrictModel, load_toml, validate
+from harness.bench.named_files import named_file
 from harness.bench.station_sections import (
     ArmSection,
     CameraSection,
@@ -18,8 +18,6 @@ from harness.bench.station_sections import (
     MicrophoneSection,
     Placement,
 )
-
-_SHIPPED = Path(__file__).parents[2] / "stations"
 
 
 class Frames(StrictModel):
@@ -144,14 +142,7 @@ def station_path(name: str) -> Path:
     Raises:
         WrongUse: there is none.
     """
-    if name.endswith(".toml") or "/" in name:
-        if not Path(name).is_file():
-            raise WrongUse(f"no station file {name!r}; name one, or one of {nearest(name, _stations())}")
-        return Path(name).resolve()
-    known = _stations()
-    if name not in known:
-        raise WrongUse(f"no station {name!r}; {nearest(name, known)}; or give the path of a station file")
-    return known[name]
+    return named_file(name, "station")
 
 
 def load_station(path: Path) -> Station:
@@ -173,8 +164,3 @@ def _found(station: Path, calibration: str) -> str:
 def station_from_json(tree: Any, where: str) -> Station:
     """The station that ``model_dump(mode="json")`` wrote, for example into a recording."""
     return validate(tree, Station, where)
-
-
-def _stations() -> dict[str, Path]:
-    folders = (_SHIPPED, Path.cwd() / "stations")
-    return {path.stem: path.resolve() for folder in folders for path in sorted(folder.glob("*.toml"))}

@@ -20,7 +20,8 @@ StationOrOwn = Annotated[
     ),
 ]
 SceneOption = Annotated[
-    Path | None, typer.Option("--scene", help="A scene file; examples are under scenes/.", metavar="FILE")
+    Path | None,
+    typer.Option("--scene", help="A name under scenes/, as mug_touch, or a scene file.", metavar="NAME"),
 ]
 Object = Annotated[
     str | None,

@@ -1,6 +1,7 @@
 """The command line keeps its promises: fast help, exit codes, one JSON object."""
 
 import json
+import re
 import subprocess
 import sys
 from itertools import pairwise
@@ -47,6 +48,34 @@ def test_help_imports_no_command_and_no_heavy_library() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stderr.split("\n")[:2] == ["[]", "[]"]
+
+
+def test_the_version_is_printed_with_those_of_all_that_shapes_numbers(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert invoke(["--version"]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^touchstone-lab \d+\.\d+", out, flags=re.M)
+    assert "numpy" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        ("touchstone obj", "object"),
+        ("touchstone object ren", "render"),
+        ("touchstone run --pre", "--presses"),
+    ],
+)
+def test_a_shell_completes_commands_and_their_options(
+    words: str, completed: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("_TOUCHSTONE_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    with pytest.raises(SystemExit):
+        invoke([])
+    assert completed in capsys.readouterr().out
 
 
 def test_wrong_use_exits_with_2() -> None:

@@ -14,10 +14,10 @@ from harness.basics.mesh import Mesh
 from harness.bench.acquisition import Strike
 from harness.bench.acquisition_channels import FORCE, PRESSURE
 from harness.bench.microphone_take import BAD, CALLBACK, CLOCK, FLAGS, UNSURE, take_of
+from harness.bench.opening.instrument_check import rest_levels
 from harness.bench.scene import SceneFile, load_scene
 from harness.bench.station import RunContext, open_station
 from harness.bench.station_file import load_station
-from harness.commands.check import rest_levels
 from harness.effects.scene_object import known_object
 from harness.recording.synchronise import synchronised
 from harness.skills.planning import RunPlan
@@ -65,13 +65,13 @@ def wired(
         contacts = performed(bench, plan)
         found = {
             "contacts": contacts,
-            "levels": rest_levels(bench),
+            "levels": rest_levels(bench.hammer, bench.microphone, bench.station),
             "health": bench.microphone.health(),
         }
         assert bench.lab is not None
         bench.lab.fault("microphone", "unplug")
         with pytest.raises(BenchFault) as gone:
-            rest_levels(bench)
+            rest_levels(bench.hammer, bench.microphone, bench.station)
         return {**found, "gone": str(gone.value)}
 
 

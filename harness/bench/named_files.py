@@ -1,0 +1,33 @@
+"""Stations and scenes by name: those that come with the program, and those of the working directory."""
+
+from pathlib import Path
+
+from harness.basics.errors import WrongUse
+from harness.basics.toml_file import nearest
+
+_CHECKOUT = Path(__file__).parents[2]
+
+
+def named_file(name: str, kind: str) -> Path:
+    """A TOML file by its path, or by its name in ``stations/`` or ``scenes/``, here or in the checkout.
+
+    Args:
+        name: a text with a slash or an ending is a path.
+        kind: ``station`` or ``scene``.
+
+    Raises:
+        WrongUse: there is none.
+    """
+    known = _known(f"{kind}s")
+    if name.endswith(".toml") or "/" in name:
+        if not Path(name).is_file():
+            raise WrongUse(f"no {kind} file {name!r}; name one, or one of {nearest(name, known)}")
+        return Path(name).resolve()
+    if name not in known:
+        raise WrongUse(f"no {kind} {name!r}; {nearest(name, known)}; or give the path of a {kind} file")
+    return known[name]
+
+
+def _known(folder: str) -> dict[str, Path]:
+    places = (_CHECKOUT / folder, Path.cwd() / folder)
+    return {path.stem: path.resolve() for place in places for path in sorted(place.glob("*.toml"))}

@@ -1,0 +1,1 @@
+"""Instruments of a bench, each opened by itself."""

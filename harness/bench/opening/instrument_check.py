@@ -1,0 +1,135 @@
+"""How the instruments of a bench do at rest: rate, drops, latency, level."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any
+
+from harness.basics.errors import BenchFault, TouchstoneError
+from harness.bench.acquisition import strike_from_readings
+from harness.bench.device import Health, ImpactHammer, Microphone, TactileCamera
+from harness.bench.listening import capture
+from harness.bench.opening.open_each import Instruments
+from harness.bench.station_file import Station
+
+_LISTEN = 0.5
+"""s."""
+
+_ATTEMPTS = 3
+"""Times that is listened where samples of the sound were lost: a computer may be busy for a moment."""
+
+_HEARING = 20e-6
+"""Pa, the reference of sound pressure levels (ISO 1683)."""
+
+
+@dataclass(frozen=True)
+class RestLevels:
+    """What the hammer's box reads while nothing is struck.
+
+    Attributes:
+        force_rms_n: N, about its mean.
+        pressure_rms_pa: Pa, about its mean.
+        sound_level_db: of the pressure, over 20 uPa.
+    """
+
+    force_rms_n: float
+    pressure_rms_pa: float
+    sound_level_db: float
+
+
+@dataclass(frozen=True)
+class Checked:
+    """How the instruments of a bench do.
+
+    Attributes:
+        instruments: those that opened and send something.
+        failures: by name, why the others do not.
+        safety: the arm's; None where the arm did not open.
+        levels: of the hammer's box; None where there is none or it failed.
+    """
+
+    instruments: tuple[Health, ...]
+    failures: Mapping[str, TouchstoneError]
+    safety: str | None
+    levels: RestLevels | None
+
+    def as_json(self) -> dict[str, Any]:
+        """For ``--json``."""
+        return {
+            "safety": self.safety,
+            "instruments": [asdict(health) for health in self.instruments],
+            "failures": {name: str(error) for name, error in self.failures.items()},
+            "hammer_levels": None if self.levels is None else asdict(self.levels),
+        }
+
+
+def checked(bench: Instruments, station: Station) -> Checked:
+    """Read each instrument that opened; one that sends nothing fails alone."""
+    found: list[Health] = []
+    failures = dict(bench.failures)
+
+    def attempt(name: str, read: Callable[[], Iterable[Health]]) -> None:
+        try:
+            found.extend(read())
+        except TouchstoneError as error:
+            failures[name] = error
+
+    safety, levels = None, None
+    if bench.arm is not None:
+        arm = bench.arm
+        attempt("arm", lambda: [arm.health()])
+        safety = arm.state().safety
+    for name, camera in (("gel", bench.gel), ("camera", bench.camera)):
+        if camera is not None:
+            attempt(name, partial(_seen, camera))
+    if bench.hammer is not None and "microphone" not in failures:
+        try:
+            levels = rest_levels(bench.hammer, bench.microphone, station)
+        except TouchstoneError as error:
+            failures["hammer"] = error
+        else:
+            attempt("hammer", partial(_heard, bench.hammer, bench.microphone, levels))
+    return Checked(tuple(found), failures, safety, levels)
+
+
+def _seen(camera: TactileCamera) -> list[Health]:
+    camera.read(1, timeout=3.0)
+    return [camera.health()]
+
+
+def rest_levels(hammer: ImpactHammer, microphone: Microphone | None, station: Station) -> RestLevels:
+    """Listen for a moment with nothing fired.
+
+    Raises:
+        BenchFault: the box failed.
+        DataRefused: a channel rests where its calibration says that it cannot.
+    """
+    assert station.hammer is not None
+    for _ in range(_ATTEMPTS):
+        readings = capture(hammer, microphone, lambda: None, 0.0, _LISTEN, 0.0)
+        by_name = {reading.channel.name: reading for reading in readings}
+        rest = strike_from_readings(by_name, station.hammer.acquisition)
+        if not rest.lost:
+            break
+    else:
+        raise BenchFault(f"the microphone cannot be used: {rest.lost}; close what else runs, or try again")
+    pressure = float(rest.pressure.std())
+    # A converter that reads one count for ever is broken, not silent.
+    level = 20.0 * math.log10(pressure / _HEARING) if pressure > 0.0 else -math.inf
+    if not math.isfinite(level):
+        raise BenchFault("the microphone reads the same count for ever; check its cable and its supply")
+    return RestLevels(float(rest.force.std()), pressure, level)
+
+
+def _heard(hammer: ImpactHammer, microphone: Microphone | None, levels: RestLevels) -> list[Health]:
+    """How the hammer does and, where it has an instrument of its own, the microphone; each with its level."""
+    force, sound = f"{levels.force_rms_n:.3f} N rms", f"{levels.sound_level_db:.0f} dB SPL"
+    if microphone is None:
+        return [_with_level(hammer.health(), f"{force}, {sound}")]
+    return [_with_level(hammer.health(), force), _with_level(microphone.health(), sound)]
+
+
+def _with_level(health: Health, level: str) -> Health:
+    said = f"rest {level}"
+    return replace(health, detail=f"{said}; {health.detail}" if health.detail else said)

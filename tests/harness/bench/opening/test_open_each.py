@@ -1,0 +1,132 @@
+"""Instruments opened each by itself: what opens is shown, what does not is named, and nothing else stops."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.basics.errors import BenchFault, ProtectiveStop, TouchstoneError, WrongUse
+from harness.bench.device import Health
+from harness.bench.opening import open_each as module
+from harness.bench.opening.instrument_check import checked
+from harness.bench.opening.open_each import open_camera, open_each, scene_of_all
+from harness.bench.reading import Channel, Reading
+from harness.bench.station import RunContext
+from harness.bench.station_file import Station, load_station, station_path
+from harness.commands import check as command
+from harness.objects.household import build
+
+
+class Fake:
+    """Stands for a driver; ``fails`` names what does not work."""
+
+    log: list[str]
+    fails: dict[str, TouchstoneError]
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def open(self) -> None:
+        self._do("open")
+
+    def close(self) -> None:
+        self._do("close")
+
+    def stop(self) -> None:
+        self._do("stop")
+
+    def read(self, count: int, timeout: float) -> Reading:
+        self._do("read")
+        return Reading(Channel("x", "count", (1,), "uint8"), np.arange(count, dtype=np.float64), np.zeros((count, 1)))
+
+    def health(self) -> Health:
+        return Health(self.name, "", 1.0, 0, None)
+
+    def state(self) -> Any:
+        return type("State", (), {"safety": "normal"})
+
+    def _do(self, verb: str) -> None:
+        self.log.append(f"{self.name} {verb}")
+        if f"{self.name} {verb}" in self.fails:
+            raise self.fails[f"{self.name} {verb}"]
+
+
+@pytest.fixture(autouse=True)
+def fakes(monkeypatch: pytest.MonkeyPatch) -> type[Fake]:
+    Fake.log, Fake.fails = [], {}
+    for name in ("arm", "gel", "camera"):
+        monkeypatch.setattr(module, f"make_{name}", lambda _, name=name: Fake(name))
+    monkeypatch.setattr(module, "make_hammer", lambda _: None)
+    monkeypatch.setattr(module, "CAMERAS", {"gel": lambda _: Fake("gel"), "scene": lambda _: None})
+    return Fake
+
+
+@pytest.fixture
+def station() -> Station:
+    bench = load_station(station_path("example_bench"))
+    return bench.model_copy(update={"hammer": None, "microphone": None})
+
+
+def context(folder: Path) -> RunContext:
+    return RunContext(folder / "truth.json", build("mug"))
+
+
+def test_what_does_not_open_is_named_and_the_rest_is_read(
+    tmp_path: Path, station: Station, fakes: type[Fake]
+) -> None:
+    fakes.fails = {"arm open": BenchFault("no answer; check the cable"), "camera read": BenchFault("dark")}
+    with open_each(station, scene_of_all(station), context(tmp_path)) as bench:
+        assert bench.arm is None
+        found = checked(bench, station)
+    assert [health.name for health in found.instruments] == ["gel"]
+    assert {name: str(error) for name, error in found.failures.items()} == {
+        "arm": "no answer; check the cable",
+        "camera": "dark",
+    }
+    assert found.safety is None
+    assert fakes.log[-2:] == ["camera close", "gel close"]
+
+
+def test_the_arm_is_stopped_before_anything_closes(
+    tmp_path: Path, station: Station, fakes: type[Fake]
+) -> None:
+    with open_each(station, scene_of_all(station), context(tmp_path)):
+        begun = len(fakes.log)
+    assert fakes.log[begun:] == ["camera close", "gel close", "arm stop", "arm close"]
+
+
+@pytest.mark.parametrize(
+    ("failure", "code"), [(None, 0), (BenchFault("unplugged"), 1), (ProtectiveStop("stopped"), 3)]
+)
+def test_a_check_s_exit_code_is_that_of_the_worst(
+    failure: TouchstoneError | None,
+    code: int,
+    station: Station,
+    fakes: type[Fake],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    fakes.fails = {} if failure is None else {"arm open": failure}
+    monkeypatch.setattr("harness.bench.station_file.load_station", lambda _: station)
+    assert command.check("example_bench", seconds=0.0) == code
+    out = capsys.readouterr()
+    assert "gel" in out.out
+    assert failure is None or str(failure) in out.err
+
+
+def test_a_camera_opens_alone(tmp_path: Path, station: Station, fakes: type[Fake]) -> None:
+    with open_camera("gel", station, scene_of_all(station), context(tmp_path)) as camera:
+        camera.read(1, 1.0)
+    assert fakes.log == ["gel open", "gel read", "gel close"]
+
+
+@pytest.mark.parametrize(("name", "words"), [("gle", "did you mean 'gel'"), ("scene", "no \\[camera\\]")])
+def test_a_camera_that_is_not_there_is_wrong_use(
+    name: str, words: str, tmp_path: Path, station: Station
+) -> None:
+    with (
+        pytest.raises(WrongUse, match=words),
+        open_camera(name, station, scene_of_all(station), context(tmp_path)),
+    ):
+        pass
