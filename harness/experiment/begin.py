@@ -32,6 +32,7 @@ def begin(
     seed: int | None = None,
     gap: str | None = None,
     folder: Path | None = None,
+    bench: str | None = None,
 ) -> Begun:
     """Take in the object, plan and rehearse every step, make the run's folder.
 
@@ -42,6 +43,7 @@ def begin(
         seed: of all that is drawn; the scene's where None.
         gap: reality gap of a mocked bench; the experiment's or the station's where None.
         folder: of the run; a dated one under ``runs/`` where None.
+        bench: of a mocked station, ``wires`` or ``in-process``; over its wires where None.
 
     Raises:
         MeshRefused, WrongUse: of the object, the scene, the gap, or a folder that holds a run; or the scene
@@ -50,16 +52,12 @@ def begin(
     """
     if folder is not None:
         require_unused(folder)
-    if gap is not None and station.mock is None:
-        raise WrongUse("--gap is for a mocked bench; this station is a real one: leave it out")
     if scene.object.is_hidden and not procedure.sizes_unknown:
         raise WrongUse(
             f'the scene says object.scale = "hidden", and {procedure.name} needs to know how large the '
             "object is; give its scale, or find it first with touchstone run scale-estimation"
         )
-    mock = None
-    if station.mock is not None:
-        mock = {"gap": lasting_name(gap or procedure.gap or station.mock.gap)}
+    mock = _mock(procedure, station, gap, bench)
     if procedure.observe is not None and scene.observe == SceneFile.model_fields["observe"].default:
         scene = scene.model_copy(update={"observe": procedure.observe})
     known = known_object(scene)
@@ -91,3 +89,16 @@ def begin(
         acquisition,
     )
     return Begun(recording, plan, known)
+
+
+def _mock(
+    procedure: Procedure, station: Station, gap: str | None, bench: str | None
+) -> dict[str, str] | None:
+    """How the mocked bench is started; None at a real one, of which none of it can be asked."""
+    if station.mock is None:
+        for option, value in (("--gap", gap), ("--bench", bench)):
+            if value is not None:
+                raise WrongUse(f"{option} is for a mocked bench; this station is a real one: leave it out")
+        return None
+    chosen = {} if bench is None else {"bench": bench}
+    return {"gap": lasting_name(gap or procedure.gap or station.mock.gap), **chosen}

@@ -13,14 +13,11 @@ from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.experiment.begin import begin
 from harness.experiment.experiment import Experiment, RunCell
-from harness.experiment.perform import perform_on
+from harness.experiment.perform import IN_PROCESS_BENCH, perform_on
 from harness.experiment.truth import truth_paths
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
-
-IN_PROCESS = "mocks.in_process.bench:in_process_bench"
-"""Import string of the mocked bench."""
 
 
 def performed(
@@ -39,7 +36,7 @@ def performed(
     recording = begin(experiment, scene, station, cell.seed, gap, folder).recording
     run = RunFiles(recording)
     context = RunContext(recording.truth_path, run.mesh, cell.seed, gap)
-    perform_on(experiment, loaded(IN_PROCESS)(run.scene, run.station, context), recording, Quiet())
+    perform_on(experiment, loaded(IN_PROCESS_BENCH)(run.scene, run.station, context), recording, Quiet())
     return recording
 
 

@@ -1,13 +1,14 @@
 """Perform what is left of a run on its bench; a step's readings are taken in once it is on the disk."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from harness.basics.clock import now
 from harness.basics.errors import FitRefused, WrongUse
 from harness.bench.device import Health
+from harness.bench.experiments import loaded
 from harness.bench.station import Bench, RunContext, open_station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Answering, Experiment, Helpers, Procedure
@@ -17,6 +18,13 @@ from harness.recording.session import Progress, perform
 from harness.recording.step_file import Step
 from harness.skills.strike import Ask, by_hand, somebody
 from harness.twin.bench_of import twin_of
+
+WIRES, IN_PROCESS = "wires", "in-process"
+"""Mocked benches: each instrument at the far end of its cable, or the same world without cables, in simulated
+time."""
+
+IN_PROCESS_BENCH = "mocks.in_process.bench:in_process_bench"
+"""Import string of the latter."""
 
 _REHEARSED_ANSWERS = 2
 """Steps after which the answer is tried once: what is compiled for it is loaded while the arm rests."""
@@ -71,13 +79,6 @@ def perform_on_bench(
         MeshRefused: the scene calls for sound, and the object's surface cannot be filled.
     """
     run = RunFiles(recording)
-    mock = recording.header.mock
-    context = RunContext(
-        truth=recording.truth_path,
-        mesh=run.mesh,
-        seed=recording.header.seed,
-        gap=None if mock is None else mock["gap"],
-    )
     if by_hand(run.scene, run.station):
         somebody(ask)
     ahead = ThreadPoolExecutor(1, "model")
@@ -85,12 +86,25 @@ def perform_on_bench(
     if accuracy is not None and isinstance(procedure, Experiment):
         answering = ahead.submit(procedure.answering, run, accuracy)
     ahead.shutdown(wait=False)  # a bench that does not open says so at once
-    with open_station(run.station, run.scene, context) as bench:
+    with _bench_of(run) as bench:
         made = None if answering is None else answering.result()
         performed = perform_on(procedure, bench, recording, progress, ask, made, say)
         if performed.complete:
             conclude(performed)
     return performed
+
+
+@contextmanager
+def _bench_of(run: RunFiles) -> Iterator[Bench]:
+    """The bench that a run was begun for, open."""
+    recording = run.recording
+    mock = recording.header.mock or {}
+    context = RunContext(recording.truth_path, run.mesh, recording.header.seed, mock.get("gap"))
+    if mock.get("bench", WIRES) == IN_PROCESS:
+        yield loaded(IN_PROCESS_BENCH)(run.scene, run.station, context)
+        return
+    with open_station(run.station, run.scene, context) as bench:
+        yield bench
 
 
 def perform_on(

@@ -7,7 +7,7 @@ import typer
 
 from harness.commands import options
 from harness.commands.output import CONSOLE
-from harness.commands.run.run import DEFAULT, RUNNABLE, Spacing, run
+from harness.commands.run.run import DEFAULT, RUNNABLE, BenchKind, BenchOption, Spacing, run
 
 _OPTIONS: dict[str, dict[str, Any]] = {
     DEFAULT: {"contacts": 4, "spacing": Spacing.SPREAD, "sense": "both"},
@@ -15,6 +15,12 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     "shape-reconstruction": {"presses": 4, "set_": ["choose=active"]},
 }
 """Of ``touchstone run``, by experiment: a short run that shows what it does."""
+
+
+_BENCHES = {
+    BenchKind.WIRES: "each at the far end of its cable",
+    BenchKind.IN_PROCESS: "in this process and in simulated time (--bench wires for the cables)",
+}
 
 
 def demo(
@@ -26,24 +32,26 @@ def demo(
     ] = "mug",
     objectfile: options.ObjectFileOption = None,
     level: options.LevelOption = None,
+    bench: BenchOption = BenchKind.IN_PROCESS,
     seed: options.Seed = 1,
     out: Annotated[Path | None, typer.Option(help="The run's folder.")] = None,
     json: options.Json = False,
 ) -> int:
     """Run an experiment on the mocked bench from end to end, by every sense that it has.
 
-    A mocked UR5e (over RTDE) presses a mocked GelSight (over HTTP) on an object a few times; where sound
-    is asked for it strikes it with a mocked hammer (over a serial line), and where a picture is, a mocked
-    camera looks first. The drivers are those of a real bench. The estimates are made from the recording
-    alone. What they are compared with comes from the ObjectFile of the object that lies in objects/: its
-    networks stand for finite elements and rasteriser. Where there is none, or with --objectfile, or for an
-    unknown shape, the object is a mesh.
+    A mocked UR5e presses a mocked GelSight on an object a few times; where sound is asked for it strikes
+    it with a mocked hammer, and where a picture is, a mocked camera looks first. With --bench wires they
+    are at the far ends of their cables (RTDE, HTTP, a serial line), and the drivers are those of a real
+    bench; the readings are the same. The estimates are made from the recording alone. What they are
+    compared with comes from the ObjectFile of the object that lies in objects/: its networks stand for
+    finite elements and rasteriser. Where there is none, or with --objectfile, or for an unknown shape,
+    the object is a mesh.
 
     Try: touchstone demo shape-reconstruction
     """
     CONSOLE.print(
-        "mock bench: a UR5e's controller, a GelSight's stream and what else the run reads, each at the far "
-        "end of its cable, with a reality gap of their own"
+        f"mock bench: a UR5e, a GelSight and what else the run reads, {_BENCHES[bench or BenchKind.WIRES]}, "
+        "with a reality gap of their own"
     )
     folder = None if objectfile is not None else _objectfile(experiment, object_)
     return run(
@@ -51,6 +59,7 @@ def demo(
         object_=f"builtin:{object_}" if folder is None else str(folder),
         objectfile=objectfile,
         level=level,
+        bench=bench,
         seed=seed,
         out=out,
         json=json,

@@ -24,11 +24,27 @@ class Spacing(StrEnum):
     SPREAD = "spread"
 
 
+class BenchKind(StrEnum):
+    """How a mocked bench is run."""
+
+    WIRES = "wires"
+    IN_PROCESS = "in-process"
+
+
 class Yaw(StrEnum):
     """Whether the estimator knows the object's yaw."""
 
     KNOWN = "known"
     UNKNOWN = "unknown"
+
+
+BenchOption = Annotated[
+    BenchKind | None,
+    typer.Option(
+        help="Of a mocked station. wires: each instrument at the far end of its cable, in real time; "
+        "in-process: the same world without cables, in simulated time. wires if left out.",
+    ),
+]
 
 
 def run(
@@ -45,6 +61,7 @@ def run(
     objectfile: options.ObjectFileOption = None,
     seed: options.Seed = None,
     gap: options.GapOption = None,
+    bench: BenchOption = None,
     set_: Annotated[
         list[str] | None,
         typer.Option(
@@ -120,6 +137,7 @@ def run(
             objectfile=objectfile,
             seed=seed,
             gap=gap,
+            bench=bench,
             out=out,
             set=set_,
             contacts=contacts,
@@ -154,10 +172,10 @@ def run(
             kind.assumed,
         )
         accuracy = chosen_levels(kind.knobs, level or [], scene_levels(wanted))
-        bench = load_station(station_path(station or "mock"))
+        of = load_station(station_path(station or "mock"))
         if target is not None:
             CONSOLE.print(foresee(kind, wanted, target), markup=False)
-        begun = begin(kind, wanted, bench, seed, gap, out)
+        begun = begin(kind, wanted, of, seed, gap, out, bench)
         recording = begun.recording
         _describe(kind, begun, accuracy)
     written: list[Any] = []

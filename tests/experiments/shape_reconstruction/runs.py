@@ -16,8 +16,7 @@ from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import score
 from harness.experiment.begin import begin
-from harness.experiment.in_process import IN_PROCESS
-from harness.experiment.perform import perform_on
+from harness.experiment.perform import IN_PROCESS_BENCH, perform_on
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
@@ -52,7 +51,7 @@ def went_on(recording: Recording, progress: Quiet) -> bool:
     run, mock = RunFiles(recording), recording.header.mock
     assert mock is not None
     context = RunContext(recording.truth_path, run.mesh, recording.header.seed, mock["gap"])
-    bench = loaded(IN_PROCESS)(run.scene, run.station, context)
+    bench = loaded(IN_PROCESS_BENCH)(run.scene, run.station, context)
     return perform_on(EXPERIMENT, bench, recording, progress).complete
 
 

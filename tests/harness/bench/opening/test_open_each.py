@@ -38,7 +38,9 @@ class Fake:
 
     def read(self, count: int, timeout: float) -> Reading:
         self._do("read")
-        return Reading(Channel("x", "count", (1,), "uint8"), np.arange(count, dtype=np.float64), np.zeros((count, 1)))
+        return Reading(
+            Channel("x", "count", (1,), "uint8"), np.arange(count, dtype=np.float64), np.zeros((count, 1))
+        )
 
     def health(self) -> Health:
         return Health(self.name, "", 1.0, 0, None)
