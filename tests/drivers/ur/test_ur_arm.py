@@ -293,6 +293,20 @@ def test_stale_state_is_a_fault(make_arm: MakeArm) -> None:
         move(arm)
 
 
+def test_stale_state_latches_though_it_comes_again(make_arm: MakeArm, tmp_path: Path) -> None:
+    """A child that was frozen and goes on does not move as though nothing had been."""
+    arm = make_arm("hiccup")
+    arm.open()
+    time.sleep(0.9)
+    with pytest.raises(BenchFault, match="s old"):
+        arm.state()
+    time.sleep(0.4)
+    assert not arm.state().moving
+    with pytest.raises(BenchFault, match="s old"):
+        move(arm)
+    assert sent(tmp_path) == []
+
+
 @pytest.mark.parametrize(("mode", "words"), [("mute", "no answer"), ("refuse", "remote control")])
 def test_a_child_that_does_not_open_leaves_no_process_and_no_lock(
     make_arm: MakeArm, mode: str, words: str
