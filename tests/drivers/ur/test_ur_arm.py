@@ -429,3 +429,14 @@ def test_a_sensor_that_does_not_go_to_zero_is_a_fault(make_arm: MakeArm) -> None
     arm.open()
     with pytest.raises(BenchFault, match=r"something pulls at the tool.* reads 7\.0 N"):
         arm.zero_force()
+
+
+def test_a_busy_computer_that_sees_no_state_is_no_pull_at_the_tool(
+    make_arm: MakeArm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ur_arm, "SEEN_WITHIN", 0.1)
+    arm = make_arm("stale")
+    arm.open()
+    time.sleep(0.25)
+    with pytest.raises(BenchFault, match="too busy to see it"):
+        arm.zero_force()
