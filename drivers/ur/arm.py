@@ -209,10 +209,7 @@ class UrArm:
         if not session.comes_true(
             lambda p: bool(int(p[pipe.FIELDS["output_bits"]][0]) & bit) == on, SEEN_WITHIN
         ):
-            raise BenchFault(
-                f"tool digital output {index} did not switch {'on' if on else 'off'}; check the tool's "
-                "supply voltage in the pendant's installation, and that no fieldbus owns the outputs"
-            )
+            raise ur_state.not_switched(index, on)
 
     def stop(self) -> None:
         """Stop now, from any thread and in any state; no motion asked for before begins after.
@@ -255,15 +252,8 @@ class UrArm:
     ) -> bool:
         """Have the child perform a checked motion; stops the arm if the waiting is interrupted."""
         allowed = 1.5 * seconds + MOTION_SPARE
-        message = {
-            "do": "move",
-            "what": what,
-            "epoch": epoch,
-            "seconds": allowed,
-            "force_press": self.limits.force_press,
-            "force_any": self.limits.force_any,
-            **details,
-        }
+        limits = {"force_press": self.limits.force_press, "force_any": self.limits.force_any}
+        message = {"do": "move", "what": what, "epoch": epoch, "seconds": allowed, **limits, **details}
         alarm = None if self._alarm() else self._alarm
         try:
             arrived = bool(session.ask(message, allowed + KILL_SPARE, beat=True, alarm=alarm))

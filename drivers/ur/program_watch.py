@@ -71,8 +71,9 @@ class ProgramWatch:
 
     def _run(self) -> None:
         try:
-            for program in started_programs(self._chunks()):
-                self._judge(program)
+            with self._socket:
+                for program in started_programs(self._chunks()):
+                    self._judge(program)
         except (BenchFault, OSError) as error:
             self.failure = (
                 f"the arm at {self._address}: its messages on port {PORT} ended ({error}); "

@@ -37,7 +37,6 @@ LIMITS = {"ur": "drivers.ur.safety:SafetyLimits"}
 
 _LOG = logging.getLogger(__name__)
 
-
 PRESS, STRIKE, LOOK, BARE = range(4)
 """The samples of a step: the gel pressed on the object, the hammer fired before it, the scene camera's
 picture, the same without the object."""
@@ -179,9 +178,7 @@ def _surround(stack: ExitStack, environment: Mapping[str, str]) -> None:
 def make_arm(station: Station, alarm: Callable[[], str] = lambda: "") -> Arm:
     """The arm's driver, not yet open; its limits hold for the flange, the gel's housing and the hammer.
 
-    Args:
-        station: whose.
-        alarm: why a motion must end, in words; empty while all is well.
+    ``alarm`` says why a motion must end, in words; it is empty while all is well.
     """
     section = station.arm
     made: Arm = loaded(INSTRUMENTS[section.kind])(

@@ -44,7 +44,9 @@ def mock_lab(
                 named = {"arm": where.arm, "gel": where.gel, "camera": where.camera}
                 emit({"schema": 1, **named, "hammer": where.hammer})
             else:
-                ANSWERS.print(f"arm: {where.arm} (ports 29999, 30003, 30004)\ngel: {where.gel}", markup=False)
+                ANSWERS.print(
+                    f"arm: {where.arm} (ports 29999, 30003, 30004, 30011)\ngel: {where.gel}", markup=False
+                )
                 if where.hammer is not None:
                     ANSWERS.print(f"hammer: {where.hammer} (a serial port)", markup=False)
             CONSOLE.print("Ctrl-C ends it")

@@ -299,10 +299,11 @@ def test_a_frozen_program_stops_its_motion_and_may_not_move_again(far_end: FarEn
         while np.abs(far_end.joints() - before).max() < 0.02:
             time.sleep(0.01)
         running.send_signal(signal.SIGSTOP)
-        assert comes_to_rest(far_end, 1.5, FAR)
+        stopped = comes_to_rest(far_end, 1.5, FAR)
         resting = far_end.joints()
         running.send_signal(signal.SIGCONT)
         first, second = (line.decode() for line in running.stdout)
+    assert stopped, "while the program was frozen"
     assert "BenchFault" in first
     assert "was frozen or this computer too busy" in first
     assert second == first

@@ -53,7 +53,8 @@ def main() -> None:
     joints, moving, moving_id, end, start = READY.copy(), False, 0, 0.0, time.monotonic()
     force = 7.0 if mode == "pulled" else 0.0
     while True:
-        if mode != "stale" or time.monotonic() < start + 0.2:
+        silent = {"stale": (0.2, np.inf), "hiccup": (0.2, 1.1)}.get(mode, (np.inf, np.inf))
+        if not silent[0] <= time.monotonic() - start < silent[1]:
             os.write(out, packet(joints, moving, force))
         try:
             request = requests.get(timeout=0.005)

@@ -1,13 +1,18 @@
 """The names of programs that start, from bytes written by hand from the manual of the primary interface."""
 
+import os
+import queue
+import socket
 import struct
+import time
 from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.ur.program_watch import started_programs
+from drivers.ur import program_watch
+from drivers.ur.program_watch import ProgramWatch, started_programs
 from harness.basics.errors import BenchFault
 
 
@@ -52,3 +57,40 @@ def test_a_short_message_is_no_start(body: bytes) -> None:
 def test_a_package_of_impossible_size_is_a_fault(size: int) -> None:
     with pytest.raises(BenchFault, match="bytes"):
         list(started_programs(iter([struct.pack(">i", size) + b"more"])))
+
+
+@pytest.fixture
+def controller() -> Iterator[socket.socket]:
+    """The listening primary port of a controller."""
+    address = f"127.89.{os.getpid() // 250 % 250}.{1 + os.getpid() % 250}"
+    with socket.create_server((address, program_watch.PORT)) as port:
+        yield port
+
+
+def test_a_foreign_program_is_stopped_by_the_watch_itself_whatever_else_hangs(
+    controller: socket.socket,
+) -> None:
+    stops: queue.SimpleQueue[str] = queue.SimpleQueue()
+    watch = ProgramWatch(controller.getsockname()[0], lambda: stops.put("stop"))
+    link, _ = controller.accept()
+    with link:
+        watch.expect()
+        watch.start()
+        link.sendall(key_message("PROGRAM_XXX_STARTED", "rtde_control") + STARTED)
+        assert stops.get(timeout=5.0) == "stop"
+        assert watch.foreign == "'intruder'"
+        assert not watch.awaits
+        link.sendall(key_message("PROGRAM_XXX_STARTED", "rtde_control"))
+        assert stops.get(timeout=5.0) == "stop", "a second one of the driver's name is somebody else's"
+        assert watch.foreign == "'intruder'"
+        assert stops.empty()
+    while not watch.failure:
+        time.sleep(0.001)
+    assert "messages on port 30011 ended" in watch.failure
+
+
+def test_a_controller_without_messages_is_refused(controller: socket.socket) -> None:
+    address = controller.getsockname()[0]
+    controller.close()
+    with pytest.raises(BenchFault, match="would go unnoticed"):
+        ProgramWatch(address, lambda: None)

@@ -293,6 +293,20 @@ def test_stale_state_is_a_fault(make_arm: MakeArm) -> None:
         move(arm)
 
 
+def test_stale_state_latches_though_it_comes_again(make_arm: MakeArm, tmp_path: Path) -> None:
+    """A child that was frozen and goes on does not move as though nothing had been."""
+    arm = make_arm("hiccup")
+    arm.open()
+    time.sleep(0.9)
+    with pytest.raises(BenchFault, match="s old"):
+        arm.state()
+    time.sleep(0.4)
+    assert not arm.state().moving
+    with pytest.raises(BenchFault, match="s old"):
+        move(arm)
+    assert sent(tmp_path) == []
+
+
 @pytest.mark.parametrize(("mode", "words"), [("mute", "no answer"), ("refuse", "remote control")])
 def test_a_child_that_does_not_open_leaves_no_process_and_no_lock(
     make_arm: MakeArm, mode: str, words: str
@@ -414,4 +428,15 @@ def test_a_sensor_that_does_not_go_to_zero_is_a_fault(make_arm: MakeArm) -> None
     arm = make_arm("pulled")
     arm.open()
     with pytest.raises(BenchFault, match=r"something pulls at the tool.* reads 7\.0 N"):
+        arm.zero_force()
+
+
+def test_a_busy_computer_that_sees_no_state_is_no_pull_at_the_tool(
+    make_arm: MakeArm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ur_arm, "SEEN_WITHIN", 0.1)
+    arm = make_arm("stale")
+    arm.open()
+    time.sleep(0.25)
+    with pytest.raises(BenchFault, match="too busy to see it"):
         arm.zero_force()

@@ -234,6 +234,7 @@ def test_a_motion_that_never_begins_is_a_fault(monkeypatch: pytest.MonkeyPatch) 
     outcome = rig.look()
     assert outcome is not None
     assert "did not begin" in str(outcome.error)
+    assert outcome.latch, "it may begin yet"
 
 
 def test_a_dead_script_s_cause_is_waited_for_but_not_for_long() -> None:
