@@ -12,6 +12,7 @@ from harness.effects.scene_object import KnownObject, known_object
 from harness.experiment.compare import require_sources
 from harness.experiment.experiment import Experiment, Planned, Procedure
 from harness.experiment.lookup import runs_folder
+from harness.experiment.solving import TARGET, Target
 from harness.recording.recording import Recording, require_unused
 from harness.recording.run_folder import create_run, station_acquisition, station_calibration
 
@@ -33,6 +34,7 @@ def begin(
     gap: str | None = None,
     folder: Path | None = None,
     bench: str | None = None,
+    target: Target | None = None,
 ) -> Begun:
     """Take in the object, plan and rehearse every step, make the run's folder.
 
@@ -44,6 +46,7 @@ def begin(
         gap: reality gap of a mocked bench; the experiment's or the station's where None.
         folder: of the run; a dated one under ``runs/`` where None.
         bench: of a mocked station, ``wires`` or ``in-process``; over its wires where None.
+        target: what is asked of the answer beside its levels; kept with the plan.
 
     Raises:
         MeshRefused, WrongUse: of the object, the scene, the gap, or a folder that holds a run; or the scene
@@ -72,6 +75,7 @@ def begin(
     described = {
         procedure.plan_key: list(plan.steps),
         **plan.described,
+        **({} if target is None else {TARGET: target.as_json()}),
         "warnings": [*known.warnings, *plan.rehearsal.warnings],
     }
     stamp = dt.datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")

@@ -73,7 +73,7 @@ def answer_as_asked(
     finest = run.solve(readings, budgets.finest)
     said, best = run.described(asked.solved), run.described(finest)
     return {
-        "asked": {"budget_s": target.seconds, "error_m": target.error},
+        "asked": target.as_json(),
         "setting": asked.point.name,
         "levels": dict(asked.point.levels),
         "tried": list(asked.tried),

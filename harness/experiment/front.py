@@ -8,6 +8,7 @@ from harness.bench.scene import SceneFile
 from harness.cost.choice import for_budget, for_error, nearest_condition
 from harness.cost.curve import Curve, Point
 from harness.cost.file import curve_path, load
+from harness.cost.promise import promise_share, typical_promise
 from harness.cost.provenance import code, machine, stale
 from harness.effects.accuracy import Level, Setting
 from harness.effects.scene_object import known_object
@@ -130,14 +131,21 @@ def foresee(experiment: Experiment, scene: SceneFile, target: Target) -> str:
         target: what is asked.
 
     Raises:
-        WrongUse: the cheapest setting measured on this machine takes longer than the budget; nothing like
-            this run was measured, or the experiment keeps no budgets.
+        WrongUse: the cheapest setting measured on this machine takes longer than the budget, or no setting
+            was measured that promised the error; nothing like this run was measured, or the experiment
+            keeps no budgets.
     """
     front = front_for(experiment, scene, budgets_of(experiment).steps(scene))
     name = object_key(scene.object.name, known_object(scene).mesh)
     if target.seconds is None:
         assert target.error is not None
         tried = for_error(front.points, target.error, name)
+        if front.vouches and promise_share(tried[-1], name, target.error) == 0.0:
+            raise WrongUse(
+                f"an error of {1e3 * target.error:g} mm cannot be promised: no answer to runs like this one "
+                f"did, at any setting; half of them promised {1e3 * typical_promise(tried[-1], name):.2g} mm "
+                f"({tried[-1].name}); allow more, or take more {experiment.plural}"
+            )
         return f"for an error of {1e3 * target.error:g} mm: {', then '.join(point.name for point in tried)}"
     found = for_budget(front.points, target.seconds, name, front.scale)
     if not found.fits and front.trusted:

@@ -10,6 +10,9 @@ from harness.cost.curve import Curve
 from harness.effects.accuracy import Level, Setting
 from harness.recording.run_folder import RunFiles
 
+TARGET = "target"
+"""The key of a run's plan under which what was asked of its answer is found again by ``--resume``."""
+
 
 @dataclass(frozen=True)
 class Target:
@@ -26,6 +29,16 @@ class Target:
     def __post_init__(self) -> None:
         if (self.seconds is None) == (self.error is None):
             raise WrongUse("give either a budget of seconds or an error to be met")
+
+    def as_json(self) -> dict[str, float | None]:
+        """For a run's plan and its result."""
+        return {"budget_s": self.seconds, "error_m": self.error}
+
+
+def target_of(plan: Mapping[str, Any]) -> Target | None:
+    """What was asked when a run was planned; None where nothing was."""
+    asked = plan.get(TARGET)
+    return None if asked is None else Target(asked["budget_s"], asked["error_m"])
 
 
 class Shared(Protocol):

@@ -19,22 +19,23 @@ from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.dials import METHOD, SPACING
 from harness.basics.errors import WrongUse
-from harness.bench.station_file import load_station, station_path
+from harness.bench.station_file import Station, load_station, station_path
 from harness.cli import invoke
 from harness.commands.run import run as run_command
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import curve_path, load, save
 from harness.cost.provenance import code, machine
 from harness.effects.accuracy import Accuracy, Level
+from harness.experiment.begin import begin
 from harness.experiment.budget import answer_as_asked, sentences
 from harness.experiment.costing import Work, gathered, joined, measure
 from harness.experiment.front import Front, doubts, foresee, front_for, staleness
-from harness.experiment.solving import Target
+from harness.experiment.solving import Target, target_of
 from harness.experiment.subjects import object_key, objects
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from tests.support import sessions as session_of
-from tests.support.whole_run import copied
+from tests.support.whole_run import copied, touch_scene
 
 COARSE: dict[str, Level] = {
     METHOD.name: "grid",
@@ -148,6 +149,28 @@ def test_a_budget_that_cannot_be_kept_is_refused_before_anything_moves(done: Rec
     with pytest.raises(WrongUse, match="the cheapest setting may take"):
         foresee(EXPERIMENT, scene, Target(seconds=1e-3))
     assert "at most" in foresee(EXPERIMENT, scene, Target(seconds=30.0))
+
+
+def test_an_error_that_no_setting_promises_is_refused_before_anything_moves(
+    done: Recording, cache: Path
+) -> None:
+    save(curve_of(done), curve_path(PROGRAM))
+    scene = RunFiles(done).scene
+    with pytest.raises(WrongUse, match=r"0.001 mm cannot be promised: .* allow more"):
+        foresee(EXPERIMENT, scene, Target(error=1e-6))
+    assert "for an error of 100 mm" in foresee(EXPERIMENT, scene, Target(error=0.1))
+
+
+@pytest.mark.parametrize("target", [Target(seconds=2.0), Target(error=5e-3)])
+def test_what_was_asked_is_with_the_plan_and_is_asked_again_when_the_run_goes_on(
+    target: Target, station: Station, tmp_path: Path
+) -> None:
+    begin(EXPERIMENT, touch_scene(contacts=1), station, 3, folder=tmp_path / "run", target=target)
+    assert target_of(Recording(tmp_path / "run").header.plan) == target
+
+
+def test_a_run_that_was_asked_for_nothing_goes_on_so(done: Recording) -> None:
+    assert target_of(done.header.plan) is None
 
 
 def test_without_a_curve_of_this_machine_the_one_that_came_along_is_gone_by_and_said_to_be_stale(

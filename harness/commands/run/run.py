@@ -120,6 +120,7 @@ def run(
     from harness.experiment.front import doubts, foresee, front_for
     from harness.experiment.levels import chosen_levels
     from harness.experiment.lookup import experiment_of, named, require_of
+    from harness.experiment.solving import target_of
     from harness.recording.recording import Recording
     from harness.recording.run_folder import RunFiles
 
@@ -152,6 +153,8 @@ def run(
         if experiment is not None:
             require_of(recording, named(experiment).name, "--resume")
         accuracy = chosen_levels(kind.knobs, level or [], RunFiles(recording).network_levels)
+        if target is None and not level:
+            target = target_of(recording.header.plan)
     else:
         _ = chosen_levels(kind.knobs, level or [])  # a wrong one is refused before any file is read
         keys: dict[str, Any] = {"contacts": contacts, "presses": presses, "spacing": spacing, "yaw": yaw}
@@ -175,7 +178,7 @@ def run(
         of = load_station(station_path(station or "mock"))
         if target is not None:
             CONSOLE.print(foresee(kind, wanted, target), markup=False)
-        begun = begin(kind, wanted, of, seed, gap, out, bench)
+        begun = begin(kind, wanted, of, seed, gap, out, bench, target)
         recording = begun.recording
         _describe(kind, begun, accuracy)
     written: list[Any] = []
