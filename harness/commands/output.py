@@ -1,9 +1,12 @@
 """What commands say: prose and progress on standard error, one JSON object on standard output."""
 
 import json
+import re
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +29,12 @@ WIDE = 132
 """Columns of a table where what it is written to is no terminal."""
 
 CONSOLE = Console(stderr=True, highlight=False, soft_wrap=True, width=None if sys.stderr.isatty() else WIDE)
+A_MINUTE = 60.0
+"""s after which a work that has no bar says how far it is."""
+
+_DIGITS = re.compile(r"[\d.]+")
+"""What changes in what is being done without another stage beginning."""
+
 ANSWERS = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else WIDE)
 
 
@@ -59,12 +68,57 @@ def stopped(step: str, folder: Path, how: str, as_json: bool) -> int:
     return 130
 
 
+class Pace:
+    """Time taken and time left of a work whose share done is known; says so in lines where there is no bar.
+
+    Args:
+        clock: s, of a clock that does not go back.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._began = self._told = clock()
+        self._first: float | None = None
+        self._stage = ""
+
+    def left(self, share: float) -> str:
+        """``"; 3 min left"`` at a share done from 0 to 1, at the pace so far; nothing before there is one."""
+        if self._first is None:
+            self._first = share
+        done = share - self._first
+        if done <= 0.0 or share >= 1.0:
+            return ""
+        return f"; {duration((self._clock() - self._began) * (1.0 - share) / done)} left"
+
+    def line(self, doing: str, share: float) -> str | None:
+        """What to print of it now: a line where a new stage begins, and one a minute; else None."""
+        left, stage = self.left(share), _DIGITS.sub("", doing)
+        new = stage != self._stage
+        if not new and self._clock() - self._told < A_MINUTE:
+            return None
+        if new:
+            # Another stage has a pace of its own.
+            self._began, self._first, left = self._clock(), share, ""
+        self._stage, self._told = stage, self._clock()
+        return f"{doing}: {100.0 * share:.0f} %{left}" if share > 0.0 else doing
+
+
+def duration(seconds: float) -> str:
+    """A time as people say it: ``"40 s"``, ``"3 min"``, ``"2.1 h"``."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
 class StepProgress:
-    """A bar over the steps of a run."""
+    """A bar over the steps of a run, and a line after each."""
 
     def __init__(self, bar: Progress, done: int, total: int, noun: str) -> None:
         self._bar = bar
         self._noun = noun
+        self._done, self._total = done, total
+        self._pace = Pace()
+        self._pace.left(done / total)
         self._task = bar.add_task(f"{noun}s", completed=done, total=total)
 
     def began(self, step: Step) -> None:
@@ -72,8 +126,11 @@ class StepProgress:
         self._bar.update(self._task, description=f"{self._noun} {step.index + 1}: {step.kind}")
 
     def ended(self, step: Step, seconds: float) -> None:
-        """Count it, and say how long it took."""
-        self._bar.console.print(f"  {self._noun} {step.index + 1} recorded in {seconds:.1f} s")
+        """Count it, and say how long it took and how long the rest will take."""
+        self._done += 1
+        left = self._pace.left(self._done / self._total)
+        said = f"  {self._noun} {step.index + 1} of {self._total} recorded in {seconds:.1f} s{left}"
+        self._bar.console.print(said, markup=False)
         self._bar.advance(self._task)
 
     def say(self, sentence: str) -> None:
@@ -91,7 +148,7 @@ def step_progress(done: int, total: int, noun: str = "step") -> Iterator[StepPro
 
 @contextmanager
 def run_progress(total: int) -> Iterator[Callable[[], None]]:
-    """A progress bar over many runs, and what counts one of them as done."""
+    """A progress bar over many runs, and what counts one as done; lines where there is no terminal."""
     columns = (
         TextColumn("runs"),
         BarColumn(),
@@ -99,19 +156,39 @@ def run_progress(total: int) -> Iterator[Callable[[], None]]:
         TextColumn("left:"),
         TimeRemainingColumn(),
     )
+    pace, done = Pace(), count(1)
     with Progress(*columns, console=CONSOLE, transient=True) as bar:
         task = bar.add_task("runs", total=total)
-        yield lambda: bar.advance(task)
+
+        def advance() -> None:
+            bar.advance(task)
+            at = next(done)
+            _print_line(pace, f"run {at} of {total}", at / total)
+
+        pace.left(0.0)
+        yield advance
 
 
 @contextmanager
 def share_progress() -> Iterator[Callable[[str, float], None]]:
-    """A progress bar for the length of a work, and what tells it: what is being done, and the share done."""
+    """A progress bar for the length of a work, and what is told what is done and the share of it.
+
+    Where there is no terminal a line is printed as each stage begins, and one a minute.
+    """
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    pace = Pace()
     with Progress(*columns, console=CONSOLE, transient=True) as bar:
         task = bar.add_task("", total=1.0)
 
         def report(doing: str, share: float) -> None:
             bar.update(task, description=doing, completed=share)
+            _print_line(pace, doing, share)
 
         yield report
+
+
+def _print_line(pace: Pace, doing: str, share: float) -> None:
+    if not CONSOLE.is_terminal:
+        line = pace.line(doing, share)
+        if line is not None:
+            CONSOLE.print(line, markup=False)
