@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from harness.commands import options
+from harness.commands import options, places
 from harness.commands.object.render_answer import RenderedSound, as_json, draw, print_answer
 from harness.commands.output import emit
 
@@ -41,7 +41,10 @@ def render(
     folder: Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")],
     out: Annotated[Path, typer.Option(help="The sound, 24 bits.", metavar="FILE.wav")],
     at: Annotated[
-        Three | None, typer.Option(help="Where it is struck, metres in the object's frame.", metavar="X Y Z")
+        places.Coordinates | None,
+        typer.Option(
+            help="Where it is struck, in the object's frame: metres, or each with its unit.", metavar="X Y Z"
+        ),
     ] = None,
     vertex: Annotated[
         int | None, typer.Option(help="Or at a vertex of mesh.ply, counted from 0.", metavar="N")
@@ -144,7 +147,7 @@ def _check(
 def _rendered(
     folder: Path,
     level: str,
-    at: Three | None,
+    at: places.Coordinates | None,
     vertex: int | None,
     force: Three | None,
     given: _Pulse,
@@ -183,12 +186,12 @@ def _level(text: str) -> "AudioLevel":
     raise WrongUse(f"no level {text!r} of a sound; --level takes network, or table for the exact gains")
 
 
-def _place(audio: "ObjectAudio", at: Three | None, vertex: int | None) -> "Place":
+def _place(audio: "ObjectAudio", at: places.Coordinates | None, vertex: int | None) -> "Place":
     from harness.basics.errors import WrongUse
     from harness.objectfile.audio.strike import place_near, place_of_vertex
 
     if at is not None and vertex is None:
-        return place_near(audio.surface, at, audio.most)
+        return place_near(audio.surface, places.point("--at", at), audio.most)
     if vertex is not None and at is None:
         return place_of_vertex(audio.surface.mesh, vertex)
     raise WrongUse("say where it is struck: either --at X Y Z in metres, or --vertex N")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from harness.commands import force_options as forces
-from harness.commands import options
+from harness.commands import options, places
 from harness.commands.object.render_touch_answer import RenderedPress, as_json, draw, notes, print_answer
 from harness.commands.output import emit, warn
 
@@ -21,15 +21,19 @@ if TYPE_CHECKING:
     from harness.sim.gel.press_pose import ContactPlace
     from harness.sim.optics.pressed_gel import Gel
 
-Three = tuple[float, float, float]
-
 
 def render(
     folder: Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")],
-    contact: Annotated[
-        Three, typer.Option(help="Where it is pressed, metres in the object's frame.", metavar="X Y Z")
-    ],
     out: Annotated[Path, typer.Option(help="The picture, 8 bits RGB.", metavar="FILE.png")],
+    contact: Annotated[
+        places.Coordinates | None,
+        typer.Option(
+            help="Where it is pressed, in the object's frame: metres, or each with its unit.", metavar="X Y Z"
+        ),
+    ] = None,
+    vertex: Annotated[
+        int | None, typer.Option(help="Or at a vertex of mesh.ply, counted from 0.", metavar="N")
+    ] = None,
     depth: Annotated[str, typer.Option(help="How deep the gel's centre is pressed on.", metavar="L")] = "1mm",
     tilt: Annotated[str, typer.Option(help="Between the gel's axis and the normal.", metavar="A")] = "0deg",
     azimuth: Annotated[
@@ -101,7 +105,7 @@ def render(
     table, levels = forces.measured(force_table, [])
     gel = _gel(sensor, calibration, forces.stiffness(gel_modulus, gel_modulus_error, gel_poisson), table)
     pressing = _Pressing(gel, (deep, tilted, towards, turned), levels, force)
-    rendered = _rendered(folder, _level(level), contact, pressing)
+    rendered = _rendered(folder, _level(level), contact, vertex, pressing)
     write_png(out, rendered.press.image)
     if height_out is not None:
         _write_heights(height_out, rendered)
@@ -141,19 +145,22 @@ def _gel(
     return replace(known_gel(sensor, calibration, shadow=False), elastic=elastic, forces=table)
 
 
-def _rendered(folder: Path, level: "TouchLevel", contact: Three, by: _Pressing) -> RenderedPress:
-    import numpy as np
-
+def _rendered(
+    folder: Path,
+    level: "TouchLevel",
+    contact: places.Coordinates | None,
+    vertex: int | None,
+    by: _Pressing,
+) -> RenderedPress:
     from harness.objectfile.file import ObjectFile
     from harness.objectfile.touch.level import require_gel
     from harness.objectfile.touch.touch import open_touch
-    from harness.sim.gel.press_pose import contact_place
 
     begun = time.perf_counter()
     of = ObjectFile.open(folder)
     touch = open_touch(of, level)
     require_gel(of, touch.entry.gel, by.gel.sensor, by.gel.calibration.header.skirt)
-    place = contact_place(of.mesh, np.array(contact))
+    place = places.pressed_place(of.mesh, contact, vertex)
     # The first press makes ready what all that follow use.
     _pressed(of, touch, place, by)
     loaded, begun = time.perf_counter() - begun, time.perf_counter()

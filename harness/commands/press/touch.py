@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from harness.commands import force_options as forces
-from harness.commands import options
+from harness.commands import options, places
 from harness.commands.output import emit, warn
 from harness.commands.press import touch_sources as sources
 from harness.commands.press.touch_answer import Touched, as_json, draw, print_answer
-from harness.commands.press.touch_sources import Three, refuse
+from harness.commands.press.touch_sources import refuse
 
 
 def touch(
@@ -82,8 +82,13 @@ def touch(
         typer.Option(help="Dots of the very gel, as calibrate markers wrote them.", metavar="FILE.json"),
     ] = None,
     contact: Annotated[
-        Three | None,
-        typer.Option(help="Of a mesh: where, metres in the mesh file's frame.", metavar="X Y Z"),
+        places.Coordinates | None,
+        typer.Option(
+            help="Of a mesh: where, in the mesh file's frame: metres, or each with its unit.", metavar="X Y Z"
+        ),
+    ] = None,
+    vertex: Annotated[
+        int | None, typer.Option(help="Or at a vertex of the mesh, counted from 0.", metavar="N")
     ] = None,
     depth: Annotated[
         str | None,
@@ -161,18 +166,21 @@ def touch(
     if (mesh is None) == (height is None):
         refuse("say what is pressed: either a MESH with --contact X Y Z, or --height FILE.npy")
     if height is not None:
-        if any(given is not None for given in (contact, depth, tilt, azimuth, yaw, units, objectfile)):
+        of_mesh = (contact, vertex, depth, tilt, azimuth, yaw, units, objectfile)
+        if any(given is not None for given in of_mesh):
             refuse(
-                "--contact, --depth, --tilt, --azimuth, --yaw, --units and --objectfile are of a mesh; "
-                "--height is a map"
+                "--contact, --vertex, --depth, --tilt, --azimuth, --yaw, --units and --objectfile are of a "
+                "mesh; --height is a map"
             )
         touched = sources.of_heights(height, heights_of, reached, gel, levels, force)
     else:
-        if contact is None or heights_of != "object" or reached is not None:
-            refuse("a mesh needs --contact X Y Z, and --heights-of and --reached are of --height")
+        if (contact is None and vertex is None) or heights_of != "object" or reached is not None:
+            refuse(
+                "a mesh needs --contact X Y Z or --vertex N, and --heights-of and --reached are of --height"
+            )
         assert mesh is not None
         pose = (depth, tilt, azimuth, yaw)
-        touched = sources.of_mesh(mesh, units, contact, pose, gel, levels, objectfile, force)
+        touched = sources.of_mesh(mesh, units, contact, vertex, pose, gel, levels, objectfile, force)
     if pressure_out is not None:
         _write_pressure(pressure_out, touched)
     return _finish(touched, {"calibration": loaded}, out, live, picture, height_out, json)

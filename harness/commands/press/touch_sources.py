@@ -5,15 +5,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from harness.commands import options
+from harness.commands import options, places
 from harness.commands.press.touch_answer import Touched
 
 if TYPE_CHECKING:
     from harness.bench.scene import SceneFile
     from harness.sim.gel.height_file import Heights
     from harness.sim.optics.pressed_gel import Gel
-
-Three = tuple[float, float, float]
 
 
 def refuse(sentence: str) -> NoReturn:
@@ -90,7 +88,8 @@ def _heights_of(text: str) -> "Heights":
 def of_mesh(
     mesh: str,
     units: str | None,
-    contact: Three,
+    contact: places.Coordinates | None,
+    vertex: int | None,
     pose: tuple[str | None, str | None, str | None, str | None],
     gel: "Gel",
     levels: list[str],
@@ -98,12 +97,10 @@ def of_mesh(
     force: bool = False,
 ) -> Touched:
     """The press of a mesh; ``pose`` is depth, tilt, azimuth and yaw with their units, None where left out."""
-    import numpy as np
-
     from harness.basics.quantities import ANGLE, LENGTH
     from harness.effects.scene_object import known_object
     from harness.effects.touch_press import press_mesh
-    from harness.sim.gel.press_pose import contact_place, gel_from_object
+    from harness.sim.gel.press_pose import gel_from_object
     from harness.sim.gel.presses import Presses
 
     depth = options.quantity("--depth", pose[0] or "1mm", LENGTH)
@@ -114,7 +111,7 @@ def of_mesh(
     begun = time.perf_counter()
     scene = _scene(mesh, units, gel, objectfile)
     known = known_object(scene)
-    place = contact_place(known.mesh, np.array(contact))
+    place = places.pressed_place(known.mesh, contact, vertex)
     at = gel_from_object(place, depth, tilt, azimuth, yaw)
     read = time.perf_counter() - begun
     sources = {

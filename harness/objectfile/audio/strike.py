@@ -89,20 +89,22 @@ def place_near(surface: SurfaceSearch, point: ArrayLike, most: float) -> Place:
     asked = checked_points(np.array(point, dtype=np.float64)[None])
     low, high = surface.mesh.bounds
     outside = float(np.maximum(low - asked[0], asked[0] - high).max())
+    size = float(np.linalg.norm(high - low))
     # What lies far out of the box is not searched for: its squares may overflow.
-    if outside > most:
-        raise _too_far(f"{outside * 1e3:.3g} mm or more", most)
-    places, faces = surface.nearest(asked, most)
+    if outside > size + most:
+        raise _too_far(f"{outside * 1e3:.3g} mm or more", most, "move it onto the surface")
+    places, faces = surface.nearest(asked, 2.0 * (size + most))
     moved = float(np.linalg.norm(places[0] - asked[0]))
     if moved > most:
-        raise _too_far(f"{moved * 1e3:.3g} mm", most)
+        x, y, z = np.round(places[0], 6) + 0.0  # no -0
+        raise _too_far(f"{moved * 1e3:.3g} mm", most, f"say the nearest place, {x:g} {y:g} {z:g}")
     return Place(read_only(places[0]), surface.mesh.face_normals[faces[0]], moved)
 
 
-def _too_far(gap: str, most: float) -> OutOfDomain:
+def _too_far(gap: str, most: float, instead: str) -> OutOfDomain:
     return OutOfDomain(
         f"the place to strike is {gap} off the surface; the limit is {most * 1e3:.3g} mm. Is it in metres "
-        "and in the mesh's frame? Else move it onto the surface"
+        f"and in the mesh's frame? Else {instead}"
     )
 
 

@@ -58,12 +58,24 @@ def contact_place(mesh: Mesh, asked: FloatArray) -> ContactPlace:
     if moved > MOST_MOVED:
         raise OutOfDomain(
             f"the contact ({point[0]:g}, {point[1]:g}, {point[2]:g}) m is {moved * 1e3:.4g} mm off the "
-            f"surface; the limit is {MOST_MOVED * 1e3:g} mm{_hint(mesh, point)}"
+            f"surface; the limit is {MOST_MOVED * 1e3:g} mm{_hint(mesh, point, place)}"
         )
     normal = _smooth_normal(mesh, place, face)
     if not normal.any():
         raise OutOfDomain("the surface has no normal at the contact; move it off the sliver of a face")
     return ContactPlace(read_only(place), read_only(normal), moved)
+
+
+def contact_vertex(mesh: Mesh, vertex: int) -> ContactPlace:
+    """A vertex of a mesh, counted from 0, as a place to press.
+
+    Raises:
+        OutOfDomain: there is no such vertex, or its faces have no area.
+    """
+    count = len(mesh.vertices)
+    if not 0 <= vertex < count:
+        raise OutOfDomain(f"there is no vertex {vertex}; the mesh has {count}, say 0 to {count - 1}")
+    return contact_place(mesh, mesh.vertices[vertex])
 
 
 def gel_from_object(place: ContactPlace, depth: float, tilt: float, azimuth: float, yaw: float) -> FloatArray:
@@ -104,11 +116,12 @@ def _nearest(mesh: Mesh, point: FloatArray) -> tuple[FloatArray, int]:
     return places[0], int(faces[0])
 
 
-def _hint(mesh: Mesh, point: FloatArray) -> str:
+def _hint(mesh: Mesh, point: FloatArray, nearest: FloatArray) -> str:
     place, _ = _nearest(mesh, point * 1e-3)
     if np.linalg.norm(place - point * 1e-3) <= MOST_MOVED:
-        return "; read as millimetres it would be on it: write metres"
-    return "; give a point of the surface, in metres in the mesh file's frame"
+        return "; read as millimetres it would be on it: write metres, or each number with its unit"
+    x, y, z = np.round(nearest, 6) + 0.0  # no -0
+    return f"; give a point of the surface, as the nearest, {x:g} {y:g} {z:g} (metres, mesh frame)"
 
 
 def _smooth_normal(mesh: Mesh, place: FloatArray, face: int) -> FloatArray:

@@ -195,6 +195,13 @@ def test_a_point_too_far_off_is_refused_with_the_limit(audio: ObjectAudio, off: 
         place_near(audio.surface, np.array([0.11 - 0.03 - off, -0.02, 0.05]), NEAR)
 
 
+def test_a_point_off_the_surface_is_answered_with_the_nearest_that_is_taken(audio: ObjectAudio) -> None:
+    with pytest.raises(OutOfDomain, match="say the nearest place") as refused:
+        place_near(audio.surface, np.array([0.11 - 0.03 - 5.0 * NEAR, -0.02, 0.05]), NEAR)
+    nearest = [float(text) for text in str(refused.value).split("place, ")[1].split()]
+    assert place_near(audio.surface, np.array(nearest), NEAR).moved < 1e-6
+
+
 def test_a_point_that_is_no_number_is_refused(audio: ObjectAudio) -> None:
     with pytest.raises(WrongUse, match="finite"):
         place_near(audio.surface, np.array([0.1, float("nan"), 0.05]), NEAR)
