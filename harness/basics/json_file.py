@@ -34,7 +34,13 @@ def read_model(path: Path, kind: type[M], what: str, advice: str) -> M:
     try:
         return kind.model_validate_json(read_bounded(path, what, MOST_JSON, CalibrationRefused))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "all of it"
-        said = first["msg"].removeprefix("Value error, ")
-        raise CalibrationRefused(f"{path} is no {what}: {where}: {said}; {advice}") from error
+        raise CalibrationRefused(f"{path} is no {what}: {_first(error)}; {advice}") from error
+
+
+def _first(error: ValidationError) -> str:
+    first = error.errors()[0]
+    if first["type"] == "json_invalid":
+        return "it is no JSON"
+    where = ".".join(str(part) for part in first["loc"]) or "all of it"
+    said = first["msg"].removeprefix("Value error, ").replace("Input should", "it should")
+    return f"{where}: {said}"

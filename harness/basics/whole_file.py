@@ -37,12 +37,12 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         OSError: with the path, which a full disk's own error does not name.
     """
     path = Path(os.path.realpath(path))
-    if path.exists() and not path.is_file():
-        with path.open("wb") as stream:
-            yield stream
-        return
     part = path.with_name(f".{path.name}.part")
     try:
+        if path.exists() and not path.is_file():
+            with path.open("wb") as stream:
+                yield stream
+            return
         with part.open("wb") as stream:
             yield stream
             stream.flush()
@@ -51,9 +51,9 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         sync_folder(path.parent)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise (
-            error if error.filename is not None else OSError(error.errno, error.strerror, str(path))
-        ) from error
+        if error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
     except BaseException:
         part.unlink(missing_ok=True)
         raise

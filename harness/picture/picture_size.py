@@ -5,7 +5,6 @@ from io import BytesIO
 from PIL import Image
 
 from harness.basics.errors import DataRefused, TouchstoneError
-from harness.basics.foreign_file import refused_as
 
 MOST_PIXELS = 2**25
 """Of a picture; the largest cameras of a bench have some 20 million."""
@@ -24,10 +23,13 @@ def require_modest_picture(data: bytes, name: str, refused: type[TouchstoneError
     Raises:
         TouchstoneError: of the class ``refused``.
     """
-    no_picture = refused_as(refused, f"{name} is no picture ({len(data)} bytes); give a PNG or a JPEG")
-    with no_picture, Image.open(BytesIO(data), formats=_FORMATS) as head:
-        columns, rows = head.size
+    most = f"a picture has at most {MOST_PIXELS:,}: shrink it"
+    try:
+        with Image.open(BytesIO(data), formats=_FORMATS) as head:
+            columns, rows = head.size
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
+        raise refused(f"{name} states far more pixels than a camera has; {most}") from error
+    except Exception as error:
+        raise refused(f"{name} is no picture ({len(data)} bytes); give a PNG or a JPEG") from error
     if rows * columns > MOST_PIXELS:
-        raise refused(
-            f"{name} states {rows:,} x {columns:,} pixels; a picture has at most {MOST_PIXELS:,}: shrink it"
-        )
+        raise refused(f"{name} states {rows:,} x {columns:,} pixels; {most}")

@@ -26,7 +26,9 @@ from tests.samples.object_bench import egg_part
 from tests.support.hostile_files import make_hostile_files
 
 STEEL = ("--material", "steel", "--units", "mm")
-GEL = ("--sensor", "gelsight-r1.5")
+
+PLACE = ("--contact", "0.04", "0", "0.05", "--depth", "1mm")
+CAMERA = ("--camera", "0.3", "0", "0.1")
 
 USES: dict[str, tuple[str, ...]] = {
     "run --scene": ("run", "--scene", "FILE"),
@@ -67,25 +69,35 @@ USES: dict[str, tuple[str, ...]] = {
     "object import": ("object import", "FILE", "--out", "OUT"),
     "object view": ("object view", "FILE"),
     "object render audio": ("object render audio", "FILE", "--out", "OUT.wav"),
-    "object render touch": ("object render touch", "FILE", "--out", "OUT.png"),
+    "object render touch": ("object render touch", "FILE", *PLACE, "--out", "OUT.png"),
     "object render vision": ("object render vision", "FILE", "--out", "OUT.png"),
     "object render queries": (
         *("object render queries", "OBJECT", "--audio-vertices", "FILE", "--audio-forces", "FILE"),
         *("--out", "OUT"),
     ),
-    "object compare vision": ("object compare vision", "FILE", "--live", "GREY.png", "--out", "OUT.png"),
+    "object compare vision": (
+        "object compare vision",
+        "FILE",
+        "--live",
+        "GREY.png",
+        *CAMERA,
+        "--out",
+        "OUT.png",
+    ),
     "calibrate taxim": ("calibrate taxim", "FILE", "--ball-radius", "2 mm", "--out", "OUT.npz"),
     "calibrate taxim --scene": (
         *("calibrate taxim", "--scene", "FILE", "--station", "mock", "--ball-radius", "2 mm"),
     ),
     "calibrate markers": ("calibrate markers", "FILE", "--out", "OUT.json"),
     "sim modes": ("sim modes", "FILE", *STEEL),
-    "sim touch": ("sim touch", "FILE", "--units", "mm", "--out", "OUT.png"),
+    "sim touch": ("sim touch", "FILE", "--units", "mm", *PLACE, "--out", "OUT.png"),
     "sim touch --height": ("sim touch", "--height", "FILE", "--out", "OUT.png"),
     "sim touch --sensor": ("sim touch", "builtin:mug", "--sensor", "FILE", "--out", "OUT.png"),
     "sim touch --calibration": ("sim touch", "builtin:mug", "--calibration", "FILE", "--out", "OUT.png"),
     "sim touch --markers": ("sim touch", "builtin:mug", "--markers", "FILE", "--out", "OUT.png"),
-    "sim touch --force-table": ("sim touch", "builtin:mug", "--force-table", "FILE", "--out", "OUT.png"),
+    "sim touch --force-table": (
+        *("sim touch", "builtin:mug", *PLACE, "--force", "--force-table", "FILE", "--out", "OUT.png"),
+    ),
 }
 
 _PYTHONS_OWN = re.compile(
@@ -157,6 +169,7 @@ def walk(folder: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
     def step(use: str, name: str) -> None:
         words = [word for part in USES[use] for word in (part.split() if part[0].islower() else [part])]
         arguments = [str(Path("hostile") / name) if word == "FILE" else word for word in words]
+        link = (folder / "hostile" / name).is_symlink()
         before = set(folder.rglob("*"))
         with bounded():
             code = invoke([*arguments, "--json"])
@@ -167,7 +180,8 @@ def walk(folder: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
         assert code in (1, 2), answer
         assert answer["exit_code"] == code
         assert answer["kind"] != UNFORESEEN
-        assert answer["error"].strip()
+        named = (name.partition("\n")[0], str((folder / "hostile" / name).readlink()) if link else name)
+        assert any(each in answer["error"] for each in (*named, "extra `author`")), answer["error"]
         assert not _PYTHONS_OWN.search(answer["error"]), answer["error"]
         assert set(folder.rglob("*")) == before, "a refused command leaves nothing behind"
 
