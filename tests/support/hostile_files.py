@@ -22,7 +22,7 @@ def make_hostile_files(folder: Path) -> dict[str, Path]:
     folder.mkdir(parents=True, exist_ok=True)
     for name, make in _MADE.items():
         make(folder / name)
-    return {name: folder / name for name in (*_MADE, "absent.toml", "absent.obj")}
+    return {name: folder / name for name in NAMES}
 
 
 def _bytes(data: bytes) -> Callable[[Path], object]:
@@ -196,3 +196,6 @@ _MADE: dict[str, Callable[[Path], object]] = {
     "picture_folder": _folder_with("press.png", "no picture"),
     "pack_folder": _folder_with("dataPack.npz", "no archive"),
 }
+
+NAMES = (*_MADE, "absent.toml", "absent.obj")
+"""Of the files; the last ones are not there."""

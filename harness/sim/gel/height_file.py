@@ -58,9 +58,9 @@ def read_heights(path: Path, sensor: TactileSensor, of: Heights = "object") -> G
         DataRefused: the file does not read, or holds something else than numbers.
         OutOfDomain: another shape, no height at all, or heights in another unit or of another sign.
     """
+    require_file(path, "height map")
     if path.suffix != ".npy":
         raise DataRefused(f"{path}: a height map is read from a .npy file; write it with numpy.save")
-    require_file(path, "height map")
     found = read_array(path, "a height map")
     if found.dtype.kind != "f":
         raise DataRefused(
