@@ -103,7 +103,7 @@ def touch(
         str | None, typer.Option(help="Of a mesh: the sensor turned about its own axis.", metavar="A")
     ] = None,
     units: Annotated[
-        str | None, typer.Option(help="Of the mesh file's numbers: m, cm, mm or in.", metavar="U")
+        str | None, typer.Option(help="Of the mesh file's numbers: m, cm, mm, um, in or ft.", metavar="U")
     ] = None,
     objectfile: Annotated[
         Path | None,
