@@ -7,7 +7,9 @@ import importlib
 import json
 import os
 import sys
+import traceback
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import wraps
 from inspect import cleandoc, signature
@@ -17,7 +19,8 @@ import typer
 from rich.console import Console
 from typer.exceptions import TyperException
 
-from harness.basics.errors import TouchstoneError
+from harness.basics.answers import answers_alone, write_answer
+from harness.basics.errors import TouchstoneError, WrongUse
 from harness.bench.experiments import EXPERIMENTS
 
 
@@ -156,6 +159,12 @@ GROUPS = {
     "sim": "What the simulators compute, one at a time.",
 }
 
+SYSTEM = "system error"
+"""The kind of a failure of the computer's: a full disk, a folder that may not be written."""
+
+UNFORESEEN = "unforeseen"
+"""The kind of a defect of Touchstone's own."""
+
 _MOST_WORDS = 3
 """Of a command's name."""
 
@@ -172,18 +181,29 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def invoke(arguments: list[str]) -> int:
     """Run the command line; the exit code instead of an exit."""
+    as_json = "--json" in arguments
+    with answers_alone() if as_json else nullcontext():
+        return _ended(arguments, as_json)
+
+
+def _ended(arguments: list[str], as_json: bool) -> int:
     try:
         result = _app(_chosen(_completed() or arguments))(arguments, standalone_mode=False, prog_name=PROGRAM)
     except TouchstoneError as error:
-        return _report(str(error), error.exit_code, "--json" in arguments)
+        return _report(str(error), error.kind(), error.exit_code, as_json)
     except KeyboardInterrupt:
-        return _report(str(Interrupted()), Interrupted.exit_code, "--json" in arguments)
+        return _report(str(Interrupted()), Interrupted.kind(), Interrupted.exit_code, as_json)
+    except FileNotFoundError as error:
+        return _report(_of_system(error), WrongUse.kind(), WrongUse.exit_code, as_json)
     except OSError as error:
-        return _report(_of_system(error), 1, "--json" in arguments)
+        return _report(_of_system(error), SYSTEM, 1, as_json)
     except TyperException as error:
         # The library's checker of values puts its own kind of error before what is said.
         said = error.format_message().replace("Value error, ", "")
-        return _report(said, error.exit_code, "--json" in arguments)
+        return _report(said, WrongUse.kind(), error.exit_code, as_json)
+    except Exception as error:  # noqa: BLE001 - the last place where a program can still get an answer
+        traceback.print_exc()
+        return _report(_unforeseen(error), UNFORESEEN, 1, as_json)
     return result if isinstance(result, int) else 0
 
 
@@ -273,10 +293,10 @@ def _stub() -> None:
     """Stand in for a command that is listed but not run."""
 
 
-def _report(message: str, code: int, as_json: bool) -> int:
+def _report(message: str, kind: str, code: int, as_json: bool) -> int:
     Console(stderr=True, highlight=False, soft_wrap=True).print(f"[bold red]error:[/] {_escape(message)}")
     if as_json:
-        sys.stdout.write(json.dumps({"schema": 1, "error": message, "exit_code": code}) + "\n")
+        write_answer(json.dumps({"schema": 1, "error": message, "kind": kind, "exit_code": code}))
     return code
 
 
@@ -284,6 +304,13 @@ def _of_system(error: OSError) -> str:
     """A folder that may not be written, a full disk: what, and of which file."""
     reason = error.strerror or type(error).__name__
     return f"{error.filename}: {reason}" if error.filename is not None else reason
+
+
+def _unforeseen(error: Exception) -> str:
+    return (
+        f"Touchstone failed in a way that nobody foresaw ({type(error).__name__}); report the lines above "
+        "this one, with the command and its files"
+    )
 
 
 def _escape(message: str) -> str:

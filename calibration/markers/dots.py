@@ -30,6 +30,9 @@ _SAMPLED = 0.004
 _CLOSE = 1e-6
 """Of a place: how closely its fit is finished."""
 
+_ENOUGH = 480
+"""Pixels of the shorter side: the gel's own light needs no more, and a median counts in 16 bits."""
+
 _SPECK = 6
 _AROUND = 1.8
 """Radii about a dot that it is fitted over, or half the way to the next dot where that is nearer."""
@@ -92,12 +95,15 @@ def find_dots(picture: ByteArray) -> Dots:
 def relative_light(picture: ByteArray) -> FloatArray:
     """``(rows, columns)`` light over the gel's own about it: 1 beside the dots, the ink's share on them.
 
-    The gel's own is the median over a quarter of the shorter side: dots cover far less than half of that.
+    The gel's own is the median over a quarter of the shorter side: dots cover far less than half of that. It
+    changes slowly, so that it is found on a smaller picture where the camera has many pixels.
     """
-    side = (min(picture.shape[:2]) // 4) | 1
-    gel = sum(
-        cv2.medianBlur(np.ascontiguousarray(picture[..., c]), side).astype(np.float64) for c in range(3)
-    )
+    rows, columns = picture.shape[:2]
+    by = max(1, min(rows, columns) // _ENOUGH)
+    small = cv2.resize(picture, (columns // by, rows // by), interpolation=cv2.INTER_AREA)
+    side = (min(small.shape[:2]) // 4) | 1
+    medians = cv2.merge([cv2.medianBlur(channel, side) for channel in cv2.split(small)])
+    gel = cv2.resize(medians, (columns, rows), interpolation=cv2.INTER_LINEAR).astype(np.float64).sum(axis=2)
     light: FloatArray = picture.astype(np.float64).sum(axis=2) / np.maximum(gel, 1.0)
     return light
 

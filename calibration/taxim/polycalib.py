@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.basics.npz_file import write_arrays
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 
@@ -18,5 +19,5 @@ def write_polycalib(calibration: TactileCalibration, path: Path) -> None:
         path: of the file.
     """
     red, green, blue = (calibration.table[..., c].astype(np.float64) for c in range(3))
-    with path.open("wb") as file:
-        np.savez(file, bins=np.int64(calibration.bins), grad_r=blue, grad_g=green, grad_b=red)
+    bins = np.array(calibration.bins, dtype=np.int64)
+    write_arrays(path, {"bins": bins, "grad_r": blue, "grad_g": green, "grad_b": red})

@@ -8,9 +8,8 @@ computed from a nominal rate, so each frame is stamped here on arrival.
 import os
 import threading
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from harness.basics.arrays import ByteArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 from harness.bench.reading import Channel, Reading
+from harness.picture.jpeg import decode_jpeg
 
 OPEN_TIMEOUT = 2.0
 """s until a host that does not answer, or sends no frame, is given up."""
@@ -30,6 +30,12 @@ _RETRY_PERIOD = 0.1
 _KEPT_FRAMES = 64
 _RHYTHM_FRAMES = 8
 _RHYTHM_GAIN = 0.1
+_EVEN = 0.7
+"""Share of the gaps between frames that are alike where a stream has a rhythm."""
+
+_MOST_OF_TIME = 0.25
+"""Share of the time that as many usual gaps fill there: the rest may be stalls."""
+
 _END_OF_IMAGE = b"\xff\xd9"
 
 
@@ -62,6 +68,7 @@ class MjpegStream:
         self._missed = 0
         self._reopened = 0
         self._due = 0.0
+        self._opened = 0.0
         self._stalled = False
         self._whole = 0.0
 
@@ -101,18 +108,34 @@ class MjpegStream:
         """The next ``count`` frames that arrive from now on, decoded to RGB.
 
         Raises:
-            BenchFault: after ``timeout`` s without them, or for frames of another size.
+            BenchFault: after ``timeout`` s without them, or for frames of another size. Frames of which bytes
+                were lost are none.
         """
-        frames = self._next_frames(count, timeout)
-        images = np.stack([self._decode(frame.jpeg) for frame in frames])
-        return Reading(
-            self.channel, np.array([frame.time for frame in frames]), images, tuple(f.jpeg for f in frames)
-        )
+        if self._thread is None:
+            raise BenchFault(f"{self.name} was read before it was opened; open the bench first")
+        if not 1 <= count <= _KEPT_FRAMES:
+            raise ValueError(f"{count} frames asked for; between 1 and {_KEPT_FRAMES} can be kept")
+        after, damaged = now(), self._damaged
+        until = after + timeout
+        read: list[tuple[Frame, ByteArray]] = []
+        while len(read) < count:
+            frames = self._next_frames(count - len(read), after, until)
+            read += [(frame, image) for frame in frames if (image := self._decode(frame.jpeg)) is not None]
+            if now() >= until and len(read) < count:
+                lost = f", {self._damaged - damaged} damaged ones beside" if self._damaged > damaged else ""
+                raise BenchFault(
+                    f"{self.name} sent {len(read)} of {count} frames in {timeout:g} s{lost}; "
+                    f"the stream at {self.url} has stalled: check the camera's power and cable"
+                )
+            after = frames[-1].time if frames else after
+        times = np.array([frame.time for frame, _ in read])
+        images = np.stack([image for _, image in read])
+        return Reading(self.channel, times, images, tuple(frame.jpeg for frame, _ in read))
 
     @property
     def rate(self) -> float:
-        """Frames a second over the newest frames; zero before two have arrived."""
-        times = self._recent_times()
+        """Frames a second over the newest frames of this connection; zero before two have arrived."""
+        times = [time for time in self._recent_times() if time > self._opened]
         return (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
 
     @property
@@ -139,43 +162,45 @@ class MjpegStream:
         with self._arrived:
             return [frame.time for frame in self._frames]
 
-    def _next_frames(self, count: int, timeout: float) -> list[Frame]:
-        if self._thread is None:
-            raise BenchFault(f"{self.name} was read before it was opened; open the bench first")
-        if not 1 <= count <= _KEPT_FRAMES:
-            raise ValueError(f"{count} frames asked for; between 1 and {_KEPT_FRAMES} can be kept")
-        asked = now()
+    def _next_frames(self, count: int, after: float, until: float) -> list[Frame]:
+        """The first ``count`` frames after ``after`` on the bench clock; fewer where it reaches ``until``."""
 
         def fresh() -> list[Frame]:
-            return [frame for frame in self._frames if frame.time > asked]
+            return [frame for frame in self._frames if frame.time > after]
 
         with self._arrived:
-            if not self._arrived.wait_for(lambda: len(fresh()) >= count, timeout):
-                raise BenchFault(
-                    f"{self.name} sent {len(fresh())} of {count} frames in {timeout:g} s; "
-                    f"the stream at {self.url} has stalled: check the camera's power and cable"
-                )
+            self._arrived.wait_for(lambda: len(fresh()) >= count, max(0.0, until - now()))
             return fresh()[:count]
 
-    def _decode(self, jpeg: bytes) -> ByteArray:
-        import cv2
+    def _decode(self, jpeg: bytes) -> ByteArray | None:
+        """``(rows, columns, 3)`` RGB; None of a frame that lost bytes, which a plain decoder fills up."""
+        import simplejpeg
 
-        image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-        if image is None:
-            raise BenchFault(f"{self.name}: {self.url} sends something that is not JPEG; check the address")
-        if image.shape != self.channel.shape:
-            rows, columns = self.channel.shape[:2]
+        try:
+            # By its head alone: a head that states a larger picture takes no memory.
+            rows, columns = simplejpeg.decode_jpeg_header(jpeg)[:2]
+        except ValueError as error:
             raise BenchFault(
-                f"{self.name}: {self.url} sends {image.shape[1]} x {image.shape[0]} pixels and the station "
-                f"expects {columns} x {rows}; set the stream's size or name the right sensor"
+                f"{self.name}: {self.url} sends something that is not JPEG; check the address"
+            ) from error
+        if (rows, columns) != self.channel.shape[:2]:
+            high, wide = self.channel.shape[:2]
+            raise BenchFault(
+                f"{self.name}: {self.url} sends {columns} x {rows} pixels and the station expects "
+                f"{wide} x {high}; set the stream's size or name the right sensor"
             )
-        return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8)
+        try:
+            simplejpeg.decode_jpeg(jpeg, strict=True)
+        except ValueError:
+            self._damaged += 1
+            return None
+        return decode_jpeg(jpeg)
 
     def _drain(self, capture: Any) -> None:
         while not self._closing.is_set():
             arrived, packet = capture.read()
             if arrived:
-                self._keep(Frame(now(), packet.tobytes()))
+                self._keep(now(), packet.tobytes())
                 continue
             # After one timeout a capture is dead for good, although it calls itself open.
             capture.release()
@@ -184,6 +209,7 @@ class MjpegStream:
             capture = self._reconnect()
             if capture is None:
                 return
+            self._opened = now()
         capture.release()
 
     def _reconnect(self) -> Any:
@@ -193,11 +219,14 @@ class MjpegStream:
                 return capture
         return None
 
-    def _keep(self, frame: Frame) -> None:
-        if _END_OF_IMAGE not in frame.jpeg[-16:]:
+    def _keep(self, time: float, packet: bytes) -> None:
+        end = packet.rfind(_END_OF_IMAGE)
+        if end < 0:
             self._damaged += 1
-            self._stalled = self._stalled or frame.time - self._whole > READ_TIMEOUT
+            self._stalled = self._stalled or time - self._whole > READ_TIMEOUT
             return
+        # Cameras pad their frames after the end of the image.
+        frame = Frame(time, packet[: end + len(_END_OF_IMAGE)])
         self._whole = frame.time
         with self._arrived:
             self._missed += self._missing_before(frame)
@@ -207,15 +236,25 @@ class MjpegStream:
 
     def _missing_before(self, frame: Frame) -> int:
         """Frames due before this one by the stream's rhythm; negative where late ones catch up."""
-        times = [kept.time for kept in self._frames]
-        if len(times) < _RHYTHM_FRAMES:
+        period = _rhythm([kept.time for kept in self._frames])
+        if period is None:
             self._due = frame.time
             return 0
-        period = median(later - earlier for earlier, later in pairwise(times))
         late = frame.time - (self._due + period)
-        missing = round(late / period) if period > 0.0 else 0
+        missing = round(late / period)
         self._due += (1 + missing) * period + _RHYTHM_GAIN * (late - missing * period)
         return missing
+
+
+def _rhythm(times: Sequence[float]) -> float | None:
+    """Seconds from frame to frame; None where they come in groups, so that none of them is due."""
+    if len(times) < _RHYTHM_FRAMES:
+        return None
+    gaps = np.diff(times)
+    period = float(np.median(gaps))
+    even = np.mean(np.abs(gaps - period) <= 0.5 * period)
+    steady = even >= _EVEN and period * len(gaps) >= _MOST_OF_TIME * (times[-1] - times[0])
+    return period if steady and period > 0.0 else None
 
 
 def _capture(url: str) -> Any:

@@ -77,7 +77,8 @@ class UrArm:
         """Connect; raises ``BenchFault`` naming the cable or the switch to look at.
 
         Raises:
-            SafetyStop: the address is not a loopback address, or what answers there is no mock.
+            WrongUse: the address is not a loopback address.
+            SafetyStop: what answers there is no mock.
             ProtectiveStop: the controller has stopped the arm.
         """
         if self._session is not None:

@@ -102,14 +102,14 @@ def require_loopback(address: str) -> None:
     """Refuse an address that could be a real arm's.
 
     Raises:
-        SafetyStop: ``address`` is not a loopback address.
+        WrongUse: ``address`` is not a loopback address; nothing was reached that could have moved.
     """
     try:
         loopback = ipaddress.ip_address(address).is_loopback
     except ValueError:
         loopback = False
     if not loopback:
-        raise SafetyStop(
+        raise WrongUse(
             f"the arm at '{address}' was not connected: only a mock controller on a loopback address "
             f"(127.0.0.0/8 or ::1) is accepted, {_NOT_COMPLETE}"
         )

@@ -29,8 +29,9 @@ STALE: Final = 5.0  # of the watchdog's patience
 class UrSession:
     """From connected to closed; after a failure it stays latched and only closes.
 
-    Raises: on construction, ``SafetyStop`` for an address that is not loopback or a controller that is
-        no mock, ``ProtectiveStop`` where the controller has stopped the arm, ``BenchFault`` for all else.
+    Raises: on construction, ``WrongUse`` for an address that is not loopback, ``SafetyStop`` for a
+        controller that is no mock, ``ProtectiveStop`` where the controller has stopped the arm,
+        ``BenchFault`` for all else.
     """
 
     def __init__(

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
-from harness.basics.npz_file import write_arrays
+from harness.basics.foreign_file import refused_as
+from harness.basics.npz_file import read_arrays, write_arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +50,11 @@ def read_checkpoint(path: Path, identity: str) -> tuple[TrainingProgress, Mappin
     Raises:
         DataRefused: the file cannot be read, or is of another training.
     """
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+    begin_anew = "; delete it to begin anew"
+    arrays = read_arrays(path, "a checkpoint", advice=begin_anew, refused=DataRefused)
+    with refused_as(DataRefused, f"{path} does not read as a checkpoint: other arrays{begin_anew}"):
         found = str(arrays.pop("identity"))
         progress = TrainingProgress(int(arrays.pop("epoch")), arrays.pop("losses").tolist())
-    except (OSError, ValueError, BadZipFile, EOFError, KeyError, TypeError, AttributeError) as error:
-        raise DataRefused(f"checkpoint {path} cannot be read ({error}); delete it to begin anew") from error
     if found != identity:
         raise DataRefused(
             f"checkpoint {path} is of another network, object, data or seed; "

@@ -3,11 +3,18 @@
 Messages say what was asked, the value, the limit with its unit, and what to do next.
 """
 
+import re
+
 
 class TouchstoneError(Exception):
     """A failure with a name; its text is the one line shown to the operator."""
 
     exit_code = 1
+
+    @classmethod
+    def kind(cls) -> str:
+        """The class's name in words, by which a program tells failures apart: ``"recording damaged"``."""
+        return re.sub(r"(?<!^)(?=[A-Z])", " ", cls.__name__).lower()
 
 
 class WrongUse(TouchstoneError):

@@ -6,7 +6,8 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from harness.basics.errors import CalibrationRefused, WrongUse
+from harness.basics.errors import CalibrationRefused
+from harness.basics.foreign_file import MOST_JSON, read_bounded
 from harness.basics.whole_file import write_text_whole
 
 M = TypeVar("M", bound=BaseModel)
@@ -31,11 +32,15 @@ def read_model(path: Path, kind: type[M], what: str, advice: str) -> M:
         CalibrationRefused: not what ``write_model`` writes.
     """
     try:
-        return kind.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+        return kind.model_validate_json(read_bounded(path, what, MOST_JSON, CalibrationRefused))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "all of it"
-        said = first["msg"].removeprefix("Value error, ")
-        raise CalibrationRefused(f"{path} is no {what}: {where}: {said}; {advice}") from error
+        raise CalibrationRefused(f"{path} is no {what}: {_first(error)}; {advice}") from error
+
+
+def _first(error: ValidationError) -> str:
+    first = error.errors()[0]
+    if first["type"] == "json_invalid":
+        return "it is no JSON"
+    where = ".".join(str(part) for part in first["loc"]) or "all of it"
+    said = first["msg"].removeprefix("Value error, ").replace("Input should", "it should")
+    return f"{where}: {said}"

@@ -1,5 +1,6 @@
 """A file that an operator names: there, or wrong use."""
 
+import os
 from pathlib import Path
 
 from harness.basics.errors import WrongUse
@@ -18,3 +19,8 @@ def require_file(path: Path, what: str, advice: str = "check the path") -> None:
     """
     if not path.is_file():
         raise WrongUse(f"there is no {what} {path}; {advice}")
+
+
+def real_path(path: Path) -> Path:
+    """Absolute, through every link; one that leads to itself stays, and whoever opens it is refused."""
+    return Path(os.path.realpath(path))

@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -64,7 +63,7 @@ class Store:
                 arrays = {name: archive[name] for name in archive.files}
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, BadZipFile, EOFError, KeyError):
+        except Exception:  # noqa: BLE001 - numpy and zipfile fail on damage in any way, and it is made anew
             path.unlink(missing_ok=True)
             return None
         check = arrays.pop(_CHECK, None)

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from harness.basics.errors import WrongUse
+from harness.basics.foreign_file import MOST_TEXT, read_bounded
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -35,16 +36,42 @@ def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as plain values.
 
     Raises:
-        WrongUse: the file cannot be read, or is not TOML.
+        WrongUse: the file cannot be read, is not TOML, or nests deeper or says more than any of ours.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        tree = tomllib.loads(read_bounded(path, "a TOML file", MOST_TEXT, WrongUse).decode("utf-8"))
     except UnicodeDecodeError as error:
         raise WrongUse(f"{path} is not UTF-8 text ({error.reason} at byte {error.start})") from error
-    except OSError as error:
-        raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
     except tomllib.TOMLDecodeError as error:
         raise WrongUse(f"{path} is not TOML: {str(error)[:1].lower()}{str(error)[1:]}") from error
+    except RecursionError as error:
+        raise WrongUse(f"{path} {_TOO_DEEP}") from error
+    _require_modest(tree, path)
+    return tree
+
+
+def _require_modest(tree: dict[str, Any], path: Path) -> None:
+    """Refuse a tree that recursion would not end in, or whose every mistake nobody would read."""
+    level, values = [tree], 0
+    for _ in range(_DEEPEST):
+        items: list[Any] = [
+            item for table in level for item in (table.values() if isinstance(table, dict) else table)
+        ]
+        values += len(items)
+        level = [item for item in items if isinstance(item, dict | list)]
+        if values > _MOST_VALUES:
+            raise WrongUse(f"{path} holds more than {_MOST_VALUES:,} values, and no file of ours does")
+        if not level:
+            return
+    raise WrongUse(f"{path} {_TOO_DEEP}")
+
+
+_DEEPEST = 32
+_MOST_VALUES = 10_000
+_TOO_DEEP = f"nests tables or lists more than {_DEEPEST} deep, and no file of ours does"
+_MOST_MISTAKES = 20
+_MOST_SHOWN = 100
+"""Characters of a value that a mistake shows."""
 
 
 def validate(tree: Any, model: type[M], where: str, folder: Path | None = None) -> M:
@@ -62,11 +89,13 @@ def validate(tree: Any, model: type[M], where: str, folder: Path | None = None) 
     try:
         return model.model_validate(_frozen(tree), context={"folder": folder})
     except ValidationError as error:
-        problems = [_sentence(detail, model) for detail in error.errors(include_url=False)]
+        details = error.errors(include_url=False)
+    problems = [_sentence(detail, model) for detail in details[:_MOST_MISTAKES]]
     if len(problems) == 1:
         raise WrongUse(f"{where}: {problems[0]}")
     listed = "".join(f"\n  - {problem}" for problem in problems)
-    raise WrongUse(f"{where}: {len(problems)} mistakes:{listed}")
+    more = "\n  - and more" if len(details) > len(problems) else ""
+    raise WrongUse(f"{where}: {len(details)} mistakes:{listed}{more}")
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -97,7 +126,7 @@ def _sentence(detail: ErrorDetails, model: type[BaseModel]) -> str:
     if kind == "missing":
         return f"{key!r} is missing"
     if kind == "model_type":
-        return f"{key!r} must be a table, [{key}], not {detail['input']!r}"
+        return f"{key!r} must be a table, [{key}], not {_shown(detail['input'])}"
     if kind == "value_error":
         return _with_value(key, detail, str(detail["ctx"]["error"]))
     if kind == "literal_error":
@@ -108,12 +137,17 @@ def _sentence(detail: ErrorDetails, model: type[BaseModel]) -> str:
 def _with_value(key: str, detail: ErrorDetails, expected: str) -> str:
     value = detail["input"]
     shown = list(value) if isinstance(value, tuple) else value
-    quoted = repr(shown)
-    if expected.startswith(quoted):
+    quoted = _shown(shown)
+    if expected.startswith(repr(shown)[:_MOST_SHOWN]):
         return f"{key!r}: {expected}" if key else expected
     if isinstance(value, dict):
         return f"[{key}]: {expected}" if key else expected
     return f"{key!r} = {quoted}: {expected}"
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
 
 
 def _one_of(detail: ErrorDetails) -> str:

@@ -30,13 +30,19 @@ def make_folder(folder: Path) -> None:
 def whole_file(path: Path) -> Iterator[BinaryIO]:
     """A stream beside ``path`` that becomes the file, flushed to the disk, once it is written to the end.
 
-    Readers see the old file or the new one; where writing fails, nothing is left of it.
+    Readers see the old file or the new one; where writing fails, nothing is left of it. A link stays one,
+    and a device is written to as it is.
 
     Raises:
         OSError: with the path, which a full disk's own error does not name.
     """
+    path = Path(os.path.realpath(path))
     part = path.with_name(f".{path.name}.part")
     try:
+        if path.exists() and not path.is_file():
+            with path.open("wb") as stream:
+                yield stream
+            return
         with part.open("wb") as stream:
             yield stream
             stream.flush()
@@ -45,9 +51,9 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         sync_folder(path.parent)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise (
-            error if error.filename is not None else OSError(error.errno, error.strerror, str(path))
-        ) from error
+        if error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
     except BaseException:
         part.unlink(missing_ok=True)
         raise

@@ -18,6 +18,7 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import CalibrationRefused, DataRefused
+from harness.basics.foreign_file import MOST_TEXT, read_bounded
 from harness.basics.resampling import resample
 from harness.basics.whole_file import write_text_whole
 from harness.bench.acquisition_channels import (
@@ -109,9 +110,9 @@ class AcquisitionCalibration:
                 finite or of the wrong sign, or was changed after it was made.
         """
         try:
-            tree = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise CalibrationRefused(f"{path}: not a calibration of an acquisition box ({error})") from error
+            tree = json.loads(read_bounded(path, "a calibration", MOST_TEXT, CalibrationRefused))
+        except (ValueError, RecursionError) as error:
+            raise CalibrationRefused(f"{path}: not a calibration of an acquisition box: no JSON") from error
         if not isinstance(tree, dict) or tree.get("schema") != SCHEMA:
             raise CalibrationRefused(f"{path}: not schema {SCHEMA} of an acquisition box's calibration")
         values = {name: value for name, value in tree.items() if name not in ("schema", "hash")}

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from harness.basics.errors import WrongUse
+from harness.basics.named_file import real_path
 from harness.basics.quantities import Angle, Decay, Length, Level, Nonnegative, Ordered, Positive, Ratio, Time
 from harness.basics.toml_file import StrictModel, load_toml, nearest
 
@@ -195,7 +196,7 @@ def gap_path(name: str) -> Path:
         return shipped[name]
     if not Path(name).is_file():
         raise WrongUse(f"no gap file {name!r}; give a path or a shipped name: {nearest(name, shipped)}")
-    return Path(name).resolve()
+    return real_path(Path(name))
 
 
 def load_gap(name: str) -> Gap:

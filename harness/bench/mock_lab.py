@@ -136,7 +136,7 @@ class MockLab:
                 stream.write(json.dumps(request, allow_nan=False).encode() + b"\n")
                 stream.flush()
             except OSError as error:
-                raise BenchFault(f"the mocked lab is gone ({error}); {self._said()}") from error
+                raise BenchFault(f"the mocked lab is gone; {self._said()}") from error
             answer = self._line(ANSWER_WITHIN)
         if "error" in answer:
             raise BenchFault(f"the mocked lab refused {json.dumps(request)}: {answer['error']}")

@@ -21,7 +21,7 @@ def named_file(name: str, kind: str) -> Path:
     known = _known(f"{kind}s")
     if name.endswith(".toml") or "/" in name:
         if not Path(name).is_file():
-            raise WrongUse(f"no {kind} file {name!r}; name one, or one of {nearest(name, known)}")
+            raise WrongUse(f"no {kind} file {name!r}; give a path or a shipped name: {nearest(name, known)}")
         return Path(name).resolve()
     if name not in known:
         raise WrongUse(f"no {kind} {name!r}; {nearest(name, known)}; or give the path of a {kind} file")

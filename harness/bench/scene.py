@@ -13,6 +13,7 @@ from harness.basics.errors import WrongUse
 from harness.basics.geometry import rotation_about, transform, translation
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
+from harness.basics.named_file import real_path
 from harness.basics.quantities import (
     Angle,
     Length,
@@ -381,7 +382,7 @@ def _with_tables(named: tuple[tuple[str, str], ...]) -> type[SceneFile]:
 def _with_files_found(scene: SceneFile, folder: Path, where: str) -> SceneFile:
     named, found = scene.object, {}
     if named.builtin is None and not named.is_objectfile:
-        path = (folder / named.mesh).resolve()
+        path = real_path(folder / named.mesh)
         if not path.is_file():
             own = f'our own objects are written "{BUILTIN}mug" and so on'
             raise WrongUse(f"{where}: 'object.mesh': there is no file {path}; {own}")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.named_file import real_path
 from harness.objects.builtin import DESCRIPTION
 
 OBJECTFILE = "objectfile:"
@@ -38,7 +39,7 @@ def objectfile_folder(named: str, beside: Path) -> Path:
         named: what is at that path comes before what has that name.
         beside: the folder that a path is relative to.
     """
-    path = (beside / named).resolve()
+    path = real_path(beside / named)
     return path if path.exists() else shipped_objectfiles().get(named, path)
 
 
@@ -86,6 +87,5 @@ def _described(path: Path) -> tuple[str, str]:
         return str(tree["name"]), str(tree["material"]["name"])
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise DataRefused(
-            f"{path} does not say the object's name and material ({error}); copy it again, or build the "
-            "object again"
+            f"{path} does not say the object's name and material; copy it again, or build the object again"
         ) from error

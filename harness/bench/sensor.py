@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from harness.basics.errors import WrongUse
+from harness.basics.named_file import real_path
 from harness.basics.toml_file import load_toml, nearest
 from harness.bench.sensor_file import MarkerFigure, SensorFile, Sourced
 
@@ -108,7 +109,7 @@ def sensor_path(make: str, folder: Path | None = None) -> Path:
     if not path.is_file():
         listed = nearest(make, shipped_sensors())
         raise WrongUse(f"no sensor {make!r}; {listed}; or give the path of a sensor's file")
-    return path.resolve()
+    return real_path(path)
 
 
 def lasting_make(make: str, folder: Path | None = None) -> str:
@@ -176,7 +177,7 @@ def _beside(path: Path, calibration: str | None) -> str | None:
     if calibration is None:
         return None
     beside = path.parent / calibration
-    return str(beside.resolve()) if beside.is_file() else calibration
+    return str(real_path(beside)) if beside.is_file() else calibration
 
 
 def _markers(said: MarkerFigure | None) -> MarkerGrid | None:

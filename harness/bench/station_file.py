@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply
+from harness.basics.named_file import real_path
 from harness.basics.toml_file import StrictModel, load_toml, validate
 from harness.bench.named_files import named_file
 from harness.bench.station_sections import (
@@ -158,7 +159,7 @@ def load_station(path: Path) -> Station:
 def _found(station: Path, calibration: str) -> str:
     """The absolute path of a calibration beside the station file; else the name it is given by."""
     beside = station.parent / calibration
-    return str(beside.resolve()) if beside.exists() else calibration
+    return str(real_path(beside)) if beside.exists() else calibration
 
 
 def station_from_json(tree: Any, where: str) -> Station:

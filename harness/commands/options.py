@@ -37,7 +37,9 @@ Material = Annotated[
 ]
 Units = Annotated[
     str | None,
-    typer.Option("--units", help="Of the mesh file's numbers: m, cm, mm or in (with --object).", metavar="U"),
+    typer.Option(
+        "--units", help="Of the mesh file's numbers: m, cm, mm, um, in or ft (with --object).", metavar="U"
+    ),
 ]
 Wall = Annotated[
     str | None,

@@ -22,6 +22,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from harness.basics.answers import write_answer
 from harness.basics.errors import TouchstoneError
 from harness.recording.step_file import Step
 
@@ -40,8 +41,7 @@ ANSWERS = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isat
 
 def emit(result: Mapping[str, Any]) -> None:
     """Print the one JSON object of a command, at once: some go on until they are told to end."""
-    sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
-    sys.stdout.flush()
+    write_answer(json.dumps(result, allow_nan=False))
 
 
 def warn(sentence: str) -> None:
@@ -64,7 +64,7 @@ def stopped(step: str, folder: Path, how: str, as_json: bool) -> int:
     said = f"stopped after {step}; go on with `{how}`"
     CONSOLE.print(said, markup=False)
     if as_json:
-        emit({"schema": 1, "error": said, "exit_code": 130, "recording": str(folder)})
+        emit({"schema": 1, "error": said, "kind": "interrupted", "exit_code": 130, "recording": str(folder)})
     return 130
 
 

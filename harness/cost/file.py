@@ -43,9 +43,17 @@ def load(path: Path) -> Curve:
     text = path.read_text(encoding="utf-8")
     try:
         return from_json(json.loads(text))
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, TouchstoneError) as error:
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        IndexError,
+        AttributeError,
+        RecursionError,
+        TouchstoneError,
+    ) as error:
         raise DataRefused(
-            f"{path} is not a cost curve of schema {SCHEMA} ({error}); delete it and measure again"
+            f"{path} is not a cost curve of schema {SCHEMA}; delete it and measure again"
         ) from error
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from harness.basics.clock import now
 from harness.basics.errors import RecordingDamaged, WrongUse
+from harness.basics.foreign_file import MOST_JSON, read_bounded
+from harness.basics.npz_file import write_arrays
 from harness.basics.whole_file import write_text_whole
 from harness.bench.device import Health
 from harness.effects.accuracy import Accuracy, Level
@@ -146,7 +146,7 @@ def add_report(
     comparison = compare(scored, experiment.sources(scored))
     scored = replace(scored, warnings=(*scored.warnings, *comparison.notes))
     page = (experiment.report or draw)(scored, comparison, health, folder / "report")
-    np.savez_compressed(folder / OBSERVED, **comparison.arrays())  # type: ignore[arg-type]
+    write_arrays(folder / OBSERVED, comparison.arrays(), compressed=True)
     result = {
         **written.result,
         "plan": plan_json(comparison),
@@ -196,10 +196,12 @@ def levels_of_result(experiment: Experiment, folder: Path) -> dict[str, Level]:
         return {}
     known = {knob.name: knob for knob in experiment.knobs}
     try:
-        levels = json.loads(path.read_text())["accuracy"]
+        levels = json.loads(read_bounded(path, "a result", MOST_JSON))["accuracy"]
         return {name: known[name].checked(level) for name, level in levels.items()}
-    except (ValueError, KeyError, TypeError, AttributeError, WrongUse) as error:
-        raise RecordingDamaged(f"{path} does not say at which levels it was found ({error})") from error
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, WrongUse) as error:
+        raise RecordingDamaged(
+            f"{path} does not say at which levels it was found; replay the run into another folder"
+        ) from error
 
 
 def _write(path: Path, result: Mapping[str, Any]) -> None:

@@ -133,8 +133,14 @@ def read_tree(path: Path) -> Any:
         )
     except (ValueError, RecursionError) as error:
         raise DataRefused(
-            f"{path} is not JSON ({error}); copy it again, or build the object again"
+            f"{path} is not JSON{_why(error)}; copy it again, or build the object again"
         ) from error
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, json.JSONDecodeError):
+        return f" from line {error.lineno} on"
+    return f" ({error})" if isinstance(error, _Ambiguous) else ""
 
 
 def description_from(tree: Any, where: str) -> Description:
@@ -180,13 +186,17 @@ def _text(value: Any, indent: str) -> str:
     return json.dumps(value, allow_nan=False, ensure_ascii=False)
 
 
+class _Ambiguous(ValueError):
+    """What Python's reader takes and other programs read in another way, or not at all."""
+
+
 def _no_constant(text: str) -> Any:
-    raise ValueError(f"{text} is no number of JSON")
+    raise _Ambiguous(f"{text} is no number of JSON")
 
 
 def _no_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     tree = dict(pairs)
     if len(tree) != len(pairs):
         names = [name for name, _ in pairs]
-        raise ValueError(f"the key {next(n for n in names if names.count(n) > 1)!r} is there twice")
+        raise _Ambiguous(f"the key {next(n for n in names if names.count(n) > 1)!r} is there twice")
     return tree

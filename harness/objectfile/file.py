@@ -13,6 +13,7 @@ from typing import Any
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
+from harness.basics.named_file import real_path
 from harness.basics.whole_file import write_bytes_whole
 from harness.objectfile.description import (
     SCHEMA,
@@ -96,8 +97,8 @@ def read_named(folder: Path, entry: FileEntry) -> bytes:
     path = folder / entry.file
     if not path.is_file():
         raise DataRefused(f"{path} is missing; copy the whole folder again, or build the object again")
-    if path.resolve().parent != folder.resolve():
-        raise DataRefused(f"{path} leads out of its folder, to {path.resolve()}; put the file itself there")
+    if real_path(path).parent != real_path(folder):
+        raise DataRefused(f"{path} leads out of its folder, to {real_path(path)}; put the file itself there")
     size = path.stat().st_size
     if size != entry.bytes:
         raise DataRefused(

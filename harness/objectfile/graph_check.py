@@ -48,7 +48,7 @@ def checked_graph(data: bytes, name: str) -> ModelProto:
     try:
         model = onnx.load_model_from_string(data)
     except DecodeError as error:
-        raise DataRefused(f"{name} is not ONNX ({error}); copy it again") from error
+        raise DataRefused(f"{name} is not ONNX; copy it again") from error
     _check_nodes(model, name)
     for tensor in _tensors(model.graph):
         _check_tensor(tensor, name)
@@ -94,9 +94,7 @@ def _check_tensor(tensor: TensorProto, name: str) -> None:
     try:
         array = numpy_helper.to_array(tensor)
     except (ValueError, TypeError, MemoryError, OverflowError) as error:
-        raise DataRefused(
-            f"{name}: {tensor.name!r} does not fill its shape ({error}); copy it again"
-        ) from error
+        raise DataRefused(f"{name}: {tensor.name!r} does not fill its shape; copy it again") from error
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         bad = int(np.count_nonzero(~np.isfinite(array)))
         raise DataRefused(

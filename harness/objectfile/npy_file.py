@@ -41,7 +41,7 @@ def npy_array(data: bytes, name: str, dtype: str, shape: tuple[int | None, ...],
         np.lib.format.read_magic(stream)
         found, fortran, kind = np.lib.format.read_array_header_1_0(stream, max_header_size=_LONGEST_HEADER)
     except ValueError as error:
-        raise DataRefused(f"{name} is not a file of numpy ({error}); build the object again") from error
+        raise DataRefused(f"{name} is no .npy file of numbers; build the object again") from error
     if fortran or kind != np.dtype(dtype) or not _fits(found, shape):
         raise DataRefused(f"{name} holds {kind} {found}, not {wanted}; build the object again")
     start, count = stream.tell(), math.prod(found)

@@ -6,7 +6,12 @@ import cv2
 import numpy as np
 
 from harness.basics.arrays import ByteArray, read_only
-from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.errors import DataRefused
+from harness.basics.foreign_file import read_bounded, refused_as
+from harness.basics.whole_file import write_bytes_whole
+from harness.picture.picture_size import require_modest_picture
+
+_MOST_BYTES = 2**28
 
 
 def read_image(path: Path) -> ByteArray:
@@ -16,14 +21,12 @@ def read_image(path: Path) -> ByteArray:
         WrongUse: no such file, or none that may be read.
         DataRefused: it is no such picture.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise WrongUse(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
-    # OpenCV fails on a buffer without bytes instead of answering that it is no picture.
-    seen = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+    data = read_bounded(path, "a picture", _MOST_BYTES)
+    require_modest_picture(data, str(path))
+    with refused_as(DataRefused, f"{path} is a damaged picture; write it again"):
+        seen = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if seen is None:
-        raise DataRefused(f"{path} is no picture ({len(data)} bytes); give a PNG or a JPEG")
+        raise DataRefused(f"{path} is a picture cut short or damaged ({len(data)} bytes); write it again")
     if seen.dtype != np.uint8 or seen.ndim != 3 or seen.shape[2] != 3:
         raise DataRefused(
             f"{path} is {seen.dtype} {seen.shape}; a colour picture of 8 bits a channel is wanted"
@@ -33,7 +36,7 @@ def read_image(path: Path) -> ByteArray:
 
 def write_png(path: Path, image: ByteArray) -> None:
     """Write ``(rows, columns, 3)`` RGB, pixel for pixel; the same picture gives the same bytes."""
-    path.write_bytes(png_bytes(image))
+    write_bytes_whole(path, png_bytes(image))
 
 
 def png_bytes(image: ByteArray) -> bytes:

@@ -8,7 +8,6 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
@@ -22,6 +21,8 @@ from harness.basics.arrays import AnyArray
 from harness.basics.errors import RecordingDamaged
 from harness.bench.acquisition_channels import FORCE, PRESSURE
 from harness.bench.reading import Channel, Reading
+from harness.picture.jpeg import decode_jpeg
+from harness.picture.picture_size import require_modest_picture
 
 _JSON_SCHEMA = {
     "type": "object",
@@ -60,15 +61,6 @@ def codec_of(channel: Channel) -> Codec:
     return _BY_NAME.get(channel.name, _NUMBERS)
 
 
-def decode_jpeg(data: bytes) -> AnyArray:
-    """``(rows, columns, 3)`` uint8 RGB of a JPEG; ``RecordingDamaged`` where it is none."""
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    if image is None:
-        raise RecordingDamaged(f"an image of {len(data)} bytes is not a JPEG that decodes")
-    rgb: AnyArray = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
-    return rgb
-
-
 def _stamp(wall_ns: int) -> Timestamp:
     return Timestamp(seconds=wall_ns // 10**9, nanos=wall_ns % 10**9)
 
@@ -101,7 +93,8 @@ def _encode_image(reading: Reading, index: int, wall_ns: int) -> Message:
 
 def _decode_image(data: bytes, _: Channel) -> tuple[AnyArray, bytes]:
     jpeg = CompressedImage.FromString(data).data
-    return decode_jpeg(jpeg), jpeg
+    require_modest_picture(jpeg, "an image", RecordingDamaged)
+    return decode_jpeg(jpeg, RecordingDamaged), jpeg
 
 
 def _encode_joints(reading: Reading, index: int, wall_ns: int) -> Message:

@@ -5,6 +5,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from harness.basics.whole_file import write_text_whole
+
 
 def write_page(path: Path, template: str, **content: Any) -> Path:
     """Write a page, with the style of all reports as ``style``; its path.
@@ -22,5 +24,5 @@ def write_page(path: Path, template: str, **content: Any) -> Path:
         lstrip_blocks=True,
     )
     style = environment.get_template("report.css").render()
-    path.write_text(environment.get_template(template).render(style=style, **content), encoding="utf-8")
+    write_text_whole(path, environment.get_template(template).render(style=style, **content))
     return path

@@ -7,7 +7,6 @@ simulated bench clock, from zero.
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray
@@ -18,6 +17,7 @@ from harness.bench.reading import Channel, Reading
 from harness.bench.scene import SceneFile
 from harness.bench.station import LOOK, PRESS, STRIKE, Bench, RunContext
 from harness.bench.station_file import Station
+from harness.picture.jpeg import decode_jpeg
 from mocks.camera.gelsight_stream import encode
 from mocks.in_process.arm import InProcessArm
 from mocks.in_process.simulated_motion import Stage
@@ -82,8 +82,7 @@ class InProcessCamera:
         times = np.arange(first, first + count) / self._rate
         pose = self._arm.state().base_from_flange
         jpeg = encode(self._look(pose, self._stage.step, self._stage.sample))
-        image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-        values = np.repeat(np.asarray(image)[None, ..., ::-1], count, axis=0)
+        values = np.repeat(decode_jpeg(jpeg)[None], count, axis=0)
         self._stage.time = float(times[-1])
         return Reading(self._channel, times, values, (jpeg,) * count)
 

@@ -4,10 +4,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply
+from harness.basics.npz_file import write_arrays
 from harness.basics.whole_file import write_text_whole
 from harness.bench.station import STRIKE
 from mocks.world.world import World
@@ -75,9 +74,8 @@ class TruthFile:
 
     def _write_surface(self) -> None:
         world, path = self._world, self._path.with_suffix(".npz")
-        part = path.with_name(f".{path.name}")
-        np.savez(part, vertices=apply(world.base_from_object, world.mesh.vertices), faces=world.mesh.faces)
-        part.replace(path)
+        vertices = apply(world.base_from_object, world.mesh.vertices)
+        write_arrays(path, {"vertices": vertices, "faces": world.mesh.faces})
         self._has_surface = True
 
     def _strike(self, sound: "WorldSound", base_from_flange: FloatArray, step: int) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from harness.experiment.compare import CARRIED
 from harness.experiment.lookup import named, names
 from harness.objectfile.description import Description
 from harness.objectfile.published.entries import PublishedDescription
+from harness.recording.checksums import SUM
 from harness.recording.recording import SCHEMA, RunHeader
 from tests.docs.model_tables import dataclass_keys, keys, markdown, nested, summary, table
 from tests.docs.result_keys import ASKED, COMMON, ESTIMATE, LOCALIZATION, SHAPE, SHAPE_ESTIMATE
@@ -108,9 +109,10 @@ def _run() -> list[str]:
     about = (
         "What a run is, written once before anything moves. The readings are in "
         "`steps/NNN.mcap`, one file a step. "
-        f"The schema's number is {SCHEMA}."
+        f"The schema's number is {SCHEMA}; runs of schema 1 had no checksums and are read as before."
     )
-    return [*_page("`run.json`", about), *table(("key", "meaning"), dataclass_keys(RunHeader))]
+    rows = [*dataclass_keys(RunHeader), (f"`{SUM}`", "the SHA-256 of all the other values.")]
+    return [*_page("`run.json`", about), *table(("key", "meaning"), rows)]
 
 
 def _result() -> list[str]:

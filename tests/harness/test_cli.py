@@ -5,10 +5,13 @@ import re
 import subprocess
 import sys
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
-from harness.cli import COMMANDS, invoke, load
+from drivers.dataq.link import LinkCut
+from harness.basics.errors import TouchstoneError
+from harness.cli import COMMANDS, SYSTEM, UNFORESEEN, Interrupted, invoke, load
 
 FORBIDDEN_AT_START = ("torch", "mujoco", "numba", "scipy", "cv2", "matplotlib", "pydantic")
 
@@ -107,3 +110,54 @@ def test_nothing_at_the_bench_imports_torch() -> None:
         "assert 'torch' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_the_readme_lists_every_kind_of_error() -> None:
+    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    listed = text.partition("`kind`, which stays")[2].partition("\n\n")[0]
+    known = set(_every(TouchstoneError))
+    assert {LinkCut, Interrupted} <= known
+    expected = {each.kind() for each in known - {TouchstoneError}} | {SYSTEM, UNFORESEEN}
+    assert {name.replace("\n", " ") for name in re.findall(r"`([^`]+)`", listed)} == expected
+
+
+def _every(of: type[TouchstoneError]) -> list[type[TouchstoneError]]:
+    return [of, *(found for each in of.__subclasses__() for found in _every(each))]
+
+
+def test_a_failure_says_its_kind(capsys: pytest.CaptureFixture[str]) -> None:
+    assert invoke(["replay", "nowhere", "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["kind"] == "wrong use"
+    assert invoke(["sim", "modes", "--no-such-option", "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["kind"] == "wrong use"
+
+
+def test_what_nobody_foresaw_is_one_json_object_too(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("harness.cli._app", broken)
+    assert invoke(["explain", "--json"]) == 1
+    captured = capsys.readouterr()
+    assert json.loads(captured.out)["kind"] == UNFORESEEN
+    assert "ZeroDivisionError" in captured.err
+
+
+NOISY = """
+import os, sys
+from harness.basics.answers import answers_alone, write_answer
+with answers_alone():
+    print("a library prints")
+    os.write(1, b"a compiled library prints\\n")
+    write_answer('{"answer": 1}')
+print("after")
+"""
+
+
+def test_answers_alone_are_on_standard_output() -> None:
+    done = subprocess.run([sys.executable, "-c", NOISY], capture_output=True, text=True, check=True)
+    assert done.stdout == '{"answer": 1}\nafter\n'
+    assert "a library prints" in done.stderr
+    assert "a compiled library prints" in done.stderr

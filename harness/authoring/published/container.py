@@ -59,10 +59,8 @@ def _require_archive(path: Path) -> None:
     try:
         with zipfile.ZipFile(path) as archive:
             listed = archive.infolist()
-    except (zipfile.BadZipFile, OSError, ValueError) as error:
-        raise DataRefused(
-            f"{path.name} is damaged or cut short ({error}); copy or download it again"
-        ) from error
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
+        raise DataRefused(f"{path.name} is damaged or cut short; copy or download it again") from error
     unpacked = sum(item.file_size for item in listed)
     if unpacked > _MOST_BYTES:
         raise DataRefused(f"{path.name} unpacks to {unpacked} bytes, more than {_MOST_BYTES}; {_FOREIGN}")
@@ -87,9 +85,7 @@ def _loaded(path: Path) -> Any:
         ) from error
     except Exception as error:
         # torch raises whatever its reader met: KeyError, RuntimeError, EOFError for one damaged file.
-        raise DataRefused(
-            f"{path.name} is damaged or cut short ({_reason(error)}); copy or download it again"
-        ) from error
+        raise DataRefused(f"{path.name} is damaged or cut short; copy or download it again") from error
 
 
 def _reason(error: Exception) -> str:

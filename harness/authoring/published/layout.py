@@ -75,7 +75,7 @@ def checked(value: Any, shape: tuple[int | None, ...], name: str) -> FloatArray:
     try:
         array = np.asarray(value)
     except ValueError as error:
-        raise DataRefused(f"{name} is no array ({error})") from error
+        raise DataRefused(f"{name} is no array") from error
     if array.dtype.kind not in "fiub" or not _fits(array.shape, shape):
         wanted = " x ".join("n" if size is None else str(size) for size in shape) or "one number"
         raise DataRefused(f"{name} holds {array.dtype} {array.shape}, where {wanted} belongs")

@@ -20,6 +20,7 @@ from harness.authoring.vision.profiles import CellsSpec
 from harness.authoring.vision.vision import networks_alone
 from harness.basics.arrays import FloatArray
 from harness.basics.store import digest
+from harness.basics.whole_file import write_bytes_whole
 from harness.cost.curve import ErrorUnit, Point, Sample
 from harness.objectfile.vision.network.graph import vision_graph
 from harness.objectfile.vision.render import VisionRenderer
@@ -171,9 +172,7 @@ class Studio:
         kept, checkpoint = folder / f"{name}.onnx", folder / f".{name}.npz"
         if not kept.is_file():
             model = networks_alone(self.lit, self.held_out, spec, seed, checkpoint, report, self.threads)
-            part = kept.with_name(f".{kept.name}.part")
-            part.write_bytes(vision_graph(model).SerializeToString())
-            part.replace(kept)
+            write_bytes_whole(kept, vision_graph(model).SerializeToString())
             checkpoint.unlink(missing_ok=True)
         data, mesh = kept.read_bytes(), self.lit.appearance.mesh
         self.renderers[spec] = VisionRenderer(data, mesh, self.threads, name=kept.name)

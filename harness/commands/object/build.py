@@ -35,7 +35,7 @@ def build(
         ),
     ] = "standard",
     units: Annotated[
-        str | None, typer.Option(help="Of the file's numbers: m, cm, mm or in.", metavar="U")
+        str | None, typer.Option(help="Of the file's numbers: m, cm, mm, um, in or ft.", metavar="U")
     ] = None,
     wall: Annotated[
         str | None,

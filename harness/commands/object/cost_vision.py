@@ -30,7 +30,7 @@ CODE = "harness.authoring.vision.cost"
 def vision(
     mesh: Annotated[str, typer.Argument(help="A mesh file, or builtin:mug and so on.", metavar="MESH")],
     units: Annotated[
-        str | None, typer.Option(help="Of the file's numbers: m, cm, mm or in.", metavar="U")
+        str | None, typer.Option(help="Of the file's numbers: m, cm, mm, um, in or ft.", metavar="U")
     ] = None,
     profile: Annotated[str, typer.Option(help="Of the networks: smoke or standard.")] = "smoke",
     knob: Annotated[

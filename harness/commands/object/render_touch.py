@@ -198,6 +198,6 @@ def _level(text: str) -> "TouchLevel":
 
 
 def _write_heights(path: Path, rendered: RenderedPress) -> None:
-    import numpy as np
+    from harness.basics.npz_file import write_array
 
-    np.save(path, rendered.press.surface)
+    write_array(path, rendered.press.surface)

@@ -64,7 +64,9 @@ def write_arrays(path: Path, arrays: "Sequence[FloatArray]") -> None:
     """``(rows, columns)`` float32 of one picture; ``(pictures, rows, columns)`` of more."""
     import numpy as np
 
-    np.save(path, np.float32(arrays[0] if len(arrays) == 1 else np.stack(arrays)))
+    from harness.basics.npz_file import write_array
+
+    write_array(path, np.float32(arrays[0] if len(arrays) == 1 else np.stack(arrays)))
 
 
 def from_finest(found: RenderedLook) -> dict[str, float | None] | None:

@@ -155,19 +155,19 @@ def _detection(rest: "ByteArray | None") -> "Detection":
 
 
 def _write(found: "DepthReading", points: "FloatArray", out: Path, height_out: Path | None) -> None:
-    import numpy as np
+    from harness.basics.npz_file import write_array, write_arrays
 
-    np.savez_compressed(
-        out,
-        height=found.height,
-        sigma=found.sigma,
-        contact=found.contact,
-        trusted=found.trusted,
-        points=points,
-        points_sigma=found.sigma[found.contact],
-    )
+    arrays = {
+        "height": found.height,
+        "sigma": found.sigma,
+        "contact": found.contact,
+        "trusted": found.trusted,
+        "points": points,
+        "points_sigma": found.sigma[found.contact],
+    }
+    write_arrays(out if out.suffix == ".npz" else out.with_name(f"{out.name}.npz"), arrays, compressed=True)
     if height_out is not None:
-        np.save(height_out, found.height)
+        write_array(height_out, found.height)
 
 
 def _draw(found: "DepthReading", picture: Path) -> None:

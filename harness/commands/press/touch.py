@@ -108,7 +108,7 @@ def touch(
         str | None, typer.Option(help="Of a mesh: the sensor turned about its own axis.", metavar="A")
     ] = None,
     units: Annotated[
-        str | None, typer.Option(help="Of the mesh file's numbers: m, cm, mm or in.", metavar="U")
+        str | None, typer.Option(help="Of the mesh file's numbers: m, cm, mm, um, in or ft.", metavar="U")
     ] = None,
     objectfile: Annotated[
         Path | None,
@@ -229,17 +229,19 @@ def _checked_files(
 
 
 def _write_pressure(path: Path, touched: Touched) -> None:
-    import numpy as np
+    from harness.basics.npz_file import write_array
 
     found = touched.press.force
     assert found is not None
     if touched.press.levels[forces.LEVEL] == "table":
         refuse("a table of forces says how much, not where; leave --pressure-out out, or --force-table")
-    np.save(path, found.pressure[0])
+    write_array(path, found.pressure[0])
 
 
 def _write_heights(path: Path, touched: Touched) -> None:
     import numpy as np
 
+    from harness.basics.npz_file import write_array
+
     heights, missing = touched.press.heights, touched.press.missing
-    np.save(path, heights if missing is None else np.where(missing, np.nan, heights))
+    write_array(path, heights if missing is None else np.where(missing, np.nan, heights))

@@ -30,7 +30,7 @@ def modes(
         str | None, typer.Option(help="What it is made of; a built-in object's own if left out.", metavar="M")
     ] = None,
     units: Annotated[
-        str | None, typer.Option(help="Of the file's numbers: m, cm, mm or in.", metavar="U")
+        str | None, typer.Option(help="Of the file's numbers: m, cm, mm, um, in or ft.", metavar="U")
     ] = None,
     young: Annotated[str | None, typer.Option(help="Young's modulus, as 210GPa.", metavar="E")] = None,
     poisson: Annotated[float | None, typer.Option(help="Poisson's ratio.", metavar="NU")] = None,

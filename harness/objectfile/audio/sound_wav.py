@@ -9,6 +9,7 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.wav import write_pcm
+from harness.basics.whole_file import write_bytes_whole
 
 BITS = 24
 """Of a sample: its rounding lies 140 dB below full scale, under what a sum of modes is in error."""
@@ -48,7 +49,7 @@ def write_wav(path: Path, sound: FloatArray, rate: float, full_scale: float | No
     counts = np.rint(sound * ((most + 1) / scale)).astype(np.int64)
     stream = io.BytesIO()
     write_pcm(stream, counts, whole, BITS)
-    path.write_bytes(stream.getvalue())
+    write_bytes_whole(path, stream.getvalue())
     return scale
 
 

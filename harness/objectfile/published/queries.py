@@ -5,14 +5,15 @@ forces ``(n, 3)``. ``touch``: vertices ``(n, 3)`` in metres, and the gel's tilt 
 in metres, ``(n, 3)``.
 """
 
-import io
 from pathlib import Path
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import DataRefused, OutOfDomain
+from harness.basics.foreign_file import require_readable
 from harness.basics.named_file import require_file
+from harness.basics.npz_file import read_array
 
 MOST_ROWS = 1000
 """Of one file: a thousand compatible sounds are 1 GB while they are computed."""
@@ -36,15 +37,8 @@ def read_rows(path: Path, columns: int, what: str) -> FloatArray:
         DataRefused: it holds something else, or numbers that are not finite.
     """
     require_file(path, "query file", "give a .npy file as ObjectFolder's")
-    size = path.stat().st_size
-    if size > _MOST_BYTES:
-        raise DataRefused(f"{path} has {size} bytes, more than {_MOST_BYTES}; give fewer queries at once")
-    try:
-        found = np.lib.format.read_array(io.BytesIO(path.read_bytes()), allow_pickle=False)
-    except (ValueError, EOFError, MemoryError) as error:
-        raise DataRefused(
-            f"{path} is no array of numbers in numpy's format ({error}); write it with numpy.save"
-        ) from error
+    require_readable(path, "a query file", _MOST_BYTES)
+    found = read_array(path, "queries")
     if found.ndim == 1 and found.size == columns:
         found = found[None]
     if found.dtype.kind not in "fiu" or found.ndim != 2 or found.shape[1] != columns:

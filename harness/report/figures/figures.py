@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
 from harness.basics.arrays import AnyArray
+from harness.basics.whole_file import write_bytes_whole
 from harness.report.figures.style import styled
 
 
@@ -59,7 +60,7 @@ class Album:
 
     def _beside(self, name: str, content: bytes) -> str:
         file = f"{name}.png"
-        (self._folder / file).write_bytes(content)
+        write_bytes_whole(self._folder / file, content)
         return file
 
 

@@ -8,9 +8,10 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from harness.basics.arrays import AnyArray, BoolArray, FloatArray, read_only
+from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, OutOfDomain
 from harness.basics.named_file import require_file
+from harness.basics.npz_file import read_array
 from harness.bench.sensor import TactileSensor
 
 Heights = Literal["object", "gel"]
@@ -57,13 +58,10 @@ def read_heights(path: Path, sensor: TactileSensor, of: Heights = "object") -> G
         DataRefused: the file does not read, or holds something else than numbers.
         OutOfDomain: another shape, no height at all, or heights in another unit or of another sign.
     """
+    require_file(path, "height map")
     if path.suffix != ".npy":
         raise DataRefused(f"{path}: a height map is read from a .npy file; write it with numpy.save")
-    require_file(path, "height map")
-    try:
-        found: AnyArray = np.load(path, allow_pickle=False)
-    except (OSError, EOFError, ValueError) as error:
-        raise DataRefused(f"{path} does not read as an array: {error}") from error
+    found = read_array(path, "a height map")
     if found.dtype.kind != "f":
         raise DataRefused(
             f"{path} holds {found.dtype}; a height map holds floating-point metres. Is it a picture of one?"

@@ -12,7 +12,7 @@ from harness.basics.mesh import Mesh
 from harness.basics.named_file import require_file
 from harness.picture.srgb import PEAK, linear_from_srgb
 from harness.sim.light.appearance import CREASE, NO_TEXTURE, Appearance, smooth_normals
-from harness.sim.solid.intake import METRES
+from harness.sim.solid.mesh_read import METRES
 
 GREY = 0.5
 """Linear albedo of what says no colour."""
@@ -66,8 +66,10 @@ def _pieces(path: Path) -> list[Any]:
             pieces = [piece for piece in loaded.dump() if isinstance(piece, trimesh.Trimesh)]
     # The readers raise whatever their parsers meet: there is no common class to name.
     except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise MeshRefused(f"{path.name} does not read as a mesh: {reason[:160]}") from error
+        raise MeshRefused(
+            f"{path.name} does not read as {path.suffix or 'a mesh'}: it is cut short, damaged or of another "
+            "format; export it again"
+        ) from error
     if not any(len(piece.faces) for piece in pieces):
         raise MeshRefused(f"{path.name} holds no triangle; export a surface")
     return pieces

@@ -14,7 +14,7 @@ import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused
-from harness.basics.npz_file import read_arrays
+from harness.basics.npz_file import read_array, read_arrays
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.gel import R15_SKIRT, TAXIM_SKIRT, GelSkirt, skirt_for
 from harness.sim.optics.shadow import ShadowTable
@@ -141,10 +141,10 @@ def _rest(folder: Path, rows: int, columns: int, pitch: float) -> FloatArray | N
 
 
 def _surface(path: Path, rows: int, columns: int) -> FloatArray:
-    try:
-        surface = np.load(path, allow_pickle=False).astype(np.float64)
-    except (OSError, EOFError, ValueError) as error:
-        raise CalibrationRefused(f"{path} does not read as a surface: {error}") from error
+    read = read_array(path, "a surface", CalibrationRefused)
+    if read.dtype.kind not in "fiu":
+        raise CalibrationRefused(f"{path} holds {read.dtype}, and a surface holds numbers")
+    surface = read.astype(np.float64)
     if surface.shape != (rows, columns) or not np.isfinite(surface).all():
         raise CalibrationRefused(
             f"{path} is {surface.shape}, not finite or not the camera's {(rows, columns)}; remove it or give "

@@ -7,13 +7,16 @@ begin and the numbers in them taken from their bytes.
 
 import pickletools
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.lib import format as npy_format
 
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
+from harness.basics.foreign_file import refused_as, require_unpackable
+from harness.basics.npz_file import read_arrays
+from harness.basics.whole_file import whole_file
 from harness.sim.optics.shadow import ShadowTable
 
 SHALLOWEST = -0.2e-3
@@ -48,7 +51,10 @@ def read_shadow_table(path: Path, shallowest: float = SHALLOWEST) -> ShadowTable
     Raises:
         CalibrationRefused: missing, incomplete, or lists of another kind.
     """
-    try:
+    if not path.is_file():
+        raise CalibrationRefused(f"{path} does not read as a shadow table: there is no such file")
+    with refused_as(CalibrationRefused, f"{path} does not read as a shadow table: cut short or damaged"):
+        require_unpackable(path, "a shadow table", CalibrationRefused)
         with ZipFile(path) as archive:
             names = {name.removesuffix(".npy") for name in archive.namelist()}
             if {"directions", "lengths", "values"} <= names:
@@ -59,8 +65,6 @@ def read_shadow_table(path: Path, shallowest: float = SHALLOWEST) -> ShadowTable
                 raise CalibrationRefused(
                     f"{path} holds {sorted(names)}; a shadow table holds shadowDirections and shadowTable"
                 )
-    except (OSError, EOFError, ValueError, BadZipFile) as error:
-        raise CalibrationRefused(f"{path} does not read as a shadow table: {error}") from error
     directions, lengths, values = parts
     lists = np.split(values, np.cumsum(lengths.ravel())[:-1])
     rgb = np.arange(lengths.size).reshape(lengths.shape)[::-1].ravel()
@@ -88,12 +92,14 @@ def write_shadow_table(table: ShadowTable, path: Path) -> None:
         first = starts[c, nearest, max(row, 0)]
         length = table.lengths[c, nearest, row] if row_of[k] >= 0.0 else 0
         lists[_CHANNELS - 1 - c, d, k] = [float(v) for v in table.values[first : first + length]]
-    np.savez(path, shadowDirections=towards, shadowTable=lists)
+    with whole_file(path) as stream:
+        np.savez(stream, shadowDirections=towards, shadowTable=lists)
 
 
 def _plain(path: Path) -> tuple[FloatArray, IntArray, FloatArray]:
-    with np.load(path, allow_pickle=False) as archive:
-        directions, lengths, values = (archive[name] for name in ("directions", "lengths", "values"))
+    names = ("directions", "lengths", "values")
+    arrays = read_arrays(path, "a shadow table", names)
+    directions, lengths, values = (arrays[name] for name in names)
     _check_lengths(lengths.shape, len(directions))
     if int(lengths.sum()) != len(values):
         raise CalibrationRefused(f"{path}: {int(lengths.sum())} samples are listed and {len(values)} came")

@@ -221,8 +221,8 @@ def _parse(text: str, path: Path) -> tuple[CalibrationHeader, str]:
         skirt = inner.pop("skirt")
         inner["skirt"] = GelSkirt(tuple(skirt["kernels"]), skirt["final"], skirt["core"])
         return CalibrationHeader(**inner), str(outer["sha256"])
-    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
-        raise CalibrationRefused(f"{path} has no readable header: {error!r}") from error
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise CalibrationRefused(f"{path} has no readable header; fit the calibration again") from error
 
 
 def _check(calibration: TactileCalibration) -> None:

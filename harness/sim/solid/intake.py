@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.sim.solid.mesh_holes import fill_holes, join_bodies
-from harness.sim.solid.mesh_read import RawMesh, read_mesh
+from harness.sim.solid.mesh_read import METRES, RawMesh, read_mesh
 from harness.sim.solid.mesh_repair import (
     RepairedSurface,
     boundary_edges,
@@ -23,9 +23,6 @@ from harness.sim.solid.mesh_repair import (
     orient,
     weld,
 )
-
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
-"""Metres in one unit of a mesh file, by the unit's name."""
 
 _ASKED_ABOUT = ("m", "cm", "mm")
 _SMALLEST, _LARGEST = 5e-3, 2.0

@@ -10,7 +10,11 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.named_file import require_file
 
-_BY_TRIMESH = frozenset({".obj", ".stl", ".stl_ascii", ".ply", ".off", ".glb", ".gltf", ".3mf"})
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
+"""Metres in one unit of a mesh file, by the unit's name."""
+
+_BY_TRIMESH = frozenset({".obj", ".stl", ".stl_ascii", ".ply", ".off", ".glb", ".gltf", ".3mf", ".dae"})
+_OFTEN = "OBJ, STL, PLY, OFF, glTF, 3MF, COLLADA, or tetrahedra as Gmsh, VTK, Abaqus or Nastran write them"
 _TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 _METRES_BY_DEFINITION = frozenset({".glb", ".gltf"})
 
@@ -40,7 +44,10 @@ def read_mesh(path: Path) -> RawMesh:
     require_file(path, "mesh file")
     if path.stat().st_size == 0:
         raise MeshRefused(f"{path.name} is empty (0 bytes); export it again")
-    read = _with_trimesh if path.suffix.lower() in _BY_TRIMESH else _with_meshio
+    kind = path.suffix.lower()
+    read = _with_trimesh if kind in _BY_TRIMESH else _with_meshio
+    if read is _with_meshio and not _known_to_meshio(kind):
+        raise MeshRefused(f"{path.name}: {kind or 'no ending'} is not that of a mesh; give {_OFTEN}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -49,9 +56,9 @@ def read_mesh(path: Path) -> RawMesh:
         raise
     # The readers raise whatever their parsers meet: there is no common class to name.
     except (Exception, SystemExit) as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
         raise MeshRefused(
-            f"{path.name} does not read as {path.suffix or 'a mesh'}: {reason[:160]}"
+            f"{path.name} does not read as {path.suffix or 'a mesh'}: it is cut short, damaged or of another "
+            "format; export it again"
         ) from error
     if len(raw.faces) == 0:
         raise MeshRefused(f"{path.name} holds no triangle ({len(raw.vertices)} vertices); export a surface")
@@ -75,9 +82,14 @@ def _with_trimesh(path: Path) -> RawMesh:
     return RawMesh(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64), declared)
 
 
-def _known_unit(name: str | None) -> str | None:
-    names = {"m": "m", "meters": "m", "meter": "m", "millimeters": "mm", "mm": "mm", "centimeters": "cm"}
-    return names.get(str(name).lower()) if name else None
+def _known_unit(declared: str | None) -> str | None:
+    """The unit that a file names, or None; COLLADA says how many metres one is."""
+    import trimesh
+
+    if declared is None:
+        return None
+    metres = trimesh.units.unit_conversion(declared, "meters")
+    return next((name for name, size in METRES.items() if np.isclose(metres, size, rtol=1e-6)), None)
 
 
 def _with_meshio(path: Path) -> RawMesh:
@@ -93,6 +105,12 @@ def _with_meshio(path: Path) -> RawMesh:
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
     return RawMesh(points, np.vstack([np.zeros((0, 3), np.int64), *faces]), None)
+
+
+def _known_to_meshio(kind: str) -> bool:
+    import meshio
+
+    return kind in meshio.extension_to_filetypes
 
 
 def _triangles_of(kind: str, cells: IntArray) -> IntArray:

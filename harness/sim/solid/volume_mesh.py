@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused, WrongUse
-from harness.sim.solid.intake import METRES
+from harness.sim.solid.mesh_read import METRES
 from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh, six_node_faces
 from harness.sim.solid.volume_mesh_checks import (
     check_curved,
@@ -102,9 +102,9 @@ def _read(path: Path) -> Any:
             return meshio.read(path)
     # The readers raise whatever their parsers meet, and one of them exits: there is no common class.
     except (Exception, SystemExit) as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
         raise MeshRefused(
-            f"{path.name} does not read as {path.suffix or 'a mesh'}: {reason[:160]}"
+            f"{path.name} does not read as {path.suffix or 'a mesh'}: it is cut short, damaged or of another "
+            "format; export it again"
         ) from error
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from calibration.markers.at_rest import Printed, markers_at_rest
-from calibration.markers.dots import Dots, find_dots
+from calibration.markers.dots import Dots, find_dots, relative_light
 from calibration.markers.lattice import lay_lattice
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, OutOfDomain
@@ -44,6 +44,15 @@ def test_dots_are_placed_to_some_hundredths_of_a_pixel(drawn: DrawnDots) -> None
     assert np.abs(off).max() < 0.1
     # Without bias: the mean of n dots is known to one over the root of n.
     assert np.abs(off.mean(axis=0)).max() < 4.0 * np.sqrt(np.mean(off**2) / len(off))
+
+
+def test_a_camera_of_more_pixels_sees_the_same_light() -> None:
+    """Beyond 1,544 rows a median over a quarter of them would count beyond 16 bits."""
+    picture = DrawnDots().picture()
+    fine = np.repeat(np.repeat(picture, 7, axis=0), 7, axis=1)
+    assert len(fine) > 1544
+    off = relative_light(fine)[3::7, 3::7] - relative_light(picture)
+    assert np.sqrt(np.mean(off**2)) < 0.01
 
 
 def test_errors_are_what_they_are_said_to_be() -> None:

@@ -1,18 +1,25 @@
 """The GelSight driver against a stream on a socket: the driver used at the bench, unchanged."""
 
 import socket
+import struct
 import threading
-from collections.abc import Iterator
+import tracemalloc
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from drivers.camera.http_camera import HttpCamera, gelsight, scene_camera
+from drivers.camera.mjpeg import MjpegStream
 from harness.basics.arrays import ByteArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
+from harness.bench.reading import Channel
 from harness.bench.sensor import GELSIGHT_R15
+from harness.picture.image_file import read_image
+from harness.picture.jpeg import decode_jpeg
 from mocks.camera.gelsight_stream import MjpegServer, encode
 from mocks.faults import Fault
 
@@ -169,3 +176,84 @@ def test_the_scene_camera_reads_the_same_way(bench: Bench) -> None:
     camera.close()
     assert reading.channel.name == "camera.image"
     assert reading.values.shape == (2, 12, 16, 3)
+
+
+def stream() -> MjpegStream:
+    """A stream that no thread fills."""
+    channel = Channel("gel.image", "count", (120, 160, 3), "uint8")
+    return MjpegStream("the camera", "http://127.0.0.1:1", channel)
+
+
+def frames_at(camera: MjpegStream, times: Iterable[float], jpeg: bytes = b"\xff\xd8\xff\xd9") -> None:
+    for time in times:
+        camera._keep(time, jpeg)
+
+
+def lit(rows: int = 120, columns: int = 160) -> bytes:
+    y, x = np.mgrid[:rows, :columns]
+    levels = 128.0 + 60.0 * np.sin(x / 17.0)[..., None] * [1.0, 0.5, 0.2] + 40.0 * np.cos(y / 11.0)[..., None]
+    noise = np.random.default_rng(0).normal(0.0, 2.0, (rows, columns, 3))
+    return encode(np.clip(levels + noise, 0.0, 255.0).astype(np.uint8))
+
+
+def test_a_frame_that_lost_a_packet_is_no_frame() -> None:
+    camera, whole, random = stream(), lit(), np.random.default_rng(1)
+    assert camera._decode(whole) is not None
+    for start in random.integers(700, len(whole) - 1100, 50):
+        assert camera._decode(whole[:start] + whole[start + 1024 :]) is None
+    assert camera.drops == 50
+
+
+def test_what_follows_the_end_of_an_image_is_left_out() -> None:
+    camera, whole = stream(), lit()
+    camera._keep(1.0, whole + bytes(500))
+    assert [frame.jpeg for frame in camera._frames] == [whole]
+    assert camera.drops == 0
+
+
+def test_frames_that_come_in_groups_are_not_missed() -> None:
+    camera, random = stream(), np.random.default_rng(2)
+    groups = [0.4 * k + np.sort(random.uniform(0.0, 2e-3, 10)) for k in range(20)]
+    frames_at(camera, np.concatenate(groups))
+    assert camera.drops == 0
+
+
+@pytest.mark.parametrize("jitter", [0.0, 2e-3, 5e-3])
+def test_frames_that_a_steady_stream_loses_are_counted(jitter: float) -> None:
+    camera, random = stream(), np.random.default_rng(3)
+    lost = set(random.choice(np.arange(40, 200), 20, replace=False))
+    times = 0.04 * np.arange(201) + random.uniform(-jitter, jitter, 201)
+    frames_at(camera, [time for k, time in enumerate(times) if k not in lost])
+    assert abs(camera.drops - 20) <= 1
+
+
+def test_the_rate_is_that_of_the_connection_there_is() -> None:
+    camera = stream()
+    frames_at(camera, 0.04 * np.arange(20))
+    camera._opened = 5.0
+    frames_at(camera, 5.02 + 0.04 * np.arange(20))
+    assert camera.rate == pytest.approx(25.0)
+
+
+@pytest.mark.parametrize("size", [30_000, 60_000])
+def test_a_head_that_states_a_vast_picture_takes_no_memory(size: int) -> None:
+    data = bytearray(lit())
+    at = data.index(b"\xff\xc0")
+    data[at + 5 : at + 9] = struct.pack(">HH", size, size)
+    tracemalloc.start()
+    with pytest.raises(BenchFault, match=f"sends {size} x {size} pixels and the station expects 160 x 120"):
+        stream()._decode(bytes(data))
+    assert tracemalloc.get_traced_memory()[1] < 1e6
+    tracemalloc.stop()
+
+
+def test_no_camera_turns_a_stream_that_it_does_not_turn_in_a_file(tmp_path: Path) -> None:
+    """EXIF's orientation 6: the picture lies on its side."""
+    tags = struct.pack("<2sHIHHHIHHI", b"II", 42, 8, 1, 0x0112, 3, 1, 6, 0, 0)
+    exif = b"\xff\xe1" + struct.pack(">H", 8 + len(tags)) + b"Exif\0\0" + tags
+    turned = lit()[:2] + exif + lit()[2:]
+    (tmp_path / "turned.jpg").write_bytes(turned)
+    of_stream = stream()._decode(turned)
+    assert of_stream is not None
+    assert np.array_equal(of_stream, read_image(tmp_path / "turned.jpg"))
+    assert np.array_equal(of_stream, decode_jpeg(lit()))

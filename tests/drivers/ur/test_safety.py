@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from drivers.ur import paths, safety
 from drivers.ur.safety import SafetyLimits
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import LimitExceeded, SafetyStop, WrongUse
+from harness.basics.errors import LimitExceeded, WrongUse
 from harness.basics.geometry import rotation_about, transform, translation
 from harness.bench import kinematics
 
@@ -41,7 +41,7 @@ def test_loopback_addresses_are_accepted(address: str) -> None:
     ["192.168.56.101", "10.0.0.2", "0.0.0.0", "robot.lab", "::", "", "127.0.0.1.nip.io"],  # noqa: S104
 )
 def test_every_other_address_is_refused_saying_why(address: str) -> None:
-    with pytest.raises(SafetyStop, match="it will not move a real arm"):
+    with pytest.raises(WrongUse, match="it will not move a real arm"):
         safety.require_loopback(address)
 
 

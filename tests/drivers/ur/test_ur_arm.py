@@ -22,7 +22,7 @@ from drivers.ur import session as ur_session
 from drivers.ur.arm import UrArm
 from drivers.ur.safety import SafetyLimits
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import BenchFault, LimitExceeded, ProtectiveStop, SafetyStop
+from harness.basics.errors import BenchFault, LimitExceeded, ProtectiveStop, SafetyStop, WrongUse
 from harness.basics.geometry import translation
 from harness.bench import kinematics
 from harness.bench.device import Arm
@@ -333,7 +333,7 @@ def test_nobody_at_the_address_names_the_cable(tmp_path: Path) -> None:
 
 
 def test_an_address_outside_this_computer_is_refused_before_anything_is_sent(tmp_path: Path) -> None:
-    with pytest.raises(SafetyStop, match="will not move a real arm"):
+    with pytest.raises(WrongUse, match="will not move a real arm"):
         UrArm("192.168.1.10", "ur5e", LIMITS, lock_folder=tmp_path).open()
     assert list(tmp_path.iterdir()) == []
 

@@ -134,7 +134,7 @@ def test_a_damaged_step_without_checksum_is_a_refusal_and_nothing_else(tmp_path:
 def test_a_message_without_checksum_is_held_to_the_crc_of_its_chunk(tmp_path: Path) -> None:
     data, path = OLD_STEP.read_bytes(), tmp_path / "000.mcap"
     at = data.index(b'"values": [0.0, 0.1, -4.5')
-    assert refused(path, data[: at + 12] + b"7" + data[at + 13 :], summed=False)
+    assert refused(path, data[: at + 11] + b"7" + data[at + 12 :], summed=False)
 
 
 def test_a_run_with_checksums_takes_no_step_without(run: Recording) -> None:

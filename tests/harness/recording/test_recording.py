@@ -140,7 +140,10 @@ def test_kill_at_any_moment_leaves_only_whole_steps(tmp_path: Path) -> None:
 def test_a_step_that_fails_to_flush_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     recording = Recording.create(tmp_path / "run", sample_header())
 
+    path = tmp_path / "run" / "steps" / "000.mcap"
+
     def full(descriptor: int) -> None:
+        assert not path.exists()
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", full)

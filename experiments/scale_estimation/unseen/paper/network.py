@@ -85,7 +85,7 @@ def opened_paper(folder: Path, sense: str) -> PaperNetwork:
     try:
         card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise DataRefused(f"{path} has no card beside it ({error}); train it again: {_TRAIN}") from error
+        raise DataRefused(f"{path} has no card beside it; train it again: {_TRAIN}") from error
     inputs = [reading_input(name, shape, _GREATEST) for name, shape in INPUTS[sense]]
     size = Tensor(name="log_size", dtype="float32", shape=("n", 1), unit="1", meaning="log of the size in m")
     return PaperNetwork(Network(path.read_bytes(), path.name, inputs, [size]), card)

@@ -95,8 +95,7 @@ def built_touches(
         DataRefused: the object has no touch.
         OutOfDomain: a press that its networks were not made for.
     """
-    import numpy as np
-
+    from harness.basics.npz_file import write_array
     from harness.objectfile.touch.level import require_gel
     from harness.objectfile.touch.touch import open_touch
     from harness.picture.image_file import write_png
@@ -115,7 +114,7 @@ def built_touches(
     into.notes.append("maps are metres of indentation, of the gel that the object's touch was built for")
     into.files[TOUCH] = []
     for number, (height, image) in enumerate(zip(heights, images, strict=True), start=1):
-        np.save(out / f"{number}.npy", height)
+        write_array(out / f"{number}.npy", height)
         write_png(out / f"{number}.png", image)
         into.files[TOUCH] += [out / f"{number}.npy", out / f"{number}.png"]
 

@@ -31,8 +31,8 @@ def _maps(
     out: Path,
     into: AnsweredQueries,
 ) -> list[Path]:
-    import numpy as np
 
+    from harness.basics.npz_file import write_array
     from harness.objectfile.published.taxim_picture import TaximPicture
     from harness.objectfile.published.touch import open_depths
     from harness.picture.image_file import write_png
@@ -51,7 +51,7 @@ def _maps(
         zip(open_depths(of, entry).maps(vertices, gel), gel, strict=True), start=1
     ):
         written.append(out / f"{number}.npy")
-        np.save(written[-1], depth)
+        write_array(written[-1], depth)
         if optics is not None:
             draw = optics.compat_image if given.compat else optics.image
             written.append(out / f"{number}.png")

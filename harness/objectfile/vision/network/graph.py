@@ -210,9 +210,7 @@ def vision_model(data: bytes, name: str = FILE) -> VisionModel:
             f"{name} holds no {error}: it is no graph of networks of vision; build it again"
         ) from error
     except (WrongUse, IndexError, ValueError, TypeError) as error:
-        raise DataRefused(
-            f"{name} holds networks that do not fit together ({error}); build it again"
-        ) from error
+        raise DataRefused(f"{name} holds networks that do not fit together; build it again") from error
 
 
 def graph_block(data: bytes, name: str = FILE) -> int:
