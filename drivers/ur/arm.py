@@ -45,8 +45,8 @@ class UrArm:
         tool_points: m in the flange's frame, the points that the workspace and speed limits are for.
         lock_folder: where the lock file lies; None for the computer's temporary folder.
         command: what to run as the child process; None for ``drivers.ur.child``.
-        alarm: says why a motion must end, empty while all is well: a motion that began without is stopped,
-            and no search for contact begins with one. An arm may move away from where it learned of it.
+        alarm: why a motion must end, empty while all is well. It ends a motion that began without one, and
+            no search for contact begins under one; other motions may, so that the arm can back away.
     """
 
     def __init__(

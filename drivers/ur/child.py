@@ -67,10 +67,10 @@ class Child:
 
     def _tick(self) -> None:
         message = self._parent.next(TICK if self._motion else REST_TICK)
+        self._check_programs()
         if message is not None:
             self._serve(message)
         self._stream.require_younger((LOST_MOVING if self._motion else LOST_AT_REST) * self._patience)
-        self._check_programs()
         self._check_safety()
         self._check_script()
         if self._motion is not None:

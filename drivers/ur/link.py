@@ -22,7 +22,7 @@ PATIENCE: Final = 0.1  # s that the watchdog waits for a kick
 LATELY: Final = 0.2  # s before the script's end in which a late kick may be what ended it
 DECELERATION: Final = 10.0  # m/s^2; 25 ms from the free speed of 0.25 m/s
 NO_OFFSET: Final = [0.0] * 6
-START_WITHIN: Final = 2.0  # s for the uploaded script to run, and to be named
+START_WITHIN: Final = 5.0  # s for the uploaded script to run, and to be named
 
 
 class Link:

@@ -120,7 +120,7 @@ class ChildProcess:
             message: without its id.
             seconds: the deadline.
             beat: send heartbeats meanwhile, which keep a motion alive.
-            alarm: asked with every heartbeat.
+            alarm: looked at before every heartbeat.
 
         Raises:
             Alarmed: by ``alarm``; the request goes on.

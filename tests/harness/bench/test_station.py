@@ -12,6 +12,7 @@ from drivers.microphone.microphone import PortAudioMicrophone
 from harness.basics.errors import BenchFault, CalibrationRefused, ProtectiveStop, SafetyStop, WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench import station as station_module
+from harness.bench.device import Health
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.station import INSTRUMENTS, LIMITS, RunContext, make_arm, make_microphone, open_station
 from harness.bench.station_file import Station, load_station, station_from_json, station_path
@@ -71,6 +72,19 @@ def opened(folder: Path, camera: bool = True, sound: bool = False) -> Any:
 def scene(camera: bool = True, sound: bool = False) -> SceneFile:
     made = scene_from_options("builtin:mug")
     return made.model_copy(update={"sensors": Sensors(camera=camera, sound=sound)})
+
+
+def test_a_gel_that_sends_nothing_is_the_arms_alarm(
+    instruments: type[Instrument], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failures = iter(["", "gel sent no whole frame for 0.5 s"])
+
+    def health(_: Instrument) -> Health:
+        return Health("gel", "", 25.0, 0, None, failure=next(failures))
+
+    monkeypatch.setattr(Instrument, "health", health, raising=False)
+    with opened(tmp_path) as bench:
+        assert [bench.arm.options["alarm"]() for _ in range(2)] == ["", "gel sent no whole frame for 0.5 s"]
 
 
 @pytest.mark.parametrize("path", STATIONS, ids=lambda p: p.stem)
