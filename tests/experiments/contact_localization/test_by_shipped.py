@@ -20,6 +20,7 @@ from harness.experiment.in_process import performed
 from harness.experiment.levels import chosen_levels
 from harness.experiment.object_modes import carried_by, object_modes
 from harness.recording.run_folder import RunFiles
+from harness.report.simulated import network_rows
 from harness.sim.gel import height_map, raster_kernels
 from harness.sim.light import direct_image
 
@@ -77,6 +78,7 @@ def test_networks_stand_for_every_simulation(run: RunFiles, simulated: list[str]
     assert picture.max() > 0.01
     assert comparison.observed()["camera.image"]["parts"].keys() == {"colour", "coverage"}
     assert np.isfinite(modes.shapes).all()
+    assert [row.file for row in network_rows(scored)] == ["touch.onnx", "vision.onnx"]
 
 
 def test_a_coloured_lamp_is_refused_before_anything_moves(tmp_path: Any) -> None:
