@@ -7,9 +7,11 @@ from typing import Any
 from rich.table import Table
 
 from harness.bench.scene import SceneFile
+from harness.effects.accuracy import Level
 from harness.effects.file_levels import DIALS, NETWORK
 from harness.effects.plan import Plan
 from harness.effects.scene_object import named_file
+from harness.objectfile.description import Description
 from harness.objectfile.entries import Modality, NetworkEntry
 
 _INSTEAD_OF: Mapping[Modality, str] = {
@@ -50,11 +52,21 @@ def networks_in_use(scene: SceneFile, chosen: Plan) -> tuple[NetworkInUse, ...]:
     turned = {name for step in chosen.ran for name, level in step.levels.items() if level == NETWORK}
     if scene.object.objectfile is None or not turned:
         return ()
-    networks = named_file(scene).description.networks
+    return networks_at(named_file(scene).description, dict.fromkeys(turned, NETWORK))
+
+
+def networks_at(of: Description, levels: Mapping[str, Level]) -> tuple[NetworkInUse, ...]:
+    """The networks of an ObjectFile that stand for a simulation at some levels.
+
+    Args:
+        of: what its ``object.json`` says.
+        levels: by the names of dials.
+    """
+    networks = of.networks
     return tuple(
         _in_use(sense, networks[sense])
         for sense, dial in DIALS.items()
-        if dial.name in turned and sense in networks
+        if levels.get(dial.name) == NETWORK and sense in networks
     )
 
 

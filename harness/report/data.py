@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
+from harness.effects.explain_networks import NetworkInUse
 from harness.report.sound_data import Sound
 from harness.report.values import Missing, Posterior
 
@@ -225,6 +226,7 @@ class ReportData:
         sound: what each sense contributed.
         symmetry: the object's, in words.
         accuracy: the chosen levels by knob.
+        networks: of the object's ObjectFile, which stood for a simulation.
         warnings: what the operator should know.
         observed: what the scene observes, simulated at the answer.
     """
@@ -252,5 +254,6 @@ class ReportData:
     sound: Sound | Missing
     symmetry: str = "not looked for"
     accuracy: dict[str, str] = field(default_factory=dict)
+    networks: tuple[NetworkInUse, ...] = ()
     warnings: tuple[str, ...] = ()
     observed: tuple[Observed, ...] = ()

@@ -12,7 +12,7 @@ from harness.experiment.experiment import Experiment, Scored
 from harness.report import wording
 from harness.report.figures.figures import Picture
 from harness.report.instruments import artefacts, instruments
-from harness.report.simulated import effect_rows, flat, observed_rows, world_rows
+from harness.report.simulated import effect_rows, flat, network_rows, observed_rows, world_rows
 from harness.report.template import write_page
 from harness.report.turned import TurnedSurface
 from harness.report.values import Missing
@@ -103,6 +103,7 @@ def facts_of(
         "instruments": instruments(run, health),
         "calibrations": artefacts(run),
         "effects": effect_rows(comparison),
+        "networks": network_rows(scored),
         "observed": observed_rows(comparison),
         "world": world_rows(scored, ours or {}),
         "versions": {name: text for name, text in header.versions.items() if name != "git"},

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from harness.effects.explain_networks import NetworkInUse, networks_at
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.report.data import EffectRun, Observed
@@ -26,6 +27,13 @@ def effect_rows(comparison: Comparison) -> tuple[EffectRun, ...]:
         for step in plan.ran
     ]
     return (*ran, *(EffectRun(step.effect.provides, False, step.reason) for step in plan.skipped))
+
+
+def network_rows(scored: Scored) -> tuple[NetworkInUse, ...]:
+    """The networks that stood for a simulation in an answer; none where the run carries no ObjectFile."""
+    if scored.run.scene.object.objectfile is None:
+        return ()
+    return networks_at(scored.run.objectfile.description, scored.accuracy.levels)
 
 
 def observed_rows(comparison: Comparison) -> tuple[Observed, ...]:

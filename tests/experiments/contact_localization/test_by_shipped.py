@@ -1,5 +1,6 @@
 """A run by an ObjectFile that comes with the program, with a scene camera: networks alone draw and sound."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,17 @@ from experiments.contact_localization.section import Localization
 from harness.basics.errors import WrongUse
 from harness.bench.scene import Light, SceneFile, Sensors, scene_from_options
 from harness.bench.station_file import load_station, station_path
-from harness.effects import sound_effects
+from harness.effects import camera_effects, sound_effects
+from harness.effects.scene_object import known_object
 from harness.experiment.begin import begin
 from harness.experiment.compare import compare
 from harness.experiment.experiment import Scored
 from harness.experiment.in_process import performed
 from harness.experiment.levels import chosen_levels
-from harness.experiment.object_modes import carried_by, object_modes
+from harness.experiment.object_modes import object_modes
 from harness.recording.run_folder import RunFiles
+from harness.report.simulated import network_rows
 from harness.sim.gel import height_map, raster_kernels
-from harness.sim.light import direct_image
 
 STATION = load_station(station_path("mock"))
 CALLS = ("touch.image", "camera.image")
@@ -52,7 +54,7 @@ def simulated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     monkeypatch.setattr(height_map, "rasterise", counted("rasterised", raster_kernels.rasterise))
     monkeypatch.setattr(sound_effects, "modes_of", lambda *_: calls.append("solved"))
-    monkeypatch.setattr(direct_image, "LitObject", lambda *_: calls.append("traced"))
+    monkeypatch.setattr(camera_effects, "LitObject", lambda *_: calls.append("traced"))
     return calls
 
 
@@ -63,7 +65,6 @@ def test_networks_stand_for_every_simulation(run: RunFiles, simulated: list[str]
         answering.read(record)
     scored = Scored(run, None, answering.answer(), None, accuracy, ())
     comparison = compare(scored, EXPERIMENT.sources(scored))
-    modes = object_modes(run.scene, run.station, run.mesh, None, carried_by(run))
     assert simulated == []
     calls = comparison.evaluation.calls
     assert {"object.vision", "camera.image", "object.touch_codes"} <= calls.keys()
@@ -76,10 +77,19 @@ def test_networks_stand_for_every_simulation(run: RunFiles, simulated: list[str]
     assert np.isfinite(picture).all()
     assert picture.max() > 0.01
     assert comparison.observed()["camera.image"]["parts"].keys() == {"colour", "coverage"}
+    assert [row.file for row in network_rows(scored)] == ["touch.onnx", "vision.onnx"]
+
+
+def test_its_modes_are_the_networks_and_nothing_is_solved(simulated: list[str]) -> None:
+    scene = scene_from_options("wrench")
+    scene = scene.model_copy(update={"sensors": Sensors(sound=True)})
+    modes = object_modes(scene, STATION, known_object(scene).mesh)
+    assert simulated == []
     assert np.isfinite(modes.shapes).all()
+    assert len(modes.frequencies) > 10
 
 
-def test_a_coloured_lamp_is_refused_before_anything_moves(tmp_path: Any) -> None:
+def test_a_coloured_lamp_is_refused_before_anything_moves(tmp_path: Path) -> None:
     with pytest.raises(
         WrongUse, match=r"lamp 1 of the scene has the colour \[1\.0, 0\.8, 0\.6\].*one number"
     ):

@@ -153,6 +153,7 @@ def test_a_schema_of_the_future(copy: Path, sense: str) -> None:
     refused(copy, sense, "is of schema 2, this program reads 1; use the program that made it")
 
 
+@pytest.mark.parametrize("sense", ["audio", "touch"])
 def test_another_objects_network_of_the_same_size(copy: Path, sense: str) -> None:
     """Its hash is right, and so are its inputs and outputs: only its answers are another's."""
 
@@ -161,6 +162,16 @@ def test_another_objects_network_of_the_same_size(copy: Path, sense: str) -> Non
         tensor.CopyFrom(numpy_helper.from_array(np.ascontiguousarray(array[::-1]), tensor.name))
 
     changed(copy, sense, turn)
+    refused(copy, sense, "differs from what it gave when it was made.*another object's network")
+
+
+@pytest.mark.parametrize("sense", ["vision"])
+def test_a_look_of_the_same_size_in_other_colours(copy: Path, sense: str) -> None:
+    graph = graph_of(copy, sense)
+    (bias,) = (each for each in graph.graph.initializer if each.name == "networks.colour_bias")
+    turned = numpy_helper.to_array(bias)[..., ::-1].copy()
+    bias.CopyFrom(numpy_helper.from_array(turned, bias.name))
+    exchange(copy, SENSES[sense].network, graph.SerializeToString())
     refused(copy, sense, "differs from what it gave when it was made.*another object's network")
 
 

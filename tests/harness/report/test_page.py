@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from harness.effects.explain_networks import NetworkInUse
 from harness.report.data import AnswerRow, ReportData
 from harness.report.page import write_report
 from harness.report.sound_data import StrikeLine
@@ -239,3 +240,15 @@ def test_a_report_needs_no_simulator_of_the_arm() -> None:
     ask = "import sys, harness.report.page, harness.report.figures.props; print('mujoco' in sys.modules)"
     answer = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "False"
+
+
+def test_networks_that_stand_for_a_simulation_are_listed_with_their_errors(
+    report_data: ReportData, page: Page, tmp_path: Path
+) -> None:
+    sound = NetworkInUse("sound.shapes", "audio.onnx", "finite elements", {"gain_error_median": 0.0045}, {})
+    look = NetworkInUse("camera.look", "vision.onnx", "rays on the mesh", {}, {})
+    path = write_report(replace(light(report_data), networks=(sound, look)), tmp_path)
+    text = Page(path.read_text(encoding="utf-8")).text
+    assert "audio.onnx finite elements gain_error_median 0.0045" in text
+    assert "vision.onnx rays on the mesh not measured" in text
+    assert "The object is an ObjectFile" not in page.text
