@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from harness.agreement.compare_run import agreement_of
+from harness.agreement.subject import own_subject
 from harness.basics.clock import now
 from harness.basics.errors import RecordingDamaged, WrongUse
 from harness.basics.whole_file import write_text_whole
@@ -151,6 +153,7 @@ def add_report(
         **written.result,
         "plan": plan_json(comparison),
         "observed": comparison.observed(),
+        "agreement": agreement_of(scored.run, own_subject(scored.run, scored.accuracy)).as_json(),
         "warnings": [*written.result["warnings"], *comparison.notes],
         "report": str(page),
     }
