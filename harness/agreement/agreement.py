@@ -7,9 +7,10 @@ from typing import Any, Literal
 import numpy as np
 from scipy.stats import chi2
 
+from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
 
-Sense = Literal["arm", "touch", "sound"]
+Sense = Literal["arm", "touch", "sound", "camera"]
 Source = Literal["twin", "network", "reference"]
 Verdict = Literal["fits", "does not fit", "not comparable"]
 
@@ -18,6 +19,21 @@ FALSE_ALARM = 0.01
 
 _MOST = 1.0e12
 """Of a chi-square: JSON has no infinity, and beyond this it says no more."""
+
+
+@dataclass(frozen=True, eq=False)
+class SideBySide:
+    """A reading and what a model says of it, as a report shows them; no verdict reads it.
+
+    Attributes:
+        live: ``(rows, columns)`` a field, or ``(n,)`` values in ascending order.
+        model: of the same shape for a field; ``(m,)`` for values.
+        unit: of both.
+    """
+
+    live: FloatArray
+    model: FloatArray
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -30,6 +46,7 @@ class Residual:
         chi_square: 0 or more.
         dof: its degrees of freedom, more than 0; need not be whole.
         numbers: that it is made of, keys with their units.
+        sides: the reading and the model; None where the numbers are all of it.
     """
 
     step: int
@@ -37,6 +54,7 @@ class Residual:
     chi_square: float
     dof: float
     numbers: Mapping[str, float] = field(default_factory=dict)
+    sides: SideBySide | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.chi_square) and self.chi_square >= 0.0 and self.dof > 0.0):
@@ -56,12 +74,14 @@ class SenseResiduals:
         source: what it is compared with.
         residuals: in order of the steps; empty where it cannot be compared.
         why: it cannot be compared, or what a reader must know of how it was.
+        seconds: of CPU that the comparison took.
     """
 
     sense: Sense
     source: Source
     residuals: tuple[Residual, ...]
     why: str = ""
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -122,9 +142,16 @@ class Agreement:
             "senses": [_sense_json(one) for one in self.senses],
         }
 
-    def lines(self) -> list[str]:
-        """For people, a sentence a sense."""
+    def sentences(self) -> list[str]:
+        """For people, a sense each: the residual that speaks most against the model, with its numbers."""
         return [_sentence(one) for one in self.senses]
+
+    def lines(self) -> list[str]:
+        """For people, a sense each: what it was compared with, the verdict, and its sentence."""
+        return [
+            f"{one.compared.sense} against the {one.compared.source}: {one.verdict}; {sentence}"
+            for one, sentence in zip(self.senses, self.sentences(), strict=True)
+        ]
 
 
 def judged(about: str, senses: Sequence[SenseResiduals], false_alarm: float = FALSE_ALARM) -> Agreement:
@@ -133,20 +160,22 @@ def judged(about: str, senses: Sequence[SenseResiduals], false_alarm: float = FA
     Args:
         about: the object that was compared with.
         senses: residuals of each.
-        false_alarm: of the whole run, shared evenly by all residuals (Bonferroni).
+        false_alarm: of the whole run, shared evenly by the senses that are compared, and by the residuals of
+            each (Bonferroni): a sense of many residuals takes nothing from one of few.
 
     Raises:
         OutOfDomain: a rate that is not between 0 and 1.
     """
     if not 0.0 < false_alarm < 1.0:
         raise OutOfDomain(f"a false alarm rate of {false_alarm:g} was given; it must be between 0 and 1")
-    count = sum(len(one.residuals) for one in senses)
-    return Agreement(about, false_alarm, tuple(_judged(one, false_alarm / max(1, count)) for one in senses))
+    compared = max(1, sum(bool(one.residuals) for one in senses))
+    return Agreement(about, false_alarm, tuple(_judged(one, false_alarm / compared) for one in senses))
 
 
-def _judged(one: SenseResiduals, each: float) -> JudgedSense:
+def _judged(one: SenseResiduals, rate: float) -> JudgedSense:
     if not one.residuals:
         return JudgedSense(one, "not comparable", ())
+    each = rate / len(one.residuals)
     limits = tuple(np.atleast_1d(chi2.isf(each, [residual.dof for residual in one.residuals])).tolist())
     beyond = any(r.chi_square > limit for r, limit in zip(one.residuals, limits, strict=True))
     return JudgedSense(one, "does not fit" if beyond else "fits", limits)
@@ -158,6 +187,7 @@ def _sense_json(one: JudgedSense) -> dict[str, Any]:
         "compared_with": one.compared.source,
         "verdict": one.verdict,
         "why": one.compared.why or None,
+        "seconds": one.compared.seconds,
         "residuals": [
             {
                 "step": residual.step + 1,
@@ -173,14 +203,28 @@ def _sense_json(one: JudgedSense) -> dict[str, Any]:
 
 
 def _sentence(one: JudgedSense) -> str:
-    what = f"{one.compared.sense} against the {one.compared.source}"
-    note = f" ({one.compared.why})" if one.compared.why else ""
     if one.verdict == "not comparable":
-        return f"{what}: not comparable: {one.compared.why}"
+        return one.compared.why
+    note = f" ({one.compared.why})" if one.compared.why else ""
     worst = one.doubted or max(one.compared.residuals, key=lambda r: r.chi_square / r.dof)
     limit = one.limits[one.compared.residuals.index(worst)]
     kind = "first in doubt" if one.doubted else "worst"
     return (
-        f"{what}: {one.verdict}; {kind}: step {worst.step + 1}, {worst.quantity}, chi-square "
-        f"{worst.chi_square:.1f} with {worst.dof:.1f} degrees of freedom (limit {limit:.1f}){note}"
+        f"{kind}: step {worst.step + 1}, {worst.quantity}, chi-square {worst.chi_square:.1f} with "
+        f"{worst.dof:.1f} degrees of freedom (limit {limit:.1f}): {numbers_text(worst.numbers)}{note}"
     )
+
+
+_SHOWN = {"m": (1e3, " mm"), "m2": (1e6, " mm²"), "rad": (180.0 / np.pi, "°"), "px": (1.0, " px")}
+"""What the unit at the end of a number's name is shown in."""
+
+
+def numbers_text(numbers: Mapping[str, float]) -> str:
+    """Numbers in words, each by its name and in a unit that suits it: ``read_m`` is ``read 1.95 mm``."""
+    return ", ".join(_number_text(name, value) for name, value in numbers.items())
+
+
+def _number_text(name: str, value: float) -> str:
+    words, _, unit = name.rpartition("_")
+    factor, shown = _SHOWN.get(unit, (1.0, ""))
+    return f"{(words if shown else name).replace('_', ' ')} {factor * value:.3g}{shown}"

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom
 
-from harness.agreement.agreement import Residual, SenseResiduals, Source
+from harness.agreement.agreement import Residual, SenseResiduals, SideBySide, Source
+from harness.agreement.phases import PhaseNoise, phase_residual
 from harness.agreement.readings import PressedContact
 from harness.agreement.subject import Subject
 from harness.basics.arrays import BoolArray, FloatArray
@@ -60,16 +61,18 @@ def compare_sound(
     source: Source,
     contacts: Sequence[PressedContact],
     noise: ResonanceNoise | None = None,
+    phases: PhaseNoise | None = None,
 ) -> SenseResiduals:
-    """The resonances of a run against a model's modes.
+    """The resonances of a run against a model's modes, and the phases of its strikes against each other.
 
     Args:
         subject: the object.
         source: the ObjectFile's network, or finite elements.
         contacts: of the run.
         noise: of the resonances; None for the stated one.
+        phases: of the strikes; None for the stated one.
     """
-    noise = noise or ResonanceNoise()
+    noise, phases = noise or ResonanceNoise(), phases or PhaseNoise()
     struck = [contact for contact in contacts if contact.seen.strike is not None]
     if not struck:
         return SenseResiduals("sound", source, (), "no contact was struck")
@@ -81,9 +84,10 @@ def compare_sound(
         stored = subject.simulated("audio", source, ("object.modes",), {})["object.modes"]
     except TouchstoneError as refusal:
         return SenseResiduals("sound", source, (), str(refusal))
-    modes = np.asarray(from_arrays(stored).frequencies)
-    residual = resonance_residual(struck[-1].step, peaks, modes, noise)
-    return SenseResiduals("sound", source, (residual,))
+    modes, last = np.asarray(from_arrays(stored).frequencies), struck[-1].step
+    resonances = resonance_residual(last, peaks, modes, noise)
+    moved = phase_residual(last, evidence.peaks, resonances.numbers["factor"] * modes, phases)
+    return SenseResiduals("sound", source, (resonances,) if moved is None else (resonances, moved))
 
 
 def resonance_residual(step: int, peaks: FloatArray, modes: FloatArray, noise: ResonanceNoise) -> Residual:
@@ -105,7 +109,8 @@ def resonance_residual(step: int, peaks: FloatArray, modes: FloatArray, noise: R
         "probability": probability,
         "by_chance": float(found.chance.mean()),
     }
-    return Residual(step, "resonances", -2.0 * float(np.log(max(probability, _LEAST))), 2.0, numbers)
+    sides = SideBySide(peaks, found.factor * modes, "Hz")
+    return Residual(step, "resonances", -2.0 * float(np.log(max(probability, _LEAST))), 2.0, numbers, sides)
 
 
 def matched(peaks: FloatArray, modes: FloatArray, noise: ResonanceNoise) -> ResonanceMatch:

@@ -1,7 +1,7 @@
 """What readings are compared with: a run's own object as it carries it, or an ObjectFile in its place."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Facts
 from harness.effects.evaluate import Evaluation, evaluate
 from harness.effects.file_levels import DIALS, NETWORK, networks_of
-from harness.effects.plan import default_accuracy, plan
+from harness.effects.plan import Plan, default_accuracy, plan
 from harness.objectfile.entries import Modality
 from harness.objectfile.file import ObjectFile
 from harness.recording.run_folder import RunFiles
@@ -45,6 +45,7 @@ class Subject:
     objectfile: ObjectFile | None
     levels: Mapping[str, Level] = field(default_factory=dict)
     _store: Store = field(default_factory=lambda: Store(default_folder()), repr=False)
+    _made: dict[tuple[Modality, Source], dict[str, Any]] = field(default_factory=dict, repr=False, init=False)
 
     @cached_property
     def base_from_object(self) -> FloatArray:
@@ -72,12 +73,22 @@ class Subject:
             OutOfDomain: a gel stands where no network was made for it.
         """
         dial, known = DIALS[sense], default_accuracy(EFFECTS)
-        kept = {name: level for name, level in self.levels.items() if name in known.levels}
+        chosen_levels = {name: level for name, level in self.levels.items() if name in known.levels}
         turned = NETWORK if source == "network" else dial.default
-        levels = known.with_({**kept, dial.name: turned})
-        sensor = self.run.station.gel.sensor
-        chosen = plan(EFFECTS, Facts(self.scene, sensor), tuple(wanted), levels)
-        return evaluate(chosen, {**self._sources(), **given}, self._store)
+        levels = known.with_({**chosen_levels, dial.name: turned})
+        facts = Facts(self.scene, self.run.station.gel.sensor)
+        chosen = plan(EFFECTS, facts, tuple(wanted), levels)
+        if (sense, source) not in self._made:
+            lasting = _of_object(chosen, given)
+            made = evaluate(plan(EFFECTS, facts, lasting, levels), self._sources(), self._store)
+            self._made[sense, source] = {name: made[name] for name in lasting}
+        known_values = self._made[sense, source]
+        left = replace(
+            chosen,
+            ran=tuple(step for step in chosen.ran if step.effect.provides not in known_values),
+            sources=(*chosen.sources, *known_values),
+        )
+        return evaluate(left, {**self._sources(), **given, **known_values}, self._store)
 
     def _sources(self) -> dict[str, Any]:
         sources: dict[str, Any] = {
@@ -88,6 +99,18 @@ class Subject:
             "sensor.calibration": self.run.calibration,
         }
         return sources if self.objectfile is None else {**sources, "object.file": self.objectfile}
+
+
+def _of_object(chosen: Plan, given: Mapping[str, Any]) -> tuple[str, ...]:
+    """What follows from the object alone and what does not follow from it needs: it is made once."""
+    fixed, needed = set(chosen.sources) - set(given), set[str]()
+    for step in chosen.ran:
+        needs = {chosen.resolved(need) for need in step.effect.needs}
+        if needs <= fixed:
+            fixed.add(step.effect.provides)
+        else:
+            needed |= needs & fixed
+    return tuple(sorted(needed - set(chosen.sources)))
 
 
 def own_subject(run: RunFiles, levels: Mapping[str, Level] | None = None) -> Subject:

@@ -145,7 +145,9 @@ def add_report(
 ) -> dict[str, Any]:
     """Compare, draw the report, and write the result again with both; the arguments are ``finish``'s."""
     scored = written.scored
-    comparison = compare(scored, experiment.sources(scored))
+    own = own_subject(scored.run, scored.accuracy)
+    agreement = agreement_of(scored.run, own, measured=experiment.measured)
+    comparison = replace(compare(scored, experiment.sources(scored)), agreement=agreement)
     scored = replace(scored, warnings=(*scored.warnings, *comparison.notes))
     page = (experiment.report or draw)(scored, comparison, health, folder / "report")
     np.savez_compressed(folder / OBSERVED, **comparison.arrays())  # type: ignore[arg-type]
@@ -153,7 +155,7 @@ def add_report(
         **written.result,
         "plan": plan_json(comparison),
         "observed": comparison.observed(),
-        "agreement": agreement_of(scored.run, own_subject(scored.run, scored.accuracy)).as_json(),
+        "agreement": agreement.as_json(),
         "warnings": [*written.result["warnings"], *comparison.notes],
         "report": str(page),
     }

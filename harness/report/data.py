@@ -2,10 +2,14 @@
 
 from dataclasses import dataclass, field
 
+from harness.agreement.agreement import Agreement
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
 from harness.report.sound_data import Sound
 from harness.report.values import Missing, Posterior
+
+NOT_COMPARED = Missing("the readings were not compared with a model")
+"""Why a report has no part that compares them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +231,7 @@ class ReportData:
         accuracy: the chosen levels by knob.
         warnings: what the operator should know.
         observed: what the scene observes, simulated at the answer.
+        agreement: of the readings with a model of the object at the stated pose.
     """
 
     title: str
@@ -254,3 +259,4 @@ class ReportData:
     accuracy: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     observed: tuple[Observed, ...] = ()
+    agreement: Agreement | Missing = field(default_factory=lambda: NOT_COMPARED)

@@ -33,14 +33,20 @@ def compare(
     To try: touchstone compare runs/... --objectfile objects/bowl
     """
     from harness.agreement.compare_run import agreement_of
-    from harness.agreement.subject import subject_of_file
+    from harness.agreement.subject import own_subject, subject_of_file
     from harness.commands.output import ANSWERS, emit
+    from harness.experiment.answer import levels_of_result
+    from harness.experiment.lookup import experiment_of
     from harness.recording.recording import Recording
     from harness.recording.run_folder import RunFiles
 
     files = RunFiles(Recording(run))
-    subject = None if objectfile is None else subject_of_file(files, objectfile)
-    found = agreement_of(files, subject, reference)
+    kind = experiment_of(files.recording)
+    if objectfile is None:
+        subject = own_subject(files, levels_of_result(kind, run))
+        found = agreement_of(files, subject, reference, kind.measured)
+    else:
+        found = agreement_of(files, subject_of_file(files, objectfile), reference)
     if json:
         emit({"schema": 1, "recording": str(run), **found.as_json()})
         return 0

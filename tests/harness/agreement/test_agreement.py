@@ -25,12 +25,12 @@ def test_right_models_are_refused_at_the_stated_rate() -> None:
     assert abs(refused - runs * rate) < 3.0 * np.sqrt(runs * rate)
 
 
-def test_limits_are_shared_by_all_senses() -> None:
+def test_limits_are_shared_by_senses_and_by_the_residuals_of_each() -> None:
     one = SenseResiduals("arm", "twin", (residual(0, 0.0),))
     two = SenseResiduals("touch", "network", (residual(0, 0.0, 3.0), residual(1, 0.0, 3.0)))
     limits = [sense.limits for sense in judged("a mug", [one, two], 0.03).senses]
-    assert limits[0] == pytest.approx([chi2.isf(0.01, 1.0)])
-    assert limits[1] == pytest.approx([chi2.isf(0.01, 3.0)] * 2)
+    assert limits[0] == pytest.approx([chi2.isf(0.015, 1.0)])
+    assert limits[1] == pytest.approx([chi2.isf(0.0075, 3.0)] * 2)
 
 
 def test_the_first_in_doubt_is_the_earliest_step() -> None:
