@@ -56,6 +56,10 @@ class SurfaceNoise:
         block: m, a side of the blocks of pixels that are averaged.
         core: share of the deepest place above which a surface is compared: below it, it is the gel that
             hangs from the contact, not the object that shapes it.
+        rim: m along the picture's border that are not compared: heights are integrated from slopes, and
+            beyond the border there are none.
+        most: sigmas that one block counts as at most: a crease that the gel does not reach is a few blocks
+            far off, another object is all of them off.
     """
 
     rms: float = 0.042e-3
@@ -65,6 +69,8 @@ class SurfaceNoise:
     length: float = 3.0e-3
     block: float = 0.6e-3
     core: float = 0.4
+    rim: float = 1.2e-3
+    most: float = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +134,9 @@ class _Search:
         self._block = max(1, round(noise.block / sensor.pitch))
         self._pitch = self._block * sensor.pitch
         self._read = self._coarse(contact.heights)
+        rim = round(noise.rim / self._pitch)
+        self._inside = np.zeros(self._read.shape, np.bool_)
+        self._inside[rim : -rim or None, rim : -rim or None] = True
         anchor = subject.base_from_object[:3, 3]
         self._root = np.linalg.cholesky(twist_covariance(places, self._pose, anchor))
 
@@ -199,8 +208,9 @@ class _Search:
         return (tried[best], gained) if gained > 0.0 else (at, 0.0)
 
     def _cost(self, modelled: FloatArray, at: FloatArray, mask: BoolArray, weights: FloatArray) -> float:
-        gaps = (self._read - modelled)[mask]
-        return float(weights @ gaps**2 + at @ at)
+        squares = weights * (self._read - modelled)[mask] ** 2
+        most = self._noise.most**2 * self._dof(mask) / int(mask.sum())
+        return float(np.minimum(squares, most).sum() + at @ at)
 
     def _weights(self, modelled: FloatArray, mask: BoolArray) -> FloatArray:
         """1/m^2 of each block: blocks beside each other are off alike."""
@@ -239,4 +249,4 @@ class _Search:
         return self._core(self._read) | self._core(modelled)
 
     def _core(self, heights: FloatArray) -> BoolArray:
-        return np.asarray(heights > max(SEEN, self._noise.core * float(heights.max())))
+        return np.asarray(self._inside & (heights > max(SEEN, self._noise.core * float(heights.max()))))

@@ -30,6 +30,7 @@ class PhaseNoise:
         within: rad, between two strikes of one mode.
         strong: share of the loudest strike's amplitude from which on a phase is read.
         alone: least logarithm between a mode's frequency and the next one's, of a mode that is alone.
+        widths: half widths of the peak, within which no other mode may lie either.
         near: most logarithm between a peak's frequency and that of its mode.
         clutter: share of such peaks that are more than one mode all the same, or read wrongly.
     """
@@ -37,6 +38,7 @@ class PhaseNoise:
     within: float = np.radians(20.0)
     strong: float = 0.25
     alone: float = 0.02
+    widths: float = 4.0
     near: float = 0.04
     clutter: float = 0.08
 
@@ -50,7 +52,7 @@ def phase_residual(step: int, peaks: Sequence[Peak], modes: FloatArray, noise: P
         modes: ``(m,)`` Hz of the model, with the factor that the object's frequencies have over it.
         noise: of the phases.
     """
-    shares = [peak.y[peak.heard] for peak in peaks if is_single(peak.frequency, modes, noise)]
+    shares = [peak.y[peak.heard] for peak in peaks if is_single(peak, modes, noise)]
     apart = np.array([angle for y in shares if (angle := phase_apart(y, noise.strong)) is not None])
     if not len(apart):
         return None
@@ -65,14 +67,16 @@ def phase_residual(step: int, peaks: Sequence[Peak], modes: FloatArray, noise: P
     return Residual(step, "phases", -2.0 * float(np.log(max(probability, _LEAST))), 2.0, numbers)
 
 
-def is_single(peak: float, modes: FloatArray, noise: PhaseNoise) -> bool:
+def is_single(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> bool:
     """Whether exactly one of ``(m,)`` modes, in Hz, lies at a peak, and no other beside that."""
     if not len(modes):
         return False
-    apart = np.abs(np.log(modes / peak))
+    apart = np.abs(np.log(modes / peak.frequency))
     nearest = int(np.argmin(apart))
     others = np.abs(np.log(np.delete(modes, nearest) / modes[nearest]))
-    return bool(apart[nearest] < noise.near and (others > noise.alone).all())
+    width = max(peak.damping, 0.0) / (2.0 * np.pi * peak.frequency)
+    alone = max(noise.alone, noise.widths * width)
+    return bool(apart[nearest] < noise.near and (others > alone).all())
 
 
 def phase_apart(y: ComplexArray, strong: float) -> float | None:

@@ -77,6 +77,6 @@ def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise) -> Residua
         "gain": found.gain,
         "prior_chi_square": found.prior,
     }
-    chi_square = dof * float(np.mean(gaps**2 / variance)) + found.prior
+    chi_square = dof * float(np.mean(np.minimum(gaps**2 / variance, noise.most**2))) + found.prior
     sides = SideBySide(found.read, found.modelled, "m")
     return Residual(step, "gel surface", chi_square, dof, numbers, sides)

@@ -20,6 +20,10 @@ def peaks_of(shares: list[ComplexArray]) -> list[Peak]:
     ]
 
 
+def peak_at(frequency: float, damping: float = 20.0) -> Peak:
+    return Peak(frequency, damping, np.ones(2, complex), np.full(2, 1e-3), np.ones(2, np.bool_), 0.0, 0.0)
+
+
 def drawn(rng: np.random.Generator, phases: float) -> list[ComplexArray]:
     """Real gains of either sign, one phase a mode, and one more of each strike."""
     gains = rng.normal(size=(len(MODES), 6))
@@ -49,11 +53,16 @@ def test_a_microphone_that_moves_between_strikes_is_improbable(phases: float, mo
 
 def test_modes_in_pairs_have_no_phase_of_their_own() -> None:
     pairs: FloatArray = np.sort(np.concatenate([MODES, 1.005 * MODES]))
-    assert not any(is_single(float(frequency), pairs, NOISE) for frequency in MODES)
+    assert not any(is_single(peak_at(float(frequency)), pairs, NOISE) for frequency in MODES)
     assert phase_residual(0, peaks_of(drawn(np.random.default_rng(4), 1.6)), pairs, NOISE) is None
 
 
 def test_a_peak_far_from_every_mode_is_no_modes() -> None:
-    assert is_single(1000.0, np.array([1000.0, 1300.0]), NOISE)
-    assert not is_single(1100.0, np.array([1000.0, 1300.0]), NOISE)
-    assert not is_single(1000.0, np.zeros(0), NOISE)
+    assert is_single(peak_at(1000.0), np.array([1000.0, 1300.0]), NOISE)
+    assert not is_single(peak_at(1100.0), np.array([1000.0, 1300.0]), NOISE)
+    assert not is_single(peak_at(1000.0), np.zeros(0), NOISE)
+
+
+def test_a_broad_peak_may_hold_its_neighbour_too() -> None:
+    assert is_single(peak_at(1000.0, 20.0), np.array([1000.0, 1100.0]), NOISE)
+    assert not is_single(peak_at(1000.0, 200.0), np.array([1000.0, 1100.0]), NOISE)
