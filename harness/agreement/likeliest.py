@@ -58,8 +58,8 @@ class SurfaceNoise:
             hangs from the contact, not the object that shapes it.
         rim: m along the picture's border that are not compared: heights are integrated from slopes, and
             beyond the border there are none.
-        most: sigmas that one block counts as at most: a crease that the gel does not reach is a few blocks
-            far off, another object is all of them off.
+        most: sigmas that one block counts as at most, once the pose is found: a crease that the gel does not
+            reach is a few blocks far off, another object is all of them off.
     """
 
     rms: float = 0.042e-3
@@ -208,9 +208,7 @@ class _Search:
         return (tried[best], gained) if gained > 0.0 else (at, 0.0)
 
     def _cost(self, modelled: FloatArray, at: FloatArray, mask: BoolArray, weights: FloatArray) -> float:
-        squares = weights * (self._read - modelled)[mask] ** 2
-        most = self._noise.most**2 * self._dof(mask) / int(mask.sum())
-        return float(np.minimum(squares, most).sum() + at @ at)
+        return float(weights @ (self._read - modelled)[mask] ** 2 + at @ at)
 
     def _weights(self, modelled: FloatArray, mask: BoolArray) -> FloatArray:
         """1/m^2 of each block: blocks beside each other are off alike."""
