@@ -25,7 +25,7 @@ _STEPS = np.repeat([0.15e-3, np.radians(0.4)], 3)
 _STEP = 0.1
 """Of a sigma of gain and skirt, over which slopes are taken."""
 
-_DEEPER = (-0.8e-3, 0.0, 0.8e-3, 1.6e-3, 2.4e-3)
+_DEEPER = (-0.8e-3, -0.4e-3, 0.0, 0.4e-3, 0.8e-3, 1.2e-3, 1.6e-3, 2.4e-3)
 _ASIDE = ((0.0, 0.0), (1.2e-3, 0.0), (-1.2e-3, 0.0), (0.0, 1.2e-3), (0.0, -1.2e-3))
 """m along the gel's axes from the stated pose to those at which a search may start: where the model does not
 reach the gel, or an edge lies on the other side of it, no slope leads to the contact."""

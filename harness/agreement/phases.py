@@ -40,7 +40,7 @@ class PhaseNoise:
     alone: float = 0.02
     widths: float = 4.0
     near: float = 0.04
-    clutter: float = 0.08
+    clutter: float = 0.05
 
 
 def phase_residual(step: int, peaks: Sequence[Peak], modes: FloatArray, noise: PhaseNoise) -> Residual | None:
