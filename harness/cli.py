@@ -57,6 +57,10 @@ COMMANDS = {
     "replay": Command(
         "harness.commands.run.replay:replay", "Estimate again from a recording alone; no bench is opened."
     ),
+    "compare": Command(
+        "harness.commands.run.compare:compare",
+        "Hold a run's readings against its object's networks, the simulation and the twin.",
+    ),
     "explain": Command(
         "harness.commands.explain:explain", "Say which effects a scene calls for, which not, and why."
     ),

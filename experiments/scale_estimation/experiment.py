@@ -80,4 +80,5 @@ EXPERIMENT = Experiment(
     error_key="until",
     budgets=plain_budgets(NAME, steps_of, *OWN),
     sizes_unknown=True,
+    measured="the size and the place of the object are what this run measures",
 )

@@ -6,15 +6,14 @@ import numpy as np
 
 from experiments.scale_estimation.sound.peaks import Peaks
 from experiments.scale_estimation.touch.patch import Patch, patch_of
-from harness.basics.arrays import ByteArray
 from harness.bench.acquisition import Strike
 from harness.picture.object_mask import mask_by_background
 from harness.picture.outline import SeenOutline, read_outline
+from harness.recording.look_pictures import look_pictures
 from harness.recording.observation import Observation
 from harness.recording.step_file import StepRecord
 from harness.sim.optics.inverse import invert
 from harness.sim.optics.tactile_calibration import TactileCalibration
-from harness.skills.look import BARE_IMAGE, IMAGE
 from harness.strikes.peaks import analyse
 from harness.strikes.spectra import Analysis
 
@@ -25,15 +24,8 @@ def outline_of(record: StepRecord) -> SeenOutline | None:
     Raises:
         DataRefused: the object is not seen.
     """
-    pictures = pictures_of(record)
+    pictures = look_pictures(record)
     return None if pictures is None else read_outline(mask_by_background(*pictures))
-
-
-def pictures_of(record: StepRecord) -> tuple[ByteArray, ByteArray] | None:
-    """``(rows, columns, 3)`` RGB with the object and without it; None where the step was no look."""
-    if IMAGE not in record.readings or BARE_IMAGE not in record.readings:
-        return None
-    return _median(record.readings[IMAGE].values), _median(record.readings[BARE_IMAGE].values)
 
 
 def patch_of_contact(seen: Observation, calibration: TactileCalibration, pitch: float) -> Patch | None:
@@ -66,7 +58,3 @@ def peaks_of(strikes: Sequence[Strike]) -> Peaks | None:
     levels = found.loudest + np.array([peak.level for peak in peaks])
     decays = np.array([peak.damping for peak in peaks])
     return Peaks(frequencies, levels, found.band, settings.decay, decays)
-
-
-def _median(frames: ByteArray) -> ByteArray:
-    return np.asarray(np.median(frames, axis=0)).astype(np.uint8)

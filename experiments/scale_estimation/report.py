@@ -20,6 +20,7 @@ from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Scored
 from harness.experiment.lookup import named
 from harness.picture.outline import SeenOutline, corners_of
+from harness.recording.look_pictures import IMAGE
 from harness.report.figures.figures import Album
 from harness.report.figures.size import (
     Resonances,
@@ -31,7 +32,6 @@ from harness.report.figures.size import (
     touched_figure,
 )
 from harness.report.run_page import PageSection, write_run_page
-from harness.skills.look import IMAGE
 
 _NAME = "scale-estimation"
 

@@ -15,7 +15,6 @@ from experiments.scale_estimation.baselines import (
     constant,
     random_error,
 )
-from experiments.scale_estimation.readings import pictures_of
 from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import Belief, fused
 from experiments.scale_estimation.touch.touch import by_touch
@@ -33,6 +32,7 @@ from harness.experiment.lookup import named
 from harness.experiment.plain import perform_in_process
 from harness.experiment.truth import read_truth
 from harness.picture.outline import SeenOutline
+from harness.recording.look_pictures import look_pictures
 from harness.recording.run_folder import RunFiles
 
 TRIVIAL = ("random", "constant", "first peak", "outline's area", "outline's box", "contacts' box")
@@ -139,7 +139,7 @@ def run_cell(
         pictures = None
         for record in recording.steps():
             answering.read(record)
-            pictures = pictures_of(record) or pictures
+            pictures = look_pictures(record) or pictures
         true = float(truth.differences["longest_side_m"])
         rows = _rows(answering, answering.answer(), true)
         rows.update(_paper_rows(networks, answering, pictures, true))

@@ -41,4 +41,5 @@ EXPERIMENT = Experiment(
     assumed={"sensors": {"camera": True, "touch": True}},
     error_key="until",
     budgets=plain_budgets(NAME, steps_of, *OWN),
+    measured="the shape and the place of the object are what this run measures",
 )

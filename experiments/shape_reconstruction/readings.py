@@ -12,11 +12,11 @@ from harness.basics.arrays import ByteArray, FloatArray, read_only
 from harness.basics.geometry import apply, translation
 from harness.picture.object_mask import mask_by_background
 from harness.picture.square_pixels import aspect_stated
+from harness.recording.look_pictures import look_pictures
 from harness.recording.observation import observe_step
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.sim.optics.inverse import invert
-from harness.skills.look import BARE_IMAGE, IMAGE
 
 LEAST_PIXELS = 12
 """That an object must cover to be seen."""
@@ -39,8 +39,9 @@ class ShapeReadings:
 
     def read(self, record: StepRecord) -> None:
         """Take in a step: a look, a press, or one that was not made."""
-        if IMAGE in record.readings and BARE_IMAGE in record.readings:
-            self.look = seen_mask(self.run, record)
+        pictures = look_pictures(record)
+        if pictures is not None:
+            self.look = seen_mask(self.run, *pictures)
         elif "gel.image" in record.readings:
             self.touches.append(guarded_touch(self.run, record))
 
@@ -105,15 +106,19 @@ def _way(run: RunFiles, record: StepRecord, base_from_gel: FloatArray) -> float:
     return max(0.0, float(stand_off[:3, 2] @ (base_from_gel[:3, 3] - stand_off[:3, 3])))
 
 
-def seen_mask(run: RunFiles, record: StepRecord) -> SeenMask | None:
+def seen_mask(run: RunFiles, live: ByteArray, bare: ByteArray) -> SeenMask | None:
     """The object's silhouette; None where the camera did not see it.
+
+    Args:
+        run: whose camera it is.
+        live: ``(rows, columns, 3)`` RGB, with the object.
+        bare: the same without it.
 
     Raises:
         DataRefused: the two pictures are of two sizes.
     """
     camera, settings = run.station.camera, run.scene.section(ShapeRun)
     assert camera is not None  # there are its pictures
-    live, bare = (_median(record.readings[name].values) for name in (IMAGE, BARE_IMAGE))
     mask = mask_by_background(live, bare)
     if mask.sum() < LEAST_PIXELS:
         return None
@@ -128,7 +133,3 @@ def seen_mask(run: RunFiles, record: StepRecord) -> SeenMask | None:
         rotation_error=settings.camera_rotation_error,
         focal_length_error=settings.focal_length_error,
     )
-
-
-def _median(frames: ByteArray) -> ByteArray:
-    return np.asarray(np.median(frames, axis=0)).astype(np.uint8)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from harness.agreement.compare_run import agreement_of
+from harness.agreement.subject import own_subject
 from harness.basics.clock import now
 from harness.basics.errors import RecordingDamaged, WrongUse
 from harness.basics.foreign_file import MOST_JSON, read_bounded
@@ -143,7 +145,9 @@ def add_report(
 ) -> dict[str, Any]:
     """Compare, draw the report, and write the result again with both; the arguments are ``finish``'s."""
     scored = written.scored
-    comparison = compare(scored, experiment.sources(scored))
+    own = own_subject(scored.run, scored.accuracy)
+    agreement = agreement_of(scored.run, own, measured=experiment.measured)
+    comparison = replace(compare(scored, experiment.sources(scored)), agreement=agreement)
     scored = replace(scored, warnings=(*scored.warnings, *comparison.notes))
     page = (experiment.report or draw)(scored, comparison, health, folder / "report")
     write_arrays(folder / OBSERVED, comparison.arrays(), compressed=True)
@@ -151,6 +155,7 @@ def add_report(
         **written.result,
         "plan": plan_json(comparison),
         "observed": comparison.observed(),
+        "agreement": agreement.as_json(),
         "warnings": [*written.result["warnings"], *comparison.notes],
         "report": str(page),
     }

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.agreement.agreement import Agreement
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import OutOfDomain, WrongUse
 from harness.basics.materials import MATERIALS
@@ -39,11 +40,13 @@ class Comparison:
         plan: which effects the scene called for.
         evaluation: which ran, how often and how long; their values by name.
         notes: what a reader must know of how it was simulated.
+        agreement: of the readings with a model of the object at the stated pose; None where not compared.
     """
 
     plan: Plan
     evaluation: Evaluation
     notes: tuple[str, ...] = ()
+    agreement: Agreement | None = None
 
     def observed(self) -> dict[str, dict[str, Any]]:
         """Every wanted quantity in JSON: shape and range of an array, parts of a mapping or a picture."""

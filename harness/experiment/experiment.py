@@ -296,6 +296,8 @@ class Experiment(Procedure):
             result names it; None for nothing.
         budgets: answers to a budget or an error; None where it cannot.
         measurement: for tables and cost; None where it has none.
+        measured: what it finds of the object, so that no scene of it states it and readings have no model to
+            be compared with: a sentence; empty where shape, size and pose are stated.
     """
 
     title: str
@@ -309,6 +311,7 @@ class Experiment(Procedure):
     files: Callable[[Scored, Path], None] | None = None
     budgets: Budgets | None = None
     measurement: Measurement | None = None
+    measured: str = ""
 
     @property
     def own_knobs(self) -> tuple[Knob[Level], ...]:

@@ -200,7 +200,7 @@ class RunFiles:
             WrongUse: the scene named none.
             DataRefused: it is damaged.
         """
-        if _DESCRIBED not in self.recording.header.files:
+        if not self.carries_objectfile:
             raise WrongUse(
                 f"{self.recording.folder} carries no ObjectFile, as its scene named none; take "
                 "sound.shapes = elements and touch.shapes = reference"
@@ -208,10 +208,14 @@ class RunFiles:
         return ObjectFile.open(self._checked(_DESCRIBED).parent)
 
     @property
+    def carries_objectfile(self) -> bool:
+        """Whether the scene named an ObjectFile when the run was made."""
+        return _DESCRIBED in self.recording.header.files
+
+    @property
     def network_levels(self) -> dict[str, Level]:
         """Levels at which networks of the carried ObjectFile stand for the simulation; none without one."""
-        carried = _DESCRIBED in self.recording.header.files
-        return network_levels(self.scene, self.objectfile.description) if carried else {}
+        return network_levels(self.scene, self.objectfile.description) if self.carries_objectfile else {}
 
     @property
     def _where(self) -> str:

@@ -2,11 +2,15 @@
 
 from dataclasses import dataclass, field
 
+from harness.agreement.agreement import Agreement
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.mesh import Mesh
 from harness.effects.explain_networks import NetworkInUse
 from harness.report.sound_data import Sound
 from harness.report.values import Missing, Posterior
+
+NOT_COMPARED = Missing("the readings were not compared with a model")
+"""Why a report has no part that compares them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,6 +233,7 @@ class ReportData:
         networks: of the object's ObjectFile, which stood for a simulation.
         warnings: what the operator should know.
         observed: what the scene observes, simulated at the answer.
+        agreement: of the readings with a model of the object at the stated pose.
     """
 
     title: str
@@ -257,3 +262,4 @@ class ReportData:
     networks: tuple[NetworkInUse, ...] = ()
     warnings: tuple[str, ...] = ()
     observed: tuple[Observed, ...] = ()
+    agreement: Agreement | Missing = field(default_factory=lambda: NOT_COMPARED)

@@ -8,6 +8,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.report import wording
+from harness.report.agreement_part import agreement_part
 from harness.report.data import AnswerRow, ContactRow, ErrorCurve, ReportData
 from harness.report.figures.charts import error_chart
 from harness.report.figures.figures import Album, Picture
@@ -70,6 +71,7 @@ def _content(data: ReportData, album: Album) -> dict[str, Any]:
         "tiles": {contact.number: _tiles(contact, album) for contact in data.contacts},
         "fits": {contact.number: _fit(contact) for contact in data.contacts},
         "gain": f"{DIFFERENCE_GAIN:g}",
+        "agreement": agreement_part(data.agreement, album),
         "by_contact": _chart(data.error_by_contact, "error_by_contact", "contacts used", False, album),
         "by_seconds": _chart(data.error_by_seconds, "error_by_seconds", "seconds a contact", True, album),
     }

@@ -10,7 +10,9 @@ from harness.bench.device import Health
 from harness.experiment.compare import Comparison
 from harness.experiment.experiment import Experiment, Scored
 from harness.report import wording
-from harness.report.figures.figures import Picture
+from harness.report.agreement_part import agreement_part
+from harness.report.data import NOT_COMPARED
+from harness.report.figures.figures import Album, Picture
 from harness.report.instruments import artefacts, instruments
 from harness.report.simulated import effect_rows, flat, network_rows, observed_rows, world_rows
 from harness.report.template import write_page
@@ -62,8 +64,9 @@ def write_run_page(
     folder.mkdir(parents=True, exist_ok=True)
     run, result = scored.run, scored.result
     named = {"object": run.scene.object.name, "mock": run.recording.header.mock is not None}
+    facts = facts_of(experiment.title, scored, comparison, health)
     data = {
-        **facts_of(experiment.title, scored, comparison, health),
+        **facts,
         "lines": experiment.lines({**result, **named}),
         "answer": [(name, _text(value)) for name, value in flat(result) if name.split(".")[-1] != "warnings"],
         "sections": sections,
@@ -71,7 +74,12 @@ def write_run_page(
         "warnings": (*scored.warnings, *result.get("warnings", ())),
     }
     return write_page(
-        folder / PAGE, TEMPLATE, data=data, say=wording, is_missing=lambda value: isinstance(value, Missing)
+        folder / PAGE,
+        TEMPLATE,
+        data=data,
+        say=wording,
+        is_missing=lambda value: isinstance(value, Missing),
+        agreement=agreement_part(facts["agreement"], Album(folder)),
     )
 
 
@@ -105,6 +113,7 @@ def facts_of(
         "effects": effect_rows(comparison),
         "networks": network_rows(scored),
         "observed": observed_rows(comparison),
+        "agreement": comparison.agreement or NOT_COMPARED,
         "world": world_rows(scored, ours or {}),
         "versions": {name: text for name, text in header.versions.items() if name != "git"},
         "git": header.versions["git"],

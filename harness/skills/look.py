@@ -5,10 +5,8 @@ from dataclasses import replace
 from harness.basics.errors import WrongUse
 from harness.bench.reading import Reading
 from harness.bench.station import BARE, LOOK, Bench
+from harness.recording.look_pictures import BARE_IMAGE, IMAGE
 from harness.skills.strike import Ask
-
-BARE_IMAGE, IMAGE = "camera.bare", "camera.image"
-"""Channels: the bench without the object, and with it."""
 
 FRAMES = 3
 """Of each: their median has less of the camera's noise."""

@@ -52,7 +52,7 @@ PASSING = {
 """Keys whose values are paths, versions and times, in which two computations may differ."""
 
 
-ADDED = {"observed", "answered_after_s"}
+ADDED = {"observed", "answered_after_s", "agreement"}
 """Keys of a result that the reference does not have yet."""
 
 

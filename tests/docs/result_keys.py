@@ -16,6 +16,8 @@ COMMON = {
     "answered_after_s": "s from the last step's commit to the answer; null in a replay",
     "observed": "with the report: each quantity of `observe`, simulated at the answer: shape, dtype, least, "
     "mean, most; the arrays are in `observed.npz`",
+    "agreement": "with the report: the readings against networks, or the simulation, and the twin: "
+    "one `verdict` a sense with its `residuals`, and `first_in_doubt`; as `touchstone compare` prints it",
 }
 """Of every experiment."""
 

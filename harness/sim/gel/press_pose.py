@@ -51,9 +51,27 @@ def contact_place(mesh: Mesh, asked: FloatArray) -> ContactPlace:
         OutOfDomain: it is farther than ``MOST_MOVED``; the distance is named.
     """
     point = np.asarray(asked, dtype=np.float64)
-    if point.shape != (3,) or not np.isfinite(point).all():
+    if point.shape != (3,):
         raise WrongUse(f"a contact at {asked} is no place; give three finite numbers, x y z in metres")
-    place, face = _nearest(mesh, point)
+    return contact_places(mesh, point[None])[0]
+
+
+def contact_places(mesh: Mesh, points: FloatArray) -> tuple[ContactPlace, ...]:
+    """The places of a surface nearest to ``(n, 3)`` metres, each as ``contact_place`` gives it.
+
+    Raises:
+        WrongUse: a point that is not finite.
+        OutOfDomain: a point that is farther than ``MOST_MOVED``; the distance is named.
+    """
+    for point in points:
+        if not np.isfinite(point).all():
+            raise WrongUse(f"a contact at {point} is no place; give three finite numbers, x y z in metres")
+    places, faces = _nearest(mesh, points)
+    found = zip(points, places, faces, strict=True)
+    return tuple(_contact_place(mesh, point, place, int(face)) for point, place, face in found)
+
+
+def _contact_place(mesh: Mesh, point: FloatArray, place: FloatArray, face: int) -> ContactPlace:
     moved = float(np.linalg.norm(place - point))
     if moved > MOST_MOVED:
         raise OutOfDomain(
@@ -108,16 +126,17 @@ def gel_from_object(place: ContactPlace, depth: float, tilt: float, azimuth: flo
     return read_only(inverse(transform(turned, place.point + depth * turned[:, 2])))
 
 
-def _nearest(mesh: Mesh, point: FloatArray) -> tuple[FloatArray, int]:
+def _nearest(mesh: Mesh, points: FloatArray) -> tuple[FloatArray, IntArray]:
+    """``(n, 3)`` places of the surface nearest to ``(n, 3)`` points, and their ``(n,)`` faces."""
     low, high = mesh.bounds
     # No place of the surface is farther than the far corner of its box.
-    reach = float(np.linalg.norm(np.maximum(np.abs(point - low), np.abs(point - high)))) * (1.0 + 1e-9)
-    places, faces = nearest_on_surface(mesh, point[None], np.zeros((1, 3)), np.array([reach]))
-    return places[0], int(faces[0])
+    farthest = np.maximum(np.abs(points - low), np.abs(points - high))
+    reach = np.linalg.norm(farthest, axis=1) * (1.0 + 1e-9)
+    return nearest_on_surface(mesh, points, np.zeros(points.shape), reach)
 
 
 def _hint(mesh: Mesh, point: FloatArray, nearest: FloatArray) -> str:
-    place, _ = _nearest(mesh, point * 1e-3)
+    (place,), _ = _nearest(mesh, point[None] * 1e-3)
     if np.linalg.norm(place - point * 1e-3) <= MOST_MOVED:
         return "; read as millimetres it would be on it: write metres, or each number with its unit"
     x, y, z = np.round(nearest, 6) + 0.0  # no -0

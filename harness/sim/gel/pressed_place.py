@@ -8,7 +8,7 @@ from harness.basics.faces.mesh_rays import first_distances
 from harness.basics.geometry import inverse
 from harness.basics.mesh import Mesh
 from harness.sim.gel.height_map import SEARCH_DEPTH, STAND_OFF, rigid_poses
-from harness.sim.gel.press_pose import contact_place
+from harness.sim.gel.press_pose import contact_places
 from harness.sim.gel.presses import Presses, frames_facing
 
 
@@ -38,7 +38,7 @@ def presses_of(mesh: Mesh, gel_from_object: FloatArray) -> Presses:
             "presses no place of it; press elsewhere, or take touch.shapes = reference"
         )
     points = object_from_gel[:, :3, 3] + gaps[:, None] * object_from_gel[:, :3, 2]
-    normals = np.array([contact_place(mesh, point).normal for point in points]).reshape(-1, 3)
+    normals = np.array([place.normal for place in contact_places(mesh, points)]).reshape(-1, 3)
     leant = np.swapaxes(frames_facing(-normals), 1, 2) @ object_from_gel[:, :3, :3]
     tilts, azimuths, yaws = _angles(leant)
     return Presses(points, normals, -gaps, tilts, azimuths, yaws)

@@ -1,9 +1,11 @@
 """What a surface encloses and how thick its walls are."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.faces.face_grid import build_face_grid
+from harness.basics.faces.face_grid import FaceGrid, build_face_grid
 from harness.basics.faces.mesh_rays import column_crossings, first_distances
 from harness.basics.faces.nearest_kernels import nearest_places
 from harness.basics.mesh import Mesh
@@ -87,6 +89,12 @@ def flat_share(mesh: Mesh) -> float:
     return flat
 
 
+@lru_cache(maxsize=4)
+def _grid_of(mesh: Mesh) -> FaceGrid:
+    """A mesh's grid, made once for searches that follow each other."""
+    return build_face_grid(mesh)
+
+
 def nearest_on_surface(
     mesh: Mesh, points: FloatArray, directions: FloatArray, reach: FloatArray, least_cosine: float = -1.0
 ) -> tuple[FloatArray, IntArray]:
@@ -102,7 +110,7 @@ def nearest_on_surface(
     Returns:
         ``(n, 3)`` places and ``(n,)`` faces; where there is none the point itself and -1.
     """
-    grid = build_face_grid(mesh)
+    grid = _grid_of(mesh)
     return nearest_places(
         points,
         directions,

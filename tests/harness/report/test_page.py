@@ -15,7 +15,7 @@ from harness.report.values import Missing
 
 SECTIONS = (
     "bench", "posterior", "sound", "errors", "contacts", "instruments", "calibrations", "effects", "world",
-    "twin", "versions",
+    "twin", "versions", "agreement",
 )  # fmt: skip
 BESIDE = (
     "bench", "contacts", "posterior", "posterior_by_contact", "error_by_contact", "error_by_seconds",

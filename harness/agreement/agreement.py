@@ -1,0 +1,230 @@
+"""The comparison as a value: residuals in units of their stated noise, and one verdict a sense."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from scipy.stats import chi2
+
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import OutOfDomain
+
+Sense = Literal["arm", "touch", "sound", "camera"]
+Source = Literal["twin", "network", "reference"]
+Verdict = Literal["fits", "does not fit", "not comparable"]
+
+FALSE_ALARM = 0.01
+"""Probability that a run which the model describes is said not to fit, in any of its senses."""
+
+_MOST = 1.0e12
+"""Of a chi-square: JSON has no infinity, and beyond this it says no more."""
+
+
+@dataclass(frozen=True, eq=False)
+class SideBySide:
+    """A reading and what a model says of it, as a report shows them; no verdict reads it.
+
+    Attributes:
+        live: ``(rows, columns)`` a field, or ``(n,)`` values in ascending order.
+        model: of the same shape for a field; ``(m,)`` for values.
+        unit: of both.
+    """
+
+    live: FloatArray
+    model: FloatArray
+    unit: str
+
+
+@dataclass(frozen=True)
+class Residual:
+    """One reading less what a model says, in units of its noise.
+
+    Attributes:
+        step: of the run, from 0; of what all steps have in common, the last that it was read at.
+        quantity: what was compared: ``"contact depth"``.
+        chi_square: 0 or more.
+        dof: its degrees of freedom, more than 0; need not be whole.
+        numbers: that it is made of, keys with their units.
+        sides: the reading and the model; None where the numbers are all of it.
+    """
+
+    step: int
+    quantity: str
+    chi_square: float
+    dof: float
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    sides: SideBySide | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.chi_square) and self.chi_square >= 0.0 and self.dof > 0.0):
+            raise OutOfDomain(
+                f"step {self.step + 1}, {self.quantity}: chi-square {self.chi_square:g} with {self.dof:g} "
+                "degrees of freedom; it must be finite and 0 or more, and they more than 0"
+            )
+        object.__setattr__(self, "chi_square", min(self.chi_square, _MOST))
+
+
+@dataclass(frozen=True)
+class SenseResiduals:
+    """What one sense was compared with, and the residuals.
+
+    Attributes:
+        sense: which.
+        source: what it is compared with.
+        residuals: in order of the steps; empty where it cannot be compared.
+        why: it cannot be compared, or what a reader must know of how it was.
+        seconds: of CPU that the comparison took.
+    """
+
+    sense: Sense
+    source: Source
+    residuals: tuple[Residual, ...]
+    why: str = ""
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class JudgedSense:
+    """One sense with its verdict.
+
+    Attributes:
+        compared: its residuals.
+        verdict: of all of them together.
+        limits: for each residual, the chi-square beyond which it does not fit.
+    """
+
+    compared: SenseResiduals
+    verdict: Verdict
+    limits: tuple[float, ...]
+
+    @property
+    def doubted(self) -> Residual | None:
+        """The first residual beyond its limit."""
+        pairs = zip(self.compared.residuals, self.limits, strict=True)
+        return next((residual for residual, limit in pairs if residual.chi_square > limit), None)
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Every sense of a run against a model.
+
+    Attributes:
+        about: the object that was compared with.
+        false_alarm: probability that a right model is said not to fit.
+        senses: judged; touch and sound may be there twice, by the network and by the reference.
+    """
+
+    about: str
+    false_alarm: float
+    senses: tuple[JudgedSense, ...]
+
+    @property
+    def fits(self) -> bool:
+        """Whether nothing that could be compared is in doubt, and something could be."""
+        verdicts = {one.verdict for one in self.senses}
+        return "fits" in verdicts and "does not fit" not in verdicts
+
+    @property
+    def first_doubt(self) -> tuple[int, Sense] | None:
+        """Step, from 0, and sense of the earliest reading that does not fit."""
+        found = [(one.doubted.step, one.compared.sense) for one in self.senses if one.doubted is not None]
+        return min(found, key=lambda pair: pair[0], default=None)
+
+    def as_json(self) -> dict[str, Any]:
+        """Steps are counted from 1, as everywhere in a result."""
+        doubt = self.first_doubt
+        return {
+            "object": self.about,
+            "fits": self.fits,
+            "false_alarm": self.false_alarm,
+            "first_in_doubt": None if doubt is None else {"step": doubt[0] + 1, "sense": doubt[1]},
+            "senses": [_sense_json(one) for one in self.senses],
+        }
+
+    def sentences(self) -> list[str]:
+        """For people, a sense each: the residual that speaks most against the model, with its numbers."""
+        return [_sentence(one) for one in self.senses]
+
+    def lines(self) -> list[str]:
+        """For people, a sense each: what it was compared with, the verdict, and its sentence."""
+        return [
+            f"{one.compared.sense} against the {one.compared.source}: {one.verdict}; {sentence}"
+            for one, sentence in zip(self.senses, self.sentences(), strict=True)
+        ]
+
+
+def judged(about: str, senses: Sequence[SenseResiduals], false_alarm: float = FALSE_ALARM) -> Agreement:
+    """Verdicts of residuals that are each a chi-square where the model is right.
+
+    Args:
+        about: the object that was compared with.
+        senses: residuals of each.
+        false_alarm: of the whole run, shared evenly by the senses that are compared, and by the residuals of
+            each (Bonferroni): a sense of many residuals takes nothing from one of few.
+
+    Raises:
+        OutOfDomain: a rate that is not between 0 and 1.
+    """
+    if not 0.0 < false_alarm < 1.0:
+        raise OutOfDomain(f"a false alarm rate of {false_alarm:g} was given; it must be between 0 and 1")
+    compared = max(1, sum(bool(one.residuals) for one in senses))
+    return Agreement(about, false_alarm, tuple(_judged(one, false_alarm / compared) for one in senses))
+
+
+def _judged(one: SenseResiduals, rate: float) -> JudgedSense:
+    if not one.residuals:
+        return JudgedSense(one, "not comparable", ())
+    each = rate / len(one.residuals)
+    limits = tuple(np.atleast_1d(chi2.isf(each, [residual.dof for residual in one.residuals])).tolist())
+    beyond = any(r.chi_square > limit for r, limit in zip(one.residuals, limits, strict=True))
+    return JudgedSense(one, "does not fit" if beyond else "fits", limits)
+
+
+def _sense_json(one: JudgedSense) -> dict[str, Any]:
+    return {
+        "sense": one.compared.sense,
+        "compared_with": one.compared.source,
+        "verdict": one.verdict,
+        "why": one.compared.why or None,
+        "seconds": one.compared.seconds,
+        "residuals": [
+            {
+                "step": residual.step + 1,
+                "quantity": residual.quantity,
+                "chi_square": residual.chi_square,
+                "dof": residual.dof,
+                "limit": limit,
+                "numbers": dict(residual.numbers),
+            }
+            for residual, limit in zip(one.compared.residuals, one.limits, strict=True)
+        ],
+    }
+
+
+def _sentence(one: JudgedSense) -> str:
+    if one.verdict == "not comparable":
+        return one.compared.why
+    note = f" ({one.compared.why})" if one.compared.why else ""
+    worst = one.doubted or max(one.compared.residuals, key=lambda r: r.chi_square / r.dof)
+    limit = one.limits[one.compared.residuals.index(worst)]
+    kind = "first in doubt" if one.doubted else "worst"
+    return (
+        f"{kind}: step {worst.step + 1}, {worst.quantity}, chi-square {worst.chi_square:.1f} with "
+        f"{worst.dof:.1f} degrees of freedom (limit {limit:.1f}): {numbers_text(worst.numbers)}{note}"
+    )
+
+
+_SHOWN = {"m": (1e3, " mm"), "m2": (1e6, " mm²"), "rad": (180.0 / np.pi, "°"), "px": (1.0, " px")}
+"""What the unit at the end of a number's name is shown in."""
+
+
+def numbers_text(numbers: Mapping[str, float]) -> str:
+    """Numbers in words, each by its name and in a unit that suits it: ``read_m`` is ``read 1.95 mm``."""
+    return ", ".join(_number_text(name, value) for name, value in numbers.items())
+
+
+def _number_text(name: str, value: float) -> str:
+    words, _, unit = name.rpartition("_")
+    factor, shown = _SHOWN.get(unit, (1.0, ""))
+    return f"{(words if shown else name).replace('_', ' ')} {factor * value:.3g}{shown}"

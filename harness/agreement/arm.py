@@ -1,0 +1,146 @@
+"""The arm against the twin: its tables, and how deep the twin's object reaches into the gel at a contact."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from harness.agreement.agreement import Residual, SenseResiduals
+from harness.agreement.place_noise import PlaceNoise, shared_twists
+from harness.agreement.readings import PressedContact
+from harness.agreement.subject import Subject
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import rotation_from_quaternion, rotation_from_vector, transform
+from harness.recording.run_folder import RunFiles
+from harness.recording.step_file import StepRecord
+from harness.twin.bench import TwinBench
+from harness.twin.bench_of import twin_of
+from harness.twin.compare import compare_arm
+
+TABLES = 1.0e-3
+"""m, one sigma along each axis: a controller's own calibrated tables against the maker's printed ones."""
+
+READ = 0.08e-3
+"""m, one sigma of the deepest place of a gel as its picture shows it, beside ``GAIN`` of it."""
+
+GAIN = 0.1
+"""One sigma of how much deeper or shallower the gel is read than it is, of its depth."""
+
+_STEPS = np.repeat([0.4e-3, np.radians(0.5)], 3)
+"""m and rad over which a depth's slope is taken: as far as the noise reaches, not the mesh's own facets."""
+
+_MOST_POSES = 100
+_NOTHING = -20e-3
+"""m of depth where the object is nowhere before the pad."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactDepth:
+    """How deep a contact was, by the picture and by the twin.
+
+    Attributes:
+        step: of the run.
+        read: m, the deepest place of the gel.
+        expected: m that the twin's object reaches into the pad; 0 where it does not.
+        shared: ``(13,)`` m for one sigma of each error that contacts share.
+        own: m, one sigma of the contact's own.
+    """
+
+    step: int
+    read: float
+    expected: float
+    shared: FloatArray
+    own: float
+
+
+def compare_with_twin(
+    subject: Subject, contacts: Sequence[PressedContact], noise: PlaceNoise | None = None
+) -> SenseResiduals:
+    """Joints and contacts of a run against the twin of its scene.
+
+    Args:
+        subject: the object, where the scene states it.
+        contacts: of the run.
+        noise: of places; None for the stated one.
+
+    Raises:
+        WrongUse: the object cannot stand in the scene.
+    """
+    run, noise = subject.run, noise or PlaceNoise()
+    bench = twin_of(subject.scene, run.station, subject.mesh, subject.base_from_object)
+    joints = [found for record in run.recording.steps() if (found := joint_residual(run, record)) is not None]
+    depths = [contact_depth(bench, subject.base_from_object, contact, noise) for contact in contacts]
+    residuals = sorted((*joints, *depth_residuals(depths)), key=lambda residual: residual.step)
+    return SenseResiduals(
+        "arm", "twin", tuple(residuals), "" if residuals else "no pose of the arm was recorded"
+    )
+
+
+def joint_residual(run: RunFiles, record: StepRecord) -> Residual | None:
+    """The controller's poses of the flange against the twin's, of the same joints; None without them."""
+    readings = record.readings
+    if "arm.joints" not in readings or "arm.base_from_flange" not in readings:
+        return None
+    joints, poses = readings["arm.joints"].values, readings["arm.base_from_flange"].values
+    count = min(len(joints), len(poses))
+    chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_POSES)).astype(np.int64))
+    stated = np.array([transform(rotation_from_quaternion(p[3:]), p[:3]) for p in poses[chosen]])
+    found = compare_arm(run.station.arm.model, joints[chosen], stated)
+    apart = float(found.distances.max())
+    numbers = {"apart_m": apart, "turned_rad": float(found.angles.max()), "sigma_m": TABLES}
+    return Residual(record.step.index, "joints", (apart / TABLES) ** 2, 3.0, numbers)
+
+
+def contact_depth(
+    bench: TwinBench, base_from_object: FloatArray, contact: PressedContact, noise: PlaceNoise
+) -> ContactDepth:
+    """One contact's depth, and how far each error moves it."""
+    pose = contact.seen.base_from_gel
+    slope = _slope(bench, pose)
+    read, expected = max(0.0, float(contact.heights.max())), _reached(bench, pose)
+    shared = slope @ shared_twists(noise, pose, base_from_object[:3, 3])
+    own = float(np.sqrt(slope @ noise.own @ slope + READ**2 + (GAIN * read) ** 2))
+    return ContactDepth(contact.step, read, expected, shared, own)
+
+
+def depth_residuals(depths: Sequence[ContactDepth]) -> tuple[Residual, ...]:
+    """Each contact's depth given those before it: independent, one degree of freedom each."""
+    if not depths:
+        return ()
+    shared = np.array([depth.shared for depth in depths])
+    covariance = shared @ shared.T + np.diag([depth.own**2 for depth in depths])
+    gaps = np.array([depth.read - depth.expected for depth in depths])
+    root = np.linalg.cholesky(covariance)
+    innovations = solve_triangular(root, gaps, lower=True)
+    return tuple(
+        Residual(
+            depth.step,
+            "contact depth",
+            float(innovation**2),
+            1.0,
+            {"read_m": depth.read, "expected_m": depth.expected, "sigma_m": float(sigma)},
+        )
+        for depth, innovation, sigma in zip(depths, innovations, np.diag(root), strict=True)
+    )
+
+
+def _slope(bench: TwinBench, base_from_gel: FloatArray) -> FloatArray:
+    """``(6,)``: change of the depth with the gel's twist, m per m and m per rad."""
+    changes = []
+    for twist in np.diag(_STEPS):
+        ahead, behind = (
+            _reached(bench, twisted(base_from_gel, sign * twist), _NOTHING) for sign in (1.0, -1.0)
+        )
+        changes.append(ahead - behind)
+    return np.asarray(np.array(changes) / (2.0 * _STEPS))
+
+
+def _reached(bench: TwinBench, base_from_gel: FloatArray, least: float = 0.0) -> float:
+    return max(least, bench.pad_depth(base_from_gel))
+
+
+def twisted(base_from_gel: FloatArray, twist: FloatArray) -> FloatArray:
+    """A pose ``(4, 4)`` displaced and turned about its own place by ``(6,)`` m and rad, in base."""
+    rotation = rotation_from_vector(twist[3:]) @ base_from_gel[:3, :3]
+    return transform(rotation, base_from_gel[:3, 3] + twist[:3])

@@ -1,0 +1,183 @@
+"""The scene camera: how far the object's outline reaches in its picture, against the model's.
+
+An outline is read as how far it reaches in each of 72 directions. What may be off, the camera's place, turn
+and focal length and the object's place, turn and size, moves all directions together along few patterns, to
+first order. How far the outline is off along these, over the stated sigmas, is where it lies; what is left is
+its shape. Each is a chi-square.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import cv2
+import numpy as np
+
+from harness.agreement.agreement import Residual, SenseResiduals, SideBySide
+from harness.agreement.place_noise import PlaceNoise
+from harness.agreement.subject import Subject
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray
+from harness.basics.errors import DataRefused
+from harness.basics.geometry import apply, rotation_from_vector
+from harness.basics.mesh import Mesh
+from harness.basics.mesh_hull import hull_of
+from harness.bench.station_sections import CameraSection
+from harness.picture.camera_errors import CameraErrors
+from harness.picture.object_mask import mask_by_background, overlap
+from harness.picture.outline import SeenOutline, corners_of, directions, read_outline
+from harness.recording.look_pictures import look_pictures
+
+_UNKNOWNS = 14
+"""The object's place (3), rotation (3) and size, the camera's place (3), rotation (3) and focal length."""
+
+_NEAREST = 1.0e-2
+"""m before a camera, at least, of what has an outline."""
+
+
+@dataclass(frozen=True)
+class OutlineNoise:
+    """How far an outline in a picture may be from a model's, beside where the object stands.
+
+    Attributes:
+        camera: of its place, rotation and focal length.
+        read: pixels, one sigma of how far an outline reaches in one direction: half a pixel's width, the
+            camera's noise, and what the surface is off by.
+    """
+
+    camera: CameraErrors = field(default_factory=CameraErrors)
+    read: float = 0.7
+
+
+def compare_camera(
+    subject: Subject, places: PlaceNoise | None = None, noise: OutlineNoise | None = None
+) -> SenseResiduals:
+    """The outline in every picture of the scene camera against the model's.
+
+    Args:
+        subject: the object, where the scene states it.
+        places: of the object; None for the stated one.
+        noise: of the outline; None for the stated one.
+    """
+    camera = subject.run.station.camera
+    looks = [
+        (record.step.index, found)
+        for record in subject.run.recording.steps()
+        if (found := look_pictures(record)) is not None
+    ]
+    if camera is None or not looks:
+        return SenseResiduals("camera", "reference", (), "no picture by the scene camera was recorded")
+    places, noise = places or PlaceNoise(), noise or OutlineNoise()
+    view = OutlineView(subject.mesh, subject.base_from_object, camera)
+    residuals: list[Residual] = []
+    refusals = []
+    for step, (live, bare) in looks:
+        try:
+            residuals += _residuals(view, step, live, bare, places, noise)
+        except DataRefused as refusal:
+            refusals.append(f"step {step + 1}: {refusal}")
+    return SenseResiduals("camera", "reference", tuple(residuals), "; ".join(refusals))
+
+
+def _residuals(
+    view: "OutlineView", step: int, live: ByteArray, bare: ByteArray, places: PlaceNoise, noise: OutlineNoise
+) -> list[Residual]:
+    seen = read_outline(mask_by_background(live, bare))
+    outlines = (seen.extents, view.extents(np.zeros(_UNKNOWNS)))
+    read, modelled = (_filled(extents, live.shape[:2]) for extents in outlines)
+    sides = SideBySide(read.astype(np.float64), modelled.astype(np.float64), "covered")
+    shared = {"overlap": overlap(read, modelled)}
+    found = outline_residuals(step, view, seen, places, noise)
+    return [replace(one, numbers={**one.numbers, **shared}, sides=sides) for one in found]
+
+
+def outline_residuals(
+    step: int, view: "OutlineView", seen: SeenOutline, places: PlaceNoise, noise: OutlineNoise
+) -> tuple[Residual, ...]:
+    """How far an outline lies from the model's, and how far its shape is off.
+
+    Args:
+        step: of the look.
+        view: the model before the camera.
+        seen: the outline; directions in which it is hidden do not count.
+        places: of the object.
+        noise: of the outline.
+
+    Raises:
+        DataRefused: the outline is hidden in every direction, or the model stands behind the camera.
+    """
+    free = ~seen.hidden
+    if not free.any():
+        raise DataRefused("the object's outline is hidden, or cut off by the picture's border, all around")
+    gaps = (seen.extents - view.extents(np.zeros(_UNKNOWNS)))[free]
+    patterns, sizes, _ = np.linalg.svd(view.slopes(places, noise.camera)[free])
+    along = patterns.T @ gaps
+    variances = np.full(len(gaps), noise.read**2)
+    variances[: len(sizes)] += sizes**2
+    # Patterns that the noise of reading hides belong to the shape.
+    moving = int(np.count_nonzero(sizes > noise.read))
+    parts = {"outline's place": slice(0, moving), "outline's shape": slice(moving, None)}
+    return tuple(
+        _part(step, name, along[part], variances[part]) for name, part in parts.items() if len(along[part])
+    )
+
+
+def _part(step: int, name: str, along: FloatArray, variances: FloatArray) -> Residual:
+    numbers = {
+        "rms_px": float(np.sqrt(np.mean(along**2))),
+        "sigma_px": float(np.sqrt(np.mean(variances))),
+    }
+    return Residual(step, name, float(np.sum(along**2 / variances)), float(len(along)), numbers)
+
+
+class OutlineView:
+    """A model of the object before the scene camera.
+
+    Args:
+        mesh: of the object, m, in its own frame.
+        base_from_object: ``(4, 4)``, where the scene states it.
+        camera: of the station.
+    """
+
+    def __init__(self, mesh: Mesh, base_from_object: FloatArray, camera: CameraSection) -> None:
+        self._anchor = base_from_object[:3, 3]
+        self._standing = apply(base_from_object, hull_of(mesh.vertices)) - self._anchor
+        self._camera = camera
+
+    def extents(self, unknowns: FloatArray) -> FloatArray:
+        """``(72,)`` pixels: how far the outline reaches in each direction.
+
+        Args:
+            unknowns: ``(14,)`` m, rad and relative: what the object and the camera are off by.
+
+        Raises:
+            DataRefused: the object stands behind the camera.
+        """
+        moved, turned, grown, eye_moved, eye_turned, focal = np.split(unknowns, [3, 6, 7, 10, 13])
+        standing = (1.0 + grown) * self._standing @ rotation_from_vector(turned).T
+        pose = self._camera.base_from_camera.matrix
+        rotation = pose[:3, :3] @ rotation_from_vector(eye_turned)
+        seen = (standing + self._anchor + moved - pose[:3, 3] - eye_moved) @ rotation
+        if seen[:, 2].min() < _NEAREST:
+            raise DataRefused("at the pose that the scene states, the object is not before the scene camera")
+        middle = 0.5 * np.array([self._camera.columns, self._camera.rows])
+        places = (1.0 + focal) * self._camera.focal_length * seen[:, :2] / seen[:, 2:] + middle
+        return np.asarray((directions() @ places.T).max(axis=1))
+
+    def slopes(self, places: PlaceNoise, camera: CameraErrors) -> FloatArray:
+        """``(72, 14)`` pixels for one sigma of everything that may be off."""
+        sigmas = np.concatenate(
+            [
+                3 * [places.position],
+                [places.tilt, places.tilt, places.yaw, places.scale],
+                3 * [camera.position],
+                3 * [camera.rotation],
+                [camera.focal_length],
+            ]
+        )
+        return np.array([0.5 * (self.extents(one) - self.extents(-one)) for one in np.diag(sigmas)]).T
+
+
+def _filled(extents: FloatArray, shape: tuple[int, ...]) -> BoolArray:
+    """``(rows, columns)`` pixels within an outline that reaches so far."""
+    corners = corners_of(SeenOutline(extents, np.zeros(len(extents), np.bool_)))
+    picture = np.zeros(shape, np.uint8)
+    cv2.fillPoly(picture, [np.rint(corners - 0.5).astype(np.int32)], 1)
+    return picture.astype(np.bool_)

@@ -1,0 +1,92 @@
+"""A run's readings against its object's ObjectFile, the reference simulation and the twin."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from time import process_time
+from typing import ParamSpec
+
+from harness.agreement.agreement import Agreement, Sense, SenseResiduals, Source, judged
+from harness.agreement.arm import compare_with_twin
+from harness.agreement.camera import compare_camera
+from harness.agreement.readings import PressedContact, contacts_of
+from harness.agreement.sound import compare_sound
+from harness.agreement.subject import Subject, own_subject
+from harness.agreement.touch import compare_touch
+from harness.basics.errors import WrongUse
+from harness.objectfile.entries import Modality
+from harness.recording.run_folder import RunFiles
+
+HIDDEN = "the size of the object is what this run measures"
+"""Why nothing is compared where the scene hides the object's size."""
+
+NAME_ONE = "name an ObjectFile of it, at the pose that the scene states, with --objectfile"
+
+_NOTHING: tuple[tuple[Sense, Source], ...] = (
+    ("arm", "twin"),
+    ("touch", "reference"),
+    ("sound", "reference"),
+    ("camera", "reference"),
+)
+
+P = ParamSpec("P")
+
+
+def agreement_of(
+    run: RunFiles, subject: Subject | None = None, reference: bool = False, measured: str = ""
+) -> Agreement:
+    """Hold a recording against an object at the place that its scene states.
+
+    Args:
+        run: of any experiment.
+        subject: the object; None for the run's own.
+        reference: whether the reference simulation is compared too where a network stands for it.
+        measured: what the run itself measures of its object, so that its scene does not state it, in a
+            sentence; empty where the scene, or who gives the subject, states all.
+
+    Raises:
+        RecordingDamaged: the recording, or what it carries, cannot be read.
+    """
+    subject = subject or own_subject(run)
+    name = subject.scene.object.name
+    unknown = measured or (HIDDEN if subject.scene.object.is_hidden else "")
+    if unknown:
+        why = f"{unknown}; {NAME_ONE}"
+        return judged(name, [SenseResiduals(sense, source, (), why) for sense, source in _NOTHING])
+    return judged(name, list(_compared(subject, contacts_of(run), reference)))
+
+
+def _compared(
+    subject: Subject, contacts: tuple[PressedContact, ...], reference: bool
+) -> Iterator[SenseResiduals]:
+    sensors = subject.scene.sensors
+    yield _timed(_arm, subject, contacts)
+    for source in _sources(subject, "touch", reference):
+        yield _timed(compare_touch, subject, source, contacts) if sensors.touch else _unasked("touch", source)
+    for source in _sources(subject, "audio", reference):
+        yield _timed(compare_sound, subject, source, contacts) if sensors.sound else _unasked("sound", source)
+    if sensors.camera:
+        yield _timed(compare_camera, subject)
+    else:
+        yield _unasked("camera", "reference")
+
+
+def _arm(subject: Subject, contacts: tuple[PressedContact, ...]) -> SenseResiduals:
+    try:
+        return compare_with_twin(subject, contacts)
+    except WrongUse as refusal:  # another object may not fit where the scene's stands
+        return SenseResiduals("arm", "twin", (), str(refusal))
+
+
+def _sources(subject: Subject, sense: Modality, reference: bool) -> tuple[Source, ...]:
+    sources = subject.sources_of(sense)
+    return sources if reference else sources[:1]
+
+
+def _unasked(sense: Sense, source: Source) -> SenseResiduals:
+    return SenseResiduals(sense, source, (), f"the scene uses no {sense}")
+
+
+def _timed(compare: Callable[P, SenseResiduals], *args: P.args, **kwargs: P.kwargs) -> SenseResiduals:
+    began = process_time()
+    found = compare(*args, **kwargs)
+    return replace(found, seconds=process_time() - began)

@@ -1,0 +1,61 @@
+"""A run's readings as they are compared: pictures as heights of the gel, poses, strikes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.basics.arrays import FloatArray
+from harness.picture.square_pixels import aspect_stated
+from harness.recording.observation import Observation, in_time, observe_step
+from harness.recording.run_folder import RunFiles
+from harness.sim.optics.inverse import invert
+from harness.sim.optics.tactile_calibration import TactileCalibration
+
+SEEN = 0.12e-3
+"""m of indentation at the deepest place, below which a picture shows no contact."""
+
+
+@dataclass(frozen=True, eq=False)
+class PressedContact:
+    """One step that pressed the gel.
+
+    Attributes:
+        step: of the run.
+        seen: as it was recorded.
+        heights: ``(rows, columns)`` m of indentation, by its picture.
+    """
+
+    step: int
+    seen: Observation
+    heights: FloatArray
+
+    @property
+    def touched(self) -> bool:
+        """Whether the picture shows a contact."""
+        return float(self.heights.max()) > SEEN
+
+
+def contacts_of(run: RunFiles) -> tuple[PressedContact, ...]:
+    """Every step of a run that has pictures of the gel, its strikes in time with each other.
+
+    Raises:
+        RecordingDamaged: a step has pictures and no pose of the arm with them.
+    """
+    aspect = aspect_stated(run.calibration.header.made_from)
+    records = [record for record in run.recording.steps() if "gel.image" in record.readings]
+    seen = in_time(
+        [observe_step(record, run.station.flange_from_gel, run.acquisition, aspect) for record in records]
+    )
+    return tuple(
+        PressedContact(record.step.index, one, heights_of(one, run.calibration))
+        for record, one in zip(records, seen, strict=True)
+    )
+
+
+def heights_of(seen: Observation, calibration: TactileCalibration) -> FloatArray:
+    """``(rows, columns)`` m of indentation, from the mean of a contact's frames.
+
+    Colour is close to linear in slope, so the mean of frames is the picture of the mean shape.
+    """
+    mean = np.rint(seen.images.mean(axis=0)).astype(np.uint8)
+    return np.asarray(invert(mean[None], calibration).height[0])

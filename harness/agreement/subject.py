@@ -1,0 +1,149 @@
+"""What readings are compared with: a run's own object as it carries it, or an ObjectFile in its place."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from harness.agreement.agreement import Source
+from harness.basics.arrays import FloatArray
+from harness.basics.materials import MATERIALS, Material
+from harness.basics.mesh import Mesh
+from harness.basics.store import Store, default_folder
+from harness.bench.scene import SceneFile
+from harness.bench.scene_objectfile import OBJECTFILE
+from harness.effects.accuracy import Level
+from harness.effects.catalogue import EFFECTS
+from harness.effects.effect import Facts
+from harness.effects.evaluate import Evaluation, evaluate
+from harness.effects.file_levels import DIALS, NETWORK, networks_of
+from harness.effects.plan import Plan, default_accuracy, plan
+from harness.objectfile.entries import Modality
+from harness.objectfile.file import ObjectFile
+from harness.recording.run_folder import RunFiles
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """An object, standing where a run's scene states.
+
+    Attributes:
+        run: whose readings are compared.
+        scene: of the run, with this object in it.
+        mesh: of the object, m, in its own frame.
+        material: it is made of.
+        objectfile: of the object; None without one.
+        levels: of the simulation's dials, but for the one that chooses between network and reference; what
+            they leave out is at its default.
+    """
+
+    run: RunFiles
+    scene: SceneFile
+    mesh: Mesh
+    material: Material
+    objectfile: ObjectFile | None
+    levels: Mapping[str, Level] = field(default_factory=dict)
+    _store: Store = field(default_factory=lambda: Store(default_folder()), repr=False)
+    _made: dict[tuple[Modality, Source], dict[str, Any]] = field(default_factory=dict, repr=False, init=False)
+
+    @cached_property
+    def base_from_object(self) -> FloatArray:
+        """``(4, 4)``, as the scene states it."""
+        return self.scene.base_from_object(self.mesh)
+
+    def sources_of(self, sense: Modality) -> tuple[Source, ...]:
+        """What can stand for a sense, the ObjectFile's network first."""
+        has = self.objectfile is not None and sense in networks_of(self.objectfile.description)
+        return ("network", "reference") if has else ("reference",)
+
+    def simulated(
+        self, sense: Modality, source: Source, wanted: Sequence[str], given: Mapping[str, Any]
+    ) -> Evaluation:
+        """Quantities of the catalogue, of this object.
+
+        Args:
+            sense: whose dial ``source`` turns.
+            source: the network or the reference.
+            wanted: their names.
+            given: further sources, by name.
+
+        Raises:
+            WrongUse: the network is of another gel or another object.
+            OutOfDomain: a gel stands where no network was made for it.
+        """
+        dial, known = DIALS[sense], default_accuracy(EFFECTS)
+        chosen_levels = {name: level for name, level in self.levels.items() if name in known.levels}
+        turned = NETWORK if source == "network" else dial.default
+        levels = known.with_({**chosen_levels, dial.name: turned})
+        facts = Facts(self.scene, self.run.station.gel.sensor)
+        chosen = plan(EFFECTS, facts, tuple(wanted), levels)
+        if (sense, source) not in self._made:
+            lasting = _of_object(chosen, given)
+            made = evaluate(plan(EFFECTS, facts, lasting, levels), self._sources(), self._store)
+            self._made[sense, source] = {name: made[name] for name in lasting}
+        known_values = self._made[sense, source]
+        left = replace(
+            chosen,
+            ran=tuple(step for step in chosen.ran if step.effect.provides not in known_values),
+            sources=(*chosen.sources, *known_values),
+        )
+        return evaluate(left, {**self._sources(), **given, **known_values}, self._store)
+
+    def _sources(self) -> dict[str, Any]:
+        sources: dict[str, Any] = {
+            "object.mesh": self.mesh,
+            "object.wall": self.scene.object.wall,
+            "object.material": self.material,
+            "sensor": self.run.station.gel.sensor,
+            "sensor.calibration": self.run.calibration,
+        }
+        return sources if self.objectfile is None else {**sources, "object.file": self.objectfile}
+
+
+def _of_object(chosen: Plan, given: Mapping[str, Any]) -> tuple[str, ...]:
+    """What follows from the object alone and what does not follow from it needs: it is made once."""
+    fixed, needed = set(chosen.sources) - set(given), set[str]()
+    for step in chosen.ran:
+        needs = {chosen.resolved(need) for need in step.effect.needs}
+        if needs <= fixed:
+            fixed.add(step.effect.provides)
+        else:
+            needed |= needs & fixed
+    return tuple(sorted(needed - set(chosen.sources)))
+
+
+def own_subject(run: RunFiles, levels: Mapping[str, Level] | None = None) -> Subject:
+    """The object of a run's scene, with the ObjectFile that the run carries where it does.
+
+    Args:
+        run: whose readings are compared.
+        levels: of the simulation's dials; None for the default ones.
+    """
+    of = run.objectfile if run.carries_objectfile else None
+    return Subject(run, run.scene, run.mesh, MATERIALS[run.scene.object.material], of, levels or {})
+
+
+def subject_of_file(run: RunFiles, folder: Path) -> Subject:
+    """An ObjectFile in the place of a run's object.
+
+    Args:
+        run: whose scene states the place.
+        folder: of the ObjectFile.
+
+    Raises:
+        WrongUse: there is none.
+        DataRefused: it is damaged.
+    """
+    of = ObjectFile.open(folder)
+    named = {
+        "mesh": OBJECTFILE + of.description.name,
+        "objectfile": str(folder),
+        "material": of.material.name,
+        "wall": None,
+        "units": None,
+        "scale": 1.0,
+        "sizes": None,
+    }
+    object_ = run.scene.object.model_copy(update=named)
+    return Subject(run, run.scene.model_copy(update={"object": object_}), of.mesh, of.material, of)

@@ -1,0 +1,198 @@
+"""How often live readings fit the right model, and how often a wrong one is named.
+
+``python tests/benchmarks/runs/bench_agreement.py RECORDINGS [--seeds 10] [--first-seed 6000]`` performs runs
+of contact localization with strikes in process, gap on, six built-in objects, and compares each with the
+right model and with wrong ones. The folder keeps the recordings: what is there is not performed again. A
+solid of revolution that is turned about its axis is not moved; it is left out of that row. The pitcher is not
+struck: to solve for the modes of its mocked truth takes two minutes a run. Seconds are of CPU.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from experiments.contact_localization.accuracy.benchmark_runs import cells, scene_of
+from experiments.contact_localization.experiment import EXPERIMENT
+from harness.agreement.agreement import Sense, Verdict
+from harness.agreement.compare_run import agreement_of
+from harness.agreement.subject import Subject, own_subject
+from harness.basics.materials import material
+from harness.bench.scene import scene_from_options
+from harness.bench.station_file import Station, load_station, station_path
+from harness.experiment.in_process import recorded
+from harness.objects.household import MATERIALS, build
+from harness.recording.run_folder import RunFiles
+from harness.sim.optics.tactile_calibration import TactileCalibration
+
+OBJECTS = tuple(MATERIALS)
+ROUND = ("bowl", "plate")
+"""Solids of revolution."""
+
+SILENT = ("pitcher",)
+
+SENSES: tuple[Sense, ...] = ("arm", "touch", "sound")
+MOVED = 10.0e-3
+TURNED = np.radians(15.0)
+
+
+@dataclass(frozen=True)
+class ComparedRun:
+    """One run against one model.
+
+    Attributes:
+        case: what was wrong: a key of ``CASES``, or ``"moved microphone"``.
+        object: that was recorded.
+        verdicts: by sense.
+        sentences: of every sense.
+        seconds: of CPU.
+    """
+
+    case: str
+    object: str
+    verdicts: Mapping[Sense, Verdict]
+    sentences: Sequence[str]
+    seconds: float
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The senses that do not fit."""
+        return tuple(sense for sense, verdict in self.verdicts.items() if verdict == "does not fit")
+
+
+def moved(subject: Subject, seed: int) -> Subject:
+    """The object stated 10 mm from where it stood, any way along the table."""
+    angle = np.random.default_rng((seed, 21)).uniform(0.0, 2.0 * np.pi)
+    x, y, z = subject.scene.object.pose.position
+    aside = MOVED * np.array([np.cos(angle), np.sin(angle)])
+    return _posed(subject, position=(float(x + aside[0]), float(y + aside[1]), z))
+
+
+def turned(subject: Subject, seed: int) -> Subject:
+    """The object stated 15 degrees from how it stood, either way about the vertical."""
+    sign = np.random.default_rng((seed, 22)).choice([-1.0, 1.0])
+    return _posed(subject, yaw=float(subject.scene.object.pose.yaw + sign * TURNED))
+
+
+def _posed(subject: Subject, **pose: object) -> Subject:
+    object_ = subject.scene.object
+    scene = subject.scene.model_copy(
+        update={"object": object_.model_copy(update={"pose": object_.pose.model_copy(update=pose)})}
+    )
+    return replace(subject, scene=scene)
+
+
+def another_object(subject: Subject, seed: int) -> Subject:
+    """Another of the built-in objects, at the same place."""
+    own = OBJECTS.index(subject.scene.object.name)
+    name = OBJECTS[(own + 1 + seed % (len(OBJECTS) - 1)) % len(OBJECTS)]
+    object_ = scene_from_options(f"builtin:{name}").object
+    object_ = object_.model_copy(update={"pose": subject.scene.object.pose})
+    scene = subject.scene.model_copy(update={"object": object_})
+    return replace(subject, scene=scene, mesh=build(name), material=material(object_.material))
+
+
+class OtherLamps(RunFiles):
+    """A run beside the calibration of a sensor whose lamps stand a third of a turn around."""
+
+    @cached_property
+    def calibration(self) -> TactileCalibration:
+        """Red is where green was."""
+        own = super().calibration
+        return replace(
+            own,
+            background=np.roll(own.background, 1, axis=-1),
+            table=np.roll(own.table, 1, axis=-1),
+            smooth=np.roll(own.smooth, 1, axis=-1),
+        )
+
+
+CASES: Mapping[str, Callable[[RunFiles, int], Subject]] = {
+    "right": lambda run, _: own_subject(run),
+    "another object": lambda run, seed: another_object(own_subject(run), seed),
+    "moved 10 mm": lambda run, seed: moved(own_subject(run), seed),
+    "turned 15 deg": lambda run, seed: turned(own_subject(run), seed),
+    "another sensor's lamps": lambda run, _: own_subject(OtherLamps(run.recording)),
+}
+MICROPHONE = "moved microphone"
+
+
+def compared(case: str, run: RunFiles, subject: Subject) -> ComparedRun:
+    """A run against a model."""
+    began = process_time()
+    found = agreement_of(subject.run, subject)
+    seconds = process_time() - began
+    verdicts = {one.compared.sense: one.verdict for one in found.senses}
+    return ComparedRun(case, run.scene.object.name, verdicts, found.sentences(), seconds)
+
+
+def rows(seed: int, folder: Path, station: Station) -> Iterator[ComparedRun]:
+    """Every run of a seed against every model."""
+    gaps = ["default", "moved_microphone"]
+    for every in cells(OBJECTS, [seed], ["spread"], gaps, ["known"], sound=True):
+        cell = replace(every, sound=every.object not in SILENT)
+        if not cell.sound and cell.gap != "default":
+            continue
+        scene = scene_of(cell, scene_from_options(f"builtin:{cell.object}"))
+        run = RunFiles(recorded(EXPERIMENT, cell, scene, station, folder))
+        if cell.gap == "moved_microphone":
+            yield compared(MICROPHONE, run, own_subject(run))
+            continue
+        for case, subject_of in CASES.items():
+            if not (case.startswith("turned") and cell.object in ROUND):
+                yield compared(case, run, subject_of(run, cell.seed))
+
+
+def table_of(found: Sequence[ComparedRun]) -> Table:
+    """A row for each case: runs, those in doubt, and the senses that are; medians of seconds."""
+    headings = (f"{sense} in doubt" for sense in SENSES)
+    table = Table("case", "runs", "in doubt", *headings, "CPU s, median, most")
+    for case in (*CASES, MICROPHONE):
+        of = [row for row in found if row.case == case]
+        if of:
+            doubted = [sum(sense in row.doubts for row in of) for sense in SENSES]
+            seconds = np.array([row.seconds for row in of])
+            numbers = [f"{len(of)}", _share(sum(bool(row.doubts) for row in of), len(of))]
+            spent = f"{np.median(seconds):.1f}, {seconds.max():.1f}"
+            table.add_row(case, *numbers, *(f"{count}" for count in doubted), spent)
+    return table
+
+
+def objects_of(found: Sequence[ComparedRun]) -> Table:
+    """Runs in doubt of each object, of how many."""
+    table = Table("in doubt", *OBJECTS)
+    for case in (*CASES, MICROPHONE):
+        of = {name: [row for row in found if (row.case, row.object) == (case, name)] for name in OBJECTS}
+        table.add_row(case, *(f"{sum(bool(r.doubts) for r in each)} of {len(each)}" for each in of.values()))
+    return table
+
+
+def _share(count: int, of: int) -> str:
+    return f"{count} ({100.0 * count / of:.0f} %)"
+
+
+def main() -> None:
+    """Perform what is not there, compare, and print."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("recordings", type=Path)
+    options.add_argument("--seeds", type=int, default=10)
+    options.add_argument("--first-seed", type=int, default=6000)
+    given = options.parse_args()
+    seeds, console = range(given.first_seed, given.first_seed + given.seeds), Console(width=140)
+    found: list[ComparedRun] = []
+    for seed in seeds:
+        for row in rows(seed, given.recordings, load_station(station_path("mock"))):
+            found.append(row)
+            shown = row.sentences if bool(row.doubts) == (row.case == "right") else ()
+            console.print(f"{row.case}, {row.object}: {', '.join(row.doubts) or 'fits'}", *shown, sep="\n  ")
+        console.print(f"to seed {seed}", table_of(found), objects_of(found))
+
+
+if __name__ == "__main__":
+    main()

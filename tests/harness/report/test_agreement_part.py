@@ -1,0 +1,67 @@
+"""The part that holds live readings beside a model: verdicts with their numbers, and a picture."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.agreement.agreement import Agreement, Residual, SenseResiduals, SideBySide, judged
+from harness.report.agreement_part import AgreementPart, agreement_part
+from harness.report.data import ReportData
+from harness.report.figures.figures import Album
+from harness.report.page import write_report
+from harness.report.values import Missing
+
+FIELD = np.linspace(0.0, 2e-3, 24).reshape(4, 6)
+
+
+@pytest.fixture
+def agreement() -> Agreement:
+    fields = SideBySide(FIELD, 0.9 * FIELD, "m")
+    peaks = SideBySide(np.array([900.0, 2100.0]), np.array([905.0, 2090.0, 7000.0]), "Hz")
+    touch = (
+        Residual(0, "gel surface", 3.0, 4.0, {"rms_m": 4e-5}, fields),
+        Residual(2, "gel surface", 99.0, 4.0, {"rms_m": 4e-4, "turned_rad": 0.1}, fields),
+    )
+    return judged(
+        "mug",
+        [
+            SenseResiduals("touch", "network", touch),
+            SenseResiduals("sound", "reference", (Residual(2, "resonances", 0.1, 2.0, {}, peaks),)),
+            SenseResiduals("camera", "reference", (), "the scene uses no camera"),
+        ],
+    )
+
+
+def test_each_sense_has_its_verdict_and_numbers(agreement: Agreement, tmp_path: Path) -> None:
+    part = agreement_part(agreement, Album(tmp_path))
+    assert isinstance(part, AgreementPart)
+    assert part.summary == "First in doubt: touch, at step 3."
+    assert [row.verdict for row in part.rows] == ["does not fit", "fits", "not comparable"]
+    assert "step 3, gel surface, chi-square 99.0" in part.rows[0].sentence
+    assert "rms 0.4 mm, turned 5.73°" in part.rows[0].sentence
+    assert part.rows[2].sentence == "the scene uses no camera"
+    assert (tmp_path / "agreement.png").exists()
+
+
+def test_a_run_that_was_not_compared_says_so(tmp_path: Path) -> None:
+    gone = Missing("the reason")
+    assert agreement_part(gone, Album(tmp_path)) is gone
+
+
+def test_a_run_of_which_nothing_can_be_compared_has_no_picture(tmp_path: Path) -> None:
+    nothing = judged("mug", [SenseResiduals("touch", "reference", (), "no picture of the gel")])
+    part = agreement_part(nothing, Album(tmp_path))
+    assert isinstance(part, AgreementPart)
+    assert part.summary == "Nothing could be compared."
+    assert isinstance(part.picture, Missing)
+
+
+def test_the_page_shows_it(report_data: ReportData, agreement: Agreement, tmp_path: Path) -> None:
+    gone = Missing("left out")
+    light = replace(report_data, bench=gone, contacts=(), sound=gone, agreement=agreement)
+    text = write_report(light, tmp_path).read_text(encoding="utf-8")
+    assert "First in doubt: touch, at step 3." in text
+    assert "does not fit" in text
+    assert (tmp_path / "agreement.png").exists()
