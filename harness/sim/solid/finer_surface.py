@@ -31,7 +31,9 @@ def with_edges_below(mesh: Mesh, longest: float) -> Mesh:
     # Loaded by those alone whose mesh is too coarse.
     from trimesh.remesh import subdivide_to_size
 
-    vertices, faces = subdivide_to_size(mesh.vertices, mesh.faces, longest, max_iter=2 * _HALVINGS)
+    vertices, faces = subdivide_to_size(  # type: ignore[no-untyped-call]
+        mesh.vertices, mesh.faces, longest, max_iter=2 * _HALVINGS
+    )
     return Mesh(vertices, faces)
 
 

@@ -49,10 +49,13 @@ def simulated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What was rasterised, followed by rays on the mesh and solved, call by call."""
     calls: list[str] = []
 
-    def counted(name: str, kernel: Any) -> Any:
-        return lambda *given: (calls.append(name), kernel(*given))[1]
+    rasterise = raster_kernels.rasterise
 
-    monkeypatch.setattr(height_map, "rasterise", counted("rasterised", raster_kernels.rasterise))
+    def counted(*given: Any) -> Any:
+        calls.append("rasterised")
+        return rasterise(*given)
+
+    monkeypatch.setattr(height_map, "rasterise", counted)
     monkeypatch.setattr(sound_effects, "modes_of", lambda *_: calls.append("solved"))
     monkeypatch.setattr(camera_effects, "LitObject", lambda *_: calls.append("traced"))
     return calls
