@@ -30,6 +30,9 @@ _RETRY_PERIOD = 0.1
 _KEPT_FRAMES = 64
 _RHYTHM_FRAMES = 8
 _RHYTHM_GAIN = 0.1
+_SHORTEST = 0.12
+"""s of frames that show a rhythm: fewer may be one group."""
+
 _EVEN = 0.5
 """Share of the gaps between frames that are alike where a stream has a rhythm."""
 
@@ -248,7 +251,7 @@ class MjpegStream:
 
 def _rhythm(times: Sequence[float]) -> float | None:
     """Seconds from frame to frame; None where they come in groups, so that none of them is due."""
-    if len(times) < _RHYTHM_FRAMES:
+    if len(times) < _RHYTHM_FRAMES or times[-1] - times[0] < _SHORTEST:
         return None
     gaps = np.diff(times)
     period = float(np.median(gaps))
