@@ -30,11 +30,14 @@ _RETRY_PERIOD = 0.1
 _KEPT_FRAMES = 64
 _RHYTHM_FRAMES = 8
 _RHYTHM_GAIN = 0.1
-_EVEN = 0.7
+_SHORTEST = 0.12
+"""s of frames that show a rhythm: fewer may be one group."""
+
+_EVEN = 0.5
 """Share of the gaps between frames that are alike where a stream has a rhythm."""
 
 _MOST_OF_TIME = 0.25
-"""Share of the time that as many usual gaps fill there: the rest may be stalls."""
+"""Share of the time that as many usual gaps fill where a stream has a rhythm: the rest may be stalls."""
 
 _END_OF_IMAGE = b"\xff\xd9"
 
@@ -248,12 +251,12 @@ class MjpegStream:
 
 def _rhythm(times: Sequence[float]) -> float | None:
     """Seconds from frame to frame; None where they come in groups, so that none of them is due."""
-    if len(times) < _RHYTHM_FRAMES:
+    if len(times) < _RHYTHM_FRAMES or times[-1] - times[0] < _SHORTEST:
         return None
     gaps = np.diff(times)
     period = float(np.median(gaps))
-    even = np.mean(np.abs(gaps - period) <= 0.5 * period)
-    steady = even >= _EVEN and period * len(gaps) >= _MOST_OF_TIME * (times[-1] - times[0])
+    even = float(np.mean(np.abs(gaps - period) <= 0.5 * period))
+    steady = even >= _EVEN and period * len(gaps) >= _MOST_OF_TIME * float(gaps.sum())
     return period if steady and period > 0.0 else None
 
 

@@ -52,7 +52,8 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def _require_modest(tree: dict[str, Any], path: Path) -> None:
     """Refuse a tree that recursion would not end in, or whose every mistake nobody would read."""
-    level, values = [tree], 0
+    values = 0
+    level: list[Any] = [tree]
     for _ in range(_DEEPEST):
         items: list[Any] = [
             item for table in level for item in (table.values() if isinstance(table, dict) else table)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from drivers.dataq.link import LinkCut
+from harness.basics.answers import answers_alone, write_answer
 from harness.basics.errors import TouchstoneError
 from harness.cli import COMMANDS, SYSTEM, UNFORESEEN, Interrupted, invoke, load
 
@@ -161,3 +162,11 @@ def test_answers_alone_are_on_standard_output() -> None:
     assert done.stdout == '{"answer": 1}\nafter\n'
     assert "a library prints" in done.stderr
     assert "a compiled library prints" in done.stderr
+
+
+def test_answers_alone_are_on_a_standard_output_that_was_replaced(capsys: pytest.CaptureFixture[str]) -> None:
+    with answers_alone():
+        sys.stdout.write("a library prints")
+        write_answer("1")
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err) == ("1\n", "a library prints")

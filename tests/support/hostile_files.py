@@ -156,6 +156,7 @@ _MADE: dict[str, Callable[[Path], object]] = {
     "small.png": _bytes(_noise(".png", 2, 2)),
     "tall.png": _bytes(_noise(".png", 1600, 8)),
     "stated.png": _bytes(_picture_of(60_000, filled=False)),
+    "large.png": _bytes(_picture_of(7_000, filled=True)),
     "vast.png": _bytes(_picture_of(30_000, filled=True)),
     "stated.jpg": _bytes(_wide_jpeg()),
     "zeros.npz": _archive_of_zeros,

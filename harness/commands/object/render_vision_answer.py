@@ -66,7 +66,7 @@ def write_arrays(path: Path, arrays: "Sequence[FloatArray]") -> None:
 
     from harness.basics.npz_file import write_array
 
-    write_array(path, np.float32(arrays[0] if len(arrays) == 1 else np.stack(arrays)))
+    write_array(path, (arrays[0] if len(arrays) == 1 else np.stack(arrays)).astype(np.float32))
 
 
 def from_finest(found: RenderedLook) -> dict[str, float | None] | None:

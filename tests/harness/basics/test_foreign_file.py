@@ -58,7 +58,7 @@ def test_arrays_read_back(tmp_path: Path) -> None:
     assert np.array_equal(read_array(tmp_path / "one.npy", "an array"), arrays["a"])
 
 
-@pytest.mark.parametrize("name", ["stated.png", "vast.png", "stated.jpg"])
+@pytest.mark.parametrize("name", ["stated.png", "vast.png", "large.png", "stated.jpg"])
 def test_a_picture_of_more_pixels_than_a_camera_has_is_not_unpacked(
     hostile: dict[str, Path], name: str
 ) -> None:

@@ -158,6 +158,7 @@ def test_a_gel_that_only_bulges_has_its_sign_the_wrong_way() -> None:
 def test_what_is_no_array_of_heights_is_refused(tmp_path: Path) -> None:
     with pytest.raises(WrongUse, match="there is no height map"):
         read_heights(tmp_path / "absent.npy", SENSOR)
+    (tmp_path / "h.png").touch()
     with pytest.raises(DataRefused, match=r"\.npy"):
         read_heights(tmp_path / "h.png", SENSOR)
     (tmp_path / "h.npy").write_bytes(b"")

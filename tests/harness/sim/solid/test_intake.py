@@ -132,7 +132,7 @@ def test_a_volume_mesh_gives_its_outside(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("units", ["meters", "MM", ""])
 def test_an_unknown_unit_is_refused_with_those_there_are(mug: Mesh, tmp_path: Path, units: str) -> None:
-    with pytest.raises(WrongUse, match="m, cm, mm, in"):
+    with pytest.raises(WrongUse, match="m, cm, mm, um, in, ft"):
         take_in(write(mug, tmp_path / "mug.stl"), units)
 
 
