@@ -62,6 +62,7 @@ def wired(
     folder = tmp_path_factory.mktemp("card")
     with open_station(CARD, scene, RunContext(folder / "wire.json", mesh, SEED, GAP)) as bench:
         assert bench.microphone is not None
+        assert bench.hammer is not None
         contacts = performed(bench, plan)
         found = {
             "contacts": contacts,

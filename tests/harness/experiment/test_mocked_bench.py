@@ -53,13 +53,12 @@ def test_a_run_takes_the_wires_where_nothing_else_is_said(
         perform_on_bench(EXPERIMENT, recording, Quiet())
 
 
-@pytest.mark.parametrize(
-    ("option", "given"), [("--gap", {"gap": "none"}), ("--bench", {"bench": IN_PROCESS})]
-)
+@pytest.mark.parametrize(("gap", "bench"), [("none", None), (None, IN_PROCESS)])
 def test_a_real_bench_has_no_gap_and_no_process_of_ours(
-    option: str, given: dict[str, str], tmp_path: Path
+    gap: str | None, bench: str | None, tmp_path: Path
 ) -> None:
     real = load_station(station_path("example_bench"))
+    option = "--gap" if bench is None else "--bench"
     with pytest.raises(WrongUse, match=f"{option} is for a mocked bench"):
-        begin(EXPERIMENT, touch_scene(contacts=1), real, 3, folder=tmp_path / "run", **given)
+        begin(EXPERIMENT, touch_scene(contacts=1), real, 3, gap, tmp_path / "run", bench)
     assert not (tmp_path / "run").exists()
