@@ -57,7 +57,7 @@ def markers(
     from calibration.markers.at_rest import Printed, markers_at_rest
     from calibration.markers.result import answer_of, file_of
     from calibration.taxim.pictures import set_digest
-    from harness.basics.json_file import write_model
+    from harness.basics.files.json_file import write_model
     from harness.basics.quantities import LENGTH
 
     pictures = _pictures(source)

@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
-from harness.basics.foreign_file import refused_as
+from harness.basics.files.foreign_file import refused_as
 from harness.basics.npz_file import read_arrays, write_arrays
 
 

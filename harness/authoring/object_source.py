@@ -8,9 +8,9 @@ from typing import Literal
 
 from harness.basics.code_version import content_hash
 from harness.basics.errors import WrongUse
+from harness.basics.files.named_file import require_file
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
-from harness.basics.named_file import require_file
 from harness.bench.scene import BUILTIN
 from harness.objectfile.entries import Provenance, Source
 from harness.objectfile.file import MESH, ObjectFile, create_object, file_entry

@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import CalibrationRefused, DataRefused, TouchstoneError
-from harness.basics.foreign_file import MOST_DATA, refused_as, require_readable, require_unpackable
+from harness.basics.files.foreign_file import MOST_DATA, refused_as, require_readable, require_unpackable
 from harness.basics.whole_file import whole_file
 
 

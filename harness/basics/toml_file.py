@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from harness.basics.errors import WrongUse
-from harness.basics.foreign_file import MOST_TEXT, read_bounded
+from harness.basics.files.foreign_file import MOST_TEXT, read_bounded
 
 M = TypeVar("M", bound=BaseModel)
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import CalibrationRefused, DataRefused
-from harness.basics.foreign_file import MOST_TEXT, read_bounded
+from harness.basics.files.foreign_file import MOST_TEXT, read_bounded
 from harness.basics.resampling import resample
 from harness.basics.whole_file import write_text_whole
 from harness.bench.acquisition_channels import (

@@ -19,8 +19,8 @@ import numpy as np
 
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
+from harness.basics.files.owned_folder import OwnedFolder
 from harness.basics.mesh import Mesh
-from harness.basics.owned_folder import OwnedFolder
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 

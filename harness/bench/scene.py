@@ -10,10 +10,10 @@ from pydantic import Field, create_model, field_validator, model_validator
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import WrongUse
+from harness.basics.files.named_file import real_path
 from harness.basics.geometry import rotation_about, transform, translation
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
-from harness.basics.named_file import real_path
 from harness.basics.quantities import (
     Angle,
     Length,

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.basics.errors import DataRefused, WrongUse
-from harness.basics.named_file import real_path
+from harness.basics.files.named_file import real_path
 from harness.objects.builtin import DESCRIPTION
 
 OBJECTFILE = "objectfile:"

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from harness.basics.errors import WrongUse
-from harness.basics.named_file import real_path
+from harness.basics.files.named_file import real_path
 from harness.basics.toml_file import load_toml, nearest
 from harness.bench.sensor_file import MarkerFigure, SensorFile, Sourced
 

@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from harness.basics.arrays import FloatArray
+from harness.basics.files.named_file import real_path
 from harness.basics.geometry import apply
-from harness.basics.named_file import real_path
 from harness.basics.toml_file import StrictModel, load_toml, validate
 from harness.bench.named_files import named_file
 from harness.bench.station_sections import (

@@ -10,7 +10,7 @@ from harness.agreement.compare_run import agreement_of
 from harness.agreement.subject import own_subject
 from harness.basics.clock import now
 from harness.basics.errors import RecordingDamaged, WrongUse
-from harness.basics.foreign_file import MOST_JSON, read_bounded
+from harness.basics.files.foreign_file import MOST_JSON, read_bounded
 from harness.basics.npz_file import write_arrays
 from harness.basics.whole_file import write_text_whole
 from harness.bench.device import Health

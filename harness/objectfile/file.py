@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.files.named_file import real_path
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
-from harness.basics.named_file import real_path
 from harness.basics.whole_file import write_bytes_whole
 from harness.objectfile.description import (
     SCHEMA,

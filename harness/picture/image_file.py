@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.basics.arrays import ByteArray, read_only
 from harness.basics.errors import DataRefused
-from harness.basics.foreign_file import read_bounded, refused_as
+from harness.basics.files.foreign_file import read_bounded, refused_as
 from harness.basics.whole_file import write_bytes_whole
 from harness.picture.picture_size import require_modest_picture
 

@@ -10,14 +10,14 @@ import pytest
 
 from drivers.ur import lock as arm_lock
 from harness.basics.errors import BenchFault
-from harness.basics.owned_folder import OwnedFolder
+from harness.basics.files.owned_folder import OwnedFolder
 
 ADDRESS = "127.9.8.7"
 OWNER = """
 import sys, time
 from pathlib import Path
 from drivers.ur import lock as arm_lock
-from harness.basics.owned_folder import OwnedFolder
+from harness.basics.files.owned_folder import OwnedFolder
 parent = Path(sys.argv[1])
 folder = OwnedFolder("touchstone-lab-", parent)
 (folder.path / "lab.log").write_text("ready")

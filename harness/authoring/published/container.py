@@ -16,7 +16,7 @@ import numpy as np
 from harness.authoring.published.stand_ins import ALLOWED, MOST_NUMBERS, PickledArray
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, WrongUse
-from harness.basics.named_file import require_file
+from harness.basics.files.named_file import require_file
 
 Tree = Any
 """Tables (``dict`` with text or whole numbers as keys), lists, arrays, numbers, text, None."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import DataRefused, OutOfDomain
-from harness.basics.foreign_file import require_readable
-from harness.basics.named_file import require_file
+from harness.basics.files.foreign_file import require_readable
+from harness.basics.files.named_file import require_file
 from harness.basics.npz_file import read_array
 
 MOST_ROWS = 1000

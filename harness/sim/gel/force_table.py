@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import OutOfDomain
-from harness.basics.json_file import read_model
+from harness.basics.files.json_file import read_model
 from harness.basics.toml_file import StrictModel
 
 Above = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 
 from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, OutOfDomain
-from harness.basics.named_file import require_file
+from harness.basics.files.named_file import require_file
 from harness.basics.npz_file import read_array
 from harness.bench.sensor import TactileSensor
 

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import OutOfDomain
-from harness.basics.json_file import read_model
+from harness.basics.files.json_file import read_model
 from harness.basics.toml_file import StrictModel
 from harness.bench.sensor import MarkerGrid
 

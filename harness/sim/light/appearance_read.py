@@ -8,8 +8,8 @@ import numpy as np
 
 from harness.basics.arrays import ByteArray, FloatArray, read_only
 from harness.basics.errors import MeshRefused, WrongUse
+from harness.basics.files.named_file import require_file
 from harness.basics.mesh import Mesh
-from harness.basics.named_file import require_file
 from harness.picture.srgb import PEAK, linear_from_srgb
 from harness.sim.light.appearance import CREASE, NO_TEXTURE, Appearance, smooth_normals
 from harness.sim.solid.mesh_read import METRES

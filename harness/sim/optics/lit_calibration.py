@@ -20,7 +20,7 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.errors import CalibrationRefused
-from harness.basics.named_file import require_file
+from harness.basics.files.named_file import require_file
 from harness.sim.optics.shading import POSITION_TERMS
 from harness.sim.optics.shadow import ShadowTable
 from harness.sim.optics.tactile_calibration import (

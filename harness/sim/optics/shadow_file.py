@@ -14,7 +14,7 @@ from numpy.lib import format as npy_format
 
 from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
-from harness.basics.foreign_file import refused_as, require_unpackable
+from harness.basics.files.foreign_file import refused_as, require_unpackable
 from harness.basics.npz_file import read_arrays
 from harness.basics.whole_file import whole_file
 from harness.sim.optics.shadow import ShadowTable

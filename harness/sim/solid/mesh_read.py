@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused
-from harness.basics.named_file import require_file
+from harness.basics.files.named_file import require_file
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Metres in one unit of a mesh file, by the unit's name."""

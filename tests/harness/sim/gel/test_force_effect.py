@@ -9,7 +9,7 @@ import pytest
 
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, OutOfDomain, WrongUse
-from harness.basics.json_file import write_model
+from harness.basics.files.json_file import write_model
 from harness.bench.scene import scene_from_options
 from harness.bench.sensor import GELSIGHT_R15
 from harness.effects.force_effects import pressed_of_gel, table_force

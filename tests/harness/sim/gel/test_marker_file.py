@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from calibration.markers.dots import find_dots
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import CalibrationRefused, DataRefused, OutOfDomain, WrongUse
-from harness.basics.json_file import write_model
+from harness.basics.files.json_file import write_model
 from harness.basics.toml_file import validate
 from harness.bench.scene import SceneFile
 from harness.bench.sensor import GELSIGHT_R15

@@ -7,7 +7,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ValidationError
 
 from harness.basics.errors import CalibrationRefused
-from harness.basics.foreign_file import MOST_JSON, read_bounded
+from harness.basics.files.foreign_file import MOST_JSON, read_bounded
 from harness.basics.whole_file import write_text_whole
 
 M = TypeVar("M", bound=BaseModel)

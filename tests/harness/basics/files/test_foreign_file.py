@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import CalibrationRefused, DataRefused, WrongUse
-from harness.basics.foreign_file import read_bounded, refused_as
+from harness.basics.files.foreign_file import read_bounded, refused_as
 from harness.basics.npz_file import read_array, read_arrays, write_array, write_arrays
 from harness.basics.toml_file import read_toml
 from harness.picture.image_file import read_image
