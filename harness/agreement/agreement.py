@@ -62,7 +62,7 @@ class Residual:
                 f"step {self.step + 1}, {self.quantity}: chi-square {self.chi_square:g} with {self.dof:g} "
                 "degrees of freedom; it must be finite and 0 or more, and they more than 0"
             )
-        object.__setattr__(self, "chi_square", min(self.chi_square, _MOST))
+        object.__setattr__(self, "chi_square", max(0.0, min(self.chi_square, _MOST)))
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,8 @@ class PhaseNoise:
         within: rad, between two strikes of one mode.
         strong: share of the loudest strike's amplitude from which on a phase is read.
         alone: least logarithm between a mode's frequency and the next one's, of a mode that is alone.
-        widths: half widths of the peak, within which no other mode may lie either.
+        broad: half width of a peak over its frequency, from which on it may be more than one mode whatever
+            the model says.
         near: most logarithm between a peak's frequency and that of its mode.
         clutter: share of such peaks that are more than one mode all the same, or read wrongly.
     """
@@ -38,7 +39,7 @@ class PhaseNoise:
     within: float = np.radians(20.0)
     strong: float = 0.25
     alone: float = 0.02
-    widths: float = 4.0
+    broad: float = 0.004
     near: float = 0.04
     clutter: float = 0.05
 
@@ -75,8 +76,7 @@ def is_single(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> bool:
     nearest = int(np.argmin(apart))
     others = np.abs(np.log(np.delete(modes, nearest) / modes[nearest]))
     width = max(peak.damping, 0.0) / (2.0 * np.pi * peak.frequency)
-    alone = max(noise.alone, noise.widths * width)
-    return bool(apart[nearest] < noise.near and (others > alone).all())
+    return bool(width < noise.broad and apart[nearest] < noise.near and (others > noise.alone).all())
 
 
 def phase_apart(y: ComplexArray, strong: float) -> float | None:
