@@ -11,8 +11,8 @@ from harness.basics.errors import DataRefused, MeshRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.bench.scene import BUILTIN
-from harness.sim.solid.intake import METRES, take_in
-from harness.sim.solid.mesh_read import read_mesh
+from harness.sim.solid.intake import take_in
+from harness.sim.solid.mesh_read import METRES, read_mesh
 from harness.sim.solid.surface_measure import enclosed_volume, thin_wall
 from harness.sim.solid.surface_source import surface_of
 from harness.sim.solid.tetrahedra import check_closed
@@ -169,6 +169,6 @@ def _of_mass(row: CatalogueRow, mass: float, longest: float) -> list[str]:
     if mass <= most:
         return []
     return [
-        f"the surface holds {mass:.3g} kg of {row.material}, impossible for an object of {longest:.3g} m "
-        f"(limit {most:.3g} kg): check material and units, or state the wall"
+        f"the surface holds {mass:.3g} kg of {row.material}, more than a household thing of {longest:.3g} m "
+        f"weighs (limit {most:.3g} kg): check material and units, or state the wall"
     ]

@@ -157,7 +157,10 @@ def _cells(columns: Sequence[str], cells: Sequence[str]) -> dict[str, str]:
 
 
 def _row(cells: dict[str, str]) -> CatalogueRow:
-    given = {name: cell for name, cell in cells.items() if cell.strip().lower() not in _NOTHING}
+    # An object may be named none; of any other cell that says that there is nothing in it.
+    given = {
+        name: cell for name, cell in cells.items() if name == "name" or cell.strip().lower() not in _NOTHING
+    }
     if "more" in given:
         raise RowRefused(f"more cells than columns ({given['more']!r}); quote a cell that holds a comma")
     name = given.get("name", "")

@@ -24,7 +24,8 @@ def test_a_label_decides_the_unit_of_a_mesh_that_does_not_state_one(
 ) -> None:
     mesh = block(tmp_path, (0.3 * scale, 0.1 * scale, 0.1 * scale))
     found = intake_finding(replace(ROW, scale=0.3), mesh)
-    assert (found.units, found.longest_side, found.reason) == (unit, pytest.approx(0.3), None)
+    assert (found.units, found.reason) == (unit, None)
+    assert found.longest_side == pytest.approx(0.3)
     assert found.mass == pytest.approx(3e-3 * 7850.0, rel=0.02)
 
 
@@ -44,7 +45,9 @@ def test_a_label_of_another_side_is_found(tmp_path: Path) -> None:
 
 def test_an_impossible_mass_is_found_by_size_and_by_weight(tmp_path: Path) -> None:
     mesh = block(tmp_path, (0.2, 0.2, 0.2))
-    assert any("impossible for an object of 0.2 m" in remark for remark in intake_finding(ROW, mesh).remarks)
+    assert any(
+        "more than a household thing of 0.2 m" in remark for remark in intake_finding(ROW, mesh).remarks
+    )
     wooden = replace(ROW, material="wood", mass=6.0)
     assert not any("kg" in remark for remark in intake_finding(wooden, mesh).remarks)
     (remark,) = [s for s in intake_finding(replace(wooden, mass=1.0), mesh).remarks if "weighs" in s]

@@ -19,7 +19,7 @@ def answered(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
 @pytest.fixture
 def catalogue(tmp_path: Path) -> Path:
     """Two blocks, a file that is no mesh, and a row of no material."""
-    for name, length in (("one", 0.08), ("two", 0.07)):
+    for name, length in (("one", 0.08), ("two", 0.09)):
         block(tmp_path, name, length)
     (tmp_path / "bad.stl").write_bytes(b"solid nothing")
     path = tmp_path / "objects.csv"
