@@ -120,6 +120,21 @@ COMMANDS = {
     "object verify": Command(
         "harness.commands.object.object:verify", "Check an ObjectFile: hashes, graphs, shapes, known answers."
     ),
+    "catalogue check": Command(
+        "harness.commands.catalogue.check:check",
+        "What intake finds of every object of a catalogue: units, labels, openings, walls, masses.",
+    ),
+    "catalogue build": Command(
+        "harness.commands.catalogue.build:build",
+        "Build every object of a catalogue, side by side; a stopped build goes on.",
+    ),
+    "catalogue status": Command(
+        "harness.commands.catalogue.status:status", "What a build has made, how well, and what failed why."
+    ),
+    "catalogue page": Command(
+        "harness.commands.catalogue.status:page",
+        "One page of all objects of a build, with a picture of each.",
+    ),
     "calibrate taxim": Command(
         "calibration.commands.taxim:taxim",
         "Calibrate a tactile camera by ball presses, made by the arm or in pictures; no marks.",
@@ -159,6 +174,7 @@ GROUPS = {
     "object": "ObjectFiles: what is known of one object, in a folder of open files.",
     "object render": "What an ObjectFile's networks say, for ears and eyes: audio, touch, vision, queries.",
     "object compare": "What instruments read of an object beside what its ObjectFile says: vision.",
+    "catalogue": "A folder of objects becomes ObjectFiles, on this machine or a cluster.",
     "calibrate": "Instruments' own calibrations, each an artefact with its residual and its reasons.",
     "sim": "What the simulators compute, one at a time.",
 }

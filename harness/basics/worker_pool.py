@@ -17,10 +17,17 @@ def worker_pool(workers: int) -> ProcessPoolExecutor:
         workers: how many.
     """
     spawn = get_context("spawn")  # threads of compiled kernels do not survive a fork
-    return ProcessPoolExecutor(workers, mp_context=spawn, initializer=_watch, initargs=(os.getpid(),))
+    return ProcessPoolExecutor(
+        workers, mp_context=spawn, initializer=end_without_parent, initargs=(os.getpid(),)
+    )
 
 
-def _watch(parent: int) -> None:
+def end_without_parent(parent: int) -> None:
+    """End this process within ``PERIOD`` once its parent is gone.
+
+    Args:
+        parent: process number of whoever started it.
+    """
     threading.Thread(target=_end_without, args=(parent,), daemon=True).start()
 
 

@@ -14,8 +14,8 @@ from harness.basics.store import Store, digest
 from harness.sim.modal.modes import Modes
 from harness.sim.modal.snap import snapped, straightened
 from harness.sim.modal.solve import Elasticity, check_limit, solve_mesh
-from harness.sim.modal.stage_seconds import timed
-from harness.sim.solid.filled import filled
+from harness.sim.modal.stage_seconds import CPU, timed
+from harness.sim.solid.filled import FillingSeconds, filled
 from harness.sim.solid.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
 from harness.sim.solid.modal_mesh import QuadraticMesh, least_determinant, middles_of, quadratic_mesh
 from harness.sim.solid.surface_measure import enclosed_volume, thin_wall
@@ -64,14 +64,15 @@ def solved_once(
 ) -> tuple[Modes, bool]:
     """``modes_of``, and whether the modes were in the store; their seconds are then of that time."""
     edge = default_edge(mesh, material, limit, most) if edge is None else edge
-    key = digest(["modes", VERSION, mesh.vertices, mesh.faces, material, float(limit), float(edge), most])
+    # Damping moves no undamped mode: a material of other alpha and beta has the same ones.
+    elastic = [material.density, material.young, material.poisson]
+    key = digest(["modes", VERSION, mesh.vertices, mesh.faces, elastic, float(limit), float(edge), most])
     kept = store.get(key) if store is not None else None
     if isinstance(kept, Mapping):
         return from_arrays(kept), True
-    spent: dict[str, float] = {}
-    with timed(spent, "tetrahedra"):
-        # Not from the store: kept cells would have no seconds of their own to say.
-        inside, _ = filled(mesh, edge, None)
+    took = FillingSeconds()
+    inside, _ = filled(mesh, edge, store, spent=took)
+    spent = {"tetrahedra": took.wall, f"{CPU}tetrahedra": took.cpu}
     solved = solve_modes(inside, material, limit, mesh, most=most, spent=spent)
     if store is not None:
         store.put(key, to_arrays(solved))

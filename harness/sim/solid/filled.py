@@ -5,7 +5,9 @@ option of it changes: two fillings of one surface have other cells, and as many 
 they were made from, one machine has one answer.
 """
 
+import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from harness.basics.store import Store, digest
 from harness.sim.solid.modal_kernels import EDGES
 from harness.sim.solid.tetrahedra import Tetrahedra, tetrahedra, tetrahedralize
 
-VERSION = 2
+VERSION = 3
 """Raised with every change of how a surface is filled, so that what is kept is dropped."""
 
 _LONGER = 1.25
@@ -24,8 +26,25 @@ _STRICTER = 10.0
 """fTetWild's own default of the energy at which it stops; it takes about twice as long."""
 
 
+@dataclass
+class FillingSeconds:
+    """What a filling took.
+
+    Attributes:
+        wall: s on the clock.
+        cpu: s of the processor.
+    """
+
+    wall: float = 0.0
+    cpu: float = 0.0
+
+
 def filled(
-    mesh: Mesh, edge: float, store: Store | None, envelope: float | None = None
+    mesh: Mesh,
+    edge: float,
+    store: Store | None,
+    envelope: float | None = None,
+    spent: FillingSeconds | None = None,
 ) -> tuple[Tetrahedra, bool]:
     """The tetrahedra of ``tetrahedralize``, from the store if they are there.
 
@@ -34,6 +53,7 @@ def filled(
         edge: m, longest edge aimed at.
         store: where they are kept; None to fill.
         envelope: m, how far cells may leave the surface, see ``tetrahedralize``; None for its own.
+        spent: is given what filling took; of kept tetrahedra, what it took then.
 
     Returns:
         The tetrahedra, and whether they were kept.
@@ -42,14 +62,20 @@ def filled(
         WrongUse: an edge or an envelope that cannot be.
         MeshRefused: a surface that cannot be filled.
     """
-    told = [] if envelope is None else [float(envelope)]
-    key = digest(["filled", VERSION, mesh.vertices, mesh.faces, float(edge), *told])
+    own = [] if envelope is None else [float(envelope)]
+    key = digest(["filled", VERSION, mesh.vertices, mesh.faces, float(edge), *own])
     kept = store.get(key) if store is not None else None
     if isinstance(kept, Mapping):
+        if spent is not None:
+            spent.wall, spent.cpu = kept["seconds"].tolist()
         return tetrahedra(kept["nodes"], kept["cells"]), True
+    took = FillingSeconds() if spent is None else spent
+    begun, worked = time.perf_counter(), time.process_time()
     found = _fine(mesh, edge, envelope)
+    took.wall, took.cpu = time.perf_counter() - begun, time.process_time() - worked
     if store is not None:
-        store.put(key, {"nodes": found.nodes, "cells": found.cells})
+        seconds = np.array([took.wall, took.cpu])
+        store.put(key, {"nodes": found.nodes, "cells": found.cells, "seconds": seconds})
     return found, False
 
 

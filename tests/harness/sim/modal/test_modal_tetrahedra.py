@@ -1,5 +1,8 @@
 """Surfaces filled with tetrahedra: right, or refused by name."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from manifold3d import Manifold
@@ -167,8 +170,23 @@ def test_modes_are_computed_once_and_then_read(
     monkeypatch.setattr("harness.sim.solid.filled.tetrahedralize", never)
     again = modes_of(sphere(0.03), CERAMIC, 60e3, 0.03, store=store)
     assert (again.shapes == first.shapes).all()
+    lossless = modes_of(sphere(0.03), replace(CERAMIC, name="other", alpha=0.0), 60e3, 0.03, store=store)
+    assert (lossless.shapes == first.shapes).all()
     with pytest.raises(AssertionError):
-        modes_of(sphere(0.03), CERAMIC, 61e3, 0.03, store=store)
+        modes_of(sphere(0.03), CERAMIC, 60e3, 0.029, store=store)
+
+
+def test_tetrahedra_outlive_a_change_of_the_material(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = Store(tmp_path)
+    first = modes_of(sphere(0.03), CERAMIC, 60e3, 0.03, store=store)
+
+    def never(*_: object) -> None:
+        raise AssertionError("meshed again")
+
+    monkeypatch.setattr("harness.sim.solid.filled.tetrahedralize", never)
+    stiffer = modes_of(sphere(0.03), replace(CERAMIC, young=4.0 * CERAMIC.young), 120e3, 0.03, store=store)
+    assert stiffer.frequencies == pytest.approx(2.0 * first.frequencies, rel=1e-6)
+    assert stiffer.seconds["tetrahedra"] == first.seconds["tetrahedra"]
 
 
 def test_modes_are_those_of_a_filling_made_again_where_edges_stayed_too_long(

@@ -1,0 +1,101 @@
+"""A catalogue is built: what stands is left alone, the rest goes to a runner."""
+
+import fcntl
+import os
+import shutil
+import socket
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from harness.authoring.catalogue.layout import BuildFolder
+from harness.authoring.catalogue.record import PASSING, ObjectRecord, read_record, stands
+from harness.authoring.catalogue.rows import CatalogueRow
+from harness.authoring.catalogue.runner import Runner
+from harness.authoring.catalogue.spec import BuildItem, BuildSpec, build_item
+from harness.authoring.catalogue.worker import Job
+from harness.basics.errors import WrongUse
+
+
+@dataclass(frozen=True, eq=False)
+class BuildPlan:
+    """What a build will do.
+
+    Attributes:
+        items: of the catalogue, in its order.
+        standing: names that are built as wanted.
+        known: records of objects that failed with the same key, and are not tried again.
+        waiting: items that are to be built.
+    """
+
+    items: tuple[BuildItem, ...]
+    standing: frozenset[str]
+    known: Mapping[str, ObjectRecord]
+    waiting: tuple[BuildItem, ...]
+
+
+def build_plan(
+    rows: Sequence[tuple[CatalogueRow, str]], spec: BuildSpec, of: BuildFolder, retry: bool = False
+) -> BuildPlan:
+    """Compare a catalogue with what is on the disk; reads every mesh once, for its hash.
+
+    Args:
+        rows: with their meshes.
+        spec: what is built.
+        of: the build's folder.
+        retry: whether objects that failed are tried again.
+
+    Raises:
+        WrongUse: a spec that cannot be built, or a mesh that is not there.
+    """
+    spec.check()
+    items = tuple(build_item(row, mesh, spec) for row, mesh in rows)
+    standing: set[str] = set()
+    known: dict[str, ObjectRecord] = {}
+    for item in items:
+        record = read_record(of, item.row.name)
+        if stands(of, record, item.key):
+            standing.add(item.row.name)
+        elif record is not None and not retry and _failed_for_good(record, item.key):
+            known[item.row.name] = record
+    waiting = tuple(item for item in items if item.row.name not in standing and item.row.name not in known)
+    return BuildPlan(items, frozenset(standing), known, waiting)
+
+
+def _failed_for_good(record: ObjectRecord, key: str) -> bool:
+    return not record.built and record.key == key and record.outcome not in PASSING
+
+
+def build_all(plan: BuildPlan, spec: BuildSpec, of: BuildFolder, runner: Runner) -> Iterator[ObjectRecord]:
+    """Build what waits; the record of every object when it is over.
+
+    Raises:
+        WrongUse: another program builds into the folder.
+    """
+    of.prepare()
+    with held(of):
+        shutil.rmtree(of.aside, ignore_errors=True)
+        of.aside.mkdir()
+        yield from runner.run(Job(item, spec, of) for item in plan.waiting)
+
+
+@contextmanager
+def held(of: BuildFolder) -> Iterator[None]:
+    """Hold a build's folder; whoever was killed holds nothing.
+
+    Raises:
+        WrongUse: another program of this machine holds it.
+    """
+    with of.lock.open("a+") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.seek(0)
+            raise WrongUse(
+                f"{of.folder} is being built by {lock.read().strip() or 'another program'}; wait for it, or "
+                "name another --out"
+            ) from None
+        lock.truncate(0)
+        lock.write(f"process {os.getpid()} on {socket.gethostname()}\n")
+        lock.flush()
+        yield

@@ -1,0 +1,82 @@
+"""What a folder of a build holds: every object with its outcome, its modes and its quality."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from harness.authoring.catalogue.layout import BuildFolder
+from harness.authoring.catalogue.record import ObjectRecord, read_record, stands
+from harness.authoring.catalogue.settings import read_settings
+from harness.basics.errors import TouchstoneError
+from harness.objectfile.description import Description
+from harness.objectfile.file import ObjectFile
+
+QUALITY: Mapping[str, tuple[str, str, float]] = MappingProxyType({
+    "gain_error_median": ("audio", "gain error, %", 1e2),
+    "unseen_places_psnr_db_median": ("touch", "touch PSNR, dB", 1.0),
+    "psnr_db": ("vision", "picture PSNR, dB", 1.0),
+})  # fmt: skip
+"""Of each sense the one number of its network's model card that stands for it: sense, heading, factor."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectSummary:
+    """One object of a build.
+
+    Attributes:
+        name: of the object.
+        outcome: ``"built"``, ``"waiting"``, or why not.
+        reason: where it is not built.
+        record: of the last attempt; None where there was none.
+        object: an ObjectFile that stands, of this key or of an earlier one; None where there is none.
+        quality: by the keys of ``QUALITY``, those that there are, in the units of their headings.
+    """
+
+    name: str
+    outcome: str
+    reason: str
+    record: ObjectRecord | None
+    object: ObjectFile | None
+    quality: Mapping[str, float] = field(default_factory=dict)
+
+
+def summaries(of: BuildFolder) -> list[ObjectSummary]:
+    """Every object of the last build, in the catalogue's order.
+
+    Raises:
+        WrongUse: nothing was built into the folder.
+    """
+    return [_summary(of, name) for name in read_settings(of).names]
+
+
+def _summary(of: BuildFolder, name: str) -> ObjectSummary:
+    record, there = read_record(of, name), _opened(of, name)
+    if record is None:
+        return ObjectSummary(name, "waiting", "not built yet", None, there)
+    if record.built and not stands(of, record, record.key):
+        reason = "its files are not those that were built; build again"
+        return ObjectSummary(name, "damaged", reason, record, None)
+    quality = {} if there is None else _quality(there.description)
+    return ObjectSummary(name, record.outcome, record.reason, record, there, quality)
+
+
+def _opened(of: BuildFolder, name: str) -> ObjectFile | None:
+    try:
+        return ObjectFile.open(of.object(name))
+    except TouchstoneError:
+        return None
+
+
+def _quality(description: Description) -> dict[str, float]:
+    networks = description.networks
+    found: dict[str, float] = {}
+    for key, (sense, _, factor) in QUALITY.items():
+        for name, entry in networks.items():
+            if _sense_of(name) == sense and key in entry.measured:
+                found.setdefault(key, factor * entry.measured[key])
+    return found
+
+
+def _sense_of(network: str) -> str:
+    """Touch has networks of several names."""
+    return network if network in ("audio", "vision") else "touch"

@@ -1,0 +1,1 @@
+"""``touchstone catalogue``: a folder of objects becomes ObjectFiles."""

@@ -1,0 +1,196 @@
+"""``touchstone catalogue build``: every object of a catalogue becomes an ObjectFile."""
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from harness.commands import options
+from harness.commands.catalogue import chosen
+from harness.commands.catalogue.build_progress import build_progress, duration
+from harness.commands.output import ANSWERS, CONSOLE, emit, warn
+
+if TYPE_CHECKING:
+    from harness.authoring.catalogue.build import BuildPlan
+    from harness.authoring.catalogue.record import ObjectRecord
+    from harness.authoring.catalogue.rows import ExcludedRow
+    from harness.authoring.catalogue.runner import Runner
+    from harness.authoring.catalogue.spec import BuildSpec
+    from harness.authoring.catalogue.worker import WorkerLimits
+
+
+def build(
+    catalogue: chosen.CatalogueFileArgument,
+    out: chosen.Folder,
+    meshes: chosen.Meshes = None,
+    material: chosen.Materials = None,
+    senses: chosen.Senses = "audio,touch",
+    profile: Annotated[str, typer.Option(help="Of every sense: smoke, standard or paper.")] = "standard",
+    up_to: Annotated[str, typer.Option("--up-to", help="Modes up to this frequency.", metavar="F")] = "20kHz",
+    modes: Annotated[int, typer.Option(help="Modes at most, the lowest.", min=1, max=4096)] = 128,
+    edge: Annotated[
+        str | None,
+        typer.Option(help="Longest edge of an element, as 3mm; by the wave if left out.", metavar="L"),
+    ] = None,
+    sensor: Annotated[
+        str | None,
+        typer.Option(help="Make of the gel that presses, or the path of its file.", metavar="NAME"),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of everything random.", min=0)] = 0,
+    runner: Annotated[str, typer.Option(help="local: processes of this machine; ray: a cluster.")] = "local",
+    workers: Annotated[int, typer.Option(help="Objects side by side; cores if left out.", min=0)] = 0,
+    address: Annotated[
+        str | None,
+        typer.Option(help="Of a running Ray cluster, HOST:6379 or auto; else one starts here.", metavar="A"),
+    ] = None,
+    time_limit: Annotated[
+        str, typer.Option("--time-limit", help="An object that takes longer is killed.", metavar="TIME")
+    ] = "120min",
+    memory: Annotated[
+        float | None,
+        typer.Option(help="Gigabytes of data a worker may have; all there is if left out.", min=0.5),
+    ] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Try objects again that failed before.")] = False,
+    stages: chosen.Stages = None,
+    json: options.Json = False,
+) -> int:
+    """Build every object of a catalogue, as many side by side as there are workers.
+
+    What stands is left alone: a second build of the same catalogue does nothing, and a changed material,
+    profile or sense makes only what depends on it. A build that was killed goes on. An object that fails,
+    hangs or kills its worker is kept apart in OUT/failed with its reason and its log, and the others go on.
+
+    ObjectFiles are in OUT/objects. Exit code 0 where all objects with a mesh are built, else 1.
+
+    Try: touchstone catalogue build objects.csv --meshes meshes --out built --profile smoke
+    """
+    from harness.authoring.catalogue.build import build_all, build_plan
+    from harness.authoring.catalogue.layout import BuildFolder
+    from harness.authoring.catalogue.settings import write_settings
+
+    begun = time.perf_counter()
+    spec = _spec(senses, profile, seed, up_to, modes, edge, sensor)
+    chosen_runner = _runner(runner, workers, address, _limits(time_limit, memory))
+    _, rows, excluded = chosen.read(catalogue, meshes, material)
+    of = BuildFolder(out.resolve(), None if stages is None else stages.resolve())
+    plan = build_plan(rows, spec, of, retry)
+    of.prepare()
+    write_settings(of, catalogue, [item.row.name for item in plan.items], excluded)
+    records: list[ObjectRecord] = []
+    if plan.waiting:
+        with build_progress(len(plan.waiting)) as count:
+            for record in build_all(plan, spec, of, chosen_runner):
+                records.append(record)
+                count(record.name, record.built)
+                if not record.built:
+                    warn(f"{record.name}: {record.outcome}: {record.reason}")
+    failed = [*plan.known.values(), *(record for record in records if not record.built)]
+    seconds = time.perf_counter() - begun
+    if json:
+        emit(_as_json(of.folder, plan, records, failed, excluded, seconds))
+    else:
+        _print(of.folder, plan, records, failed, excluded, seconds)
+    return 1 if failed or not plan.items else 0
+
+
+def _spec(
+    senses: str, profile: str, seed: int, up_to: str, modes: int, edge: str | None, sensor: str | None
+) -> "BuildSpec":
+    from harness.authoring.catalogue.spec import SENSES, BuildSpec
+    from harness.basics.errors import WrongUse
+    from harness.basics.quantities import FREQUENCY, LENGTH
+    from harness.basics.toml_file import nearest
+    from harness.bench.sensor import DEFAULT_MAKE, described_sensor
+
+    named = {name.strip() for name in senses.split(",") if name.strip()}
+    for name in sorted(named - set(SENSES)):
+        raise WrongUse(f"--senses {name}: {nearest(name, SENSES)}")
+    return BuildSpec(
+        senses=tuple(sense for sense in SENSES if sense in named),
+        profile=profile,
+        seed=seed,
+        limit=options.positive("--up-to", up_to, FREQUENCY) or 0.0,
+        most=modes,
+        edge=options.positive("--edge", edge, LENGTH),
+        sensor=described_sensor(sensor or DEFAULT_MAKE).sensor,
+    )
+
+
+def _limits(time_limit: str, memory: float | None) -> "WorkerLimits":
+    from harness.authoring.catalogue.worker import WorkerLimits
+    from harness.basics.quantities import TIME
+
+    seconds = options.positive("--time-limit", time_limit, TIME)
+    assert seconds is not None
+    return WorkerLimits(seconds, None if memory is None else int(memory * 1e9))
+
+
+def _runner(name: str, workers: int, address: str | None, limits: "WorkerLimits") -> "Runner":
+    from harness.authoring.catalogue.runner import LocalRunner
+    from harness.basics.cores import own_cores
+    from harness.basics.errors import WrongUse
+    from harness.basics.toml_file import nearest
+
+    if name == "local":
+        if address is not None:
+            raise WrongUse(f"--address {address} is of --runner ray; leave it out, or say --runner ray")
+        return LocalRunner(workers or own_cores(), limits)
+    if name != "ray":
+        raise WrongUse(f"no runner {name!r}; {nearest(name, ('local', 'ray'))}")
+    from harness.authoring.catalogue.ray_runner import RayRunner
+
+    return RayRunner(workers or None, limits, address)
+
+
+def _as_json(
+    folder: Path,
+    plan: "BuildPlan",
+    records: "Sequence[ObjectRecord]",
+    failed: "Sequence[ObjectRecord]",
+    excluded: "Sequence[ExcludedRow]",
+    seconds: float,
+) -> dict[str, Any]:
+    return {
+        "schema": 1,
+        "folder": str(folder),
+        "objects": len(plan.items),
+        "standing": len(plan.standing),
+        "built": sum(record.built for record in records),
+        "failed": [{"name": r.name, "outcome": r.outcome, "reason": r.reason} for r in failed],
+        "excluded": [{"name": row.name, "reason": row.reason} for row in excluded],
+        "stages_made": dict(Counter(s for r in records for s, part in r.senses.items() if part.made)),
+        "seconds": seconds,
+    }
+
+
+def _print(
+    folder: Path,
+    plan: "BuildPlan",
+    records: "Sequence[ObjectRecord]",
+    failed: "Sequence[ObjectRecord]",
+    excluded: "Sequence[ExcludedRow]",
+    seconds: float,
+) -> None:
+    built = sum(record.built for record in records)
+    if not plan.waiting:
+        ANSWERS.print(
+            f"nothing to do: {len(plan.standing)} of {len(plan.items)} objects stand in {folder}",
+            markup=False,
+        )
+    else:
+        made = f"{built} of {len(plan.items)} objects built, {len(plan.standing)} stood already"
+        ANSWERS.print(f"{made}; {duration(seconds)}", markup=False)
+    for record in failed:
+        log = folder / "failed" / record.name / "log.txt"
+        ANSWERS.print(f"{record.name}: {record.outcome}: {record.reason} ({log})", markup=False)
+    if plan.known:
+        CONSOLE.print(
+            f"{len(plan.known)} failed before and were not tried again; --retry tries them", markup=False
+        )
+    if excluded:
+        ANSWERS.print(
+            f"{len(excluded)} rows excluded; `touchstone catalogue check` lists the reasons", markup=False
+        )
