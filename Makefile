@@ -9,7 +9,7 @@ DEV := $(VENV)/.installed-dev
 SOUND := pipewire wireplumber pipewire-alsa libportaudio2
 
 # Objects of ours and what each is made of.
-OBJECTS := mug:ceramic bowl:ceramic plate:ceramic pitcher:ceramic tray:wood wrench:steel
+OBJECTS := mug:ceramic bowl:ceramic plate:ceramic pitcher:polycarbonate tray:wood wrench:steel
 
 .PHONY: help install demo demo-shape objectfiles test slow hunt lint types contracts reference bench tables sound clean
 
