@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from experiments.contact_localization.accuracy.solving import (
     Readings,
     loaded,
@@ -17,7 +19,7 @@ from experiments.contact_localization.posterior.dials import SENSES, Senses
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import FitRefused, WrongUse
+from harness.basics.errors import FitRefused, PictureRefused, WrongUse
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
 from harness.effects.accuracy import Accuracy
 from harness.picture.square_pixels import aspect_stated
@@ -40,6 +42,7 @@ class Answer:
             are loaded.
         sense: what ``last`` is by.
         others: the answer by each other sense, or why that sense refused the object.
+        unread: why the picture of a contact, by its number from 0, was left out.
     """
 
     observations: tuple[Observation, ...]
@@ -50,6 +53,7 @@ class Answer:
     seconds: float
     sense: Senses = "touch"
     others: Mapping[Senses, Estimate | FitRefused] = field(default_factory=dict)
+    unread: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def by_sense(self) -> dict[Senses, Estimate | FitRefused]:
@@ -71,6 +75,7 @@ class ContactAnswering:
         self._accuracy, self._run = accuracy, run
         self._seen: list[Observation] = []
         self._heights: list[FloatArray] = []
+        self._unread: dict[int, str] = {}
         self._taken = (0.0, 0.0)
         prepare(self.model, accuracy)
         _ = self.symmetry
@@ -91,14 +96,19 @@ class ContactAnswering:
             raise WrongUse("no contact was read; a run needs at least one")
         seed = self._run.recording.header.seed
         heights = tuple(self._heights)
-        return Readings(in_time(self._seen), heights, self.model, self.prior, seed, self._taken)
+        return Readings(in_time(self._seen), heights, self.model, self.prior, seed, self._taken, self._unread)
 
     def read(self, record: StepRecord) -> None:
         """Take in a contact; its images are turned into heights here, and nowhere else."""
         station = self._run.station
         aspect = aspect_stated(self._run.calibration.header.made_from)
         seen = observe_step(record, station.flange_from_gel, self._run.acquisition, aspect)
-        heights, cpu, wall = loaded(lambda: timed_height_map(seen, self.model))
+        try:
+            heights, cpu, wall = loaded(lambda: timed_height_map(seen, self.model))
+        except PictureRefused as refusal:
+            # Where the gel stood, and its strike, are as good as ever.
+            self._unread[len(self._seen)] = str(refusal)
+            heights, cpu, wall = np.zeros(seen.images.shape[1:3]), 0.0, 0.0
         self._seen.append(seen)
         self._heights.append(heights)
         self._taken = (self._taken[0] + cpu, self._taken[1] + wall)
@@ -120,7 +130,7 @@ class ContactAnswering:
         others = {other: self._tried(other, readings) for other in senses if other != sense}
         seconds = sum(last.seconds.values())
         seen, heights = readings.observations, readings.heights
-        return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others)
+        return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others, self._unread)
 
     def history(self, last: Estimate, sense: Senses) -> tuple[Estimate, ...]:
         """The estimates by a sense after each contact, the last of which is known."""

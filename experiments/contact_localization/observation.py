@@ -7,6 +7,7 @@ from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise, touch_map
 from harness.basics.arrays import FloatArray
 from harness.recording.observation import Observation
+from harness.sim.optics.check.picture_check import checked_picture
 from harness.sim.optics.inverse import invert
 
 CONTACT_THRESHOLD = 0.12e-3
@@ -28,6 +29,10 @@ def height_map(observation: Observation, model: Model) -> FloatArray:
 
     Colour is close to linear in slope, so the mean of frames is the picture of the mean shape,
     and one inversion serves for all.
+
+    Raises:
+        PictureRefused: the picture is not what the calibration was made of.
     """
     mean = np.rint(observation.images.mean(axis=0)).astype(np.uint8)
-    return np.asarray(invert(mean[None], model.calibration).height[0])
+    checked = checked_picture(mean, model.calibration)
+    return np.asarray(invert(checked.image[None], model.calibration).height[0])

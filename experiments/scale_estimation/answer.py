@@ -24,7 +24,7 @@ from experiments.scale_estimation.unseen.answer import (
 from experiments.scale_estimation.unseen.contact_set import GelWay
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import DataRefused, FitRefused, MeshRefused, WrongUse
+from harness.basics.errors import DataRefused, FitRefused, MeshRefused, PictureRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
@@ -146,15 +146,19 @@ class ScaleAnswering:
         run, began = self.run, time.perf_counter()
         aspect = aspect_stated(run.calibration.header.made_from)
         seen = observe_step(record, run.station.flange_from_gel, run.acquisition, aspect)
-        patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
+        if seen.strike is not None:
+            self.strikes.append(seen.strike)
+        try:
+            patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
+        except PictureRefused as refusal:
+            self.left_out.append(f"contact {record.step.index + 1}: {refusal}")
+            return
         if patch is not None:
             self.patches.append(patch)
         length = float(record.step.parameters["search_m"])
         self.met.append(patch is not None)
         self.ways.append(GelWay.made(seen.base_from_gel, self.model.place, patch))
         self.free.append(free_line(seen.base_from_gel, length, patch is not None))
-        if seen.strike is not None:
-            self.strikes.append(seen.strike)
         self._read["touch"] += time.perf_counter() - began
 
     def answer(self) -> SizeAnswer:

@@ -12,6 +12,7 @@ from harness.picture.outline import SeenOutline, read_outline
 from harness.recording.look_pictures import look_pictures
 from harness.recording.observation import Observation
 from harness.recording.step_file import StepRecord
+from harness.sim.optics.check.picture_check import checked_picture
 from harness.sim.optics.inverse import invert
 from harness.sim.optics.tactile_calibration import TactileCalibration
 from harness.strikes.peaks import analyse
@@ -35,9 +36,13 @@ def patch_of_contact(seen: Observation, calibration: TactileCalibration, pitch: 
         seen: the contact.
         calibration: of the gel.
         pitch: m of gel that a pixel shows.
+
+    Raises:
+        PictureRefused: the picture is not what the calibration was made of.
     """
     mean = np.rint(seen.images.mean(axis=0)).astype(np.uint8)
-    return patch_of(invert(mean[None], calibration).height[0], pitch, seen.base_from_gel)
+    checked = checked_picture(mean, calibration)
+    return patch_of(invert(checked.image[None], calibration).height[0], pitch, seen.base_from_gel)
 
 
 def peaks_of(strikes: Sequence[Strike]) -> Peaks | None:

@@ -9,6 +9,7 @@ from experiments.shape_reconstruction.contact_points import contact_points
 from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.errors import PictureRefused
 from harness.basics.geometry import apply, translation
 from harness.picture.object_mask import mask_by_background
 from harness.picture.square_pixels import aspect_stated
@@ -16,6 +17,7 @@ from harness.recording.look_pictures import look_pictures
 from harness.recording.observation import observe_step
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
+from harness.sim.optics.check.picture_check import checked_picture
 from harness.sim.optics.inverse import invert
 
 LEAST_PIXELS = 12
@@ -36,6 +38,7 @@ class ShapeReadings:
     run: RunFiles
     touches: list[GuardedTouch] = field(default_factory=list, init=False)
     look: SeenMask | None = field(default=None, init=False)
+    refused: list[str] = field(default_factory=list, init=False)
 
     def read(self, record: StepRecord) -> None:
         """Take in a step: a look, a press, or one that was not made."""
@@ -43,7 +46,10 @@ class ShapeReadings:
         if pictures is not None:
             self.look = seen_mask(self.run, *pictures)
         elif "gel.image" in record.readings:
-            self.touches.append(guarded_touch(self.run, record))
+            try:
+                self.touches.append(guarded_touch(self.run, record))
+            except PictureRefused as refusal:
+                self.refused.append(f"press {record.step.index + 1}: {refusal}")
 
     def evidence(self) -> ShapeEvidence:
         """All of it."""
@@ -79,12 +85,13 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
 
     Raises:
         RecordingDamaged: the step has no pictures or no poses.
+        PictureRefused: its picture is not what the calibration was made of.
     """
     calibration, settings = run.calibration, run.scene.section(ShapeRun)
     aspect = aspect_stated(calibration.header.made_from)
     seen = observe_step(record, run.station.flange_from_gel, aspect=aspect)
     mean = np.rint(seen.images.mean(axis=0)).astype(np.uint8)
-    read = invert(mean[None], calibration)
+    read = invert(checked_picture(mean, calibration).image[None], calibration)
     found = contact_points(read.height[0], read.error[0], run.station.gel.sensor.pitch)
     stand_from_gel = seen.base_from_gel.copy()
     stand_from_gel[:3, 3] -= base_from_stand(run)[:3, 3]

@@ -109,7 +109,8 @@ def write_files(scored: Scored, folder: Path) -> None:
 
 def _warnings(scored: Scored, answer: ShapeAnswer) -> list[str]:
     said = [f"{sense}: {one}" for sense, one in answer.by_sense.items() if isinstance(one, FitRefused)]
-    fused, left_out = answer.fused, scored.answering.left_out
+    fused = answer.fused
+    left_out = [*scored.answering.left_out, *scored.answering.readings.refused]
     said += [f"shape: {flag}" for flag in fused.flags]
     if fused.not_bounded:
         said.append(f"nothing bounds the object along {', '.join(fused.not_bounded)}: press there, or look")

@@ -43,6 +43,7 @@ class Readings:
         prior: of its orientation.
         seed: of the draws.
         shared: s of CPU time and on the clock that the height maps took.
+        unread: why the picture of a contact, by its number from 0, is not used; its height map is zero.
     """
 
     observations: tuple[Observation, ...]
@@ -51,6 +52,7 @@ class Readings:
     prior: Prior
     seed: int
     shared: tuple[float, float]
+    unread: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def heard(self) -> bool:
@@ -172,6 +174,10 @@ def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> lis
         return [Contact(observation.base_from_gel) for observation in readings.observations]
     pitch = readings.model.sensor.pitch
     return [
-        contact_of(observation.base_from_gel, heights, pitch, block, noise.touch)
-        for observation, heights in zip(readings.observations, readings.heights, strict=True)
+        Contact(observation.base_from_gel)
+        if index in readings.unread
+        else contact_of(observation.base_from_gel, heights, pitch, block, noise.touch)
+        for index, (observation, heights) in enumerate(
+            zip(readings.observations, readings.heights, strict=True)
+        )
     ]

@@ -51,7 +51,8 @@ def by_translations(found: Answer, count: int) -> FloatArray:
 
 
 def _doubts(found: Answer) -> tuple[str, ...]:
-    of_sound = doubts_of_sound(found.observations)
+    unread = (f"contact {index + 1} is left out: {why}" for index, why in found.unread.items())
+    of_sound = (*unread, *doubts_of_sound(found.observations))
     # Sense by sense the doubt may be the same one.
     of_senses = [estimate.doubts for estimate in found.by_sense.values() if isinstance(estimate, Estimate)]
     of_sound += tuple(dict.fromkeys(doubt for doubts in of_senses for doubt in doubts))
