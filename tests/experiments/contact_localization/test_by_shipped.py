@@ -1,6 +1,5 @@
 """A run by an ObjectFile that comes with the program, with a scene camera: networks alone draw and sound."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ import pytest
 from experiments.contact_localization.accuracy.benchmark_runs import Cell
 from experiments.contact_localization.answer import ContactAnswering
 from experiments.contact_localization.experiment import EXPERIMENT
-from experiments.contact_localization.report.result import result_of
 from experiments.contact_localization.section import Localization
 from harness.basics.errors import WrongUse
 from harness.bench.scene import Light, SceneFile, Sensors, scene_from_options
@@ -92,21 +90,6 @@ def test_its_modes_are_the_networks_and_nothing_is_solved(simulated: list[str]) 
     assert simulated == []
     assert np.isfinite(modes.shapes).all()
     assert len(modes.frequencies) > 10
-
-
-def test_a_picture_that_is_refused_is_left_out_and_named(run: RunFiles) -> None:
-    accuracy = chosen_levels(EXPERIMENT.knobs, (), run.network_levels)
-    answering = ContactAnswering(run, accuracy)
-    for index, record in enumerate(run.recording.steps()):
-        seen = record.readings["gel.image"]
-        mirrored = replace(seen, values=np.ascontiguousarray(seen.values[:, :, ::-1]), encoded=())
-        readings = {**record.readings, "gel.image": mirrored if index == 0 else seen}
-        answering.read(replace(record, readings=readings))
-    found = answering.answer()
-    assert list(found.unread) == [0]
-    warnings = result_of(Scored(run, answering, found, None, accuracy, ()))["warnings"]
-    assert warnings[0].startswith("contact 1 is left out")
-    assert "mirrored left to right" in warnings[0]
 
 
 def test_a_coloured_lamp_is_refused_before_anything_moves(tmp_path: Path) -> None:

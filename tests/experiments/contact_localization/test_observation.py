@@ -10,7 +10,7 @@ from experiments.contact_localization.observation import contact_of, height_map
 from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise
 from harness.basics.arrays import ByteArray, FloatArray
-from harness.basics.errors import DataRefused, RecordingDamaged, WrongUse
+from harness.basics.errors import DataRefused, PictureRefused, RecordingDamaged, WrongUse
 from harness.basics.geometry import quaternion_from_rotation, rotation_about, rotation_from_vector, transform
 from harness.bench.reading import Channel, Reading
 from harness.bench.sensor import GELSIGHT_R15
@@ -90,6 +90,11 @@ def test_the_mean_of_frames_is_read_and_their_order_does_not_matter(model: Model
 def test_an_untouched_gel_reads_zero(model: Model) -> None:
     background = model.calibration.background
     assert not height_map(Observation(np.eye(4), background[None]), model).any()
+
+
+def test_a_picture_that_is_not_the_calibrations_is_refused(model: Model, picture: ByteArray) -> None:
+    with pytest.raises(PictureRefused, match="mirrored left to right"):
+        height_map(Observation(np.eye(4), picture[None, :, ::-1]), model)
 
 
 def read(observation: Observation, model: Model) -> Contact:

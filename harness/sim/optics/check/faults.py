@@ -14,8 +14,8 @@ _DARKEST = 0.62
 _MOST_DARK = 0.02
 _MOST_LOST = 0.01
 _NO_LIGHT = 0.2
-_MOST_CLIPPED = 0.05
-"""Share of values that are clipped beside those of the calibration's background; real presses have 0.02."""
+_MOST_CLIPPED = 0.08
+"""Share of values clipped beyond those of the calibration's background; real presses have up to 0.06."""
 
 _MOST_NOISE = 12.0
 """Grey levels from pixel to pixel: camera noise of 9."""
@@ -31,7 +31,7 @@ def require_light(seen: FloatArray, known: FloatArray) -> None:
     Raises:
         PictureRefused: with the share of the light.
     """
-    left = float(np.median(seen.sum(axis=2) / np.maximum(known.sum(axis=2), 1.0)))
+    left = float(seen.sum() / max(float(known.sum()), 1.0))
     if left < _NO_LIGHT:
         raise PictureRefused(
             f"the picture has {left:.0%} of the calibration's light (at least {_NO_LIGHT:.0%}): the sensor's "
@@ -49,7 +49,8 @@ def require_whole(image: ByteArray, known: ByteArray) -> None:
     Raises:
         PictureRefused: with the share of the picture and what to do.
     """
-    lost = float((_flat(image) & ~_flat(known)).mean())
+    flat = _flat(image)
+    lost = float((flat & ~_flat(known)).mean()) if flat.any() else 0.0
     if lost > _MOST_LOST:
         raise PictureRefused(
             f"{lost:.0%} of the picture is one colour without any noise (at most {_MOST_LOST:.0%}): part of "
@@ -119,7 +120,10 @@ def _flat(image: ByteArray) -> BoolArray:
     rows, columns = image.shape[0] // _LOST, image.shape[1] // _LOST
     strips = image[: rows * _LOST, : columns * _LOST].reshape(rows, _LOST, -1)
     shape = (rows, columns, _LOST, 3)
-    least, most = strips.min(axis=1).reshape(shape), strips.max(axis=1).reshape(shape)
+    least, most = strips.min(axis=1), strips.max(axis=1)
+    if not (least == most).any():
+        return np.zeros((rows, columns), np.bool_)
+    least, most = least.reshape(shape), most.reshape(shape)
     return np.asarray((least.min(axis=2) == most.max(axis=2)).all(axis=2))
 
 

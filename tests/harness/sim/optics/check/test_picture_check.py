@@ -266,5 +266,5 @@ def test_no_real_press_is_refused(shared_data: Path) -> None:
 
 @pytest.mark.parametrize("fault", TURNS.values(), ids=TURNS)
 def test_every_real_press_turned_is_refused(shared_data: Path, fault: Fault) -> None:
-    for image in read_pictures(shared_data / "tactile/objectfolder_calibs").images[::16]:
+    for image in read_pictures(shared_data / "tactile/objectfolder_calibs").images[::24]:
         _refused(np.ascontiguousarray(fault(image)), None)
