@@ -26,7 +26,7 @@ _SAME = "as calibrated"
 
 
 @dataclass(frozen=True, eq=False)
-class Light:
+class GelLight:
     """``seen = gain * known + offset`` per channel.
 
     Attributes:
@@ -46,7 +46,7 @@ class Light:
         return np.asarray(self.gain * known + self.offset)
 
 
-def fit_light(seen: FloatArray, known: FloatArray) -> Light:
+def fit_light(seen: FloatArray, known: FloatArray) -> GelLight:
     """The light of a picture: unchanged where a quarter of it is as the reference, else fitted.
 
     Args:
@@ -55,11 +55,11 @@ def fit_light(seen: FloatArray, known: FloatArray) -> Light:
     """
     change = np.abs(seen - known)
     if (change.max(axis=2) < UNCHANGED).mean() >= _LEAST_UNCHANGED:
-        return Light(np.ones(3), np.zeros(3), float((change.max(axis=2) < ALIKE).mean()), True)
+        return GelLight(np.ones(3), np.zeros(3), float((change.max(axis=2) < ALIKE).mean()), True)
     return _fitted(seen.reshape(-1, 3), known.reshape(-1, 3))
 
 
-def _fitted(y: FloatArray, x: FloatArray) -> Light:
+def _fitted(y: FloatArray, x: FloatArray) -> GelLight:
     near = np.ones(len(x), np.bool_)
     gain, offset, apart = np.ones(3), np.zeros(3), np.zeros(len(x))
     for _ in range(_TURNS):
@@ -69,7 +69,7 @@ def _fitted(y: FloatArray, x: FloatArray) -> Light:
         if near.sum() < _LEAST_BLOCKS:
             break
     tight = float((apart < UNCHANGED).mean())
-    return Light(gain, offset, float((apart < ALIKE).mean()), tight >= _LEAST_TIGHT)
+    return GelLight(gain, offset, float((apart < ALIKE).mean()), tight >= _LEAST_TIGHT)
 
 
 def _line(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -82,7 +82,7 @@ def _line(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     return gain, level - gain * middle
 
 
-def orientation(seen: FloatArray, known: FloatArray) -> tuple[str, Light]:
+def orientation(seen: FloatArray, known: FloatArray) -> tuple[str, GelLight]:
     """Channel order and orientation of the reference that explain a picture best, and its light in it.
 
     Args:
