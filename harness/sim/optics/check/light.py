@@ -26,7 +26,7 @@ _SAME = "as calibrated"
 
 
 @dataclass(frozen=True, eq=False)
-class GelLight:
+class LightMatch:
     """``seen = gain * known + offset`` per channel.
 
     Attributes:
@@ -46,7 +46,7 @@ class GelLight:
         return np.asarray(self.gain * known + self.offset)
 
 
-def fit_light(seen: FloatArray, known: FloatArray) -> GelLight:
+def fit_light(seen: FloatArray, known: FloatArray) -> LightMatch:
     """The light of a picture: unchanged where a quarter of it is as the reference, else fitted.
 
     Args:
@@ -55,11 +55,11 @@ def fit_light(seen: FloatArray, known: FloatArray) -> GelLight:
     """
     change = np.abs(seen - known)
     if (change.max(axis=2) < UNCHANGED).mean() >= _LEAST_UNCHANGED:
-        return GelLight(np.ones(3), np.zeros(3), float((change.max(axis=2) < ALIKE).mean()), True)
+        return LightMatch(np.ones(3), np.zeros(3), float((change.max(axis=2) < ALIKE).mean()), True)
     return _fitted(seen.reshape(-1, 3), known.reshape(-1, 3))
 
 
-def _fitted(y: FloatArray, x: FloatArray) -> GelLight:
+def _fitted(y: FloatArray, x: FloatArray) -> LightMatch:
     near = np.ones(len(x), np.bool_)
     gain, offset, apart = np.ones(3), np.zeros(3), np.zeros(len(x))
     for _ in range(_TURNS):
@@ -69,7 +69,7 @@ def _fitted(y: FloatArray, x: FloatArray) -> GelLight:
         if near.sum() < _LEAST_BLOCKS:
             break
     tight = float((apart < UNCHANGED).mean())
-    return GelLight(gain, offset, float((apart < ALIKE).mean()), tight >= _LEAST_TIGHT)
+    return LightMatch(gain, offset, float((apart < ALIKE).mean()), tight >= _LEAST_TIGHT)
 
 
 def _line(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -82,7 +82,7 @@ def _line(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     return gain, level - gain * middle
 
 
-def orientation(seen: FloatArray, known: FloatArray) -> tuple[str, GelLight]:
+def orientation(seen: FloatArray, known: FloatArray) -> tuple[str, LightMatch]:
     """Channel order and orientation of the reference that explain a picture best, and its light in it.
 
     Args:

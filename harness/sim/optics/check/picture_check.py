@@ -19,7 +19,7 @@ from harness.sim.optics.check.faults import (
     require_unclipped,
     require_whole,
 )
-from harness.sim.optics.check.light import UNCHANGED, GelLight, fit_light, orientation, same
+from harness.sim.optics.check.light import UNCHANGED, LightMatch, fit_light, orientation, same
 from harness.sim.optics.check.slopes import slope_fit
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
@@ -138,7 +138,7 @@ def _rest(calibration: TactileCalibration, block: int) -> FloatArray:
     return read_only(block_means(calibration.background, block))
 
 
-def _light_of_rest(rest: FloatArray, known: FloatArray) -> GelLight:
+def _light_of_rest(rest: FloatArray, known: FloatArray) -> LightMatch:
     light = fit_light(rest, known)
     if light.alike < _LEAST_ALIKE:
         words, other = orientation(rest, known)
@@ -155,7 +155,7 @@ def _light_of_rest(rest: FloatArray, known: FloatArray) -> GelLight:
     return light
 
 
-def _light_of_press(seen: FloatArray, known: FloatArray) -> GelLight | None:
+def _light_of_press(seen: FloatArray, known: FloatArray) -> LightMatch | None:
     """The light of a press's untouched surroundings; None where too little of them is in view."""
     light = fit_light(seen, known)
     if light.sure:
@@ -170,7 +170,7 @@ def _require_same_gel(seen: FloatArray, rest: FloatArray) -> None:
         _refuse_turned(seen, rest, light)
 
 
-def _refuse_turned(seen: FloatArray, rest: FloatArray, light: GelLight) -> None:
+def _refuse_turned(seen: FloatArray, rest: FloatArray, light: LightMatch) -> None:
     words, other = orientation(seen, rest)
     if not same(words) and other.alike > max(_LEAST_ALIKE_PRESSED, light.alike + 0.2):
         raise PictureRefused(
@@ -179,7 +179,7 @@ def _refuse_turned(seen: FloatArray, rest: FloatArray, light: GelLight) -> None:
         )
 
 
-def _gain(light: GelLight | None, deadband: float) -> FloatArray:
+def _gain(light: LightMatch | None, deadband: float) -> FloatArray:
     if light is None:
         return np.ones(3)
     low, high = _GAINS
@@ -224,7 +224,7 @@ def _corrected(
     image: ByteArray,
     calibration: TactileCalibration,
     background: ByteArray | None,
-    light: GelLight | None,
+    light: LightMatch | None,
     gain: FloatArray,
 ) -> CheckedPicture:
     rest = calibration.background if background is None else background
