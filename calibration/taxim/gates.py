@@ -7,7 +7,8 @@ import numpy as np
 from calibration.taxim.detect import Detector, Found
 from calibration.taxim.pictures import Pictures, Refused
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, block_means
-from harness.basics.errors import CalibrationRefused
+from harness.basics.errors import CalibrationRefused, PictureRefused
+from harness.sim.optics.check.faults import require_whole
 
 CONTACT = 0.8
 """Ball radii: what a contact is taken to be until the fit has found its edge."""
@@ -65,6 +66,7 @@ class Sighting:
         changed: pixels that changed much, as a share of a contact's.
         exchanged: whether the untouched gel fits the background far better with red and blue exchanged.
         small: ``(rows, columns, 3)`` the change, averaged over blocks.
+        lost: why part of the picture is none; None where it is whole.
     """
 
     found: Found
@@ -74,6 +76,7 @@ class Sighting:
     changed: float
     exchanged: bool
     small: FloatArray
+    lost: str | None
 
 
 def sightings(pictures: Pictures, ball: float) -> list[Sighting]:
@@ -163,7 +166,16 @@ def _sighting(image: ByteArray, background: ByteArray, detector: Detector, ball:
         float(loud.sum() / (np.pi * (CONTACT * ball) ** 2)),
         straight > _SWAP_LEAST and crossed < _SWAP * straight,
         block_means(change - drift, max(1, round(ball / 8.0))),
+        _lost(image, background),
     )
+
+
+def _lost(image: ByteArray, background: ByteArray) -> str | None:
+    try:
+        require_whole(image, background)
+    except PictureRefused as refusal:
+        return str(refusal)
+    return None
 
 
 def _verdict(name: str, one: Sighting) -> Refused | None:
@@ -190,6 +202,8 @@ def _verdict(name: str, one: Sighting) -> Refused | None:
             f"{one.clipped:.0%} of what changed is at 0 or 255 in some channel (at most {MOST_CLIPPED:.0%}): "
             "shorten the exposure or dim the lights",
         )
+    if one.lost is not None:
+        return Refused(name, "lost", one.lost)
     if one.found.strength < LEAST_STRENGTH and one.changed > _CHANGED:
         return Refused(
             name,

@@ -51,6 +51,10 @@ class CalibrationRefused(DataRefused):
     """A calibration artefact that is missing, foreign or badly fitted."""
 
 
+class PictureRefused(DataRefused):
+    """A tactile picture that its calibration was not made for, or that no pressed gel shows."""
+
+
 class OutOfDomain(DataRefused):
     """A query outside what a model was made for."""
 

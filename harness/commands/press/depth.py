@@ -96,7 +96,7 @@ def depth(
     wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, bench)
     known = _calibration(calibration, bench)
     rest = None if background is None else read_image(background)
-    found = read_press(_frames(images), known, _detection(rest), rest)
+    found = read_press(_frames(images), known, _detection(rest), rest, _thickness(known, bench))
     frame_from_gel = None if bench is None else bench.flange_from_gel
     points = found.points(frame_from_gel)
     pressed = depth_force.answer_force(wanted, found)
@@ -129,6 +129,13 @@ def _calibration(named: str | None, bench: "Station | None") -> "TactileCalibrat
             raise WrongUse("say by which colours: --calibration FILE, or a --station that has one")
         return station_calibration(bench)
     return named_calibration(named)
+
+
+def _thickness(known: "TactileCalibration", bench: "Station | None") -> float | None:
+    from harness.sim.optics.known_gel import sensor_like
+
+    sensor = sensor_like(known) if bench is None else bench.gel.sensor
+    return None if sensor is None else sensor.gel_thickness
 
 
 def _frames(images: list[Path]) -> "ByteArray":
@@ -216,7 +223,7 @@ def _answer(
 
 
 def _notes(found: "DepthReading", touched: bool, border: bool) -> list[str]:
-    said = []
+    said = list(found.notes)
     if not touched:
         said.append("no contact: nothing in the picture differs from the untouched gel")
     if border:

@@ -1,6 +1,6 @@
 """A live picture read: the gel's surface, its error at every pixel, and its points in the frame of a tool."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import process_time
 
 import numpy as np
@@ -9,9 +9,10 @@ from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import DataRefused
 from harness.basics.geometry import apply
 from harness.picture.square_pixels import aspect_stated, made_square
+from harness.sim.optics.check.picture_check import checked_picture, require_within_gel
 from harness.sim.optics.contact_depth import Depth, read_depth
 from harness.sim.optics.inverse import Detection
-from harness.sim.optics.inverse_error import height_errors
+from harness.sim.optics.inverse_error import USUAL, height_errors
 from harness.sim.optics.tactile_calibration import TactileCalibration, with_background
 
 
@@ -27,6 +28,7 @@ class DepthReading:
         pitch: metres a pixel.
         aspect: by which the picture was made square; 1 where it was.
         seconds: of the processor, reading and its error.
+        notes: sentences for people about what was corrected before it was read.
     """
 
     image: ByteArray
@@ -36,6 +38,7 @@ class DepthReading:
     pitch: float
     aspect: float
     seconds: tuple[float, float]
+    notes: tuple[str, ...] = ()
 
     @property
     def contact(self) -> BoolArray:
@@ -79,8 +82,9 @@ def read_press(
     calibration: TactileCalibration,
     detection: Detection,
     background: ByteArray | None = None,
+    thickness: float | None = None,
 ) -> DepthReading:
-    """Read one press as a camera gave it.
+    """Read one press as a camera gave it, once it is known to be of the calibration's gel and light.
 
     Args:
         frames: ``(n, rows, columns, 3)`` RGB, of one press that was held still; their mean is read.
@@ -88,21 +92,26 @@ def read_press(
         detection: what counts as a change; one that is ``drifting`` also asks for the light of the moment.
         background: ``(rows, columns, 3)`` RGB of the untouched gel as it looks now; None for the
             calibration's.
+        thickness: metres of the gel, deeper than which no reading is; None where it is not known.
 
     Raises:
         DataRefused: no frames, or of another shape or type than the calibration's.
+        PictureRefused: not what the calibration was made of, or deeper than the gel.
         CalibrationRefused: a calibration with no smooth model, or a table of too few bins.
     """
     _check(frames, background, calibration)
     aspect = aspect_stated(calibration.header.made_from)
     mean = np.rint(made_square(frames, aspect).mean(axis=0)).astype(np.uint8)
-    by = calibration
-    if background is not None:
-        by = with_background(calibration, made_square(background, aspect))
+    rest = None if background is None else made_square(background, aspect)
     began = process_time()
-    depth = read_depth(mean[None], by, detection)
+    checked = checked_picture(mean, calibration, rest)
+    by = with_background(calibration, checked.background)
+    depth = read_depth(checked.image[None], by, detection)
     read_in = process_time() - began
-    sigma = height_errors(mean[None], depth)[0].sigma
+    assumed = replace(USUAL, camera=USUAL.camera / float(checked.gain.min()))
+    sigma = height_errors(checked.image[None], depth, assumed)[0].sigma
+    if thickness is not None:
+        require_within_gel(depth.read.height[0], sigma, thickness)
     stated_in = process_time() - began - read_in
     return DepthReading(
         read_only(mean),
@@ -112,6 +121,7 @@ def read_press(
         by.header.pitch,
         aspect,
         (read_in, stated_in),
+        checked.notes,
     )
 
 

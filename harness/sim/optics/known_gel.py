@@ -59,6 +59,16 @@ def known_gel(
     return Gel(replace(sensor, casts_shadow=table is not None), pack.calibration, pack.rest, table)
 
 
+def sensor_like(calibration: TactileCalibration) -> TactileSensor | None:
+    """The shipped sensor of a calibration's pixels and pitch; None where there is none."""
+    for name in shipped_sensors():
+        sensor, pitch = described_sensor(name).sensor, calibration.header.pitch
+        same_shape = (sensor.rows, sensor.columns) == (calibration.rows, calibration.columns)
+        if same_shape and abs(sensor.pitch / pitch - 1.0) <= _SAME_PITCH:
+            return sensor
+    return None
+
+
 def _make(name: str | None, calibration: str | None) -> SensorDescription | None:
     if name is None and calibration is not None:
         return None
@@ -116,7 +126,7 @@ def _sensor(
             f"--pitch {pitch * 1e3:g} mm contradicts the calibration, which was made at {found * 1e3:g} mm; "
             "leave --pitch out"
         )
-    sensor = _like(calibration) if make is None else make.sensor
+    sensor = sensor_like(calibration) if make is None else make.sensor
     if sensor is None:
         if thickness is None:
             raise WrongUse(
@@ -131,12 +141,3 @@ def _sensor(
             f"{found * 1e3:g} mm; give the sensor's own, or leave --sensor out"
         )
     return sensor if thickness is None else replace(sensor, gel_thickness=thickness)
-
-
-def _like(calibration: TactileCalibration) -> TactileSensor | None:
-    for name in shipped_sensors():
-        sensor, pitch = described_sensor(name).sensor, calibration.header.pitch
-        same_shape = (sensor.rows, sensor.columns) == (calibration.rows, calibration.columns)
-        if same_shape and abs(sensor.pitch / pitch - 1.0) <= _SAME_PITCH:
-            return sensor
-    return None

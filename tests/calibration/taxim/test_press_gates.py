@@ -35,6 +35,12 @@ def _overexposed(image: Image) -> Image:
     return np.where(near[..., None], 255, image).astype(np.uint8)
 
 
+def _cut_short(image: Image) -> Image:
+    cut = image.copy()
+    cut[-32:] = 128
+    return cut
+
+
 def _empty(_: Image) -> Image:
     return rounded(GEL.rest() + np.random.default_rng(5).normal(0.0, 1.0, REST.shape))
 
@@ -55,6 +61,7 @@ def _a_cloth(_: Image) -> Image:
         (_exchanged, "channels"),
         (_drifted, "drift"),
         (_overexposed, "saturated"),
+        (_cut_short, "lost"),
         (_empty, "no press"),
         (_off_the_image, "off the image"),
         (_a_cloth, "no ball"),

@@ -1,0 +1,270 @@
+"""A picture that is not what the calibration was made of: corrected, refused, or inside its stated error."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from itertools import permutations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from calibration.taxim.pictures import read_pictures
+from harness.basics.arrays import AnyArray, ByteArray, FloatArray
+from harness.basics.errors import DataRefused, PictureRefused
+from harness.bench.sensor import GELSIGHT_R15
+from harness.picture.image_file import read_image
+from harness.sim.gel.gel import R15_SKIRT, deform
+from harness.sim.optics.check.light import fit_light
+from harness.sim.optics.check.picture_check import checked_picture, require_within_gel
+from harness.sim.optics.depth_reading import read_press
+from harness.sim.optics.inverse import DRIFTING, STEADY
+from harness.sim.optics.optics import Optics
+from harness.sim.optics.tactile_calibration import shipped_calibration
+
+Pair = tuple[ByteArray, ByteArray]
+Fault = Callable[[ByteArray], AnyArray]
+
+BENCH = shipped_calibration("gelsight_r15_bench")
+REST = BENCH.background
+PITCH = GELSIGHT_R15.pitch
+
+
+def _surface(i: float = 60.0, j: float = 80.0, radius: float = 4e-3, depth: float = 0.6e-3) -> FloatArray:
+    y, x = (np.mgrid[:120, :160] - np.array([i, j])[:, None, None]) * PITCH
+    ball = depth - radius + np.sqrt(np.maximum(radius**2 - x * x - y * y, 0.0))
+    return np.asarray(deform(np.maximum(ball, 0.0)[None], R15_SKIRT)[0])
+
+
+SURFACE = _surface()
+
+
+def _byte(values: AnyArray) -> ByteArray:
+    return np.clip(np.rint(values), 0.0, 255.0).astype(np.uint8)
+
+
+def _noisy(picture: AnyArray, seed: int, noise: float = 1.0) -> ByteArray:
+    return _byte(picture + np.random.default_rng(seed).normal(0.0, noise, picture.shape))
+
+
+def _drawn(surface: FloatArray) -> Pair:
+    """Press and rest as a camera gives them, by the colours of presses that the bench never saw."""
+    seen = Optics(shipped_calibration("gelsight_r15_world"), "exact").render(surface[None]).images[0]
+    return _noisy(seen, 1), _noisy(REST, 2)
+
+
+PRESS, UNTOUCHED = _drawn(SURFACE)
+
+
+def _scores(press: ByteArray, rest: ByteArray | None, surface: FloatArray = SURFACE) -> float:
+    """Errors over stated deviations, rms over the contact; ``PictureRefused`` passes."""
+    detection = DRIFTING if rest is None else STEADY
+    read = read_press(press[None], BENCH, detection, rest, GELSIGHT_R15.gel_thickness)
+    true = surface > 0.2 * surface.max()
+    apart = (read.height - surface)[true] / read.sigma[true]
+    return float(np.sqrt(np.mean(apart**2)))
+
+
+def _refused(press: ByteArray, rest: ByteArray | None) -> str:
+    with pytest.raises(PictureRefused) as refusal:
+        checked_picture(press, BENCH, rest)
+    return str(refusal.value)
+
+
+def _turned(fault: Fault) -> Pair:
+    return np.ascontiguousarray(fault(PRESS)), np.ascontiguousarray(fault(UNTOUCHED))
+
+
+TURNS: dict[str, Fault] = {
+    "mirrored": lambda picture: picture[:, ::-1],
+    "upside down": lambda picture: picture[::-1],
+    "half a turn": lambda picture: picture[::-1, ::-1],
+    **{
+        f"channels {order}": lambda picture, order=order: picture[..., list(order)]  # type: ignore[misc]
+        for order in permutations(range(3))
+        if order != (0, 1, 2)
+    },
+}
+
+
+def test_a_press_as_the_calibration_was_made_is_not_touched() -> None:
+    for rest in (None, UNTOUCHED):
+        checked = checked_picture(PRESS, BENCH, rest)
+        assert np.array_equal(checked.image, PRESS)
+        assert (checked.gain == 1.0).all()
+        assert not checked.notes
+    assert _scores(PRESS, UNTOUCHED) < 2.0
+
+
+@pytest.mark.parametrize("fault", TURNS.values(), ids=TURNS)
+def test_another_order_of_channels_or_orientation_is_refused(fault: Fault) -> None:
+    press, rest = _turned(fault)
+    assert "camera's own channel order" in _refused(press, rest)
+    assert "fits its resting gel only with" in _refused(press, None)
+    assert "fits its resting gel only with" in _refused(press, UNTOUCHED)
+
+
+@pytest.mark.parametrize("fault", TURNS.values(), ids=TURNS)
+def test_the_same_is_seen_by_the_slopes_of_a_gel_without_a_pattern(fault: Fault) -> None:
+    """Evenly lit, the resting picture says nothing of the orientation; the press's own colours do."""
+    even = replace(BENCH, background=np.full_like(REST, 120))
+    press = _noisy(np.clip(120.0 + PRESS - REST.astype(np.float64), 0.0, 255.0), 3)
+    checked_picture(press, even)
+    with pytest.raises(PictureRefused, match=r"slopes|pulled out"):
+        checked_picture(np.ascontiguousarray(fault(press)), even)
+
+
+def test_press_and_rest_exchanged_are_refused() -> None:
+    assert "pulled out" in _refused(UNTOUCHED, PRESS)
+
+
+@pytest.mark.parametrize("gain", [0.5, 0.7, 0.9])
+@pytest.mark.parametrize("fresh", [True, False])
+def test_a_dimmer_exposure_is_corrected(gain: float, fresh: bool) -> None:
+    press, rest = _byte(gain * PRESS.astype(np.float64)), _byte(gain * UNTOUCHED.astype(np.float64))
+    assert _scores(press, rest if fresh else None) < 2.0
+
+
+@pytest.mark.parametrize("gain", [1.1, 1.2, 1.3, 1.5])
+@pytest.mark.parametrize("fresh", [True, False])
+def test_a_brighter_exposure_is_corrected_or_refused(gain: float, fresh: bool) -> None:
+    press, rest = _byte(gain * PRESS.astype(np.float64)), _byte(gain * UNTOUCHED.astype(np.float64))
+    with suppress(PictureRefused):
+        assert _scores(press, rest if fresh else None) < 2.0
+        return
+    assert "255" in _refused(press, rest if fresh else None)
+
+
+@pytest.mark.parametrize("gains", [(0.8, 1.0, 1.0), (1.0, 1.15, 0.8), (0.6, 0.9, 0.7)])
+def test_another_white_balance_is_corrected(gains: tuple[float, float, float]) -> None:
+    press, rest = (_byte(np.array(gains) * one.astype(np.float64)) for one in (PRESS, UNTOUCHED))
+    for background in (rest, None):
+        checked = checked_picture(press, BENCH, background)
+        assert np.abs(checked.gain / gains - 1.0).max() < 0.05
+        assert "divided" in checked.notes[0]
+    assert _scores(press, rest) < 2.0
+
+
+@pytest.mark.parametrize("offset", [-20.0, -5.0, 5.0, 15.0])
+def test_light_that_adds_is_no_gain(offset: float) -> None:
+    press, rest = _byte(PRESS + offset), _byte(UNTOUCHED + offset)
+    for background in (rest, None):
+        assert _scores(press, background) < 2.0
+
+
+SIDES: dict[str, tuple[slice, slice]] = {
+    "top": (slice(0, 60), slice(None)),
+    "bottom": (slice(60, None), slice(None)),
+    "left": (slice(None), slice(0, 80)),
+    "right": (slice(None), slice(80, None)),
+    "a corner": (slice(0, 40), slice(0, 40)),
+}
+
+
+@pytest.mark.parametrize("side", SIDES.values(), ids=SIDES)
+@pytest.mark.parametrize("left", [0.0, 0.3, 0.5])
+def test_a_part_without_light_is_refused(side: tuple[slice, slice], left: float) -> None:
+    dark = np.ones((120, 160, 1))
+    dark[side] = left
+    press, rest = _byte(PRESS * dark), _byte(UNTOUCHED * dark)
+    for pair in ((press, UNTOUCHED), (press, None), (press, rest)):
+        try:
+            checked = checked_picture(*pair[:1], BENCH, pair[1])
+        except PictureRefused:
+            continue
+        # A corner dark in both is small enough to be left alone: it is read as untouched.
+        assert pair[1] is rest
+        assert (checked.gain == 1.0).all()
+
+
+@pytest.mark.parametrize("grey", [0, 60, 128, 255])
+def test_a_frame_cut_short_is_refused(grey: int) -> None:
+    cut = PRESS.copy()
+    cut[90:] = grey
+    for rest in (None, UNTOUCHED):
+        _refused(cut, rest)
+
+
+def test_no_light_and_no_picture_are_refused() -> None:
+    black = np.zeros_like(PRESS)
+    for pair in ((black, UNTOUCHED), (black, black), (black, None)):
+        assert "lights are off" in _refused(*pair)
+    noise = np.random.default_rng(0).integers(0, 256, PRESS.shape).astype(np.uint8)
+    for rest in (None, UNTOUCHED):
+        assert "noise" in _refused(noise, rest)
+    _refused(np.full_like(PRESS, 255), None)
+
+
+@pytest.mark.parametrize("pixels", [1.0, 2.0])
+def test_out_of_focus_the_stated_deviations_hold(pixels: float) -> None:
+    soft = _byte(gaussian_filter(PRESS.astype(np.float64), (pixels, pixels, 0.0)))
+    assert _scores(soft, UNTOUCHED) < 2.0
+
+
+def test_a_reading_deeper_than_its_gel_is_refused() -> None:
+    deep = np.zeros((4, 5))
+    deep[1, 2] = 2.9e-3
+    require_within_gel(deep, np.full_like(deep, 0.45e-3), 2.5e-3)
+    with pytest.raises(PictureRefused, match=r"2\.90 mm deep .* 2\.50 mm"):
+        require_within_gel(deep, np.full_like(deep, 0.1e-3), 2.5e-3)
+
+
+@pytest.mark.parametrize(("radius", "depth"), [(4e-3, 2.6e-3), (4e-3, 4e-3), (8e-3, 3.5e-3)])
+def test_a_press_deeper_than_the_gel_is_refused_or_inside_its_error(radius: float, depth: float) -> None:
+    surface = _surface(radius=radius, depth=depth)
+    press, rest = _drawn(surface)
+    with suppress(PictureRefused):
+        assert _scores(press, rest, surface) < 2.0
+
+
+def test_pictures_of_another_shape_are_refused() -> None:
+    with pytest.raises(DataRefused, match="not cropped"):
+        checked_picture(PRESS[:-8], BENCH)
+    with pytest.raises(DataRefused, match="not cropped"):
+        checked_picture(PRESS, BENCH, UNTOUCHED[:, :-8])
+
+
+def test_a_gain_is_found_beside_a_contact() -> None:
+    known = REST.astype(np.float64).reshape(30, 4, 40, 4, 3).mean(axis=(1, 3))
+    seen = 0.8 * known
+    seen[8:20, 10:25] += 40.0
+    light = fit_light(seen, known)
+    assert light.sure
+    assert light.gain == pytest.approx(np.full(3, 0.8), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("press", "rest", "says"),
+    [
+        ("press_bgr", "rest_bgr", "blue, green, red"),
+        ("press_half", "rest", "frame was lost"),
+        ("black", "rest", "lights are off"),
+        ("rest", "press", "pulled out"),
+    ],
+)
+def test_the_pictures_that_were_once_read_are_refused(
+    shared_data: Path, press: str, rest: str, says: str
+) -> None:
+    assert says in _refused(*(read_image(shared_data.parent / f"cases/{one}.png") for one in (press, rest)))
+
+
+@pytest.mark.parametrize("suffix", ["", "_dim"])
+def test_a_ball_pressed_by_a_known_depth_is_read_in_either_light(shared_data: Path, suffix: str) -> None:
+    press, rest = (read_image(shared_data.parent / f"cases/{one}{suffix}.png") for one in ("press", "rest"))
+    read = read_press(press[None], BENCH, STEADY, rest)
+    row, column = read.deepest
+    assert abs(read.height[row, column] - 0.599e-3) < 2.0 * read.sigma[row, column]
+
+
+def test_no_real_press_is_refused(shared_data: Path) -> None:
+    images = read_pictures(shared_data / "tactile/objectfolder_calibs").images
+    for image in images:
+        for rest in (None, REST):
+            assert np.array_equal(checked_picture(image, BENCH, rest).image, image)
+
+
+@pytest.mark.parametrize("fault", TURNS.values(), ids=TURNS)
+def test_every_real_press_turned_is_refused(shared_data: Path, fault: Fault) -> None:
+    for image in read_pictures(shared_data / "tactile/objectfolder_calibs").images[::24]:
+        _refused(np.ascontiguousarray(fault(image)), None)
