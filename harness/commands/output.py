@@ -104,10 +104,11 @@ class Pace:
 
 
 def duration(seconds: float) -> str:
-    """A time as people say it: ``"40 s"``, ``"3 min"``, ``"2.1 h"``."""
-    if seconds < 90.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+    """A time as people say it: seconds below two minutes, then minutes, hours, days."""
+    for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
+        if seconds < limit:
+            return f"{seconds / unit:.0f} {name}"
+    return f"{seconds / 86400.0:.1f} days"
 
 
 class StepProgress:

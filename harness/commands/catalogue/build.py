@@ -10,8 +10,8 @@ import typer
 
 from harness.commands import options
 from harness.commands.catalogue import chosen
-from harness.commands.catalogue.build_progress import build_progress, duration
-from harness.commands.output import ANSWERS, CONSOLE, emit, warn
+from harness.commands.catalogue.build_progress import build_progress
+from harness.commands.output import ANSWERS, CONSOLE, duration, emit, warn
 
 if TYPE_CHECKING:
     from harness.authoring.catalogue.build import BuildPlan

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from harness.commands.output import CONSOLE
+from harness.commands.output import CONSOLE, duration
 
 PERIOD = 30.0
 """S between two lines where there is no terminal."""
@@ -53,14 +53,6 @@ class Throughput:
         rate = "" if self.hourly is None else f", {self.hourly:.3g} an hour"
         left = "" if self.seconds_left is None else f", {duration(self.seconds_left)} left"
         return f"{self.done} of {self.total} objects{failed}{rate}{left}"
-
-
-def duration(seconds: float) -> str:
-    """For people: seconds below two minutes, then minutes, hours, days."""
-    for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
-        if seconds < limit:
-            return f"{seconds / unit:.0f} {name}"
-    return f"{seconds / 86400.0:.1f} days"
 
 
 @contextmanager

@@ -48,7 +48,14 @@ def test_nothing_is_said_of_a_pace_that_there_is_not(clock: Clock) -> None:
 
 @pytest.mark.parametrize(
     ("seconds", "words"),
-    [(0.4, "0 s"), (89.0, "89 s"), (90.0, "2 min"), (5399.0, "90 min"), (7200.0, "2.0 h")],
+    [
+        (0.4, "0 s"),
+        (119.0, "119 s"),
+        (120.0, "2 min"),
+        (7100.0, "118 min"),
+        (7200.0, "2 h"),
+        (864e3, "10.0 days"),
+    ],
 )
 def test_a_duration_is_in_the_unit_that_people_use(seconds: float, words: str) -> None:
     assert duration(seconds) == words
