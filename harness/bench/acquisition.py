@@ -106,7 +106,8 @@ class AcquisitionCalibration:
         """An artefact as ``save`` writes it.
 
         Raises:
-            CalibrationRefused: it cannot be read, has a key too few or too many, a number that is not
+            WrongUse: there is no such file, or none that may be read.
+            CalibrationRefused: it is too large, has a key too few or too many, a number that is not
                 finite or of the wrong sign, or was changed after it was made.
         """
         try:

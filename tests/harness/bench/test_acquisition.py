@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.basics.errors import CalibrationRefused, DataRefused, RecordingDamaged
+from harness.basics.errors import CalibrationRefused, DataRefused, RecordingDamaged, WrongUse
 from harness.bench.acquisition import (
     AcquisitionCalibration,
     Strike,
@@ -245,5 +245,5 @@ def test_an_artefact_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.json").write_text("{")
     with pytest.raises(CalibrationRefused):
         AcquisitionCalibration.load(tmp_path / "a.json")
-    with pytest.raises(CalibrationRefused):
+    with pytest.raises(WrongUse, match="no_such_bench"):
         shipped_acquisition("no_such_bench")
