@@ -73,7 +73,7 @@ _SMALL = PerceptronSpec(branches=1, depth=4, width=256, octaves=6, skip=0, epoch
 
 PROFILES: Mapping[str, AudioProfile] = MappingProxyType({
     "smoke": AudioProfile(WavesSpec(768, (1.0,)), sounds=8),
-    "shipped": AudioProfile(WavesSpec(1536, widest=3072, storage="float16"), sounds=40, table=False),
+    "shipped": AudioProfile(WavesSpec(1536, storage="float16"), sounds=40, table=False),
     "standard": AudioProfile(WavesSpec(1536, widest=3072), sounds=40),
     "small": AudioProfile(_SMALL, sounds=40),
     "paper": AudioProfile(PerceptronSpec(epochs=120), sounds=40),

@@ -47,9 +47,10 @@ def centre_out(side: int) -> AnyArray:
 
 def is_closed(mesh: Mesh) -> bool:
     """Whether a surface has no border, and its faces look outwards: some face then hides each one's back."""
-    edges = np.concatenate([mesh.faces[:, [a, (a + 1) % 3]] for a in range(3)])
-    there = np.unique(edges, axis=0)
-    matched = len(there) == len(edges) and np.array_equal(there, np.unique(edges[:, ::-1], axis=0))
+    begin, end = mesh.faces.reshape(-1), np.roll(mesh.faces, -1, axis=1).reshape(-1)
+    # One number for a way along an edge: rows would be sorted ten times as slowly.
+    forth, back = (np.sort(one * len(mesh.vertices) + other) for one, other in ((begin, end), (end, begin)))
+    matched = np.array_equal(forth, back) and bool((np.diff(forth) > 0).all())
     low, high = mesh.corners[:, 0], np.cross(mesh.corners[:, 1], mesh.corners[:, 2])
     return bool(matched and np.einsum("nx,nx->", low, high) > 0.0)
 
