@@ -31,7 +31,8 @@ def block_means(picture: AnyArray, by: int) -> FloatArray:
     rest = picture.shape[2:]
     if picture.dtype == np.uint8:
         # One axis after the other, in whole numbers: four times as fast, and as exact.
-        strips = picture[: rows * by, : columns * by].reshape(rows, by, -1).sum(axis=1, dtype=np.uint32)
+        across = columns * by * int(np.prod(rest))
+        strips = picture[: rows * by, : columns * by].reshape(rows, by, across).sum(axis=1, dtype=np.uint32)
         return np.asarray(strips.reshape(rows, columns, by, *rest).sum(axis=2, dtype=np.uint32) / by**2)
     blocks = picture[: rows * by, : columns * by].reshape(rows, by, columns, by, *rest)
     return np.asarray(blocks.mean(axis=(1, 3)), dtype=np.float64)

@@ -64,7 +64,7 @@ def test_a_knob_is_turned_and_its_curve_kept(block: Path, capsys: pytest.Capture
     [
         (("--knob", "terminaton"), "no knob 'terminaton'; did you mean 'termination'"),
         (("--profile", "fine"), "no profile 'fine' of vision"),
-        (("--units", "ft"), "unknown unit 'ft'"),
+        (("--units", "yd"), "unknown unit 'yd'"),
         (("--size", "8"), "greater than or equal to 16"),
     ],
 )

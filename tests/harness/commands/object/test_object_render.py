@@ -145,7 +145,7 @@ def test_a_picture_is_written_beside_the_sound(
         (("--vertex", "-1"), 1, "there is no vertex -1"),
         (("--vertex", "642"), 1, "say 0 to 641"),
         (("--at", "140", "-20", "50"), 1, "the limit is 2 mm"),
-        (("--at", "nan", "0", "0"), 2, "finite numbers in metres"),
+        (("--at", "nan", "0", "0"), 2, "finite number of metres"),
         (("--vertex", "1", "--force", "0", "0", "0"), 2, "strikes nothing"),
         (("--vertex", "1", "--force", "0", "nan", "0"), 2, "not three finite numbers"),
         (("--vertex", "1", "--rate", "0"), 2, "say a whole number above 0"),
