@@ -136,7 +136,7 @@ def test_a_build_that_is_killed_keeps_what_there_was_and_goes_on(
         (("--profile", "fine"), "no profile 'fine' of vision"),
         (("--material", "cheese"), "no material"),
         (("--wall", "3"), "--wall"),
-        (("--units", "ft"), "unknown unit 'ft'"),
+        (("--units", "yd"), "unknown unit 'yd'"),
         (("--only", "touch", "--finish"), "--finish is of vision, and --only touch was asked for"),
         (("--only", "audio", "--finish"), "--finish is of vision, and --only audio was asked for"),
     ],
