@@ -189,7 +189,7 @@ HOPELESS = {
     "noise.stl": (bytes(range(256)) * 3, "does not read|no triangle"),
     "cut_short.stl": (b"\0" * 80 + (5000).to_bytes(4, "little") + b"\0" * 400, "does not read|no triangle"),
     "noise.ply": (b"ply\nformat ascii 1.0\nelement vertex 9\n", "does not read|no triangle"),
-    "unknown.xyzzy": (b"data", "does not read"),
+    "unknown.xyzzy": (b"data", "is not that of a mesh"),
     "one_triangle.off": (TRIANGLE.encode(), "at least 4 faces"),
     "all_in_a_point.off": (POINT.encode(), "one point"),
     "all_on_a_line.off": (LINE.encode(), "at least 4 faces with an area|no triangle"),

@@ -188,8 +188,8 @@ GOOD = np.ones((4, 2, 3), np.float16)
     ("data", "said"),
     [
         (pickled(), "holds object"),
-        (zipped(), "not a file of numpy"),
-        (b"", "not a file of numpy"),
+        (zipped(), "no .npy file of numbers"),
+        (b"", "no .npy file of numbers"),
         (table_bytes(GOOD)[:-1], "bytes, not"),
         (table_bytes(GOOD) + b"x", "bytes, not"),
         (table_bytes(GOOD).replace(b"(4, 2, 3)", b"(9, 9, 9)"), "a table of float16"),

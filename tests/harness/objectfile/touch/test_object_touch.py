@@ -166,7 +166,7 @@ def test_a_description_that_contradicts_itself_is_refused(spoiled_peg: Path) -> 
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"no array", "not a file of numpy"),
+        (b"no array", "no .npy file of numbers"),
         (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.eye(3)[:2]))[:-8], "bytes, not the"),
         (nodes_bytes(SurfaceNodes(np.full((2, 3), np.nan), np.eye(3)[:2])), "not finite"),
         (nodes_bytes(SurfaceNodes(np.zeros((2, 3)), np.ones((2, 3)))), "length 1"),

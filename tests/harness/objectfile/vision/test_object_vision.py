@@ -135,7 +135,7 @@ def test_networks_of_another_object_are_told_by_looking(spoiled: Path, box_objec
 
     found = failures(rewrite(empty.folder, say))
     assert set(found) == {"vision: self-test", "vision: networks and surface"}
-    assert "different objects" in found["vision: networks and surface"]
+    assert "another object's network" in found["vision: networks and surface"]
     small = filled_grid(cuboid(0.05, 0.05, 0.05), 8, 1.0)
     with pytest.raises(DataRefused, match="different objects"):
         with_vision(box_object, box_part(even_look(small, 1e6, LOGITS)))
