@@ -7,7 +7,7 @@ from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise, touch_map
 from harness.basics.arrays import FloatArray
 from harness.recording.observation import Observation
-from harness.sim.optics.inverse import invert
+from harness.sim.optics.inverse import invert_mean
 
 CONTACT_THRESHOLD = 0.12e-3
 """Metres of indentation, averaged over a compared pixel, below which no contact is seen."""
@@ -24,10 +24,5 @@ def contact_of(
 
 
 def height_map(observation: Observation, model: Model) -> FloatArray:
-    """``(rows, columns)`` metres of indentation, from the mean of the contact's frames.
-
-    Colour is close to linear in slope, so the mean of frames is the picture of the mean shape,
-    and one inversion serves for all.
-    """
-    mean = np.rint(observation.images.mean(axis=0)).astype(np.uint8)
-    return np.asarray(invert(mean[None], model.calibration).height[0])
+    """``(rows, columns)`` metres of indentation, from the mean of the contact's frames."""
+    return np.asarray(invert_mean(observation.images, model.calibration).height[0])

@@ -12,7 +12,7 @@ from harness.picture.outline import SeenOutline, read_outline
 from harness.recording.look_pictures import look_pictures
 from harness.recording.observation import Observation
 from harness.recording.step_file import StepRecord
-from harness.sim.optics.inverse import invert
+from harness.sim.optics.inverse import invert_mean
 from harness.sim.optics.tactile_calibration import TactileCalibration
 from harness.strikes.peaks import analyse
 from harness.strikes.spectra import Analysis
@@ -36,8 +36,7 @@ def patch_of_contact(seen: Observation, calibration: TactileCalibration, pitch: 
         calibration: of the gel.
         pitch: m of gel that a pixel shows.
     """
-    mean = np.rint(seen.images.mean(axis=0)).astype(np.uint8)
-    return patch_of(invert(mean[None], calibration).height[0], pitch, seen.base_from_gel)
+    return patch_of(invert_mean(seen.images, calibration).height[0], pitch, seen.base_from_gel)
 
 
 def peaks_of(strikes: Sequence[Strike]) -> Peaks | None:

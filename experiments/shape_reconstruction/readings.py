@@ -16,7 +16,7 @@ from harness.recording.look_pictures import look_pictures
 from harness.recording.observation import observe_step
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
-from harness.sim.optics.inverse import invert
+from harness.sim.optics.inverse import invert_mean
 
 LEAST_PIXELS = 12
 """That an object must cover to be seen."""
@@ -83,8 +83,7 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
     calibration, settings = run.calibration, run.scene.section(ShapeRun)
     aspect = aspect_stated(calibration.header.made_from)
     seen = observe_step(record, run.station.flange_from_gel, aspect=aspect)
-    mean = np.rint(seen.images.mean(axis=0)).astype(np.uint8)
-    read = invert(mean[None], calibration)
+    read = invert_mean(seen.images, calibration)
     found = contact_points(read.height[0], read.error[0], run.station.gel.sensor.pitch)
     stand_from_gel = seen.base_from_gel.copy()
     stand_from_gel[:3, 3] -= base_from_stand(run)[:3, 3]

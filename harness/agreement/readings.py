@@ -8,7 +8,7 @@ from harness.basics.arrays import FloatArray
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import Observation, in_time, observe_step
 from harness.recording.run_folder import RunFiles
-from harness.sim.optics.inverse import invert
+from harness.sim.optics.inverse import invert_mean
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 SEEN = 0.12e-3
@@ -53,9 +53,5 @@ def contacts_of(run: RunFiles) -> tuple[PressedContact, ...]:
 
 
 def heights_of(seen: Observation, calibration: TactileCalibration) -> FloatArray:
-    """``(rows, columns)`` m of indentation, from the mean of a contact's frames.
-
-    Colour is close to linear in slope, so the mean of frames is the picture of the mean shape.
-    """
-    mean = np.rint(seen.images.mean(axis=0)).astype(np.uint8)
-    return np.asarray(invert(mean[None], calibration).height[0])
+    """``(rows, columns)`` m of indentation, from the mean of a contact's frames."""
+    return np.asarray(invert_mean(seen.images, calibration).height[0])

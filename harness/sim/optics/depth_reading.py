@@ -11,7 +11,7 @@ from harness.basics.geometry import apply
 from harness.picture.square_pixels import aspect_stated, made_square
 from harness.sim.optics.check.picture_check import checked_picture, require_within_gel
 from harness.sim.optics.contact_depth import Depth, read_depth
-from harness.sim.optics.inverse import Detection
+from harness.sim.optics.inverse import Detection, mean_picture
 from harness.sim.optics.inverse_error import USUAL, height_errors
 from harness.sim.optics.tactile_calibration import TactileCalibration, with_background
 
@@ -101,7 +101,7 @@ def read_press(
     """
     _check(frames, background, calibration)
     aspect = aspect_stated(calibration.header.made_from)
-    mean = np.rint(made_square(frames, aspect).mean(axis=0)).astype(np.uint8)
+    mean = mean_picture(made_square(frames, aspect))
     rest = None if background is None else made_square(background, aspect)
     began = process_time()
     checked = checked_picture(mean, calibration, rest)

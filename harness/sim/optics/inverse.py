@@ -93,6 +93,19 @@ class Inversion:
     seconds: float
 
 
+def mean_picture(frames: ByteArray) -> ByteArray:
+    """``(rows, columns, 3)``: the mean of ``(n, rows, columns, 3)`` frames of one contact.
+
+    Colour is close to linear in slope, so it is the picture of the mean shape: one inversion serves for all.
+    """
+    return np.asarray(np.rint(frames.mean(axis=0)), dtype=np.uint8)
+
+
+def invert_mean(frames: ByteArray, calibration: TactileCalibration) -> Inversion:
+    """The surface of a gel from the mean of a contact's frames, as ``invert`` of that one picture."""
+    return invert(mean_picture(frames)[None], calibration)
+
+
 def invert(images: ByteArray, calibration: TactileCalibration, detection: Detection = STEADY) -> Inversion:
     """Recover the surface of a flat gel from pictures of it.
 
