@@ -1,4 +1,4 @@
-"""Stations and scenes by name: those that come with the program, and those of the working directory."""
+"""Stations, scenes and ObjectFiles by name: those that come with the program, and those here."""
 
 from pathlib import Path
 
@@ -29,5 +29,10 @@ def named_file(name: str, kind: str) -> Path:
 
 
 def _known(folder: str) -> dict[str, Path]:
+    return {path.stem: path.resolve() for path in shipped_or_here(folder, "*.toml")}
+
+
+def shipped_or_here(folder: str, pattern: str) -> list[Path]:
+    """What matches in a folder of the checkout and then in that of the working directory, each in order."""
     places = (_CHECKOUT / folder, Path.cwd() / folder)
-    return {path.stem: path.resolve() for place in places for path in sorted(place.glob("*.toml"))}
+    return [path for place in places for path in sorted(place.glob(pattern))]

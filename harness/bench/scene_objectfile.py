@@ -11,14 +11,13 @@ from typing import Any
 
 from harness.basics.errors import DataRefused, WrongUse
 from harness.basics.files.named_file import real_path
+from harness.bench.named_files import shipped_or_here
 from harness.objects.builtin import DESCRIPTION
 
 OBJECTFILE = "objectfile:"
 """In place of a mesh file: the object is that of the folder beside it, whose name follows."""
 
 _OF_A_MESH = ("material", "units", "wall")
-
-_SHIPPED = Path(__file__).parents[2] / "objects"
 
 
 def holds_objectfile(folder: Path) -> bool:
@@ -28,8 +27,7 @@ def holds_objectfile(folder: Path) -> bool:
 
 def shipped_objectfiles() -> dict[str, Path]:
     """Folders of the ObjectFiles in ``objects/``, here or in the checkout, by their names."""
-    found = (path for folder in (_SHIPPED, Path.cwd() / "objects") for path in sorted(folder.glob("*")))
-    return {path.name: path.resolve() for path in found if holds_objectfile(path)}
+    return {path.name: path.resolve() for path in shipped_or_here("objects", "*") if holds_objectfile(path)}
 
 
 def objectfile_folder(named: str, beside: Path) -> Path:
