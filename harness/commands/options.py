@@ -61,6 +61,12 @@ GapOption = Annotated[
         metavar="NAME",
     ),
 ]
+UpTo = Annotated[str, typer.Option("--up-to", help="Modes up to this frequency.", metavar="F")]
+MostModes = Annotated[int, typer.Option("--modes", help="Modes at most, the lowest.", min=1, max=4096)]
+LongestEdge = Annotated[
+    str | None,
+    typer.Option("--edge", help="Longest edge of an element, as 3mm; by the wave if left out.", metavar="L"),
+]
 LevelOption = Annotated[
     list[str] | None,
     typer.Option(

@@ -77,7 +77,7 @@ class Pace:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._began = self._told = clock()
+        self._began = self._printed = clock()
         self._first: float | None = None
         self._stage = ""
 
@@ -94,12 +94,12 @@ class Pace:
         """What to print of it now: a line where a new stage begins, and one a minute; else None."""
         left, stage = self.left(share), _DIGITS.sub("", doing)
         new = stage != self._stage
-        if not new and self._clock() - self._told < A_MINUTE:
+        if not new and self._clock() - self._printed < A_MINUTE:
             return None
         if new:
             # Another stage has a pace of its own.
             self._began, self._first, left = self._clock(), share, ""
-        self._stage, self._told = stage, self._clock()
+        self._stage, self._printed = stage, self._clock()
         return f"{doing}: {100.0 * share:.0f} %{left}" if share > 0.0 else doing
 
 
@@ -130,8 +130,8 @@ class StepProgress:
         """Count it, and say how long it took and how long the rest will take."""
         self._done += 1
         left = self._pace.left(self._done / self._total)
-        said = f"  {self._noun} {step.index + 1} of {self._total} recorded in {seconds:.1f} s{left}"
-        self._bar.console.print(said, markup=False)
+        line = f"  {self._noun} {step.index + 1} of {self._total} recorded in {seconds:.1f} s{left}"
+        self._bar.console.print(line, markup=False)
         self._bar.advance(self._task)
 
     def say(self, sentence: str) -> None:
@@ -172,7 +172,7 @@ def run_progress(total: int) -> Iterator[Callable[[], None]]:
 
 @contextmanager
 def share_progress() -> Iterator[Callable[[str, float], None]]:
-    """A progress bar for the length of a work, and what is told what is done and the share of it.
+    """A progress bar for the length of a work; its report takes what is being done and the share done.
 
     Where there is no terminal a line is printed as each stage begins, and one a minute.
     """

@@ -1,7 +1,9 @@
 """Places that options name: coordinates with or without their unit, or a vertex of the mesh."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from harness.commands import options
 
@@ -11,6 +13,12 @@ if TYPE_CHECKING:
 
 Coordinates = tuple[str, str, str]
 """Of a point, each a number of metres or a length with its unit."""
+
+
+VertexOption = Annotated[
+    int | None, typer.Option("--vertex", help="Or at a vertex of mesh.ply, counted from 0.", metavar="N")
+]
+"""Of an ObjectFile's mesh, in place of coordinates."""
 
 
 def point(option: str, texts: Coordinates) -> tuple[float, float, float]:

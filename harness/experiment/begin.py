@@ -46,7 +46,7 @@ def begin(
         gap: reality gap of a mocked bench; the experiment's or the station's where None.
         folder: of the run; a dated one under ``runs/`` where None.
         bench: of a mocked station, ``wires`` or ``in-process``; over its wires where None.
-        target: what is asked of the answer beside its levels; kept with the plan.
+        target: of the answer, beside its levels; stored with the plan.
 
     Raises:
         MeshRefused, WrongUse: of the object, the scene, the gap, or a folder that holds a run; or the scene
@@ -98,7 +98,7 @@ def begin(
 def _mock(
     procedure: Procedure, station: Station, gap: str | None, bench: str | None
 ) -> dict[str, str] | None:
-    """How the mocked bench is started; None at a real one, of which none of it can be asked."""
+    """How the mocked bench is started; None at a real one, which has no such options."""
     if station.mock is None:
         for option, value in (("--gap", gap), ("--bench", bench)):
             if value is not None:

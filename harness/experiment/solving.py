@@ -11,7 +11,7 @@ from harness.effects.accuracy import Level, Setting
 from harness.recording.run_folder import RunFiles
 
 TARGET = "target"
-"""The key of a run's plan under which what was asked of its answer is found again by ``--resume``."""
+"""The key of a run's plan that holds the target of its answer, for ``--resume``."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Target:
 
 
 def target_of(plan: Mapping[str, Any]) -> Target | None:
-    """What was asked when a run was planned; None where nothing was."""
-    asked = plan.get(TARGET)
-    return None if asked is None else Target(asked["budget_s"], asked["error_m"])
+    """The target that a run was planned with; None where it has none."""
+    stored = plan.get(TARGET)
+    return None if stored is None else Target(stored["budget_s"], stored["error_m"])
 
 
 class Shared(Protocol):

@@ -3,6 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,12 +30,9 @@ def build(
     material: chosen.Materials = None,
     senses: chosen.Senses = "audio,touch",
     profile: Annotated[str, typer.Option(help="Of every sense: smoke, standard or paper.")] = "standard",
-    up_to: Annotated[str, typer.Option("--up-to", help="Modes up to this frequency.", metavar="F")] = "20kHz",
-    modes: Annotated[int, typer.Option(help="Modes at most, the lowest.", min=1, max=4096)] = 128,
-    edge: Annotated[
-        str | None,
-        typer.Option(help="Longest edge of an element, as 3mm; by the wave if left out.", metavar="L"),
-    ] = None,
+    up_to: options.UpTo = "20kHz",
+    modes: options.MostModes = 128,
+    edge: options.LongestEdge = None,
     sensor: Annotated[
         str | None,
         typer.Option(help="Make of the gel that presses, or the path of its file.", metavar="NAME"),
@@ -87,13 +85,12 @@ def build(
                 count(record.name, record.built)
                 if not record.built:
                     warn(f"{record.name}: {record.outcome}: {record.reason}")
-    failed = [*plan.known.values(), *(record for record in records if not record.built)]
-    seconds = time.perf_counter() - begun
+    outcome = _Outcome(of.folder, plan, records, excluded, time.perf_counter() - begun)
     if json:
-        emit(_as_json(of.folder, plan, records, failed, excluded, seconds))
+        emit(outcome.as_json())
     else:
-        _print(of.folder, plan, records, failed, excluded, seconds)
-    return 1 if failed or not plan.items else 0
+        _print(outcome)
+    return 1 if outcome.failed or not plan.items else 0
 
 
 def _spec(
@@ -145,52 +142,59 @@ def _runner(name: str, workers: int, address: str | None, limits: "WorkerLimits"
     return RayRunner(workers or None, limits, address)
 
 
-def _as_json(
-    folder: Path,
-    plan: "BuildPlan",
-    records: "Sequence[ObjectRecord]",
-    failed: "Sequence[ObjectRecord]",
-    excluded: "Sequence[ExcludedRow]",
-    seconds: float,
-) -> dict[str, Any]:
-    return {
-        "schema": 1,
-        "folder": str(folder),
-        "objects": len(plan.items),
-        "standing": len(plan.standing),
-        "built": sum(record.built for record in records),
-        "failed": [{"name": r.name, "outcome": r.outcome, "reason": r.reason} for r in failed],
-        "excluded": [{"name": row.name, "reason": row.reason} for row in excluded],
-        "stages_made": dict(Counter(s for r in records for s, part in r.senses.items() if part.made)),
-        "seconds": seconds,
-    }
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """What a build came to: its folder and plan, the objects tried in it, rows left out, and s it took."""
+
+    folder: Path
+    plan: "BuildPlan"
+    records: "Sequence[ObjectRecord]"
+    excluded: "Sequence[ExcludedRow]"
+    seconds: float
+
+    @property
+    def built(self) -> int:
+        return sum(record.built for record in self.records)
+
+    @property
+    def failed(self) -> "list[ObjectRecord]":
+        """Before, and not tried again, or now."""
+        return [*self.plan.known.values(), *(record for record in self.records if not record.built)]
+
+    def as_json(self) -> dict[str, Any]:
+        made = Counter(s for r in self.records for s, part in r.senses.items() if part.made)
+        return {
+            "schema": 1,
+            "folder": str(self.folder),
+            "objects": len(self.plan.items),
+            "standing": len(self.plan.standing),
+            "built": self.built,
+            "failed": [{"name": r.name, "outcome": r.outcome, "reason": r.reason} for r in self.failed],
+            "excluded": [{"name": row.name, "reason": row.reason} for row in self.excluded],
+            "stages_made": dict(made),
+            "seconds": self.seconds,
+        }
 
 
-def _print(
-    folder: Path,
-    plan: "BuildPlan",
-    records: "Sequence[ObjectRecord]",
-    failed: "Sequence[ObjectRecord]",
-    excluded: "Sequence[ExcludedRow]",
-    seconds: float,
-) -> None:
-    built = sum(record.built for record in records)
+def _print(outcome: _Outcome) -> None:
+    plan = outcome.plan
     if not plan.waiting:
         ANSWERS.print(
-            f"nothing to do: {len(plan.standing)} of {len(plan.items)} objects stand in {folder}",
+            f"nothing to do: {len(plan.standing)} of {len(plan.items)} objects stand in {outcome.folder}",
             markup=False,
         )
     else:
-        made = f"{built} of {len(plan.items)} objects built, {len(plan.standing)} stood already"
-        ANSWERS.print(f"{made}; {duration(seconds)}", markup=False)
-    for record in failed:
-        log = folder / "failed" / record.name / "log.txt"
+        made = f"{outcome.built} of {len(plan.items)} objects built, {len(plan.standing)} stood already"
+        ANSWERS.print(f"{made}; {duration(outcome.seconds)}", markup=False)
+    for record in outcome.failed:
+        log = outcome.folder / "failed" / record.name / "log.txt"
         ANSWERS.print(f"{record.name}: {record.outcome}: {record.reason} ({log})", markup=False)
     if plan.known:
         CONSOLE.print(
             f"{len(plan.known)} failed before and were not tried again; --retry tries them", markup=False
         )
-    if excluded:
+    if outcome.excluded:
         ANSWERS.print(
-            f"{len(excluded)} rows excluded; `touchstone catalogue check` lists the reasons", markup=False
+            f"{len(outcome.excluded)} rows excluded; `touchstone catalogue check` lists the reasons",
+            markup=False,
         )

@@ -41,12 +41,9 @@ def build(
         str | None,
         typer.Option(help="Wall of a hollow thing of which the file is the outside, as 2mm.", metavar="L"),
     ] = None,
-    up_to: Annotated[str, typer.Option("--up-to", help="Modes up to this frequency.", metavar="F")] = "20kHz",
-    modes: Annotated[int, typer.Option(help="Modes at most, the lowest.", min=1, max=4096)] = 128,
-    edge: Annotated[
-        str | None,
-        typer.Option(help="Longest edge of an element, as 3mm; by the wave if left out.", metavar="L"),
-    ] = None,
+    up_to: options.UpTo = "20kHz",
+    modes: options.MostModes = 128,
+    edge: options.LongestEdge = None,
     licence: Annotated[str, typer.Option(help="Of the mesh, and so of the ObjectFile.")] = "unknown",
     seed: Annotated[int, typer.Option(help="Of everything random.", min=0)] = 0,
     threads: Annotated[

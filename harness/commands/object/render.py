@@ -46,9 +46,7 @@ def render(
             help="Where it is struck, in the object's frame: metres, or each with its unit.", metavar="X Y Z"
         ),
     ] = None,
-    vertex: Annotated[
-        int | None, typer.Option(help="Or at a vertex of mesh.ply, counted from 0.", metavar="N")
-    ] = None,
+    vertex: places.VertexOption = None,
     force: Annotated[
         Three | None,
         typer.Option(

@@ -31,9 +31,7 @@ def render(
             help="Where it is pressed, in the object's frame: metres, or each with its unit.", metavar="X Y Z"
         ),
     ] = None,
-    vertex: Annotated[
-        int | None, typer.Option(help="Or at a vertex of mesh.ply, counted from 0.", metavar="N")
-    ] = None,
+    vertex: places.VertexOption = None,
     depth: Annotated[str, typer.Option(help="How deep the gel's centre is pressed on.", metavar="L")] = "1mm",
     tilt: Annotated[str, typer.Option(help="Between the gel's axis and the normal.", metavar="A")] = "0deg",
     azimuth: Annotated[
