@@ -118,18 +118,21 @@ class StepProgress:
         self._bar = bar
         self._noun = noun
         self._done, self._total = done, total
-        self._pace = Pace()
-        self._pace.left(done / total)
+        self._pace: Pace | None = None
         self._task = bar.add_task(f"{noun}s", completed=done, total=total)
 
     def began(self, step: Step) -> None:
         """Say which step is performed."""
+        if self._pace is None:
+            # From the first step on: what opening a bench and loading kernels takes comes once.
+            self._pace = Pace()
+            self._pace.left(self._done / self._total)
         self._bar.update(self._task, description=f"{self._noun} {step.index + 1}: {step.kind}")
 
     def ended(self, step: Step, seconds: float) -> None:
         """Count it, and say how long it took and how long the rest will take."""
         self._done += 1
-        left = self._pace.left(self._done / self._total)
+        left = "" if self._pace is None else self._pace.left(self._done / self._total)
         line = f"  {self._noun} {step.index + 1} of {self._total} recorded in {seconds:.1f} s{left}"
         self._bar.console.print(line, markup=False)
         self._bar.advance(self._task)
