@@ -38,12 +38,14 @@ class FarEnd:
         self.cues: queue.SimpleQueue[Cue] = queue.SimpleQueue()
         self.where: dict[str, Any] = {}
         self.outputs = 0
+        self.has_cycled = threading.Event()
 
     def switch(self, bits: int, /) -> None:
         self.outputs = bits
 
     def cycle(self, time: float, joints: Sequence[float], base_from_flange: Any, /) -> None:
         self.where = {"time": time, "joints": list(joints), "pose": [list(row) for row in base_from_flange]}
+        self.has_cycled.set()
 
     def next_cue(self) -> Cue | None:
         return None if self.cues.empty() else self.cues.get()
@@ -53,6 +55,7 @@ class FarEnd:
             request = json.loads(line)
             if "cue" in request:
                 self.cues.put(Cue(**request["cue"]))
+            self.has_cycled.wait()
             say({**self.where, "outputs": self.outputs})
         self.closed = True
 

@@ -93,7 +93,7 @@ def test_an_emergency_stop_takes_the_power(mock: UrProcess, receive: Any, contro
     wait_until(receive.isEmergencyStopped, 0.5)
     assert receive.getSafetyStatusBits() == 1 << 6 | 1 << 7 | 1 << 10
     assert (receive.getRobotMode(), receive.getRuntimeState()) == (3, 1)
-    assert not control.isProgramRunning()
+    wait_until(lambda: not control.isProgramRunning(), 0.5)  # by a stream of its own
     assert mock.ask("power on") == "Failed to execute: power on"
     mock.cue("release_emergency_stop")
     assert mock.ask("power on") == "Powering on"
