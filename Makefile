@@ -68,7 +68,7 @@ lint: $(DEV)
 	@$(BIN)/ruff format --check .
 
 types: $(DEV)
-	@$(BIN)/mypy
+	@$(BIN)/mypy --num-workers auto
 
 contracts: $(DEV)
 	@$(BIN)/lint-imports

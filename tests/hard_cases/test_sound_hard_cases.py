@@ -231,7 +231,7 @@ def test_noise_in_place_of_sound_says_nothing(run: Run, whole: dict[Senses, Esti
     assert_nothing_was_heard(observations, run, whole)
 
 
-@pytest.mark.parametrize("senses", HEARD)
+@pytest.mark.parametrize("senses", [pytest.param("audio", marks=pytest.mark.slow), "both"])
 def test_another_object_is_refused(senses: Senses, run: Run, station: Station) -> None:
     with pytest.raises(FitRefused, match=r"contact \d"):
         by(senses, run.good, run, model_of("bowl", station))

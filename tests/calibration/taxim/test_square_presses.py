@@ -57,12 +57,14 @@ def made() -> dict[str, MarkFree]:
     }
 
 
+@pytest.mark.slow  # fits three sets of 24 presses
 def test_as_seen_the_slopes_of_rows_and_columns_are_apart_by_the_aspect(made: dict[str, MarkFree]) -> None:
     ratio = found_over_true(made["as seen"], 1) / found_over_true(made["as seen"], 0)
     ground = found_over_true(made["plain"], 1) / found_over_true(made["plain"], 0)
     assert ratio / ground == pytest.approx(TALL, abs=0.005)
 
 
+@pytest.mark.slow
 def test_made_square_they_are_as_on_a_sensor_of_square_pixels(made: dict[str, MarkFree]) -> None:
     for axis in (0, 1):
         square, plain = (found_over_true(made[which], axis) for which in ("square", "plain"))
@@ -70,12 +72,14 @@ def test_made_square_they_are_as_on_a_sensor_of_square_pixels(made: dict[str, Ma
         assert square == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_contact_line_is_a_circle_again(made: dict[str, MarkFree]) -> None:
     """An ellipse of 3 % strays from a circle of 8.7 px by a tenth of a pixel."""
     assert made["as seen"].roundness > 0.07
     assert made["square"].roundness < 0.05
 
 
+@pytest.mark.slow
 def test_presses_are_found_where_they_are_in_the_square_picture(made: dict[str, MarkFree]) -> None:
     _, centres = drawn_set(24, DrawnGel(aspect=TALL))
     wanted = square_places(centres, ROWS, COLUMNS, TALL)
@@ -84,6 +88,7 @@ def test_presses_are_found_where_they_are_in_the_square_picture(made: dict[str, 
     assert made["square"].median("table") > 44.0
 
 
+@pytest.mark.slow
 def test_the_artefact_says_by_what_the_pictures_were_made_square(made: dict[str, MarkFree]) -> None:
     assert "made square by 1.03000" in made["square"].calibration.header.made_from
     assert "square" not in made["as seen"].calibration.header.made_from

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.timeout(300)  # explores objects, and fills one with el
 
 
 @pytest.mark.parametrize("mesh", ["builtin:mug", "builtin:wrench"])
-@pytest.mark.parametrize("seed", [2, 3, 4])
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (3, 4))])
 def test_the_object_is_within_what_travels_avoid_however_it_was_seen(
     tmp_path: Path, station: Station, mesh: str, seed: int
 ) -> None:

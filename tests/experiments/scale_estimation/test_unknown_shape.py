@@ -33,7 +33,11 @@ def unknown(contacts: int, mesh: str = "builtin:mug", camera: bool = True, sound
     return scene_of(contacts, camera=camera, sound=sound, mesh=mesh, shape="unknown")
 
 
-@pytest.fixture(scope="module", params=[("builtin:mug", 60), ("builtin:bowl", 61)], ids=str)
+@pytest.fixture(
+    scope="module",
+    params=[("builtin:mug", 60), pytest.param(("builtin:bowl", 61), marks=pytest.mark.slow)],
+    ids=str,
+)
 def explored(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, station: Station
 ) -> Recording:

@@ -22,7 +22,9 @@ def own_store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
-@pytest.mark.parametrize("sense", list(MAKERS))
+@pytest.mark.parametrize(
+    "sense", ["touch", *(pytest.param(each, marks=pytest.mark.slow) for each in MAKERS if each != "touch")]
+)  # the processes are the same for every sense
 def test_samples_are_the_same_whatever_the_number_of_processes(sense: str) -> None:
     one, two = (samples_of(sense, 2, 3, 5, processes) for processes in (1, 2))
     for name, values in one.inputs.items():

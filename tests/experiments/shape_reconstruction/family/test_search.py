@@ -68,7 +68,7 @@ def nudged(shape: FamilyShape, by: float, seed: int = 0) -> FloatArray:
     return np.asarray(shape.theta + np.where(own, step, 0.05 * step) @ basis)
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", [pytest.param("mug", marks=pytest.mark.slow), *SHAPES[1:]])
 def test_a_shape_fits_its_own_readings_better_than_its_neighbours_do(name: str) -> None:
     shape, evidence = made(name)
     seen = observe(evidence)

@@ -124,7 +124,7 @@ def seen_from(mesh: Mesh, camera: Pinhole) -> tuple[FloatArray, FloatArray, AnyA
     return ways, outline.depth / slant, outline.faces
 
 
-@pytest.mark.parametrize("name", ["mug", "box", "sheet"])
+@pytest.mark.parametrize("name", [pytest.param("mug", marks=pytest.mark.slow), "box", "sheet"])
 @pytest.mark.parametrize("is_known", [False, True], ids=["taken for open", "known to be closed or not"])
 def test_pictures_are_told_what_all_faces_say(name: str, is_known: bool) -> None:
     """From near and far, by the depth of the outline, without it, and by its faces too."""

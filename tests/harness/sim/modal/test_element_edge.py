@@ -86,6 +86,7 @@ def test_a_thin_plate_is_cut_by_the_waves_that_bend_it_in_the_modes_asked_for() 
     assert fine_edge(of[0.004], STEEL, 1e3, 6) == pytest.approx(edge[0.004], rel=1e-3)
 
 
+@pytest.mark.slow  # all modes of the same plate up to a frequency stay
 def test_modes_of_a_thin_plate_are_within_a_thousandth_of_ritz_with_rims_cut(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
