@@ -196,16 +196,17 @@ class UrArm:
                 raise ur_state.not_zeroed(session.packet(), limit, SEEN_WITHIN)
 
     def set_digital_output(self, index: int, on: bool) -> None:
-        """Switch a tool digital output (0 or 1), and see it switched.
+        """Switch a tool digital output (0 or 1), and see it switched; off in any state.
 
         Raises:
             LimitExceeded: there is no such output.
             BenchFault: the controller did not switch it.
+            TouchstoneError: what latched the arm, where it is to be switched on.
         """
         if index not in (0, 1):
             raise LimitExceeded(f"tool digital output {index} was asked; the tool has outputs 0 and 1")
         session = self._opened()
-        session.ask({"do": "tool_output", "index": index, "on": on}, ANSWER_WITHIN)
+        session.ask({"do": "tool_output", "index": index, "on": on}, ANSWER_WITHIN, though_latched=not on)
         bit = 1 << (ur_words.TOOL_OUTPUT_BIT + index)
         if not session.comes_true(
             lambda p: bool(int(p[pipe.FIELDS["output_bits"]][0]) & bit) == on, SEEN_WITHIN

@@ -90,7 +90,7 @@ class Child:
                     self._zero_force()
                     self._parent.answer(message["id"], True)
                 case "tool_output":
-                    self._link.set_tool_output(message["index"], message["on"])
+                    self._switch(message["index"], message["on"])
                     self._parent.answer(message["id"], True)
                 case unknown:
                     raise BenchFault(f"the arm's process was asked to '{unknown}', which it does not know")
@@ -141,6 +141,12 @@ class Child:
         if not self._comes_to_rest(0.2):
             raise BenchFault("the force sensor was not zeroed: the arm is not at rest; wait and ask again")
         self._link.zero_force()
+
+    def _switch(self, index: int, on: bool) -> None:
+        """On by an arm that nothing has latched, as what is at the tool may move by it; off always."""
+        if on and self._latched is not None:
+            raise self._latched
+        self._link.set_tool_output(index, on)
 
     def _require_calm(self, what: str) -> None:
         if self._latched is not None:

@@ -90,14 +90,22 @@ class UrSession:
         return packet
 
     def ask(
-        self, message: pipe.Message, seconds: float, *, beat: bool = False, alarm: Alarm | None = None
+        self,
+        message: pipe.Message,
+        seconds: float,
+        *,
+        beat: bool = False,
+        alarm: Alarm | None = None,
+        though_latched: bool = False,
     ) -> Any:
         """A request to the child; a missed deadline or a lost child stops the arm and latches.
 
         Raises:
             Alarmed: by ``alarm``; nothing was stopped yet.
+            TouchstoneError: what latched the arm, unless the request may be made though it is latched.
         """
-        self.require_unlatched()
+        if not though_latched:
+            self.require_unlatched()
         try:
             return self.process.request(message, seconds, beat=beat, alarm=alarm)
         except DeadlineMissed as error:

@@ -171,9 +171,11 @@ def strike(
     assert output is not None
 
     def fire() -> None:
-        bench.arm.set_digital_output(output, True)
-        bench.pause(ON)
-        bench.arm.set_digital_output(output, False)
+        try:
+            bench.arm.set_digital_output(output, True)
+            bench.pause(ON)
+        finally:
+            bench.arm.set_digital_output(output, False)
 
     there = translation(moved * motion.axis) @ motion.base_from_firing
     if guard is not None and _blocked(motion, there, bench, guard):

@@ -102,13 +102,21 @@ def test_a_protective_stop_that_is_released_at_the_pendant_resumes_nothing(
 
 
 def test_a_protective_stop_at_rest_is_latched_too(patient_arm: UrArm, far_end: FarEnd) -> None:
+    """What is at the tool is not switched on either, and still off."""
     arm = patient_arm
+    before = far_end.outputs()
+    arm.set_digital_output(0, True)
     far_end.cue("protective_stop")
     while arm.state().safety == "normal":
         time.sleep(0.01)
     time.sleep(0.1)
     with pytest.raises(ProtectiveStop, match="at rest"):
         arm.move_joints(FAR, 0.1, 1.0)
+    with pytest.raises(ProtectiveStop, match="at rest"):
+        arm.set_digital_output(1, True)
+    assert far_end.outputs() == before | 1 << 16
+    arm.set_digital_output(0, False)
+    assert far_end.outputs() == before
 
 
 def test_killing_the_child_in_flight_stops_the_arm(arm: UrArm, far_end: FarEnd) -> None:

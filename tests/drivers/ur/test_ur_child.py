@@ -549,6 +549,29 @@ def test_joints_are_asked_for_again_only_where_a_late_kick_ended_the_script(case
     os.close(replies)
 
 
+def test_a_latched_arm_switches_off_and_not_on() -> None:
+    @dataclass
+    class Switching(ScriptedLink):
+        patience: float = 0.1
+
+        def set_tool_output(self, index: int, on: bool) -> None:
+            self.done.append(f"{index} {on}")
+
+    link: Any = Switching()
+    out, replies = os.pipe()
+    child = Child(link, -1, replies)
+    switch = {"do": "tool_output", "index": 0}
+    child._serve({**switch, "id": 1, "on": True})
+    child._latch(SafetyStop("a program of somebody else"))
+    child._serve({**switch, "id": 2, "on": True})
+    child._serve({**switch, "id": 3, "on": False})
+    os.close(replies)
+    answers = [pipe.unpack_message(payload) for _, payload in pipe.read_frames(out)]
+    assert [answer["ok"] for answer in answers] == [True, False, True]
+    assert link.done == ["0 True", "halt", "0 False"]
+    os.close(out)
+
+
 def test_the_arm_is_halted_even_where_its_state_cannot_be_told() -> None:
     class Speechless(ScriptedLink):
         patience = 0.1

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -110,6 +111,17 @@ def test_a_surface_too_far_from_the_plan_is_not_struck_and_nothing_moves(moved: 
     with pytest.raises(BenchFault, match=r"contact 3: .* mm from where it was planned"):
         strike(MOTION, 2, moved, recorder.bench)
     assert recorder.log == []
+
+
+def test_a_hammer_is_switched_off_whatever_ends_the_wait() -> None:
+    recorder = Recorder()
+
+    def interrupted(_: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        strike(MOTION, 4, 0.0, replace(recorder.bench, pause=interrupted))
+    assert "output 0 off" in recorder.log
 
 
 def test_a_strike_that_was_lost_is_repeated_and_then_given_up_behind_the_stand_off() -> None:
