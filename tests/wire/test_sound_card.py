@@ -106,8 +106,11 @@ def test_clicks_keep_their_distance(card: SoundCard, microphone: PortAudioMicrop
 def test_the_clock_is_fitted_to_the_bench_clock(card: SoundCard, microphone: PortAudioMicrophone) -> None:
     played = np.full((100, card.channels), 2**30, np.int32)
     asked = now()
-    pressure, _, callback, clock = heard(card, microphone, played)
-    _, _, rate, residual, uncertainty, opened = clock.values[0]
+    for _ in range(ATTEMPTS):  # a late computer makes a take unsure, and says so
+        pressure, _, callback, clock = heard(card, microphone, played)
+        _, _, rate, residual, uncertainty, opened = clock.values[0]
+        if uncertainty < UNSURE:
+            break
     assert uncertainty < UNSURE
     assert opened < asked
     # The card's timer is this computer's: over the take, a rate that is not the nominal one misplaces
