@@ -25,7 +25,7 @@ def by_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -
     found = family_estimate(evidence, settings)
     if not found.details["foreign"] or len(evidence.contacts) < ENOUGH:
         return found
-    smooth = by_hermite(evidence)
+    smooth = by_hermite(evidence, symmetric=False)  # every class of round bodies was tried
     fallen = f"no household shape fits {len(evidence.contacts)} contacts: the surface is by rbf"
     return replace(
         smooth,

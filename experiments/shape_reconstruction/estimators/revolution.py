@@ -1,4 +1,9 @@
-"""Whether contacts are those of a body turned about the vertical, and where else it then has its surface."""
+"""Whether contacts are those of a body turned about the vertical, and where else it then has its surface.
+
+A normal's line meets the axis, and places of different touches that face alike at one height lie on one
+profile, wherever they are around it. An axis is that which the normals agree on and then the profile; it is
+taken where most of the normals' horizontal parts and of the places that have such a partner agree.
+"""
 
 from dataclasses import dataclass
 
@@ -9,17 +14,17 @@ from experiments.shape_reconstruction.estimators.contact_samples import ContactS
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.geometry import rotation_about
 
-ON_AXIS = 5.0e-3
-"""M between a normal's line and the axis, within which a place counts as of the turned body."""
-
-SHARE = 0.65
-"""Of the horizontal parts of all normals, that must meet the axis."""
-
-AGREEING = 15
-"""Places that must have another touch's at their height, facing alike, ..."""
+RADIAL = 0.35
+"""Sine of the angle between a normal's horizontal part and the way out of the axis, at most."""
 
 OFF = 2.5e-3
-"""M, ... and the median by which their distances from the axis differ then, at most."""
+"""M off the profile that its partners have, in the median, at most."""
+
+SHARE, AGREEING = 0.6, 0.5
+"""Of the normals' horizontal parts that are radial, and of the places with partners that are on it too."""
+
+PLACES, TOUCHES = 10, 6
+"""With partners, and of how many touches, before an axis is believed."""
 
 COPIES = 16
 """Of each place, around the axis."""
@@ -28,10 +33,11 @@ APART = 12.0e-3
 """M from any contact, within which the contact knows better."""
 
 _HORIZONTAL = 0.25
-_PAIRS = 200
-_ROUNDS = 10
-_LOSS = 3.0e-3
-_HEIGHT, _ALIKE = 6.0e-3, 0.35
+_HEIGHT, _NEAR, _AROUND, _ALIKE = 8.0e-3, 12.0e-3, 25.0e-3, 0.9
+_MARGIN, _STEPS, _FIRST = 10.0e-3, (6.0e-3, 2.0e-3, 0.7e-3), 3
+_OFF_LOSS = 3.0e-3
+_MOST = 50
+_UNKNOWN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,53 +68,104 @@ class Revolution:
 
 
 def find_revolution(samples: ContactSamples, seed: int = 0) -> Revolution | None:
-    """The vertical axis that the normals point at, if their places agree on it; None where they do not."""
-    horizontal = np.linalg.norm(samples.normals[:, :2], axis=1)
-    weight = np.where(horizontal > _HORIZONTAL, horizontal, 0.0)
-    across = np.column_stack([-samples.normals[:, 1], samples.normals[:, 0]])
-    across /= np.maximum(horizontal, 1e-9)[:, None]
-    reach = np.einsum("ij,ij->i", across, samples.points[:, :2])
-    centre = _first_centre(across, reach, weight, np.random.default_rng(seed))
-    if centre is None:
+    """The vertical axis that normals and places agree on; None where they do not, or where they are too few.
+
+    Args:
+        samples: of all contacts.
+        seed: which places are looked at where there are more than a search in a tenth of a second takes.
+    """
+    side = np.flatnonzero(np.linalg.norm(samples.normals[:, :2], axis=1) > _HORIZONTAL)
+    some = np.random.default_rng(seed).permutation(side)[:_MOST]
+    if len(some) < PLACES:
         return None
-    for _ in range(_ROUNDS):
-        each = weight / (1.0 + ((across @ centre - reach) / _LOSS) ** 2)
-        weighted = across * each[:, None]
-        centre = np.linalg.solve(weighted.T @ across + 1e-9 * np.eye(2), weighted.T @ reach)
-    near = np.abs(across @ centre - reach) < ON_AXIS
-    share = float((weight * near).sum() / weight.sum())
-    found = Revolution(centre, share, near | (weight == 0.0))
-    agreeing, off = _agreement(samples, found)
-    return found if share >= SHARE and agreeing >= AGREEING and off <= OFF else None
+    centre = _best_centre(samples.of(np.sort(some)))
+    upright = samples.of(side)
+    radial, off = _radial(upright, centre), _median_errors(upright, centre)
+    paired = np.isfinite(off)
+    if paired.sum() < PLACES or len(np.unique(upright.touches[paired])) < TOUCHES:
+        return None
+    weight = np.linalg.norm(upright.normals[:, :2], axis=1)
+    share = float(weight[radial].sum() / weight.sum())
+    agreeing = float((radial & (off < OFF))[paired].mean())
+    of_body = np.ones(len(samples.points), dtype=bool)
+    of_body[side] = radial & ~(off >= OFF)
+    return Revolution(centre, share, of_body) if share >= SHARE and agreeing >= AGREEING else None
 
 
-def _first_centre(
-    across: FloatArray, reach: FloatArray, weight: FloatArray, random: np.random.Generator
-) -> FloatArray | None:
-    """Of the crossings of pairs of lines, that which most lines pass."""
-    lines = np.nonzero(weight > 0.0)[0]
-    best, centre = -1.0, None
-    for _ in range(_PAIRS if len(lines) > 1 else 0):
-        pair = random.choice(lines, 2, replace=False)
-        if abs(np.linalg.det(across[pair])) < 0.3:
-            continue
-        tried = np.linalg.solve(across[pair], reach[pair])
-        score = float(weight[np.abs(across @ tried - reach) < ON_AXIS].sum())
-        if score > best:
-            best, centre = score, tried
+def _best_centre(side: ContactSamples) -> FloatArray:
+    """``(2,)`` m: the least cost, from the first few places that the normals alone point at."""
+    low, high = side.points[:, :2].min(axis=0) - _MARGIN, side.points[:, :2].max(axis=0) + _MARGIN
+    axes = (np.arange(low[k], high[k], _STEPS[0]) for k in (0, 1))
+    grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    costs = np.array([_normals_cost(side, centre) for centre in grid])
+    found = [_refined(side, grid[k]) for k in _lowest_apart(grid, costs)]
+    return min(found, key=lambda centre: _cost(side, centre))
+
+
+def _lowest_apart(grid: FloatArray, costs: FloatArray) -> list[int]:
+    """Numbers of the lowest, none next to another."""
+    chosen: list[int] = []
+    for k in np.argsort(costs):
+        if len(chosen) == _FIRST:
+            break
+        if all(np.abs(grid[k] - grid[other]).max() > 1.5 * _STEPS[0] for other in chosen):
+            chosen.append(int(k))
+    return chosen
+
+
+def _refined(side: ContactSamples, centre: FloatArray) -> FloatArray:
+    for step in _STEPS[1:]:
+        steps = step * np.arange(-3, 4)
+        tried = centre + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        centre = tried[int(np.argmin([_cost(side, each) for each in tried]))]
     return centre
 
 
-def _agreement(samples: ContactSamples, found: Revolution) -> tuple[int, float]:
-    """How many places have another touch's at their height that faces alike, and their median difference."""
-    from_axis = samples.points[:, :2] - found.centre
-    radius = np.linalg.norm(from_axis, axis=1)
-    outward = np.einsum("ij,ij->i", samples.normals[:, :2], from_axis) / np.maximum(radius, 1e-6)
-    height = samples.points[:, 2]
-    differ = []
-    for i in np.nonzero(found.of_body)[0]:
-        other = found.of_body & (samples.touches != samples.touches[i])
-        other &= (np.abs(height - height[i]) < _HEIGHT) & (np.abs(outward - outward[i]) < _ALIKE)
-        if other.any():
-            differ.append(float(np.median(np.abs(radius[other] - radius[i]))))
-    return len(differ), float(np.median(differ)) if differ else np.inf
+def _cost(side: ContactSamples, centre: FloatArray) -> float:
+    partners, off = _profile_errors(side, centre)
+    count = partners.sum(axis=1)
+    lost = np.where(partners, np.minimum(off / _OFF_LOSS, 1.0) ** 2, 0.0).sum(axis=1)
+    each = np.where(count > 0, lost / np.maximum(count, 1), _UNKNOWN)
+    return _normals_cost(side, centre) + float(each.sum())
+
+
+def _normals_cost(side: ContactSamples, centre: FloatArray) -> float:
+    horizontal = np.linalg.norm(side.normals[:, :2], axis=1)
+    return float((horizontal * np.minimum(_aside(side, centre) / RADIAL, 1.0) ** 2).sum())
+
+
+def _radial(side: ContactSamples, centre: FloatArray) -> BoolArray:
+    return np.asarray(_aside(side, centre) < RADIAL)
+
+
+def _aside(side: ContactSamples, centre: FloatArray) -> FloatArray:
+    """``(n,)`` sines of the angles between normals, seen from above, and the way out of the axis."""
+    out, normals = side.points[:, :2] - centre, side.normals[:, :2]
+    cross = np.abs(normals[:, 1] * out[:, 0] - normals[:, 0] * out[:, 1])
+    lengths = np.linalg.norm(out, axis=1) * np.linalg.norm(normals, axis=1)
+    return np.asarray(cross / np.maximum(lengths, 1e-9))
+
+
+def _profile_errors(side: ContactSamples, centre: FloatArray) -> tuple[BoolArray, FloatArray]:
+    """``(n, n)`` which places are partners, and ``(n, n)`` m how far each is off the other's profile.
+
+    A chord of a profile is at right angles to the mean of its ends' normals where its curvature is even.
+    """
+    out = side.points[:, :2] - centre
+    radius = np.linalg.norm(out, axis=1)
+    outward = (side.normals[:, :2] * out).sum(axis=1) / np.maximum(radius, 1e-9)
+    places = np.column_stack([radius, side.points[:, 2]])
+    facing = np.column_stack([outward, side.normals[:, 2]])
+    facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-9)[:, None]
+    chords, mean = places[None] - places[:, None], facing[None] + facing[:, None]
+    partners = (np.abs(chords[..., 1]) < _HEIGHT) | (np.hypot(chords[..., 0], chords[..., 1]) < _NEAR)
+    partners &= (side.touches[:, None] != side.touches[None]) & (facing @ facing.T > _ALIKE)
+    partners &= np.linalg.norm(side.points[:, None, :2] - side.points[None, :, :2], axis=2) > _AROUND
+    off = np.abs((chords * mean).sum(axis=2)) / np.maximum(np.linalg.norm(mean, axis=2), 1e-9)
+    return partners, off
+
+
+def _median_errors(side: ContactSamples, centre: FloatArray) -> FloatArray:
+    """``(n,)`` m, the median of how far each place is off its partners' profile; infinite without any."""
+    rows = zip(*_profile_errors(side, centre), strict=True)
+    return np.array([float(np.median(off[each])) if each.any() else np.inf for each, off in rows])

@@ -198,6 +198,19 @@ def test_contacts_of_a_round_body_find_its_axis_and_those_of_a_box_do_not() -> N
     assert find_revolution(thinned(all_samples(wrench))) is None
 
 
+def test_a_round_body_s_axis_brings_its_surface_to_where_nothing_was_touched() -> None:
+    """Half of it was touched; the other half is as the axis says."""
+    body = build("bowl", 6e-3)
+    middle = 0.5 * (body.vertices.min(axis=0) + body.vertices.max(axis=0))
+    half = tuple(touch for touch in presses(body, 60, seed=5) if touch.points[:, 0].mean() > middle[0] - 0.01)
+    evidence = evidence_of(half)
+    found = find_revolution(thinned(all_samples(evidence)))
+    assert found is not None
+    assert np.abs(found.centre - middle[:2]).max() < 6e-3
+    with_axis, without = (shape_error(by_hermite(evidence, each).mesh, body) for each in (True, False))
+    assert with_axis.completeness < 0.6 * without.completeness
+
+
 def test_the_average_shape_looks_at_nothing_and_is_worse_than_touch() -> None:
     answer = by_average(evidence_of(()))
     require_whole(answer)
