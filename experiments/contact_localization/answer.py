@@ -17,7 +17,7 @@ from experiments.contact_localization.posterior.dials import SENSES, Senses
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import FitRefused, WrongUse
+from harness.basics.errors import FitRefused, MeshRefused, WrongUse
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
 from harness.effects.accuracy import Accuracy
 from harness.picture.square_pixels import aspect_stated
@@ -64,6 +64,9 @@ class ContactAnswering:
     Args:
         run: the folder.
         accuracy: of the estimate, and of the modes that a sound is compared with.
+
+    Raises:
+        MeshRefused: an estimate by sound alone is wanted, and the object has no modes to compare with.
     """
 
     def __init__(self, run: RunFiles, accuracy: Accuracy) -> None:
@@ -72,6 +75,8 @@ class ContactAnswering:
         self._seen: list[Observation] = []
         self._heights: list[FloatArray] = []
         self._taken = (0.0, 0.0)
+        if self.model.unheard and accuracy.of(SENSES) == "audio":
+            raise MeshRefused(f"an estimate by sound alone was asked for, and {self._unheard}")
         prepare(self.model, accuracy)
         _ = self.symmetry
 
@@ -106,15 +111,18 @@ class ContactAnswering:
     def answer(self) -> Answer:
         """By the sense that the accuracy names, and by each other one that was recorded.
 
+        Where the object's sound cannot be compared, by touch; the other senses are refused with the reason.
+
         Raises:
             WrongUse: no contact was read; or none was struck, and an answer by sound alone was asked for.
             FitRefused: no place on this object explains the readings.
         """
         readings = self.readings
         wanted = self._accuracy.of(SENSES)
-        if wanted == "audio" and not readings.heard:
+        struck = any(seen.strike is not None for seen in readings.observations)
+        if wanted == "audio" and not struck:
             raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
-        senses: tuple[Senses, ...] = SENSES.levels if readings.heard else ("touch",)
+        senses: tuple[Senses, ...] = SENSES.levels if struck else ("touch",)
         sense = wanted if readings.heard else "touch"
         last = loaded(lambda: self._by(sense, readings))
         others = {other: self._tried(other, readings) for other in senses if other != sense}
@@ -122,25 +130,47 @@ class ContactAnswering:
         seen, heights = readings.observations, readings.heights
         return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others)
 
-    def history(self, last: Estimate, sense: Senses) -> tuple[Estimate, ...]:
-        """The estimates by a sense after each contact, the last of which is known."""
+    def history(self, last: Estimate, sense: Senses) -> tuple[Estimate | FitRefused, ...]:
+        """The estimates by a sense after each contact, the last of which is known.
+
+        Fewer contacts than all are pictures of the way to the answer, and not judged; where they say
+        nothing yet, why.
+        """
         readings = self.readings
         count = len(readings.observations)
         if count == 1:
             return (last,)
-        return (*self._located(sense, readings.first(count - 1), 1), last)
+        try:
+            return (*self._located(sense, readings.first(count - 1), 1, judged=False), last)
+        except (FitRefused, WrongUse):  # the first images show no contact, or were not struck
+            return (*(self._early(sense, readings.first(k)) for k in range(1, count)), last)
+
+    def _early(self, sense: Senses, readings: Readings) -> Estimate | FitRefused:
+        try:
+            return self._located(sense, readings, None, judged=False)[-1]
+        except (FitRefused, WrongUse) as refusal:
+            return FitRefused(str(refusal))
 
     def _by(self, sense: Senses, readings: Readings) -> Estimate:
         return self._located(sense, readings, None)[-1]
 
+    @property
+    def _unheard(self) -> str:
+        """Why only touch answers."""
+        return f"sound cannot be compared: {self.model.unheard}"
+
     def _tried(self, sense: Senses, readings: Readings) -> Estimate | FitRefused:
+        if self.model.unheard and sense != "touch":
+            return FitRefused(self._unheard)
         try:
             return loaded(lambda: self._by(sense, readings))
         except FitRefused as refusal:
             return refusal
 
-    def _located(self, sense: Senses, readings: Readings, first: int | None) -> tuple[Estimate, ...]:
-        return located(readings, self._accuracy.with_({SENSES.name: sense}), first)
+    def _located(
+        self, sense: Senses, readings: Readings, first: int | None, judged: bool = True
+    ) -> tuple[Estimate, ...]:
+        return located(readings, self._accuracy.with_({SENSES.name: sense}), first, judged)
 
 
 def prior_of(run: RunFiles) -> Prior:

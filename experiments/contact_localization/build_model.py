@@ -1,6 +1,11 @@
 """The model of a scene's object: with its modes where the scene is to be heard."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from experiments.contact_localization.model import Model
+from harness.basics.errors import MeshRefused
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
@@ -8,22 +13,29 @@ from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
+from harness.effects.explain import without_sound
 from harness.effects.file_levels import scene_levels
 from harness.experiment.object_modes import ReadFile, carried_by, object_modes
 from harness.experiment.object_touch import object_touch
 from harness.recording.run_folder import RunFiles
+from harness.sim.modal.modes import Modes
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 
 def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
     """The object and the sensor as a recording carries them.
 
+    An object whose modes cannot be found is touched all the same; ``Model.unheard`` says why it is not heard.
+
     Args:
         run: the folder.
         accuracy: levels of the simulation's dials; None for the ObjectFile's networks, or the default ones.
     """
-    mesh, calibration = run.mesh, run.calibration
-    return model_of_scene(run.scene, run.station, mesh, calibration, accuracy, carried_by(run))
+    rest = run.station, run.mesh, run.calibration, accuracy, carried_by(run)
+    try:
+        return model_of_scene(run.scene, *rest)
+    except MeshRefused as refusal:
+        return replace(model_of_scene(without_sound(run.scene), *rest), unheard=str(refusal))
 
 
 def model_of_scene(
@@ -45,7 +57,8 @@ def model_of_scene(
         objectfile: reads the object's; None for the one that the scene names.
 
     Raises:
-        MeshRefused: the scene calls for sound, and the object's surface cannot be filled.
+        MeshRefused: the scene calls for sound, and the object's surface cannot be filled, or parts of it
+            hang together without stiffness.
         WrongUse: modes or touch are to come from an ObjectFile, and there is none or another object's.
     """
     chosen = accuracy or Accuracy.default(knobs_of(EFFECTS)).with_(scene_levels(scene))
@@ -54,4 +67,14 @@ def model_of_scene(
     if not scene.sensors.sound:
         return Model(mesh, sensor, calibration, seen=seen)
     modes = object_modes(scene, station, mesh, chosen, objectfile)
+    _refuse_loose(modes)
     return Model(mesh, sensor, calibration, modes, MATERIALS[scene.object.material], seen)
+
+
+def _refuse_loose(modes: Modes) -> None:
+    loose = int(np.count_nonzero(~(modes.frequencies > 0.0)))
+    if loose:
+        raise MeshRefused(
+            f"{loose} of the object's {len(modes.frequencies)} modes have no stiffness: parts of it hang "
+            "together by an edge or a point only; join them by faces"
+        )

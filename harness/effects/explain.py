@@ -10,6 +10,7 @@ from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Facts
 from harness.effects.plan import Plan, default_accuracy, plan
+from harness.effects.sound_effects import SOUND_EFFECTS
 
 MODES = "object.modes"
 
@@ -32,6 +33,14 @@ def wanted_of(scene: SceneFile) -> tuple[str, ...]:
     """What the scene observes and, where it is heard, the modes that its sounds are compared with."""
     heard = scene.sensors.sound and MODES not in scene.observe
     return (*scene.observe, MODES) if heard else scene.observe
+
+
+def without_sound(scene: SceneFile) -> SceneFile:
+    """The scene where nothing is to be heard, nor any quantity of sound observed."""
+    audible = {effect.provides for effect in SOUND_EFFECTS}
+    silent = scene.sensors.model_copy(update={"sound": False})
+    observed = tuple(name for name in scene.observe if name not in audible)
+    return scene.model_copy(update={"sensors": silent, "observe": observed})
 
 
 def as_json(chosen: Plan) -> dict[str, Any]:

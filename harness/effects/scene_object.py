@@ -27,6 +27,11 @@ class KnownObject:
     report: IntakeReport | None
 
     @property
+    def read(self) -> tuple[str, ...]:
+        """What was read of a mesh file, in one line; nothing of other objects."""
+        return () if self.report is None else (self.report.summary,)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What the operator should look at."""
         return self.report.warnings if self.report is not None else ()

@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.agreement.agreement import Agreement
 from harness.basics.arrays import AnyArray
-from harness.basics.errors import OutOfDomain, WrongUse
+from harness.basics.errors import MeshRefused, OutOfDomain, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.store import Store, default_folder
 from harness.bench.scene import SceneFile
@@ -16,7 +16,7 @@ from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.effects.catalogue import EFFECTS
 from harness.effects.evaluate import Evaluation, evaluate
-from harness.effects.explain import scene_plan
+from harness.effects.explain import scene_plan, without_sound
 from harness.effects.file_levels import NETWORK, scene_levels
 from harness.effects.plan import Plan, default_accuracy
 from harness.effects.touch_file_effects import SHAPES as TOUCH
@@ -98,21 +98,32 @@ def compare(scored: Scored, given: Mapping[str, Any]) -> Comparison:
         scored: the answer.
         given: what it gives the simulation, by the names of the experiment's ``gives``.
     """
+    scene = scored.run.scene
+    try:
+        return _drawn_at(scored, scene, given)
+    except MeshRefused as refusal:
+        if not scene.sensors.sound:
+            raise
+        silent = _drawn_at(scored, without_sound(scene), given)
+        return replace(silent, notes=(*silent.notes, f"the object's sound is not simulated: {refusal}"))
+
+
+def _drawn_at(scored: Scored, scene: SceneFile, given: Mapping[str, Any]) -> Comparison:
     accuracy = scored.accuracy
     try:
-        return _simulated(scored, given, accuracy)
+        return _simulated(scored, scene, given, accuracy)
     except OutOfDomain as refusal:
         if accuracy.get(TOUCH.name) != NETWORK:
             raise
         # A gel may stand where no network was made for it; the readings are compared all the same.
-        instead = _simulated(scored, given, accuracy.with_({TOUCH.name: TOUCH.default}))
+        instead = _simulated(scored, scene, given, accuracy.with_({TOUCH.name: TOUCH.default}))
         note = f"the readings are drawn with {TOUCH.name} = {TOUCH.default}: {refusal}"
         return replace(instead, notes=(note,))
 
 
-def _simulated(scored: Scored, given: Mapping[str, Any], accuracy: Accuracy) -> Comparison:
+def _simulated(scored: Scored, scene: SceneFile, given: Mapping[str, Any], accuracy: Accuracy) -> Comparison:
     run = scored.run
-    plan = scene_plan(run.scene, run.station.gel.sensor, accuracy)
+    plan = scene_plan(scene, run.station.gel.sensor, accuracy)
     sources = {**_carried(run, plan), **given}
     return Comparison(plan, evaluate(plan, sources, Store(default_folder())))
 

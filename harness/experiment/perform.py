@@ -63,8 +63,8 @@ def perform_on_bench(
 ) -> Performed:
     """Open the run's bench and perform what is left.
 
-    What the readings will be compared with is made while the bench opens, and before anything moves: an
-    object whose modes cannot be found is refused while the arm still stands.
+    What the readings will be compared with is made while the bench opens, and before anything moves: what
+    cannot be answered at all is refused while the arm still stands.
 
     Args:
         procedure: that the run is of.
@@ -76,7 +76,8 @@ def perform_on_bench(
         conclude: is given what came of it while the bench is still open: closing one takes its time.
 
     Raises:
-        MeshRefused: the scene calls for sound, and the object's surface cannot be filled.
+        MeshRefused: the answer needs the object's sound, or a mocked bench makes it, and its surface cannot
+            be filled.
     """
     run = RunFiles(recording)
     if by_hand(run.scene, run.station):

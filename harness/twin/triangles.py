@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.compiled import compiled
+from harness.basics.errors import MeshRefused
 from harness.basics.geometry import apply, inverse
 from harness.basics.mesh import Mesh
 
@@ -56,8 +57,20 @@ class Solid:
 
     @cached_property
     def hull(self) -> FloatArray:
-        """``(n, 3)`` m, the corners of the convex hull in the object's frame."""
-        return read_only(self.mesh.vertices[ConvexHull(self.mesh.vertices).vertices])
+        """``(n, 3)`` m, the corners of the convex hull in the object's frame.
+
+        Raises:
+            MeshRefused: the surface is flat, so that no body stands on the bench.
+        """
+        places = self.mesh.vertices
+        try:
+            return read_only(places[ConvexHull(places).vertices])
+        except QhullError as error:
+            sides = 1e3 * np.ptp(places, axis=0)
+            raise MeshRefused(
+                f"the object's surface of {sides[0]:.3g} x {sides[1]:.3g} x {sides[2]:.3g} mm is flat: "
+                "nothing stands on the bench that an arm may touch; give it a thickness in its file"
+            ) from error
 
     def meets(self, body: ConvexBody, object_from_body: FloatArray, clearance: float) -> bool:
         """Whether any triangle comes within ``clearance`` m of a convex body.

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from harness.basics.errors import WrongUse
+from harness.basics.errors import MeshRefused, WrongUse
 from harness.bench.gap import Gap
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
@@ -28,6 +28,7 @@ def strikes_of(
     Raises:
         WrongUse: the scene asks for sound and the station has no hammer.
         CalibrationRefused: of the hammer's box.
+        MeshRefused: the object cannot be filled with elements, so that a mocked one makes no sound.
     """
     if not scene.sensors.sound:
         return None
@@ -39,6 +40,11 @@ def strikes_of(
     from mocks.world.instrument import instrument_of
     from mocks.world.sound import WorldSound
 
-    instrument = instrument_of(world, scene, GapDraw(gap, seed))
+    try:
+        instrument = instrument_of(world, scene, GapDraw(gap, seed))
+    except MeshRefused as refusal:
+        raise MeshRefused(
+            f"a mocked bench cannot make this object's sound: {refusal}; or press it only (--sense touch)"
+        ) from refusal
     sound = WorldSound(world, instrument, gap, seed, flange_from_hammer, hammer.rate)
     return StrikeCounts(sound, hammer.acquisition, hears=station.own_microphone is None)

@@ -54,8 +54,9 @@ class Readings:
 
     @property
     def heard(self) -> bool:
-        """Whether any contact was struck."""
-        return any(observation.strike is not None for observation in self.observations)
+        """Whether any contact was struck, and the object has modes to compare its sound with."""
+        struck = any(observation.strike is not None for observation in self.observations)
+        return struck and not self.model.unheard
 
     def under(self, model: Model) -> "Readings":
         """The same readings, to be compared with another model of the object."""
@@ -153,18 +154,26 @@ def solve(readings: Readings, setting: Setting) -> Solved:
     return Solved(estimate, None if estimate is None else estimate.credible90, *taken, refusal)
 
 
-def located(readings: Readings, accuracy: Accuracy, first: int | None = None) -> tuple[Estimate, ...]:
+def located(
+    readings: Readings, accuracy: Accuracy, first: int | None = None, judged: bool = True
+) -> tuple[Estimate, ...]:
     """The estimates after each contact from the ``first`` on; after the last alone where None.
 
+    Args:
+        readings: of the run.
+        accuracy: of the estimates.
+        first: contacts of the first estimate.
+        judged: whether readings that fit no place are refused, or estimated all the same.
+
     Raises:
-        FitRefused: no place on this object explains the readings.
+        FitRefused: no place on this object explains the readings, or no image shows a contact.
     """
     noise, images = Noise(), needs_images(accuracy)
     contacts = _contacts(readings, accuracy.of(BLOCK), noise, images)
-    strikes = [observation.strike for observation in readings.observations]
+    strikes = [observation.strike for observation in readings.observations] if readings.heard else []
     seconds = readings.shared[1] if images else 0.0
     model, prior, seed = readings.model, readings.prior, readings.seed
-    return locate(contacts, model, prior, accuracy, noise, seed, first, seconds, strikes)
+    return locate(contacts, model, prior, accuracy, noise, seed, first, seconds, strikes, judged)
 
 
 def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> list[Contact]:

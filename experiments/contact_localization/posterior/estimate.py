@@ -95,6 +95,7 @@ def locate(
     first: int | None = None,
     image_seconds: float = 0.0,
     strikes: Sequence[Strike | None] = (),
+    judged: bool = True,
 ) -> tuple[Estimate, ...]:
     """The estimate after each contact from the ``first`` on; of the last contact alone where None.
 
@@ -110,9 +111,10 @@ def locate(
         first: contacts of the first estimate.
         image_seconds: s that reading all images took.
         strikes: of the contacts, as they were captured.
+        judged: whether contacts that fit no place are refused, or estimated all the same.
 
     Raises:
-        FitRefused: no place on this object explains the contacts.
+        FitRefused: no place on this object explains the contacts, or no image shows one.
         WrongUse: there are no contacts, or none was struck and sound alone is asked for.
     """
     if len(contacts) == 0:
@@ -132,7 +134,7 @@ def locate(
         if heard is not None:
             lap(seconds, "sounds", start)
         found = solve_run(search, k, accuracy, seed, seconds, heard)
-        doubts = _judged(search, found, accuracy, heard, k, seconds) if k == count else ()
+        doubts = _judged(search, found, accuracy, heard, k, seconds) if judged and k == count else ()
         floor = FLOORS[senses if heard else "touch"]
         answers.append(_answer(search, k, found, seconds, floor, doubts))
     return tuple(answers)

@@ -8,7 +8,7 @@ import numpy as np
 
 from experiments.contact_localization.answer import Answer as Found
 from experiments.contact_localization.posterior.consistency import Gate
-from experiments.contact_localization.posterior.dials import METHOD
+from experiments.contact_localization.posterior.dials import METHOD, Senses
 from experiments.contact_localization.posterior.dials import SENSES as BY
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.comparison import object_from_gels
@@ -17,7 +17,7 @@ from experiments.contact_localization.report.sound_report import posterior_of, s
 from experiments.contact_localization.report.sweep import SweepPoint, trade
 from experiments.contact_localization.report.twin_check import deviations
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import FitRefused, WrongUse
+from harness.basics.errors import FitRefused
 from harness.basics.geometry import inverse
 from harness.bench.device import Health
 from harness.effects.accuracy import Accuracy
@@ -87,7 +87,7 @@ def _answer(scored: Scored) -> AnswerRow:
 
 
 def _contacts(
-    scored: Scored, comparison: Comparison, history: tuple[Estimate, ...]
+    scored: Scored, comparison: Comparison, history: tuple[Estimate | FitRefused, ...]
 ) -> tuple[ContactRow, ...]:
     images = _of_each(comparison, "touch.image", len(history))
     gels = _of_each(comparison, "touch.gel", len(history))
@@ -101,14 +101,21 @@ def _contacts(
             live_height=scored.found.heights[k],
             simulated_height=gels[k],
             object_from_gel=poses[k],
-            posterior=posterior_of(after),
+            posterior=Missing(str(after)) if isinstance(after, FitRefused) else posterior_of(after),
             truth=None if true is None else true[k],
-            error=None if true is None else float(np.linalg.norm(after.position_in_object - true[k])),
+            error=None if true is None else _error(after, true[k]),
             flags=() if gate is None else tuple(flags_of(gate)),
             notes=(("fit", _fit(gate)),),
         )
         for k, (after, gate) in enumerate(zip(history, _gates(scored.found, len(history)), strict=True))
     )
+
+
+def _error(after: Estimate | FitRefused, true: FloatArray) -> float | None:
+    """m; None where there is no estimate."""
+    if isinstance(after, FitRefused):
+        return None
+    return float(np.linalg.norm(after.position_in_object - true))
 
 
 def _of_each(comparison: Comparison, name: str, count: int) -> list[Any]:
@@ -147,15 +154,16 @@ def _bench(run: RunFiles, found: Found) -> BenchScene:
     return BenchScene(parts, base_from_gels, in_base.mean(axis=1))
 
 
-def _by_contact(scored: Scored, history: tuple[Estimate, ...]) -> tuple[ErrorCurve, ...] | Missing:
+def _by_contact(
+    scored: Scored, history: tuple[Estimate | FitRefused, ...]
+) -> tuple[ErrorCurve, ...] | Missing:
     true, found = true_points(scored), scored.found
     if true is None:
         return NO_TRUTH
     counts = tuple(float(k + 1) for k in range(len(true)))
-    ours = _errors([estimate.position_in_object for estimate in history], true)
     alone = _errors([by_translations(found, k + 1) for k in range(len(true))], true)
     return (
-        ErrorCurve(SENSES[found.sense], counts, ours, by=found.sense),
+        _curve(found.sense, history, true),
         *_by_other_senses(scored, true),
         ErrorCurve("translations alone, no image", counts, alone, by="geometry"),
     )
@@ -163,16 +171,16 @@ def _by_contact(scored: Scored, history: tuple[Estimate, ...]) -> tuple[ErrorCur
 
 def _by_other_senses(scored: Scored, true: FloatArray) -> Iterator[ErrorCurve]:
     """The same readings after each contact by each other sense that answered in the end."""
-    counts = tuple(float(k + 1) for k in range(len(true)))
     for sense, last in scored.found.others.items():
-        if isinstance(last, FitRefused):
-            continue
-        try:
-            history = scored.answering.history(last, sense)
-        except (FitRefused, WrongUse):  # the first contacts were not struck, or told nothing yet
-            continue
-        points = [estimate.position_in_object for estimate in history]
-        yield ErrorCurve(SENSES[sense], counts, _errors(points, true), by=sense)
+        if not isinstance(last, FitRefused):
+            yield _curve(sense, scored.answering.history(last, sense), true)
+
+
+def _curve(sense: Senses, history: tuple[Estimate | FitRefused, ...], true: FloatArray) -> ErrorCurve:
+    """M after each contact that has an estimate."""
+    errors = {k + 1: _error(after, at) for k, (after, at) in enumerate(zip(history, true, strict=True))}
+    known = {float(count): error for count, error in errors.items() if error is not None}
+    return ErrorCurve(SENSES[sense], tuple(known), tuple(known.values()), by=sense)
 
 
 def _errors(points: Sequence[FloatArray], true: FloatArray) -> tuple[float, ...]:

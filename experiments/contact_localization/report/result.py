@@ -15,6 +15,8 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.experiment.experiment import Scored
 
+_UNHEARD = "the object's sound is not compared, and touch alone answers"
+
 
 def true_points(scored: Scored) -> FloatArray | None:
     """``(contacts, 3)`` metres, None where any is unknown."""
@@ -51,7 +53,8 @@ def by_translations(found: Answer, count: int) -> FloatArray:
 
 
 def _doubts(found: Answer) -> tuple[str, ...]:
-    of_sound = doubts_of_sound(found.observations)
+    unheard = found.model.unheard
+    of_sound = (f"{_UNHEARD}: {unheard}",) if unheard else doubts_of_sound(found.observations)
     # Sense by sense the doubt may be the same one.
     of_senses = [estimate.doubts for estimate in found.by_sense.values() if isinstance(estimate, Estimate)]
     of_sound += tuple(dict.fromkeys(doubt for doubts in of_senses for doubt in doubts))

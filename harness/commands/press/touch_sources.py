@@ -121,7 +121,7 @@ def of_mesh(
     }
     press = press_mesh(sources, gel, scene, levels, force)
     asked = {"depth_m": depth, "tilt_rad": tilt, "azimuth_rad": azimuth, "yaw_rad": yaw}
-    return Touched(press, mesh, place, at, asked, known.warnings, seconds={"mesh": read})
+    return Touched(press, mesh, place, at, asked, (*known.read, *known.warnings), seconds={"mesh": read})
 
 
 def _scene(what: str, units: str | None, gel: "Gel", objectfile: Path | None = None) -> "SceneFile":

@@ -306,6 +306,8 @@ def _describe(kind: Any, begun: Any, accuracy: Any) -> None:
     from harness.recording.run_folder import RunFiles
 
     run = RunFiles(begun.recording)
+    for line in begun.known.read:
+        CONSOLE.print(line, markup=False)
     wanted = None if kind.section is None else run.scene.section(kind.section)
     CONSOLE.print(
         f"{run.scene.object.name}: {len(run.mesh.faces)} faces, "

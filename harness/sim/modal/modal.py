@@ -198,7 +198,8 @@ def _check_volume(mesh: QuadraticMesh, surface: Mesh) -> None:
     if not abs(got - wanted) <= _VOLUME_GATE * wanted:
         raise MeshRefused(
             f"the elements hold {got * 1e6:.4g} cm^3 where the surface encloses {wanted * 1e6:.4g}, more "
-            f"than {_VOLUME_GATE:.0%} apart; say a smaller element edge, or repair the surface"
+            f"than {_VOLUME_GATE:.0%} apart; repair the surface, or say smaller elements (sim modes --edge, "
+            "run --level sound.edge)"
         )
 
 

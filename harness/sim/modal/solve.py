@@ -146,7 +146,8 @@ def _modes(
     outer = Mesh(mesh.nodes[used], triangles.reshape(-1, 3))
     vectors = system.whole(pairs.vectors).reshape(len(mesh.nodes), 3, -1)[used]
     return Modes(
-        frequencies=np.sqrt(pairs.values) / (2.0 * np.pi),
+        # What hangs by an edge only turns without stiffness, but for rounding.
+        frequencies=np.sqrt(np.maximum(pairs.values, 0.0)) / (2.0 * np.pi),
         points=outer.vertices,
         normals=outer.vertex_normals,
         faces=outer.faces,

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.mesh import Mesh
+from harness.sim.solid.mesh_bodies import take_apart
 from harness.sim.solid.mesh_holes import fill_holes, join_bodies
 from harness.sim.solid.mesh_read import METRES, RawMesh, read_mesh
 from harness.sim.solid.mesh_repair import (
@@ -37,7 +38,8 @@ class IntakeReport:
         file: its name.
         sha256: hash of its bytes.
         units: the unit its numbers were taken in.
-        units_from: "asked", "declared by the file" or "the only reading of its size".
+        units_from: "asked", also against what the file declares, "declared by the file" or "the only reading
+            of its size".
         scale: factor applied after the unit.
         vertices_before: in the file.
         faces_before: in the file.
@@ -81,6 +83,34 @@ class IntakeReport:
         if self.wall is not None:
             return density * self.wall * self.area
         return None if self.volume is None else density * self.volume
+
+    @property
+    def summary(self) -> str:
+        """What was read, in one line: every command that takes a mesh file says it."""
+        return read_line(
+            self.file, self.bodies, self.faces, self.volume, self.longest_side, self.units, self.units_from
+        )
+
+
+def read_line(
+    file: str, pieces: int, triangles: int, volume: float | None, longest: float, units: str, source: str
+) -> str:
+    """What was read of a mesh file.
+
+    Args:
+        file: its name.
+        pieces: separate ones.
+        triangles: of its surface.
+        volume: m^3; None where the surface is open.
+        longest: m, its longest side.
+        units: that its numbers were taken in.
+        source: where the unit came from.
+    """
+    held = "open, no volume" if volume is None else f"{1e6 * volume:.4g} cm^3"
+    return (
+        f"{file}: {pieces} piece{'s' if pieces > 1 else ''}, {triangles} triangles, {held}, longest side "
+        f"{1e3 * longest:.4g} mm; unit {units} ({source})"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +167,7 @@ def take_in(path: Path, units: str | None, scale: float = 1.0, wall: float | Non
         volume=_volume(mesh) if watertight else None,
         wall=wall,
         repairs=tuple(surface.repairs),
-        warnings=_warnings(mesh, watertight, pieces, wall),
+        warnings=(*raw.notes, *_warnings(mesh, watertight, pieces, wall)),
         seconds=time.perf_counter() - begun,
     )
     return Intake(mesh, report)
@@ -170,6 +200,7 @@ def _cleaned(raw: RawMesh, name: str) -> RepairedSurface:
     drop_duplicates(surface)
     _check_surface(surface, name)
     drop_specks(surface)
+    take_apart(surface)
     return surface
 
 
@@ -191,7 +222,8 @@ def _closed(surface: RepairedSurface) -> tuple[int, bool]:
 
 def _unit(asked: str | None, declared: str | None, size: float, name: str) -> tuple[str, str]:
     if asked is not None:
-        return asked, "asked"
+        against = f", against the {declared} that the file declares" if declared not in (None, asked) else ""
+        return asked, f"asked{against}"
     if declared is not None:
         return declared, "declared by the file"
     readings = [unit for unit in _ASKED_ABOUT if _SMALLEST <= size * METRES[unit] <= _LARGEST]

@@ -1,21 +1,32 @@
 """Triangles out of any file that trimesh or meshio reads, exactly as they stand in it."""
 
+import io
 import warnings
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.files.named_file import require_file
+from harness.sim.solid.plain_formats import read_obj, read_off, read_stl
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Metres in one unit of a mesh file, by the unit's name."""
 
-_BY_TRIMESH = frozenset({".obj", ".stl", ".stl_ascii", ".ply", ".off", ".glb", ".gltf", ".3mf", ".dae"})
+_PLAIN = {".obj": read_obj, ".stl": read_stl, ".stl_ascii": read_stl, ".off": read_off}
+_BY_TRIMESH = frozenset({".ply", ".glb", ".gltf", ".3mf", ".dae"})
 _OFTEN = "OBJ, STL, PLY, OFF, glTF, 3MF, COLLADA, or tetrahedra as Gmsh, VTK, Abaqus or Nastran write them"
 _TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+SOLIDS = ("hexahedron", "wedge", "pyramid", "tetra")
+"""How meshio's names of solid cells begin."""
+
+TETRAHEDRA = {"tetra": 4, "tetra4": 4, "tetra10": 10}
+"""Nodes of a cell of the kinds that are read."""
+
 _METRES_BY_DEFINITION = frozenset({".glb", ".gltf"})
 
 
@@ -27,15 +38,17 @@ class RawMesh:
         vertices: ``(n, 3)`` in the file's unit; may repeat, may not be numbers.
         faces: ``(m, 3)`` indices.
         unit: the unit the file declares, or None.
+        notes: what is odd of the file, a sentence each.
     """
 
     vertices: FloatArray
     faces: IntArray
     unit: str | None
+    notes: tuple[str, ...] = ()
 
 
 def read_mesh(path: Path) -> RawMesh:
-    """The triangles of a file; quadrilaterals are split, tetrahedra give their outside.
+    """The triangles of a file; polygons are split, tetrahedra give their outside and nothing else.
 
     Raises:
         WrongUse: no such file.
@@ -45,7 +58,7 @@ def read_mesh(path: Path) -> RawMesh:
     if path.stat().st_size == 0:
         raise MeshRefused(f"{path.name} is empty (0 bytes); export it again")
     kind = path.suffix.lower()
-    read = _with_trimesh if kind in _BY_TRIMESH else _with_meshio
+    read = _plain if kind in _PLAIN else _with_trimesh if kind in _BY_TRIMESH else _with_meshio
     if read is _with_meshio and not _known_to_meshio(kind):
         raise MeshRefused(f"{path.name}: {kind or 'no ending'} is not that of a mesh; give {_OFTEN}")
     try:
@@ -71,6 +84,11 @@ def read_mesh(path: Path) -> RawMesh:
     return raw
 
 
+def _plain(path: Path) -> RawMesh:
+    found = _PLAIN[path.suffix.lower()](path)
+    return RawMesh(found.vertices, found.faces, None, found.notes)
+
+
 def _with_trimesh(path: Path) -> RawMesh:
     import trimesh
 
@@ -93,18 +111,41 @@ def _known_unit(declared: str | None) -> str | None:
 
 
 def _with_meshio(path: Path) -> RawMesh:
-    import meshio
-
-    mesh = meshio.read(path)
+    mesh = read_cells(path)
     faces = [_triangles_of(block.type, np.asarray(block.data, np.int64)) for block in mesh.cells]
-    solid = [
-        np.asarray(block.data, np.int64)[:, :4] for block in mesh.cells if block.type.startswith("tetra")
-    ]
-    if solid and not any(len(part) for part in faces):
-        faces = [_outside(np.vstack(solid))]
+    kinds = {block.type for block in mesh.cells if block.type.startswith(SOLIDS)}
+    notes: tuple[str, ...] = ()
+    if kinds:
+        sides = sum(len(part) for part in faces)
+        notes = (f"{sides} faces of named sides are no surface of their own: left out",) if sides else ()
+        faces = [_outside(_tetrahedra(mesh, kinds, path.name))]
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
-    return RawMesh(points, np.vstack([np.zeros((0, 3), np.int64), *faces]), None)
+    return RawMesh(points, np.vstack([np.zeros((0, 3), np.int64), *faces]), None, notes)
+
+
+def _tetrahedra(mesh: Any, kinds: set[str], name: str) -> IntArray:
+    """``(c, 4)``: the corners of all cells of a file of solids.
+
+    Raises:
+        MeshRefused: it holds solids of other kinds.
+    """
+    if not kinds <= TETRAHEDRA.keys():
+        raise MeshRefused(
+            f"{name} holds cells of kind {', '.join(sorted(kinds))}; export it as four-node tetrahedra only, "
+            "or ten-node ones only"
+        )
+    cells = [np.asarray(block.data, np.int64)[:, :4] for block in mesh.cells if block.type in kinds]
+    return np.concatenate(cells)
+
+
+def read_cells(path: Path) -> Any:
+    """What meshio reads of a file, as it gives it; it prints to standard output, which is others'."""
+    import meshio
+
+    with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+        warnings.simplefilter("ignore")
+        return meshio.read(path)
 
 
 def _known_to_meshio(kind: str) -> bool:

@@ -77,8 +77,9 @@ def drop_flat(surface: RepairedSurface) -> None:
 def drop_duplicates(surface: RepairedSurface) -> None:
     """Keep one face of those with the same three corners.
 
-    A few pairs that face against each other are flaps that welding has pressed flat: both go.
-    Where most faces have such a twin the file holds a sheet drawn from both sides: one stays.
+    A few pairs that face against each other are flaps that welding has pressed flat, or a face in which two
+    solids meet: both go, and so do more of them if what is left is closed. Where most faces have such a twin
+    the file holds a sheet drawn from both sides: one stays.
     """
     groups, first, inverse = np.unique(
         np.sort(surface.faces, axis=1), axis=0, return_index=True, return_inverse=True
@@ -88,8 +89,10 @@ def drop_duplicates(surface: RepairedSurface) -> None:
     balance = np.bincount(inverse.ravel(), _parity(surface.faces), minlength=len(groups))
     count = np.bincount(inverse.ravel(), minlength=len(groups))
     flap = (count > 1) & (balance == 0)
-    if flap.sum() < _FEW * len(groups):
-        once[first[flap]] = False
+    without = once.copy()
+    without[first[flap]] = False
+    if flap.sum() < _FEW * len(groups) or (without.any() and _is_closed(surface.faces[without])):
+        once = without
     _drop(surface, once, "duplicate faces")
 
 

@@ -18,7 +18,7 @@ class TakenSurface:
     Attributes:
         mesh: in metres.
         units: of the file's numbers; metres of a built-in object.
-        said: what was done to the mesh and what to look at.
+        said: what was read of a file, what was done to the mesh and what to look at.
     """
 
     mesh: Mesh
@@ -41,8 +41,9 @@ def surface_of(mesh: str, units: str | None, wall: float | None) -> TakenSurface
     if mesh.startswith(BUILTIN):
         return _builtin(mesh, units, wall)
     intake = take_in(Path(mesh), units, wall=wall)
-    said = (*intake.report.repairs, *intake.report.warnings)
-    return TakenSurface(walled(intake.mesh, wall), intake.report.units, said)
+    report = intake.report
+    said = (report.summary, *report.repairs, *report.warnings)
+    return TakenSurface(walled(intake.mesh, wall), report.units, said)
 
 
 def _builtin(mesh: str, units: str | None, wall: float | None) -> TakenSurface:

@@ -14,7 +14,7 @@ from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.objects.solid import from_manifold, to_manifold
 from harness.sim.solid.mesh_repair import boundary_edges
-from harness.sim.solid.modal_mesh import boundary_faces
+from harness.sim.solid.modal_mesh import FACES, boundary_faces
 from harness.sim.solid.surface_measure import enclosed_volume, thin_wall
 
 ENVELOPE_OF_WALL = 0.2
@@ -39,9 +39,17 @@ onto the surface. A shell that was filled or lost is far beyond it."""
 _SIMPLIFIED = 0.5
 """Of the envelope, how far the surface may move, beside it, to leave out faces before it is filled."""
 
+_TRIES = ((1.0, 1.0), (1.0, 0.5), (0.5, 0.25))
+"""Of the edge and of the envelope, those that a surface is filled with in turn while a neck or a wall of it
+is lost: how near two sides come is the envelope's doing first, and the elements' next."""
+
 _MM = 1e-3
 _STOP_ENERGY = 20.0
 """At which fTetWild stops improving cells; 10 is its default, a regular tetrahedron has 3."""
+
+
+class _Lost(MeshRefused):
+    """What fills a surface is not what it encloses; finer elements may."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +116,8 @@ def tetrahedralize(
 ) -> Tetrahedra:
     """Fill a closed surface with fTetWild (Hu et al., Fast Tetrahedral Meshing in the Wild, 2020).
 
+    Where a thin neck or a wall is lost it is filled again, more closely, and refused only then.
+
     Args:
         mesh: closed, outward; parts that overlap count once.
         edge: m, longest edge aimed at; where the surface bends or is thin they are shorter.
@@ -134,9 +144,17 @@ def tetrahedralize(
             f"an envelope of {envelope * 1e3:.3g} mm lets a wall of {wall * 1e3:.3g} mm close up; say one "
             f"above 0 and up to {0.25 * wall * 1e3:.3g} mm"
         )
+    for of_edge, of_envelope in _TRIES[:-1]:
+        with contextlib.suppress(_Lost):
+            return _filled_whole(mesh, of_edge * edge, of_envelope * envelope, stop)
+    finest_edge, finest_envelope = _TRIES[-1]
+    return _filled_whole(mesh, finest_edge * edge, finest_envelope * envelope, stop)
+
+
+def _filled_whole(mesh: Mesh, edge: float, envelope: float, stop: float) -> Tetrahedra:
     found = tetrahedra(*_filled(mesh, edge, envelope, stop))
-    _check_volume(found, mesh, envelope)
-    _check_bodies(found, mesh)
+    _check_volume(found, mesh, edge, envelope)
+    _check_bodies(found, mesh, edge)
     return found
 
 
@@ -220,25 +238,41 @@ def _open_area(mesh: Mesh, rim: IntArray) -> float:
     return area
 
 
-def _check_volume(found: Tetrahedra, mesh: Mesh, envelope: float) -> None:
+def _check_volume(found: Tetrahedra, mesh: Mesh, edge: float, envelope: float) -> None:
     wanted, got = enclosed_volume(mesh), float(found.volumes.sum())
     if not abs(got - wanted) <= _VOLUME_GATE * wanted:
-        raise MeshRefused(
+        raise _Lost(
             f"the tetrahedra hold {got * 1e6:.4g} cm^3 where the surface encloses {wanted * 1e6:.4g}, more "
-            f"than {_VOLUME_GATE:.0%} apart, at an envelope of {envelope * 1e3:.3g} mm; say a smaller "
-            "element edge, or repair the surface"
+            f"than {_VOLUME_GATE:.0%} apart, with edges of {edge * 1e3:.3g} mm at an envelope of "
+            f"{envelope * 1e3:.3g} mm, the finest that were tried; repair the surface"
         )
 
 
-def _check_bodies(found: Tetrahedra, mesh: Mesh) -> None:
-    """No body that the surface has not: a thin neck that tore would be one."""
+def _check_bodies(found: Tetrahedra, mesh: Mesh, edge: float) -> None:
+    """No body that the surface has not: a thin neck that tore is one, and so is what hangs by an edge only.
+
+    Such a hinge has no stiffness, and its motion a frequency of zero.
+    """
     ends = mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]]
     rows, columns = (np.concatenate([pair[:, k] for pair in ends]) for k in (0, 1))
     graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(mesh.vertices),) * 2)
     number = connected_components(graph, directed=False)[1]
     pieces = len(np.unique(number[np.unique(mesh.faces)]))
-    if found.bodies > pieces:
-        raise MeshRefused(
-            f"the tetrahedra fall into {found.bodies} bodies where the surface has {pieces}; a thin neck was "
-            "lost: say a smaller element edge"
+    bodies = joined_by_faces(found.cells)
+    if bodies > pieces:
+        raise _Lost(
+            f"the tetrahedra fall into {bodies} bodies where the surface has {pieces}: a thin neck, or "
+            f"an edge only, was lost even with elements of {edge * 1e3:.3g} mm, the finest that were tried; "
+            "thicken it"
         )
+
+
+def joined_by_faces(cells: IntArray) -> int:
+    """How many parts ``(c, 4)`` cells make that count as joined only where they share a face."""
+    faces = np.sort(cells[:, FACES].reshape(-1, 3), axis=1)
+    _, which = np.unique(faces, axis=0, return_inverse=True)
+    owner = np.repeat(np.arange(len(cells)), len(FACES))
+    shape = (len(cells) + len(faces),) * 2
+    joined = coo_array((np.ones(len(owner)), (owner, len(cells) + which.ravel())), shape=shape)
+    number = connected_components(joined, directed=False)[1]
+    return len(np.unique(number[: len(cells)]))

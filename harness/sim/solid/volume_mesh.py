@@ -1,9 +1,6 @@
 """Tetrahedra out of any file that meshio reads, solved on their own nodes or refused by number."""
 
-import io
-import warnings
 from collections.abc import Mapping
-from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,8 +9,10 @@ import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused, WrongUse
-from harness.sim.solid.mesh_read import METRES
+from harness.sim.solid.intake import read_line
+from harness.sim.solid.mesh_read import METRES, SOLIDS, TETRAHEDRA, read_cells
 from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh, six_node_faces
+from harness.sim.solid.tetrahedra import signed_volumes
 from harness.sim.solid.volume_mesh_checks import (
     check_curved,
     check_full,
@@ -25,8 +24,6 @@ from harness.sim.solid.volume_mesh_checks import (
 )
 
 _SURFACES_ONLY = frozenset({".obj", ".stl", ".stl_ascii", ".ply", ".off", ".glb", ".gltf", ".3mf"})
-_SOLIDS = ("hexahedron", "wedge", "pyramid", "tetra")
-_TETRAHEDRA = {"tetra": 4, "tetra4": 4, "tetra10": 10}
 _READINGS = ("m", "cm", "mm")
 _SMALLEST, _LARGEST = 5e-3, 2.0
 
@@ -43,7 +40,7 @@ class VolumeMesh:
         bodies: separate pieces.
         quality: the least fullness of a cell (see ``harness.sim.solid.tetrahedra.fullness``), times
             ``6 sqrt(2)``: 1 where all are regular, 0 where one is flat.
-        said: what was done to the mesh and what to look at, a sentence each.
+        said: what was read, what was done to the mesh and what to look at, a sentence each.
     """
 
     mesh: QuadraticMesh
@@ -78,28 +75,27 @@ def read_volume(path: Path, units: str | None = None) -> VolumeMesh | None:
         raise WrongUse(f"unknown unit {units!r} for a mesh; say one of {', '.join(METRES)}")
     known = path.is_file() and path.stat().st_size > 0 and path.suffix.lower() not in _SURFACES_ONLY
     read = _read(path) if known else None
-    kinds = sorted({block.type for block in read.cells if block.type.startswith(_SOLIDS)}) if read else []
+    kinds = sorted({block.type for block in read.cells if block.type.startswith(SOLIDS)}) if read else []
     if read is None or not kinds:
         return None
     cells = _cells(read, kinds, path.name)
     nodes = np.asarray(read.points, dtype=np.float64)
     nodes, cells, number, said = _compacted(nodes, cells, path.name)
-    unit = _unit(units, float(np.ptp(nodes, axis=0).max()), path.name)
+    longest = float(np.ptp(nodes, axis=0).max())
+    unit, source = _unit(units, longest, path.name)
     mesh, done, quality = _oriented(nodes * METRES[unit], cells)
     bodies, warned = joints(mesh)
     named = {name: number[np.asarray(nodes_of, dtype=np.int64)] for name, nodes_of in read.point_sets.items()}
     sets = {name: found[found >= 0] for name, found in named.items()}
-    return VolumeMesh(mesh, sets, cells.shape[1], unit, bodies, quality, (*said, *done, *warned))
+    volume = float(signed_volumes(mesh.nodes, mesh.cells).sum())
+    summary = read_line(path.name, bodies, len(mesh.faces), volume, longest * METRES[unit], unit, source)
+    return VolumeMesh(mesh, sets, cells.shape[1], unit, bodies, quality, (summary, *said, *done, *warned))
 
 
 def _read(path: Path) -> Any:
     """What meshio reads."""
-    import meshio
-
     try:
-        with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
-            warnings.simplefilter("ignore")
-            return meshio.read(path)
+        return read_cells(path)
     # The readers raise whatever their parsers meet, and one of them exits: there is no common class.
     except (Exception, SystemExit) as error:
         raise MeshRefused(
@@ -110,7 +106,7 @@ def _read(path: Path) -> Any:
 
 def _cells(read: Any, kinds: list[str], name: str) -> IntArray:
     """``(c, 4)`` or ``(c, 10)``: the file's tetrahedra, in their order."""
-    if not set(kinds) <= set(_TETRAHEDRA) or len({_TETRAHEDRA[kind] for kind in kinds}) > 1:
+    if not set(kinds) <= set(TETRAHEDRA) or len({TETRAHEDRA[kind] for kind in kinds}) > 1:
         raise MeshRefused(
             f"{name} holds cells of kind {', '.join(kinds)}; export it as four-node tetrahedra only, or "
             "ten-node ones only"
@@ -167,11 +163,12 @@ def _oriented(nodes: FloatArray, cells: IntArray) -> tuple[QuadraticMesh, tuple[
     return mesh, tuple(said), quality
 
 
-def _unit(asked: str | None, size: float, name: str) -> str:
+def _unit(asked: str | None, size: float, name: str) -> tuple[str, str]:
+    """The unit, and where it came from."""
     if asked is not None:
-        return asked
+        return asked, "asked"
     fit = [unit for unit in _READINGS if _SMALLEST <= size * METRES[unit] <= _LARGEST]
     if len(fit) == 1:
-        return fit[0]
+        return fit[0], "the only reading of its size"
     said = " or ".join(f"{size:.4g} {unit} ({size * METRES[unit]:.3g} m)" for unit in fit or _READINGS)
     raise WrongUse(f"{name}: the longest side is {size:.4g}: {said}? say --units m, cm, mm or in")

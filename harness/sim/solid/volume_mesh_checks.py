@@ -9,7 +9,7 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.sim.solid.modal_kernels import EDGES
 from harness.sim.solid.modal_mesh import FACES, QuadraticMesh, least_determinant
-from harness.sim.solid.tetrahedra import FLATTEST, fullness, signed_volumes
+from harness.sim.solid.tetrahedra import FLATTEST, fullness, joined_by_faces, signed_volumes
 
 REGULAR = 6.0 * np.sqrt(2.0)
 """Times the fullness of a cell is its quality, 1 where it is regular."""
@@ -175,21 +175,10 @@ def joints(mesh: QuadraticMesh) -> tuple[int, tuple[str, ...]]:
         near = cKDTree(mesh.nodes).query_pairs(_COINCIDENT * float(np.ptp(mesh.nodes, axis=0).max()))
         if near:
             said.append(f"{len(near)} pairs of nodes coincide: merge them if the bodies are to be one")
-    hinged = _by_faces(cells) - bodies
+    hinged = joined_by_faces(cells) - bodies
     if hinged > 0:
         said.append(
             f"{hinged} parts are joined to others at an edge or a point only: they may turn about it, and "
             "modes near 0 Hz are such turns"
         )
     return bodies, tuple(said)
-
-
-def _by_faces(cells: IntArray) -> int:
-    """How many parts cells make that count as joined only where they share a face."""
-    faces = np.sort(cells[:, FACES].reshape(-1, 3), axis=1)
-    _, which = np.unique(faces, axis=0, return_inverse=True)
-    owner = np.repeat(np.arange(len(cells)), 4)
-    joined = coo_array((np.ones(len(owner)), (owner, len(cells) + which.ravel())),
-                       shape=(len(cells) + len(faces),) * 2)  # fmt: skip
-    _, number = connected_components(joined, directed=False)
-    return len(np.unique(number[: len(cells)]))

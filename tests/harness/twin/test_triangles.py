@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from harness.basics.arrays import FloatArray
+from harness.basics.errors import MeshRefused
 from harness.basics.geometry import apply, inverse, rotation_from_vector, transform, translation
 from harness.basics.mesh import Mesh
 from harness.twin.triangles import ConvexBody, Solid
@@ -112,3 +113,10 @@ def test_the_planes_of_a_hull_hold_its_points() -> None:
     body = ConvexBody.of_points(points)
     assert (points @ body.planes[:, :3].T + body.planes[:, 3]).max() < 1e-10
     assert not np.all((points * 1.2) @ body.planes[:, :3].T + body.planes[:, 3] < 0)
+
+
+def test_a_flat_sheet_is_no_body_that_stands_on_the_bench() -> None:
+    corners = 0.1 * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    sheet = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    with pytest.raises(MeshRefused, match="100 x 100 x 0 mm is flat"):
+        _ = Solid(sheet).hull
