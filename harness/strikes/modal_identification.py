@@ -5,9 +5,12 @@ Both are lines that poles explain (`harness.strikes.pole_fit`). How many poles t
 modes are added where what is left of the lines stands above the noise about it, with a stated chance of a
 false alarm, and all poles are refined together after each round, until nothing stands out. What a
 misfit of a strong mode leaves beside it, a non-linearity or a support that gives way, is no mode: where
-the model explains all but a stated share of a line's power, nothing is added.
+the model explains all but a stated share of a line's power, nothing is added. A mode that lies elsewhere
+in each row, of a structure that changed between them, is one mode (`harness.strikes.moved_modes`); a pole
+that does not decay is no mode of a passive structure.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,12 +20,16 @@ from threadpoolctl import threadpool_limits
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, read_only
 from harness.basics.clipping import is_clipped
 from harness.basics.errors import DataRefused, WrongUse
+from harness.strikes.moved_modes import MovedMode, moved_modes
 from harness.strikes.pole_fit import ComplexArray, PoleFit, SpectralLines, fit_poles
 from harness.strikes.pole_search import PoleSearch, new_poles
 
 _LEAST_SAMPLES = 64
 _LINES_A_MODE = 6
 """Or modes could follow the noise of a short record."""
+
+_UNEVEN = 0.01
+"""Of a line: as printed frequencies are off by their rounding."""
 
 _ROUNDING = 1e-13
 """Of the strongest line: what is left below it is arithmetic."""
@@ -34,11 +41,13 @@ class IdentifiedMode:
 
     Attributes:
         frequency: Hz, undamped.
-        damping: 1/s; noise can bring that of a sharp peak below zero.
+        damping: 1/s.
         frequency_sigma: Hz, one standard deviation, by what the fit left about the peak.
         damping_sigma: 1/s.
         level: dB of its power in the band against the strongest mode's.
         lines: ``(k, f)`` what it adds to each line of the band.
+        spread: Hz, one standard deviation from row to row of a mode that moved between them; zero of one that
+            all rows have in one place.
     """
 
     frequency: float
@@ -47,6 +56,7 @@ class IdentifiedMode:
     damping_sigma: float
     level: float
     lines: ComplexArray
+    spread: float = 0.0
 
     @property
     def ratio(self) -> float:
@@ -64,7 +74,9 @@ class Identified:
     """What was found.
 
     Attributes:
-        modes: by ascending frequency.
+        modes: by ascending frequency; each has a damping above zero.
+        undamped: poles that do not decay, likewise: driven from outside, as by the mains, or sharper than the
+            lines tell. No mode of a passive structure.
         frequencies: ``(f,)`` Hz, of the lines that were fitted.
         residual: ``(k, f)`` of them that no mode explains.
         unexplained: share of the lines' power in ``residual``.
@@ -74,11 +86,18 @@ class Identified:
     """
 
     modes: tuple[IdentifiedMode, ...]
+    undamped: tuple[IdentifiedMode, ...]
     frequencies: FloatArray
     residual: ComplexArray
     unexplained: float
     full: bool
     clipped: BoolArray
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know of the modes, in sentences."""
+        moved = (_moved_note(mode) for mode in self.modes if mode.spread > 0.0)
+        return (*moved, *(_undamped_note(pole) for pole in self.undamped))
 
 
 def modes_of_decay(decays: AnyArray, rate: float, search: PoleSearch | None = None) -> Identified:
@@ -118,7 +137,8 @@ def modes_of_response(
     no skirt follows.
 
     Args:
-        frequencies: ``(f,)`` Hz, evenly spaced; a line at 0 Hz is left out.
+        frequencies: ``(f,)`` Hz, evenly spaced but for the rounding of printed ones, up to a hundredth of a
+            line; a line at 0 Hz is left out.
         responses: ``(k, f)``, one row a pair of places.
         search: how modes are looked for.
         decay: 1/s of an exponential window that was put on forces and responses; dampings are freed of it.
@@ -130,16 +150,33 @@ def modes_of_response(
     search = search or PoleSearch()
     values = np.atleast_2d(np.asarray(responses, np.complex128))
     _check(values, "the transfer function", "line")
-    steps = np.diff(frequencies)
-    if values.shape[1] != len(frequencies) or np.ptp(steps) > 1e-6 * steps.mean():
-        raise DataRefused(
-            f"{values.shape[1]} lines at {len(frequencies)} frequencies, {steps.min():g} to {steps.max():g} "
-            "Hz apart; a response is read on evenly spaced frequencies, one a line"
-        )
-    inner = frequencies > 0.0
-    lines = SpectralLines(np.asarray(frequencies, np.float64)[inner], values[:, inner], None)
+    even = _evenly_spaced(np.asarray(frequencies, np.float64), values.shape[1])
+    inner = even > 0.5 * (even[1] - even[0])
+    lines = SpectralLines(even[inner], values[:, inner], None)
     found = _identified(_banded(lines, search), search, _ROUNDING)
-    return replace(found, modes=tuple(_without(mode, decay) for mode in found.modes)) if decay else found
+    if not decay:
+        return found
+    modes, undamped = _parted([_without(pole, decay) for pole in (*found.modes, *found.undamped)])
+    return replace(found, modes=modes, undamped=undamped)
+
+
+def _evenly_spaced(frequencies: FloatArray, lines: int) -> FloatArray:
+    """``(f,)`` Hz: the straight line through frequencies that were rounded."""
+    steps = np.diff(frequencies)
+    if frequencies.shape != (lines,) or not (np.isfinite(frequencies).all() and steps.min() > 0.0):
+        raise DataRefused(
+            f"{lines} lines at frequencies of shape {frequencies.shape}, the least step "
+            f"{steps.min(initial=np.inf):g} Hz; give one rising frequency a line"
+        )
+    number = np.arange(lines, dtype=np.float64)
+    even = np.polyval(np.polyfit(number, frequencies, 1), number)
+    off = float(np.abs(frequencies - even).max())
+    if off > _UNEVEN * float(steps.mean()):
+        raise DataRefused(
+            f"the frequencies are up to {off:g} Hz off evenly spaced ones of {steps.mean():g} Hz (at most "
+            f"{_UNEVEN:g} of a line); a response is read on evenly spaced frequencies, one a line"
+        )
+    return np.asarray(even)
 
 
 def _without(mode: IdentifiedMode, decay: float) -> IdentifiedMode:
@@ -185,7 +222,8 @@ def _searched(lines: SpectralLines, search: PoleSearch, rounding: float) -> Iden
     most = min(search.most, len(lines.frequencies) // _LINES_A_MODE)
     full = False
     while not full:
-        new = new_poles(lines, fit, search, rounding)
+        moved = moved_modes(lines, fit, search)
+        new = [one for one in new_poles(lines, fit, search, rounding) if not _stands_for(moved, one[0])]
         room = most - len(fit.omegas)
         full = len(new) > room
         if len(new) == 0 or room == 0:
@@ -193,34 +231,79 @@ def _searched(lines: SpectralLines, search: PoleSearch, rounding: float) -> Iden
         omegas = np.concatenate([fit.omegas, [omega for omega, _ in new[:room]]])
         decays = np.concatenate([fit.decays, [decay for _, decay in new[:room]]])
         fit = fit_poles(lines, omegas, decays, search.skirt)
-    return _told(lines, fit, full)
+    return _described(lines, fit, moved_modes(lines, fit, search), full)
 
 
-def _told(lines: SpectralLines, fit: PoleFit, full: bool) -> Identified:
-    powers = np.sum(np.abs(fit.model) ** 2, axis=(1, 2))
-    loudest = float(powers.max(initial=0.0))
-    count = len(fit.omegas)
-    edges = 2.0 * np.pi * lines.frequencies[[0, -1]]
-    sigmas = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    inside = (fit.omegas >= edges[0]) & (fit.omegas <= edges[1]) & (powers > 0.0)
-    modes = [
-        IdentifiedMode(
-            frequency=float(fit.omegas[k] / (2.0 * np.pi)),
-            damping=float(fit.decays[k]),
-            frequency_sigma=float(fit.omegas[k] / (2.0 * np.pi) * sigmas[k]),
-            damping_sigma=float(fit.omegas[k] * sigmas[count + k]),
-            level=float(10.0 * np.log10(powers[k] / loudest)),
-            lines=read_only(fit.model[k]),
-        )
-        for k in np.argsort(fit.omegas)
-        if inside[k]
-    ]
+def _stands_for(moved: Sequence[MovedMode], omega: float) -> bool:
+    return any(mode.holds(omega) for mode in moved)
+
+
+def _described(lines: SpectralLines, fit: PoleFit, moved: Sequence[MovedMode], full: bool) -> Identified:
+    grouped = {int(member) for mode in moved for member in mode.members}
+    poles = [_pole(fit, k) for k in range(len(fit.omegas)) if k not in grouped]
+    poles += [_moved_pole(fit, mode) for mode in moved]
+    loudest = max((pole.level for pole in poles), default=0.0)
+    low, high = lines.frequencies[[0, -1]]
+    inside = [pole for pole in poles if low <= pole.frequency <= high and pole.level > 0.0]
+    levelled = [replace(pole, level=float(10.0 * np.log10(pole.level / loudest))) for pole in inside]
     whole = float(np.sum(np.abs(lines.values) ** 2))
+    modes, undamped = _parted(levelled)
     return Identified(
-        tuple(modes),
-        read_only(lines.frequencies),
-        read_only(fit.residual),
-        float(np.sum(np.abs(fit.residual) ** 2)) / whole,
-        full,
-        read_only(np.zeros(len(lines.values), np.bool_)),
+        modes=modes,
+        undamped=undamped,
+        frequencies=read_only(lines.frequencies),
+        residual=read_only(fit.residual),
+        unexplained=float(np.sum(np.abs(fit.residual) ** 2)) / whole,
+        full=full,
+        clipped=read_only(np.zeros(len(lines.values), np.bool_)),
+    )
+
+
+def _parted(
+    poles: Sequence[IdentifiedMode],
+) -> tuple[tuple[IdentifiedMode, ...], tuple[IdentifiedMode, ...]]:
+    """Those that decay and those that do not, each by ascending frequency."""
+    ordered = sorted(poles, key=lambda pole: pole.frequency)
+    decaying = tuple(pole for pole in ordered if pole.damping > 0.0)
+    return decaying, tuple(pole for pole in ordered if not pole.damping > 0.0)
+
+
+def _pole(fit: PoleFit, k: int) -> IdentifiedMode:
+    """A pole that all rows share; its level is still a power."""
+    omega, sigmas = float(fit.omegas[k]), np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    return IdentifiedMode(
+        frequency=omega / (2.0 * np.pi),
+        damping=float(fit.decays[k]),
+        frequency_sigma=omega / (2.0 * np.pi) * float(sigmas[k]),
+        damping_sigma=omega * float(sigmas[len(fit.omegas) + k]),
+        level=float(np.sum(np.abs(fit.model[k]) ** 2)),
+        lines=read_only(fit.model[k]),
+    )
+
+
+def _moved_pole(fit: PoleFit, mode: MovedMode) -> IdentifiedMode:
+    """A mode that several shared poles stood for; its level is still a power."""
+    lines = fit.model[mode.members].sum(axis=0)
+    return IdentifiedMode(
+        frequency=mode.omega / (2.0 * np.pi),
+        damping=mode.decay,
+        frequency_sigma=mode.omega_sigma / (2.0 * np.pi),
+        damping_sigma=mode.decay_sigma,
+        level=float(np.sum(np.abs(lines) ** 2)),
+        lines=read_only(lines),
+        spread=mode.spread / (2.0 * np.pi),
+    )
+
+
+def _moved_note(mode: IdentifiedMode) -> str:
+    return (
+        f"the structure changed between the rows: the mode at {mode.frequency:.6g} Hz lies "
+        f"{mode.spread:.2g} Hz (one standard deviation) elsewhere from row to row"
+    )
+
+
+def _undamped_note(pole: IdentifiedMode) -> str:
+    return (
+        f"{pole.frequency:.6g} Hz does not decay (damping {pole.damping:.2g} 1/s, one standard deviation "
+        f"{pole.damping_sigma:.2g}): driven from outside, or sharper than the lines tell; it is no mode"
     )

@@ -13,7 +13,7 @@ from harness.strikes.pole_fit import PoleFit, SpectralLines
 _MEDIAN_COSTS = 1.0 / np.log(2.0) ** 2
 """Variance of the median of an exponential distribution over that of its mean, both scaled to the mean."""
 
-_APART = 8
+APART = 8
 """Half widths from a stronger peak within which a peak waits for the next round."""
 
 
@@ -81,9 +81,9 @@ def _spread_out(
     known, widths = fit.omegas / (2.0 * np.pi), fit.decays / (2.0 * np.pi)
     for top in tops:
         frequency, half = float(lines.frequencies[top]), _half_width(lines, power, int(top))
-        beside = np.abs(known - frequency) < 2.0 * _APART * widths
+        beside = np.abs(known - frequency) < 2.0 * APART * widths
         broad = max(half, 2.0 * float(widths[beside].max(initial=0.0)))
-        if all(abs(frequency - other) > _APART * max(broad, breadth) for other, breadth in reach):
+        if all(abs(frequency - other) > APART * max(broad, breadth) for other, breadth in reach):
             reach.append((frequency, broad))
             # A hump at the lowest lines is a mode near critical damping, as fast as it is broad.
             chosen.append((2.0 * np.pi * max(frequency, half), 2.0 * np.pi * half))

@@ -209,6 +209,8 @@ def main() -> None:
     console = Console(width=130)
     console.print(beam_table(beam_title, beam))
     console.print(ruler_table(bar_title, bar))
+    for note in (*beam.notes, *bar.notes, *decay.notes):
+        console.print(note)
     console.print(struck_table(struck_title, decay, response))
     console.print(blow_table("blows; a spline's error bound is 5/384 of the fourth difference", forces))
     assert measured.coherence is not None

@@ -12,6 +12,7 @@ from harness.sim.sound.modal_sound import impulse_response
 from harness.strikes.modal_identification import Identified, modes_of_decay, modes_of_response
 from harness.strikes.pole_fit import ComplexArray, SpectralLines, fit_poles
 from harness.strikes.pole_search import PoleSearch
+from tests.oracles.measured_beams import beam_roots, free_shape
 
 RATE = 4000.0
 SAMPLES = 2000
@@ -231,3 +232,70 @@ def test_a_band_without_lines_and_a_rate_of_nothing_are_refused() -> None:
         modes_of_decay(signal, 0.0)
     with pytest.raises(DataRefused, match="evenly"):
         modes_of_response(np.arange(100.0) ** 1.1, np.ones((1, 100)) * np.arange(100.0))
+    for frequencies in (np.arange(100.0)[::-1], np.full(100, np.nan), np.arange(99.0)):
+        with pytest.raises(DataRefused, match="one rising frequency a line"):
+            modes_of_response(frequencies, np.ones((1, 100)) * np.arange(100.0))
+
+
+@pytest.mark.parametrize("step", [0.6103515625, 0.5 + 1.0 / 7.0])
+def test_a_spectrum_printed_with_six_decimals_has_the_same_modes(step: float) -> None:
+    frequencies = step * np.arange(1.0, 701.0)
+    values = accelerance(frequencies)
+    exact, printed = (
+        found(modes_of_response(lines, values, PoleSearch(low=5.0)))
+        for lines in (frequencies, np.asarray(frequencies.round(6)))
+    )
+    assert exact[0] == pytest.approx([52.0, 142.0, 278.0], abs=2e-3)
+    assert printed[0] == pytest.approx(exact[0], rel=1e-8)
+    assert printed[1] == pytest.approx(exact[1], rel=1e-4)
+
+
+ROVING = 974.141
+"""Hz, the sixth mode of a free beam that a hammer roves along."""
+
+
+def roving(moved: float, places: int = 10) -> tuple[FloatArray, ComplexArray, FloatArray]:
+    """Hz, accelerance with noise at places along a beam, and the factor of each row's frequencies."""
+    random = np.random.default_rng(0)
+    frequencies, roots = np.arange(0.0, 1200.0, 0.75), beam_roots("free-free", 6)
+    factors = 1.0 + moved * random.normal(size=places)
+    s, values = 2j * np.pi * frequencies, np.full((places, len(frequencies)), 0.3 + 0j)
+    for root in roots:
+        omega = 2.0 * np.pi * ROVING * (root / roots[-1]) ** 2 * factors[:, None]
+        shape = free_shape(float(root), np.linspace(0.0, 1.0, places))[:, None]
+        values += shape * s**2 / (omega**2 + 4e-4 * omega * s + s**2)
+    noise = random.normal(size=values.shape) + 1j * random.normal(size=values.shape)
+    return frequencies, np.asarray(values + 1e-3 * noise, np.complex128), factors
+
+
+@pytest.mark.parametrize("moved", [0.0, 3e-4, 1e-3])
+def test_a_mode_that_moves_from_row_to_row_is_one_mode_and_that_is_stated(moved: float) -> None:
+    frequencies, values, factors = roving(moved)
+    identified = modes_of_response(frequencies, values, PoleSearch(low=20.0))
+    assert len(identified.modes) == 6
+    assert not identified.undamped
+    sixth = identified.modes[-1]
+    assert sixth.frequency == pytest.approx(ROVING * factors.mean(), abs=3.0 * sixth.frequency_sigma + 1e-3)
+    assert sixth.ratio == pytest.approx(2e-4, rel=0.02)
+    assert sixth.spread == pytest.approx(ROVING * factors.std(), rel=0.5, abs=0.01)
+    assert any("changed between the rows" in note for note in identified.notes) == (moved > 0.0)
+
+
+def test_a_close_pair_in_several_rows_stays_two_modes() -> None:
+    """Rows that all have both, in proportions of their own: no row alone is explained by one pole."""
+    random = np.random.default_rng(1)
+    pair = np.array([300.0, 301.6])
+    signals = np.array([decay(pair, np.array([5.0, 5.0]), random) for _ in range(4)])
+    identified = modes_of_decay(signals + 1e-3 * random.normal(size=signals.shape), RATE)
+    assert found(identified)[0] == pytest.approx(pair, abs=0.02)
+    assert [mode.spread for mode in identified.modes] == [0.0, 0.0]
+
+
+def test_a_tone_that_grows_is_no_mode() -> None:
+    times = np.arange(SAMPLES) / RATE
+    ringing = impulse_response(times, np.array([310.0]), np.array([12.0]))
+    hum = 0.05 * np.exp(0.2 * times) * np.sin(2.0 * np.pi * 50.0 * times)
+    identified = modes_of_decay(ringing + hum, RATE)
+    assert found(identified)[0] == pytest.approx([310.0], rel=1e-9)
+    assert [pole.frequency for pole in identified.undamped] == pytest.approx([50.0], rel=1e-6)
+    assert "50 Hz does not decay" in identified.notes[0]
