@@ -6,7 +6,7 @@ prior (Gauss-Newton, slopes by differences). For errors that are normal, what is
 with what they are off by, is a chi-square of as many degrees as there are independent readings.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from harness.agreement.agreement import Source
 from harness.agreement.arm import twisted
 from harness.agreement.place_noise import PlaceNoise, twist_covariance
 from harness.agreement.readings import SEEN, PressedContact
+from harness.agreement.stated_error import map_errors
 from harness.agreement.subject import Subject
 from harness.basics.arrays import BoolArray, FloatArray, block_means
 from harness.basics.errors import OutOfDomain
@@ -30,7 +31,6 @@ _ASIDE = ((0.0, 0.0), (1.2e-3, 0.0), (-1.2e-3, 0.0), (0.0, 1.2e-3), (0.0, -1.2e-
 """m along the gel's axes from the stated pose to those at which a search may start: where the model does not
 reach the gel, or an edge lies on the other side of it, no slope leads to the contact."""
 
-_STARTS = 2
 _POORLY = 1.5
 """Times the degrees of freedom, from which on a chi-square may be that of a wrong minimum."""
 
@@ -80,7 +80,8 @@ class Surfaces:
     Attributes:
         read: ``(rows, columns)`` m of indentation, in blocks.
         modelled: the same.
-        variance: ``(rows, columns)`` m^2 of their difference.
+        variances: ``(s, rows, columns)`` m^2 of their difference, for each of ``s`` errors of the source that
+            are as probable as each other.
         compared: ``(rows, columns)`` where they were compared.
         pitch: m, a side of a block.
         twist: ``(6,)`` m and rad from the stated pose, in base.
@@ -90,7 +91,7 @@ class Surfaces:
 
     read: FloatArray
     modelled: FloatArray
-    variance: FloatArray
+    variances: FloatArray
     compared: BoolArray
     pitch: float
     twist: FloatArray
@@ -111,7 +112,7 @@ def likeliest(
         noise: of the surface.
 
     Raises:
-        OutOfDomain: no network was made for the stated pose.
+        OutOfDomain: no network was made for the stated pose, or for those at which it would fit.
         WrongUse: the network is of another gel or object.
     """
     return _Search(subject, source, contact, places, noise).best()
@@ -137,6 +138,8 @@ class _Search:
         rim = round(noise.rim / self._pitch)
         self._inside = np.zeros(self._read.shape, np.bool_)
         self._inside[rim : -rim or None, rim : -rim or None] = True
+        self._errors = map_errors(subject, source)
+        self._error = float(np.sqrt(np.mean(self._errors**2)))
         anchor = subject.base_from_object[:3, 3]
         self._root = np.linalg.cholesky(twist_covariance(places, self._pose, anchor))
 
@@ -144,93 +147,127 @@ class _Search:
         at, modelled = self._best()
         compared, twist = self._compared(modelled), self._root @ at[:6]
         gain = 1.0 + self._noise.gain * float(at[6])
-        variance = self._variance(modelled)
-        return Surfaces(self._read, modelled, variance, compared, self._pitch, twist, gain, float(at @ at))
+        variances = np.array([self._variance(modelled, compared, error) for error in self._errors])
+        return Surfaces(self._read, modelled, variances, compared, self._pitch, twist, gain, float(at @ at))
 
     def _best(self) -> tuple[FloatArray, FloatArray]:
         """The unknowns and the surface of the best search; a second one only where the first fits badly."""
         found: list[tuple[float, FloatArray, FloatArray]] = []
-        for start in self._starts():
-            at = self._settled(start)
-            (modelled,) = self._modelled([at])
-            found.append((self._whole_cost(modelled, at), at, modelled))
-            if found[-1][0] < _POORLY * self._dof(self._compared(modelled)):
-                break
+        for places in (_ASIDE[:1], _ASIDE[1:]):
+            at, free = self._settled(self._start(places))
+            (modelled,) = self._simulated([at])
+            if modelled is None:
+                continue
+            modelled = self._shown(modelled, at)
+            cost = self._whole_cost(modelled, at)
+            if cost < _POORLY * self._dof(self._compared(modelled)):
+                return at, modelled
+            if free:
+                found.append((cost, at, modelled))
+        if not found:
+            raise OutOfDomain(
+                f"the touch's {self._source} was made neither for the stated pose of the gel nor for those "
+                "about it at which it would fit; compare with --reference"
+            )
         return min(found, key=lambda one: one[0])[1:]
 
-    def _starts(self) -> list[FloatArray]:
-        """The likeliest of poses about the stated one."""
-        # A network was made for presses about one place, and takes longer than a rasteriser.
-        places = _ASIDE[:1] if self._source == "network" else _ASIDE
+    def _start(self, places: Sequence[tuple[float, float]]) -> FloatArray:
+        """The likeliest of poses about the stated one; the stated one where the source knows none of them."""
         moves = np.array([(*across, deeper) for across in places for deeper in _DEEPER])
         twists = np.column_stack([moves @ self._pose[:3, :3].T, np.zeros_like(moves)])
         tried = np.column_stack([np.linalg.solve(self._root, twists.T).T, np.zeros((len(moves), 2))])
-        try:
-            surfaces = self._modelled(tried)
-        except OutOfDomain:  # some of them are outside of what a network was made for
-            return [np.zeros(8)]
-        costs = [self._whole_cost(one, at) for one, at in zip(surfaces, tried, strict=True)]
-        return [tried[k] for k in np.argsort(costs)[:_STARTS]]
+        costs = self._costs(tried, self._whole_cost)
+        best = int(np.argmin(costs))
+        return tried[best] if np.isfinite(costs[best]) else np.zeros(8)
 
-    def _settled(self, at: FloatArray) -> FloatArray:
+    def _settled(self, at: FloatArray) -> tuple[FloatArray, bool]:
+        """The end of a search, and whether it was free to end elsewhere."""
+        free = True
         for _ in range(_ROUNDS):
-            try:
-                at, gained = self._round(at)
-            except OutOfDomain:  # a network ends here; a start outside of it is refused by ``_best``
-                break
+            at, gained, free = self._round(at)
             if gained < _SETTLED:
                 break
-        return at
+        return at, free
 
     def _whole_cost(self, modelled: FloatArray, at: FloatArray) -> float:
         """The chi-square where either of both touches; infinite where neither does."""
         mask = self._compared(modelled)
         return self._cost(modelled, at, mask, self._weights(modelled, mask)) if mask.any() else np.inf
 
-    def _round(self, at: FloatArray) -> tuple[FloatArray, float]:
-        """The next unknowns, and the chi-square gained."""
-        steps = _STEPS / np.linalg.norm(self._root, axis=1)
-        surfaces = self._simulated([at, *(at + step for step in np.eye(8)[:6] * steps[:, None])])
-        here, *around = (self._shown(surface, at) for surface in surfaces)
+    def _round(self, at: FloatArray) -> tuple[FloatArray, float, bool]:
+        """The next unknowns, the chi-square gained, and whether the source knows a whole step from here."""
+        steps = np.column_stack([np.diag(_STEPS / np.linalg.norm(self._root, axis=1)), np.zeros((6, 2))])
+        surface, *ahead = self._simulated([at, *(at + steps)])
+        if surface is None:
+            return at, 0.0, False
+        here = self._shown(surface, at)
         mask = self._compared(here)
         if not mask.any():
-            return at, 0.0
-        around += [self._shown(surfaces[0], at + step) for step in _STEP * np.eye(8)[6:]]
-        slopes = np.array([(one - here)[mask] for one in around]).T / np.append(steps, [_STEP, _STEP])
+            return at, 0.0, True
+        moved = self._slopes_of_pose(here, at, steps, ahead)
+        shown = [(self._shown(surface, at + step) - here) / _STEP for step in _STEP * np.eye(8)[6:]]
+        slopes = np.array([slope[mask] for slope in (*moved, *shown)]).T
         weights, gaps = self._weights(here, mask), (self._read - here)[mask]
         weighted = weights[:, None] * slopes
         full = np.linalg.solve(weighted.T @ slopes + np.eye(8), weighted.T @ gaps - at)
-        tried = [at + share * full for share in _SHORTEN]
-        surfaces = self._modelled(tried)
-        costs = [self._cost(one, w, mask, weights) for one, w in zip(surfaces, tried, strict=True)]
-        best = int(np.argmin(costs))
+        tried = np.array([at + share * full for share in _SHORTEN])
+        costs = self._costs(tried, lambda one, then: self._cost(one, then, mask, weights))
+        best, free = int(np.argmin(costs)), bool(np.isfinite(costs[0]))
         gained = self._cost(here, at, mask, weights) - costs[best]
-        return (tried[best], gained) if gained > 0.0 else (at, 0.0)
+        return (tried[best], gained, free) if gained > 0.0 else (at, 0.0, free)
+
+    def _slopes_of_pose(
+        self, here: FloatArray, at: FloatArray, steps: FloatArray, ahead: Sequence[FloatArray | None]
+    ) -> list[FloatArray]:
+        """Change of the surface with each unknown of the pose, by a step to a side that the source knows."""
+        slopes = []
+        for step, one in zip(steps, ahead, strict=True):
+            way, moved = (step, one) if one is not None else (-step, self._simulated([at - step])[0])
+            known = None if moved is None else self._shown(moved, at) - here
+            # Where neither side is known the unknown stays what it is.
+            slopes.append(np.zeros_like(here) if known is None else known / way.sum())
+        return slopes
+
+    def _costs(self, tried: FloatArray, cost: Callable[[FloatArray, FloatArray], float]) -> FloatArray:
+        """``(n,)`` of unknowns ``(n, 8)``; infinite where the source was not made for the pose."""
+        surfaces = zip(self._simulated(tried), tried, strict=True)
+        return np.array([np.inf if one is None else cost(self._shown(one, at), at) for one, at in surfaces])
 
     def _cost(self, modelled: FloatArray, at: FloatArray, mask: BoolArray, weights: FloatArray) -> float:
         return float(weights @ (self._read - modelled)[mask] ** 2 + at @ at)
 
     def _weights(self, modelled: FloatArray, mask: BoolArray) -> FloatArray:
         """1/m^2 of each block: blocks beside each other are off alike."""
-        return self._dof(mask) / int(mask.sum()) / self._variance(modelled)[mask]
+        return self._dof(mask) / int(mask.sum()) / self._variance(modelled, mask, self._error)[mask]
 
-    def _variance(self, modelled: FloatArray) -> FloatArray:
+    def _variance(self, modelled: FloatArray, mask: BoolArray, error: float) -> FloatArray:
+        """m^2 of each block, where ``mask`` is compared and the source's map is off by ``error`` in m."""
         down, across = np.gradient(modelled, self._pitch)
-        return np.asarray(self._noise.rms**2 + self._noise.aside**2 * (down**2 + across**2))
+        edges = self._noise.aside**2 * (down**2 + across**2)
+        # What a map is off by lies where the object shapes the gel: elsewhere both are flat.
+        own = error**2 * mask.size / max(1, int(mask.sum()))
+        return np.asarray(self._noise.rms**2 + edges + own)
 
     def _dof(self, mask: BoolArray) -> float:
         """So many patches of a contact are off independently of each other."""
         return max(1.0, int(mask.sum()) * (self._pitch / self._noise.length) ** 2)
 
-    def _modelled(self, tried: Sequence[FloatArray] | FloatArray) -> list[FloatArray]:
-        return [self._shown(one, at) for one, at in zip(self._simulated(tried), tried, strict=True)]
+    def _simulated(self, tried: Sequence[FloatArray] | FloatArray) -> list[FloatArray | None]:
+        """The gel's surfaces in blocks, by pose alone; None of a pose that the source was not made for."""
+        try:
+            return [self._coarse(surface) for surface in self._surfaces(tried)]
+        except OutOfDomain:
+            if len(tried) == 1:
+                return [None]
+        half = len(tried) // 2
+        return [*self._simulated(tried[:half]), *self._simulated(tried[half:])]
 
-    def _simulated(self, tried: Sequence[FloatArray] | FloatArray) -> list[FloatArray]:
-        """The gel's surfaces in blocks, by pose alone."""
+    def _surfaces(self, tried: Sequence[FloatArray] | FloatArray) -> FloatArray:
+        """``(n, rows, columns)`` m of the gel's surface."""
         poses = np.array([twisted(self._pose, self._root @ at[:6]) for at in tried])
         given = {"contact.gel_from_object": inverse(poses) @ self._subject.base_from_object}
-        surfaces = self._subject.simulated("touch", self._source, ("touch.gel",), given)["touch.gel"]
-        return [self._coarse(surface) for surface in surfaces]
+        found: FloatArray = self._subject.simulated("touch", self._source, ("touch.gel",), given)["touch.gel"]
+        return found
 
     def _shown(self, surface: FloatArray, at: FloatArray) -> FloatArray:
         """A surface as its picture would show it, with its gain and its skirt."""

@@ -1,25 +1,25 @@
-"""A microphone at rest: at each resonance the strikes are heard in phase with each other, or opposed.
+"""A microphone at rest: a mode is heard in phase with itself, or opposed, whichever place was struck.
 
-A mode answers every strike with one waveform times a real gain, wherever the object is struck, so that its
-phase between two strikes is 0 or 180 degrees. A microphone, or an object, that moves between strikes turns
-it.
+A mode answers every strike with one waveform times a real gain, so that its shares of the strikes are real
+but for one complex factor. A microphone, or an object, that moves between strikes turns them.
 Two modes at one peak, each heard with a phase of its own, are out of phase though nothing moved, so that only
 those peaks count at which the model has a single mode: few of a solid of revolution, whose modes are paired.
-Of these a small share is out of phase by chance, and how many there are is binomial.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom
 
-from harness.agreement.agreement import Residual
 from harness.basics.arrays import FloatArray
 from harness.strikes.peaks import Peak
-from harness.strikes.spectra import ComplexArray
 
-_LEAST = 1.0e-300
+_LEAST = 1.0e-7
+"""Of a share: strikes that are in phase to the last digit have a logarithm too."""
+
+_FEWEST = 3
+
+_NEXT = 0.01
+"""Logarithm between frequencies, below which a model does not know how far a mode is from a peak."""
 
 
 @dataclass(frozen=True)
@@ -27,45 +27,58 @@ class PhaseNoise:
     """How far strikes may be out of phase at a resonance.
 
     Attributes:
-        within: rad, between two strikes of one mode.
-        strong: share of the loudest strike's amplitude from which on a phase is read.
+        out_of_phase: share of a mode's energy that is out of phase, in the median.
+        spread: one sigma of its logarithm.
+        skirts: of the skirts that the modes around leave at a peak, what is left of them once a level part is
+            taken off.
         alone: least logarithm between a mode's frequency and the next one's, of a mode that is alone.
         broad: half width of a peak over its frequency, from which on it may be more than one mode whatever
             the model says.
         near: most logarithm between a peak's frequency and that of its mode.
-        clutter: share of such peaks that are more than one mode all the same, or read wrongly.
     """
 
-    within: float = np.radians(20.0)
-    strong: float = 0.25
-    alone: float = 0.02
+    out_of_phase: float = 0.8e-4
+    spread: float = 2.6
+    skirts: float = 0.5
+    alone: float = 0.04
     broad: float = 0.004
     near: float = 0.04
-    clutter: float = 0.05
 
 
-def phase_residual(step: int, peaks: Sequence[Peak], modes: FloatArray, noise: PhaseNoise) -> Residual | None:
-    """How improbable it is that so many peaks are out of phase, as ``-2 ln p``; None where none has a phase.
+def phase_score(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> float | None:
+    """How far strikes are out of phase at a peak, in sigmas above the median; None where it has no phase.
 
     Args:
-        step: the last one that was struck.
-        peaks: resonances that the strikes have in common.
+        peak: a resonance that the strikes have in common.
         modes: ``(m,)`` Hz of the model, with the factor that the object's frequencies have over it.
         noise: of the phases.
     """
-    shares = [peak.y[peak.heard] for peak in peaks if is_single(peak, modes, noise)]
-    apart = np.array([angle for y in shares if (angle := phase_apart(y, noise.strong)) is not None])
-    if not len(apart):
+    if np.count_nonzero(peak.heard) < _FEWEST or not is_single(peak, modes, noise):
         return None
-    beyond = int(np.count_nonzero(apart > noise.within))
-    probability = float(binom.sf(beyond - 1, len(apart), noise.clutter))
-    numbers = {
-        "resonances": float(len(apart)),
-        "out_of_phase": float(beyond),
-        "median_rad": float(np.median(apart)),
-        "probability": probability,
-    }
-    return Residual(step, "phases", -2.0 * float(np.log(max(probability, _LEAST))), 2.0, numbers)
+    y = peak.y[peak.heard]
+    parts = np.array([y.real, y.imag])
+    least, most = np.linalg.eigvalsh(parts @ parts.T)
+    share = max(float(least / (least + most)), _LEAST)
+    around = np.sort(skirts_at(peak, modes))[:-1]
+    # Of what has a phase of its own, half of the energy is out of phase.
+    noisy = 0.5 * float(np.sum(peak.sigma[peak.heard] ** 2) / (least + most) + noise.skirts**2 * around.sum())
+    return float(np.log(share / (noise.out_of_phase + noisy)) / noise.spread)
+
+
+def skirts_at(peak: Peak, modes: FloatArray) -> FloatArray:
+    """``(m,)``: the energy of each mode's skirt at a peak over its own, were it as broad and as loud.
+
+    Args:
+        peak: a resonance.
+        modes: ``(m,)`` Hz.
+    """
+    apart = np.maximum(np.abs(np.log(modes / peak.frequency)), _NEXT)
+    return np.asarray((half_width(peak) / apart) ** 2)
+
+
+def half_width(peak: Peak) -> float:
+    """Half of a resonance's width over its frequency; 0 where the scatter of its fit is below zero."""
+    return max(peak.damping, 0.0) / (2.0 * np.pi * peak.frequency)
 
 
 def is_single(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> bool:
@@ -75,25 +88,6 @@ def is_single(peak: Peak, modes: FloatArray, noise: PhaseNoise) -> bool:
     apart = np.abs(np.log(modes / peak.frequency))
     nearest = int(np.argmin(apart))
     others = np.abs(np.log(np.delete(modes, nearest) / modes[nearest]))
-    width = max(peak.damping, 0.0) / (2.0 * np.pi * peak.frequency)
-    return bool(width < noise.broad and apart[nearest] < noise.near and (others > noise.alone).all())
-
-
-def phase_apart(y: ComplexArray, strong: float) -> float | None:
-    """Rad, 0 to pi / 2: how far any strong strike is from being in phase with the loudest, or opposed to it.
-
-    Args:
-        y: ``(K,)`` the strikes' complex shares.
-        strong: share of the loudest amplitude from which on a strike counts.
-
-    Returns:
-        None where fewer than two count.
-    """
-    if len(y) < 2:
-        return None
-    loudest = y[int(np.argmax(np.abs(y)))]
-    counting = y[np.abs(y) >= strong * np.abs(loudest)]
-    if len(counting) < 2:
-        return None
-    # Squared, what is opposed is in phase.
-    return float(np.abs(np.angle((counting * np.conj(loudest)) ** 2)).max() / 2.0)
+    return bool(
+        half_width(peak) < noise.broad and apart[nearest] < noise.near and (others > noise.alone).all()
+    )

@@ -12,12 +12,16 @@ import numpy as np
 from scipy.stats import binom
 
 from harness.agreement.agreement import Residual, SenseResiduals, SideBySide, Source
-from harness.agreement.phases import PhaseNoise, phase_residual
+from harness.agreement.phases import PhaseNoise
 from harness.agreement.readings import PressedContact
+from harness.agreement.stated_error import gain_error
+from harness.agreement.strike_shares import ShareNoise, StruckModes, microphone_residual
 from harness.agreement.subject import Subject
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import TouchstoneError
+from harness.basics.geometry import inverse
 from harness.sim.modal.modal import from_arrays
+from harness.sim.modal.modes import Modes
 from harness.strikes.peaks import analyse
 
 _GRID = 1.0e-3
@@ -61,18 +65,20 @@ def compare_sound(
     source: Source,
     contacts: Sequence[PressedContact],
     noise: ResonanceNoise | None = None,
+    shares: ShareNoise | None = None,
     phases: PhaseNoise | None = None,
 ) -> SenseResiduals:
-    """The resonances of a run against a model's modes, and the phases of its strikes against each other.
+    """The resonances of a run against a model's modes, and how its strikes share them.
 
     Args:
         subject: the object.
         source: the ObjectFile's network, or finite elements.
         contacts: of the run.
         noise: of the resonances; None for the stated one.
+        shares: of the strikes' levels; None for the stated one.
         phases: of the strikes; None for the stated one.
     """
-    noise, phases = noise or ResonanceNoise(), phases or PhaseNoise()
+    noise, shares, phases = noise or ResonanceNoise(), shares or ShareNoise(), phases or PhaseNoise()
     struck = [contact for contact in contacts if contact.seen.strike is not None]
     if not struck:
         return SenseResiduals("sound", source, (), "no contact was struck")
@@ -82,12 +88,35 @@ def compare_sound(
         return SenseResiduals("sound", source, (), "no resonance stood out of the noise in two strikes")
     try:
         stored = subject.simulated("audio", source, ("object.modes",), {})["object.modes"]
+        modes, error = from_arrays(stored), gain_error(subject, source)
     except TouchstoneError as refusal:
         return SenseResiduals("sound", source, (), str(refusal))
-    modes, last = np.asarray(from_arrays(stored).frequencies), struck[-1].step
-    resonances = resonance_residual(last, peaks, modes, noise)
-    moved = phase_residual(last, evidence.peaks, resonances.numbers["factor"] * modes, phases)
-    return SenseResiduals("sound", source, (resonances,) if moved is None else (resonances, moved))
+    resonances = resonance_residual(struck[-1].step, peaks, np.asarray(modes.frequencies), noise)
+    places = struck_modes(subject, struck, modes, resonances.numbers["factor"], error)
+    still = microphone_residual(struck[-1].step, evidence.peaks, places, shares, phases)
+    return SenseResiduals("sound", source, (resonances,) if still is None else (resonances, still))
+
+
+def struck_modes(
+    subject: Subject, struck: Sequence[PressedContact], modes: Modes, factor: float, error: float
+) -> StruckModes:
+    """A model's modes where the strikes fell: at the places pressed, along the gel's axis.
+
+    Args:
+        subject: the object, where the scene states it.
+        struck: contacts that were.
+        modes: of the object.
+        factor: of the object's frequencies over the model's.
+        error: of a gain, that its source states.
+    """
+    poses = inverse(subject.base_from_object) @ np.array([one.seen.base_from_gel for one in struck])
+    axes, depths = poses[:, :3, 2], np.array([max(0.0, float(one.heights.max())) for one in struck])
+    # Unit to the last digit, whatever the controller's quaternions are.
+    axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    points = poses[:, :3, 3] - depths[:, None] * axes
+    normal = np.einsum("nmi,ni->nm", modes.shapes, modes.normals)
+    gains, squares = modes.gains(points, axes), np.asarray(np.mean(normal**2, axis=0))
+    return StruckModes(factor * modes.frequencies, gains, squares, error)
 
 
 def resonance_residual(step: int, peaks: FloatArray, modes: FloatArray, noise: ResonanceNoise) -> Residual:

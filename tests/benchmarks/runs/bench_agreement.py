@@ -1,16 +1,18 @@
 """How often live readings fit the right model, and how often a wrong one is named.
 
-``python tests/benchmarks/runs/bench_agreement.py RECORDINGS [--seeds 10] [--first-seed 6000]`` performs runs
-of contact localization with strikes in process, gap on, six built-in objects, and compares each with the
-right model and with wrong ones. The folder keeps the recordings: what is there is not performed again. A
-solid of revolution that is turned about its axis is not moved; it is left out of that row. The pitcher is not
-struck: to solve for the modes of its mocked truth takes two minutes a run. Seconds are of CPU.
+``python tests/benchmarks/runs/bench_agreement.py RECORDINGS [--seeds 10] [--first-seed 6001] [--case NAME]``
+performs runs of contact localization with strikes in process, gap on, six built-in objects, and compares each
+with the right model and with wrong ones. The folder keeps the recordings, and in ``rows.jsonl`` what was
+compared: what is there is not done again; take that file away after a change of the comparison. A solid of
+revolution that is turned about its axis is not moved; it is left out of that row. The pitcher is not struck:
+to solve for the modes of its mocked truth takes two minutes a run. Seconds are of CPU.
 """
 
 import argparse
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property, partial
 from pathlib import Path
 from time import process_time
 
@@ -22,9 +24,10 @@ from experiments.contact_localization.accuracy.benchmark_runs import cells, scen
 from experiments.contact_localization.experiment import EXPERIMENT
 from harness.agreement.agreement import Sense, Verdict
 from harness.agreement.compare_run import agreement_of
-from harness.agreement.subject import Subject, own_subject
+from harness.agreement.subject import Subject, own_subject, subject_of_file
 from harness.basics.materials import material
 from harness.bench.scene import scene_from_options
+from harness.bench.scene_objectfile import shipped_objectfiles
 from harness.bench.station_file import Station, load_station, station_path
 from harness.experiment.in_process import recorded
 from harness.objects.household import MATERIALS, build
@@ -48,6 +51,7 @@ class ComparedRun:
 
     Attributes:
         case: what was wrong: a key of ``CASES``, or ``"moved microphone"``.
+        run: the recording's name.
         object: that was recorded.
         verdicts: by sense.
         sentences: of every sense.
@@ -55,6 +59,7 @@ class ComparedRun:
     """
 
     case: str
+    run: str
     object: str
     verdicts: Mapping[Sense, Verdict]
     sentences: Sequence[str]
@@ -113,8 +118,10 @@ class OtherLamps(RunFiles):
         )
 
 
+NETWORKS = "right, by its ObjectFile"
 CASES: Mapping[str, Callable[[RunFiles, int], Subject]] = {
     "right": lambda run, _: own_subject(run),
+    NETWORKS: lambda run, _: subject_of_file(run, shipped_objectfiles()[run.scene.object.name]),
     "another object": lambda run, seed: another_object(own_subject(run), seed),
     "moved 10 mm": lambda run, seed: moved(own_subject(run), seed),
     "turned 15 deg": lambda run, seed: turned(own_subject(run), seed),
@@ -129,24 +136,47 @@ def compared(case: str, run: RunFiles, subject: Subject) -> ComparedRun:
     found = agreement_of(subject.run, subject)
     seconds = process_time() - began
     verdicts = {one.compared.sense: one.verdict for one in found.senses}
-    return ComparedRun(case, run.scene.object.name, verdicts, found.sentences(), seconds)
+    name = run.recording.folder.name
+    return ComparedRun(case, name, run.scene.object.name, verdicts, found.sentences(), seconds)
 
 
-def rows(seed: int, folder: Path, station: Station) -> Iterator[ComparedRun]:
-    """Every run of a seed against every model."""
+class Rows:
+    """What was compared before, in a file of a JSON object a line."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        found = [ComparedRun(**json.loads(line)) for line in lines]
+        self._known = {(row.case, row.run): row for row in found}
+
+    def row(self, case: str, run: RunFiles, subject_of: Callable[[], Subject]) -> ComparedRun:
+        """As it is known, or compared now."""
+        key = case, run.recording.folder.name
+        if key not in self._known:
+            self._known[key] = compared(case, run, subject_of())
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(self._known[key])) + "\n")
+        return self._known[key]
+
+
+def rows(
+    seed: int, folder: Path, station: Station, known: Rows, cases: Sequence[str]
+) -> Iterator[ComparedRun]:
+    """Every run of a seed against every model of some cases."""
     gaps = ["default", "moved_microphone"]
     for every in cells(OBJECTS, [seed], ["spread"], gaps, ["known"], sound=True):
         cell = replace(every, sound=every.object not in SILENT)
-        if not cell.sound and cell.gap != "default":
+        still = cell.gap == "default"
+        if not (still or (cell.sound and MICROPHONE in cases)):
             continue
         scene = scene_of(cell, scene_from_options(f"builtin:{cell.object}"))
         run = RunFiles(recorded(EXPERIMENT, cell, scene, station, folder))
-        if cell.gap == "moved_microphone":
-            yield compared(MICROPHONE, run, own_subject(run))
+        if not still:
+            yield known.row(MICROPHONE, run, partial(own_subject, run))
             continue
         for case, subject_of in CASES.items():
-            if not (case.startswith("turned") and cell.object in ROUND):
-                yield compared(case, run, subject_of(run, cell.seed))
+            if case in cases and not (case.startswith("turned") and cell.object in ROUND):
+                yield known.row(case, run, partial(subject_of, run, cell.seed))
 
 
 def table_of(found: Sequence[ComparedRun]) -> Table:
@@ -182,14 +212,19 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("recordings", type=Path)
     options.add_argument("--seeds", type=int, default=10)
-    options.add_argument("--first-seed", type=int, default=6000)
+    options.add_argument("--first-seed", type=int, default=6001)
+    every = (*CASES, MICROPHONE)
+    options.add_argument("--case", choices=every, action="append", help="may be given again; all if left out")
     given = options.parse_args()
     seeds, console = range(given.first_seed, given.first_seed + given.seeds), Console(width=140)
+    given.recordings.mkdir(parents=True, exist_ok=True)
+    station = load_station(station_path("mock"))
+    known = Rows(given.recordings / "rows.jsonl")
     found: list[ComparedRun] = []
     for seed in seeds:
-        for row in rows(seed, given.recordings, load_station(station_path("mock"))):
+        for row in rows(seed, given.recordings, station, known, given.case or every):
             found.append(row)
-            shown = row.sentences if bool(row.doubts) == (row.case == "right") else ()
+            shown = row.sentences if bool(row.doubts) == row.case.startswith("right") else ()
             console.print(f"{row.case}, {row.object}: {', '.join(row.doubts) or 'fits'}", *shown, sep="\n  ")
         console.print(f"to seed {seed}", table_of(found), objects_of(found))
 

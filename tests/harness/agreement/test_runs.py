@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,11 +11,19 @@ from experiments.contact_localization.accuracy.benchmark_runs import Cell
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.section import Localization
 from harness.agreement.compare_run import agreement_of
+from harness.agreement.likeliest import SurfaceNoise, likeliest
+from harness.agreement.place_noise import PlaceNoise
+from harness.agreement.readings import contacts_of
+from harness.agreement.stated_error import gain_error, map_errors
 from harness.agreement.subject import Subject, own_subject, subject_of_file
+from harness.agreement.touch import compare_touch
 from harness.basics.errors import WrongUse
 from harness.bench.scene import scene_from_options
+from harness.bench.scene_objectfile import shipped_objectfiles
 from harness.bench.station_file import load_station, station_path
+from harness.effects.evaluate import Evaluation, evaluate
 from harness.experiment.in_process import performed
+from harness.objectfile.touch_entries import CARD_RANGE
 from harness.objects.builtin import build
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -70,6 +79,75 @@ def test_the_right_object_fits_and_every_step_has_its_numbers(run: RunFiles) -> 
     for one in found.senses[:2]:
         assert {residual.step for residual in one.compared.residuals} == {0, 1, 2}
         assert all(np.isfinite(list(r.numbers.values())).all() for r in one.compared.residuals)
+
+
+def test_by_its_objectfile_it_is_compared_with_networks_alone(
+    run: RunFiles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    called = set[str]()
+
+    def evaluated(*arguments: Any) -> Evaluation:
+        found = evaluate(*arguments)
+        called.update(found.calls)
+        return found
+
+    monkeypatch.setattr("harness.agreement.subject.evaluate", evaluated)
+    found = agreement_of(run, subject_of_file(run, shipped_objectfiles()["mug"]))
+    _, touch, *_ = found.senses
+    assert (touch.compared.source, touch.verdict) == ("network", "fits")
+    assert touch.compared.residuals[-1].quantity == "contacts together"
+    assert "object.touch_codes" in called
+    assert "touch.height_map" not in called
+
+
+def test_a_network_whose_card_states_no_error_is_not_compared(
+    run: RunFiles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    subject = subject_of_file(run, shipped_objectfiles()["mug"])
+    assert subject.objectfile is not None
+    card = subject.objectfile.description.networks["touch"].measured
+    monkeypatch.delitem(card, "unseen_places_psnr_db_median")
+    touch = compare_touch(subject, "network", contacts_of(run))
+    assert touch.residuals == ()
+    assert "states no unseen_places_psnr_db_median" in touch.why
+
+
+def test_a_network_is_off_by_what_its_card_states_and_the_reference_by_nothing(run: RunFiles) -> None:
+    subject = subject_of_file(run, shipped_objectfiles()["mug"])
+    errors = map_errors(subject, "network")
+    assert subject.objectfile is not None
+    measured = subject.objectfile.description.networks["touch"].measured
+    assert np.all(errors > 0.0)
+    decibels = -20.0 * np.log10(errors / CARD_RANGE)
+    assert np.median(decibels) == pytest.approx(measured["unseen_places_psnr_db_median"])
+    assert np.mean(decibels < measured["unseen_places_psnr_db_p10"]) == pytest.approx(0.1)
+    assert map_errors(subject, "reference").tolist() == [0.0]
+    assert gain_error(subject, "network") == measured_gain(subject)
+    assert gain_error(subject, "reference") == 0.0
+
+
+def measured_gain(subject: Subject) -> float:
+    assert subject.objectfile is not None
+    return subject.objectfile.description.networks["audio"].measured["gain_error_p95"]
+
+
+def test_what_a_network_is_off_by_counts_beside_the_noise_of_the_surface(run: RunFiles) -> None:
+    subject, places, noise = subject_of_file(run, shipped_objectfiles()["mug"]), PlaceNoise(), SurfaceNoise()
+    found = likeliest(subject, "network", contacts_of(run)[0], places, noise)
+    errors = map_errors(subject, "network")
+    share = found.compared.mean()
+    added = found.variances[:, found.compared].mean(axis=1)
+    assert added - added[-1] == pytest.approx((errors**2 - errors[-1] ** 2) / share)
+    assert added.min() > noise.rms**2
+
+
+def test_a_contact_that_no_network_was_made_for_is_noted(
+    run: RunFiles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    subject = shifted(subject_of_file(run, shipped_objectfiles()["mug"]), (0.0, 0.0, -0.2))
+    touch = compare_touch(subject, "network", contacts_of(run)[:1])
+    assert touch.residuals == ()
+    assert "outside of what the network knows" in touch.why
 
 
 def test_another_object_does_not_fit(run: RunFiles) -> None:
