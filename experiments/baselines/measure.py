@@ -8,7 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from experiments.baselines.bench import MadeMethod, RenderingBench, RenderingMethod, RenderingWork
-from experiments.baselines.kept_graph import TorchMissing
+from experiments.baselines.stored_graph import TorchMissing
 from harness.basics.arrays import FloatArray
 from harness.basics.store import digest
 
@@ -93,9 +93,9 @@ def _quality(
 ) -> Mapping[str, FloatArray]:
     """``(n,)`` of each metric, and ``made_s``."""
     key = digest(["rendering quality", VERSION, bench.identity, method.name, list(method.identity)])
-    kept = work.store.get(key)
-    if isinstance(kept, Mapping):
-        return kept
+    stored = work.store.get(key)
+    if isinstance(stored, Mapping):
+        return stored
     made = workshop.made(method)
     rows = [bench.scores(number, made.observe(number)) for number in range(bench.count)]
     found = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -110,9 +110,9 @@ def _timing(
     """``(k,)`` CPU s of each method, by its name."""
     every = [[method.name, list(method.identity)] for method in methods]
     key = digest(["rendering seconds", VERSION, bench.identity, every])
-    kept = work.store.get(key)
-    if isinstance(kept, Mapping):
-        return {name.removeprefix("of "): seconds for name, seconds in kept.items()}
+    stored = work.store.get(key)
+    if isinstance(stored, Mapping):
+        return {name.removeprefix("of "): seconds for name, seconds in stored.items()}
     made = {method.name: workshop.made(method) for method in methods}
     taken = timed_in_turn(made, bench.count)
     work.store.put(key, {f"of {name}": seconds for name, seconds in taken.items()})

@@ -34,13 +34,13 @@ class FitSpec:
     rate: float = 2e-3
 
 
-SPECTROGRAM: Final = FitSpec()
+SPECTROGRAM: Final = FitSpec(steps=400)
 """1.0's AudioNet: 4 layers of 256 for its 3 x 8."""
 
 COLOURS: Final = FitSpec(octaves=6)
 """1.0's TouchNet: 4 layers of 256, and 6 octaves for its 10, of which the last are noise between places."""
 
-AUDIONET: Final = PerceptronSpec(epochs=12)
+AUDIONET: Final = PerceptronSpec(epochs=30)
 """2.0's, with the published layers."""
 
 TOUCHNET: Final = TouchPerceptronSpec(presses=1200, epochs=1, steps=250)

@@ -78,11 +78,11 @@ def view_bench(of: ObjectFile, views: int, work: RenderingWork) -> ViewBench:
     lit = LitObject(appearance_of(origin_of(of), None, edge=_edge(of)))
     held_out = held_out_pictures(lit.appearance.mesh, views, SIZE, SIZE, _seed(of), DISTANCE)
     key = digest(["rendering reference", SAMPLES, lit.appearance.mesh.vertices, views, _seed(of)])
-    kept = work.store.get(key)
-    if not isinstance(kept, np.ndarray):
-        kept = np.stack([shown(each) for each in reference_pictures(lit, held_out, SAMPLES)])
-        work.store.put(key, kept)
-    return ViewBench(lit, held_out, tuple(kept))
+    stored = work.store.get(key)
+    if not isinstance(stored, np.ndarray):
+        stored = np.stack([shown(each) for each in reference_pictures(lit, held_out, SAMPLES)])
+        work.store.put(key, stored)
+    return ViewBench(lit, held_out, tuple(stored))
 
 
 def origin_of(of: ObjectFile) -> str:
@@ -91,7 +91,7 @@ def origin_of(of: ObjectFile) -> str:
     Raises:
         DataRefused: they come from a file, which an ObjectFile does not hold.
     """
-    origins = [source.origin for source in of.description.mesh.provenance.sources]
+    origins = [source.origin for source in of.description.provenance.sources]
     found = [origin for origin in origins if origin.startswith(BUILTIN)]
     if not found:
         raise DataRefused(
@@ -109,6 +109,6 @@ def _edge(of: ObjectFile) -> float:
 
 
 def _seed(of: ObjectFile) -> int:
-    """Of the views: those that the ObjectFile's own networks were kept from."""
+    """Of the views: those that the ObjectFile's own networks did not learn from."""
     vision = of.description.vision
     return 0 if vision is None else vision.provenance.seeds.get("vision", 0)

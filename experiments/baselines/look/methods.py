@@ -7,10 +7,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from experiments.baselines.bench import Column, MadeMethod, Observation, RenderingMethod, RenderingWork
-from experiments.baselines.kept_graph import kept_graph
 from experiments.baselines.look.bench import ViewBench, shown
 from experiments.baselines.look.field import opened_field
 from experiments.baselines.settings import FIELD, KILO_OSF
+from experiments.baselines.stored_graph import stored_graph
 from harness.authoring.vision.vision import networks_alone
 from harness.basics.arrays import AnyArray
 from harness.objectfile.file import ObjectFile
@@ -75,7 +75,7 @@ def _by_field(bench: ViewBench, work: RenderingWork) -> MadeMethod:
         return train_field(bench, FIELD, work.report)
 
     identity = ("field", bench.identity, astuple(FIELD))
-    data, seconds = kept_graph(work.store, identity, "the field of 1.0", train)
+    data, seconds = stored_graph(work.store, identity, "the field of 1.0", train)
     field = opened_field(data, bench.lit.appearance.mesh, FIELD.samples)
 
     def observe(number: int) -> AnyArray:
@@ -92,7 +92,7 @@ def _by_cells(bench: ViewBench, work: RenderingWork) -> MadeMethod:
         return vision_graph(model).SerializeToString()
 
     identity = ("kilo osf", bench.identity, asdict(KILO_OSF.size), *astuple(KILO_OSF)[1:])
-    data, seconds = kept_graph(work.store, identity, "KiloOSF", train, torch=False)
+    data, seconds = stored_graph(work.store, identity, "KiloOSF", train, torch=False)
     renderer = VisionRenderer(data, bench.lit.appearance.mesh, 1)
     return MadeMethod(_pictures(bench, renderer, RenderSettings()), seconds)
 

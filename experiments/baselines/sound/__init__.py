@@ -1,1 +1,1 @@
-"""The sound of a strike: reference, the ways to it, and what 1.0 had."""
+"""The sound of a strike: queries, methods, and the baseline of 1.0."""

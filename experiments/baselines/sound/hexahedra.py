@@ -98,12 +98,12 @@ def hexahedral_modes(
     values, vectors = eigsh(stiffness, wanted, mass, sigma=shift)
     frequencies = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
     order = np.argsort(frequencies)
-    kept = order[(frequencies[order] > _LEAST) & (frequencies[order] <= limit)]
-    if not len(kept):
+    chosen = order[(frequencies[order] > _LEAST) & (frequencies[order] <= limit)]
+    if not len(chosen):
         raise MeshRefused(f"cubes of {side * 1e3:.3g} mm have no mode up to {limit:g} Hz; take more of them")
-    shapes = vectors[:, kept].reshape(len(places), 3, -1).transpose(0, 2, 1)
+    shapes = vectors[:, chosen].reshape(len(places), 3, -1).transpose(0, 2, 1)
     return HexahedralModes(
-        frequencies[kept], origin + side * places, np.ascontiguousarray(shapes), len(cubes)
+        frequencies[chosen], origin + side * places, np.ascontiguousarray(shapes), len(cubes)
     )
 
 

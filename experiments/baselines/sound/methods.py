@@ -6,7 +6,6 @@ from dataclasses import astuple
 import numpy as np
 
 from experiments.baselines.bench import MadeMethod, Observation, RenderingMethod, RenderingWork
-from experiments.baselines.kept_graph import kept_graph
 from experiments.baselines.settings import AUDIONET, SPECTROGRAM
 from experiments.baselines.sound.bench import SEED, StrikeBench, summed
 from experiments.baselines.sound.hexahedra import CELLS, hexahedral_modes
@@ -14,9 +13,10 @@ from experiments.baselines.sound.spectrogram import (
     SPECTRUM_FILE,
     SpectrumBasis,
     SpectrumNetwork,
-    heard,
+    sound_of_spectrum,
     spectrum_pair,
 )
+from experiments.baselines.stored_graph import stored_graph
 from harness.authoring.audio.audio import opened
 from harness.authoring.audio.data import SoundSamples, wave_number
 from harness.authoring.audio.export import waves_graph
@@ -112,7 +112,7 @@ def _by_audionet(bench: StrikeBench, work: RenderingWork) -> MadeMethod:
         return train_audionet(bench, AUDIONET, work.report)
 
     identity = ("audionet", bench.lesson, astuple(AUDIONET))
-    data, seconds = kept_graph(work.store, identity, "AudioNet", train)
+    data, seconds = stored_graph(work.store, identity, "AudioNet", train)
     points, gains = network_tensors(len(bench.modes.frequencies), _ANYWHERE)
     return MadeMethod(_by_gains(bench, Network(data, NETWORK, [points], [gains])), seconds)
 
@@ -133,7 +133,7 @@ def _by_spectrogram(bench: StrikeBench, work: RenderingWork) -> MadeMethod:
         return train_spectrogram(bench, SPECTROGRAM, work.report)
 
     identity = ("spectrogram", bench.lesson, astuple(SPECTROGRAM))
-    data, seconds = kept_graph(work.store, identity, "the spectrogram network", train)
+    data, seconds = stored_graph(work.store, identity, "the spectrogram network", train)
     place, spectrum = spectrum_pair()
     low, high = bench.mesh.bounds
     network = SpectrumNetwork(
@@ -148,7 +148,7 @@ def _exact_spectrogram(bench: StrikeBench) -> MadeMethod:
     def observe(number: int) -> AnyArray:
         node = bench.nodes[number]
         gains: FloatArray = bench.modes.shapes[node] @ bench.modes.normals[node]
-        return heard(basis.spectrum(gains[basis.modes]))
+        return sound_of_spectrum(basis.spectrum(gains[basis.modes]))
 
     return MadeMethod(observe)
 

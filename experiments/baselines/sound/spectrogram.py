@@ -49,11 +49,11 @@ class SpectrumBasis:
     @classmethod
     def of(cls, bench: StrikeBench) -> "SpectrumBasis":
         """Of the reference's modes."""
-        kept = np.flatnonzero(audible(bench.modes.frequencies, SPECTRUM_RATE))
-        frequencies, rates = bench.modes.frequencies[kept], bench.rates[kept]
-        gains = np.eye(len(kept))
+        below = np.flatnonzero(audible(bench.modes.frequencies, SPECTRUM_RATE))
+        frequencies, rates = bench.modes.frequencies[below], bench.rates[below]
+        gains = np.eye(len(below))
         sounds = synthesize(frequencies, rates, gains, SECONDS, SPECTRUM_RATE, "double").sound
-        return cls(np.stack([transform().stft(each) for each in sounds]).astype(np.complex64), kept)
+        return cls(np.stack([transform().stft(each) for each in sounds]).astype(np.complex64), below)
 
     @property
     def bins(self) -> tuple[int, int]:
@@ -76,7 +76,7 @@ def transform() -> ShortTimeFFT:
     return ShortTimeFFT(get_window("hann", _WINDOW), _HOP, SPECTRUM_RATE, mfft=_POINTS)
 
 
-def heard(spectrum: AnyArray) -> FloatArray:
+def sound_of_spectrum(spectrum: AnyArray) -> FloatArray:
     """``(t,)``: the sound of an ``(f, t)`` spectrum at 44.1 kHz, with silence behind its end."""
     sound = transform().istft(spectrum, k1=round(SECONDS * SPECTRUM_RATE))
     faster = np.asarray(resample_poly(np.asarray(sound, np.float64), _UP, _DOWN))
@@ -108,7 +108,7 @@ class SpectrumNetwork:
         ]
         values = np.concatenate(runs).astype(np.float64)
         along = values[:, :3] @ normal + 1j * (values[:, 3:] @ normal)
-        return heard(along.reshape(self.basis.bins))
+        return sound_of_spectrum(along.reshape(self.basis.bins))
 
 
 def spectrum_pair() -> tuple[Input, Tensor]:

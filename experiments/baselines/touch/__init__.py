@@ -1,1 +1,1 @@
-"""The picture of a press: reference, the ways to it, and what 1.0 had."""
+"""The picture of a press: queries, methods, and the baseline of 1.0."""

@@ -122,10 +122,10 @@ def touch_bench(
     searches = [NodeSearch(places.nodes, NEAR), *([] if codes is None else [codes])]
     near = np.all([each.nearest(drawn)[1] <= each.most for each in searches], axis=0)
     reference = reference_maps(places.raster, drawn, places.sensor, places.skirt)
-    kept = np.flatnonzero(reference.possible & near)
-    if not len(kept):
+    chosen = np.flatnonzero(reference.possible & near)
+    if not len(chosen):
         raise OutOfDomain(f"none of {presses} presses is possible; is the mesh inside out?")
-    return TouchBench(places, drawn[kept], reference.maps[kept], calibration)
+    return TouchBench(places, drawn[chosen], reference.maps[chosen], calibration)
 
 
 def _drawn(mesh: Mesh, points: FloatArray, kind: Kind) -> Presses:

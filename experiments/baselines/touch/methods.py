@@ -6,8 +6,8 @@ from dataclasses import astuple
 import numpy as np
 
 from experiments.baselines.bench import Column, MadeMethod, Observation, RenderingMethod, RenderingWork
-from experiments.baselines.kept_graph import kept_graph
 from experiments.baselines.settings import COLOURS, SMALL_CODES, TOUCHNET
+from experiments.baselines.stored_graph import stored_graph
 from experiments.baselines.touch.bench import TouchBench
 from experiments.baselines.touch.colours import COLOURS_FILE, ColourNetwork, colours_pair
 from harness.authoring.touch.data import DEPTHS, MOST_TILT
@@ -27,26 +27,26 @@ _REACH = 2.0
 """Spacings that a press may be from a code: more than an ObjectFile allows, so that no press is refused."""
 
 
-def first_touch(bench: TouchBench, work: RenderingWork, said: str = "") -> RenderingMethod:
+def first_touch(bench: TouchBench, work: RenderingWork, suffix: str = "") -> RenderingMethod:
     """1.0's network.
 
     Args:
         bench: on which it is measured; it learns at the bench's places.
         work: where it is stored.
-        said: added to its name.
+        suffix: added to its name.
     """
-    column = "other" if said else "1.0 here"
+    column = "other" if suffix else "1.0 here"
     note = "one picture a place, whatever the tilt and depth"
     return RenderingMethod(
-        f"DIGIT-like TouchNet (1.0){said}", column, astuple(COLOURS), lambda: _by_colours(bench, work), note
+        f"DIGIT-like TouchNet (1.0){suffix}", column, astuple(COLOURS), lambda: _by_colours(bench, work), note
     )  # fmt: skip
 
 
-def untouched(bench: TouchBench, said: str = "") -> RenderingMethod:
+def untouched(bench: TouchBench, suffix: str = "") -> RenderingMethod:
     """The background alone, whatever is pressed."""
     nothing = np.zeros_like(bench.maps[0])
     made = MadeMethod(lambda _: bench.picture(nothing))
-    return RenderingMethod(f"untouched gel{said}", "other", (), lambda: made, "costs nothing")
+    return RenderingMethod(f"untouched gel{suffix}", "other", (), lambda: made, "costs nothing")
 
 
 def touch_methods(bench: TouchBench, of: ObjectFile, work: RenderingWork) -> list[RenderingMethod]:
@@ -113,7 +113,7 @@ def _by_touchnet(bench: TouchBench, work: RenderingWork) -> MadeMethod:
 
         return train_touchnet(bench, TOUCHNET, work.report)
 
-    data, seconds = kept_graph(work.store, ("touchnet", bench.lesson, astuple(TOUCHNET)), "TouchNet", train)
+    data, seconds = stored_graph(work.store, ("touchnet", bench.lesson, astuple(TOUCHNET)), "TouchNet", train)
     places = bench.places
     low, high = places.mesh.bounds
     least, most = pixel_domain(low, high, DEPTHS, MOST_TILT, places.sensor)
@@ -129,7 +129,7 @@ def _by_colours(bench: TouchBench, work: RenderingWork) -> MadeMethod:
 
     places = bench.places
     identity = ("colours", bench.lesson, astuple(COLOURS))
-    data, seconds = kept_graph(work.store, identity, "the tactile network of 1.0", train)
+    data, seconds = stored_graph(work.store, identity, "the tactile network of 1.0", train)
     place, colours = colours_pair()
     low, high = places.mesh.bounds
     shape = places.sensor.rows, places.sensor.columns

@@ -22,19 +22,19 @@ class ColourRows:
         normals, nothing = smooth_normals(places.mesh, places.nodes.points), np.zeros(len(places.nodes))
         presses = Presses(places.nodes.points, normals, nothing + MIDDLE, nothing, nothing, nothing)
         reference = reference_maps(places.raster, presses, places.sensor, places.skirt)
-        kept = np.flatnonzero(reference.possible)
+        chosen = np.flatnonzero(reference.possible)
         low, high = places.mesh.bounds
-        self._places = (places.nodes.points[kept] - low) / (high - low)
-        pictures = np.stack([bench.picture(each) for each in reference.maps[kept]])
-        self._colours = pictures.reshape(len(kept), -1, CHANNELS)
+        self._places = (places.nodes.points[chosen] - low) / (high - low)
+        pictures = np.stack([bench.picture(each) for each in reference.maps[chosen]])
+        self._colours = pictures.reshape(len(chosen), -1, CHANNELS)
         self._pixels = pixel_places((places.sensor.rows, places.sensor.columns))
 
-    def __call__(self, random: np.random.Generator) -> tuple[FloatArray, AnyArray]:
-        """``(batch, 5)`` inputs and ``(batch, 3)`` colours of -1 .. 1."""
+    def __call__(self, random: np.random.Generator) -> tuple[FloatArray, AnyArray, AnyArray]:
+        """``(batch, 5)`` inputs, ``(batch, 3)`` colours of -1 .. 1, and even weights."""
         place = random.integers(len(self._places), size=self._batch)
         pixel = random.integers(len(self._pixels), size=self._batch)
         rows = np.concatenate([self._places[place], self._pixels[pixel]], axis=1)
-        return rows, self._colours[place, pixel] / 127.5 - 1.0
+        return rows, self._colours[place, pixel] / 127.5 - 1.0, np.ones(self._batch)
 
 
 def train_colours(bench: TouchBench, spec: FitSpec, report: Report) -> bytes:

@@ -49,8 +49,8 @@ class OsfField(nn.Module):
     def forward(self, points: FloatArray, views: FloatArray, lights: FloatArray) -> tuple[Tensor, Tensor]:
         """``(n, 3)`` and ``(n,)``."""
         both = self._hidden(points)
-        told = [encode(each, _AS_IT_IS, self._turns) for each in (views, lights)]
-        hidden = torch.relu(self.direction(torch.cat([both[:, :-1], *told], dim=1)))
+        directions = [encode(each, _AS_IT_IS, self._turns) for each in (views, lights)]
+        hidden = torch.relu(self.direction(torch.cat([both[:, :-1], *directions], dim=1)))
         return self.colour(hidden), both[:, -1]
 
     def within(self, points: FloatArray) -> Tensor:
@@ -110,11 +110,11 @@ def is_within(
     rays: RayMesh, points: FloatArray, face_normals: FloatArray, random: np.random.Generator
 ) -> BoolArray:
     """``(n,)``: whether a closed surface is left, and not entered, by a ray from each ``(n, 3)`` place."""
-    ways = sphere(len(points), random)
-    hits = rays.first_hits(points, ways)
+    directions = sphere(len(points), random)
+    hits = rays.first_hits(points, directions)
     found = np.zeros(len(points), np.bool_)
     met = np.flatnonzero(hits.face >= 0)
-    found[met] = np.einsum("nx,nx->n", face_normals[hits.face[met]], ways[met]) > 0.0
+    found[met] = np.einsum("nx,nx->n", face_normals[hits.face[met]], directions[met]) > 0.0
     return found
 
 

@@ -11,8 +11,9 @@ from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_ra
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
 
-Drawn = Callable[[np.random.Generator], tuple[FloatArray, AnyArray]]
-"""From a generator to ``(batch, inputs)`` normalised inputs and ``(batch, outputs)`` targets."""
+Drawn = Callable[[np.random.Generator], tuple[FloatArray, AnyArray, AnyArray]]
+"""From a generator to ``(batch, inputs)`` normalised inputs, ``(batch, outputs)`` targets and ``(batch,)``
+weights of their squared errors."""
 
 
 class EncodedPerceptron(nn.Module):
@@ -58,9 +59,10 @@ def fitted(
     random = np.random.default_rng([seed, 5])
     for step in range(spec.steps):
         set_rate(adam, spec.rate, step / spec.steps)
-        rows, wanted = draw(random)
+        rows, wanted, weights = draw(random)
         adam.zero_grad()
-        loss = ((network(rows) - torch.from_numpy(np.float32(wanted))) ** 2).mean()
+        wrong = ((network(rows) - torch.from_numpy(np.float32(wanted))) ** 2).mean(dim=1)
+        loss = (wrong * torch.from_numpy(np.float32(weights))).mean()
         torch.autograd.backward(loss)
         adam.step()
         report((step + 1) / spec.steps)

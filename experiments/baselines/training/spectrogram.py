@@ -12,7 +12,7 @@ from harness.objectfile.graph import Encoding, Normaliser
 from harness.objectfile.published.graphs import perceptron_graph_of
 
 _UNIFORM = 0.5
-"""Share of bins that are drawn anywhere; the others where sounds have their energy."""
+"""Share of bins that are drawn anywhere; the others where sounds have their energy, at less weight each."""
 
 
 class SpectrumRows:
@@ -36,14 +36,15 @@ class SpectrumRows:
         self._cumulated = np.cumsum(self._shares)
         self.scale = float(np.sqrt((self._shares * energy).sum()))
 
-    def __call__(self, random: np.random.Generator) -> tuple[FloatArray, AnyArray]:
-        """``(batch, 5)`` inputs and ``(batch, 6)`` scaled values."""
+    def __call__(self, random: np.random.Generator) -> tuple[FloatArray, AnyArray, AnyArray]:
+        """``(batch, 5)`` inputs, ``(batch, 6)`` scaled values, weights that undo how bins are drawn."""
         node = random.integers(len(self._places), size=self._batch)
         at = np.searchsorted(self._cumulated, random.random(self._batch) * self._cumulated[-1], side="right")
         at = np.minimum(at, len(self._cumulated) - 1)
         values = np.einsum("km,kmd->kd", self._bins[at], self._gains[node]) / self.scale
         rows = np.concatenate([self._places[node], self._basis.places[at]], axis=1)
-        return rows, np.concatenate([values.real, values.imag], axis=1)
+        even = 1.0 / (len(self._shares) * self._shares[at])
+        return rows, np.concatenate([values.real, values.imag], axis=1), even
 
 
 def train_spectrogram(bench: StrikeBench, spec: FitSpec, report: Report) -> bytes:

@@ -1,4 +1,4 @@
-"""1.0's look: rays that meet nothing are white, a solid ball is where it is, and training finds the object."""
+"""1.0's look: rays that meet nothing are white, a solid ball is where it is, training finds the object."""
 
 import numpy as np
 import pytest

@@ -17,7 +17,7 @@ CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) 
 
 
 def steel() -> Material:
-    return MATERIALS["steel"].material
+    return MATERIALS["steel"]
 
 
 def box(extents: tuple[float, float, float]) -> Mesh:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from experiments.baselines.bench import MadeMethod, RenderingMethod, RenderingWork, Sense
-from experiments.baselines.kept_graph import TorchMissing, kept_graph
 from experiments.baselines.measure import ROUNDS, MeasuredMethod, measure_sense, timed_in_turn
+from experiments.baselines.stored_graph import TorchMissing, stored_graph
 from harness.basics.arrays import AnyArray
 from harness.basics.store import Store
 
@@ -69,13 +69,13 @@ def test_a_second_table_renders_nothing_and_makes_nothing(tmp_path: Path) -> Non
 
 
 def test_only_what_changed_is_scored_again(tmp_path: Path) -> None:
-    kept, changed = Counter(), Counter()
-    measured(tmp_path, kept.method("kept"), changed.method("changed"))
-    kept.rendered.clear()
+    same, changed = Counter(), Counter()
+    measured(tmp_path, same.method("same"), changed.method("changed"))
+    same.rendered.clear()
     changed.rendered.clear()
-    measured(tmp_path, kept.method("kept"), changed.method("changed", version=2))
+    measured(tmp_path, same.method("same"), changed.method("changed", version=2))
     # Seconds are of all methods in one run, so that both are timed anew; one alone is scored.
-    assert len(changed.rendered) == len(kept.rendered) + CountedBench().count
+    assert len(changed.rendered) == len(same.rendered) + CountedBench().count
 
 
 def test_a_table_that_was_stopped_keeps_the_cells_it_has(tmp_path: Path) -> None:
@@ -116,8 +116,8 @@ def test_a_graph_is_trained_once_and_torch_is_asked_for_only_then(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = Store(tmp_path)
-    data, seconds = kept_graph(store, ("one", 1), "one", lambda: b"graph", torch=False)
-    monkeypatch.setattr("experiments.baselines.kept_graph.find_spec", lambda name: None)
-    assert kept_graph(store, ("one", 1), "one", lambda: b"other") == (data, seconds) == (b"graph", seconds)
+    data, seconds = stored_graph(store, ("one", 1), "one", lambda: b"graph", torch=False)
+    monkeypatch.setattr("experiments.baselines.stored_graph.find_spec", lambda name: None)
+    assert stored_graph(store, ("one", 1), "one", lambda: b"other") == (data, seconds) == (b"graph", seconds)
     with pytest.raises(TorchMissing, match=r"pip install"):
-        kept_graph(store, ("two", 1), "two", lambda: b"other")
+        stored_graph(store, ("two", 1), "two", lambda: b"other")

@@ -54,9 +54,9 @@ def test_the_file_reads_back_and_json_holds_no_nan() -> None:
 
 def test_tables_are_printed_with_every_row(capsys: pytest.CaptureFixture[str]) -> None:
     print_tables([*quoted_rows(), row_of("mug", 3, "touch", found())], "this machine")
-    said = capsys.readouterr().out
+    printed = capsys.readouterr().out
     for part in ("Table 1, mug", "Table 2, mug", "ObjectFolder 1.0, quoted", "codes", "this machine"):
-        assert part in said
+        assert part in printed
 
 
 def test_pictures_of_whole_greys_are_known_no_better_than_their_rounding() -> None:

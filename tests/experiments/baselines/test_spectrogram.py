@@ -9,7 +9,7 @@ from experiments.baselines.bench import RenderingWork
 from experiments.baselines.settings import FitSpec
 from experiments.baselines.sound.bench import StrikeBench, summed
 from experiments.baselines.sound.methods import sound_methods
-from experiments.baselines.sound.spectrogram import SpectrumBasis, heard
+from experiments.baselines.sound.spectrogram import SpectrumBasis, sound_of_spectrum
 from harness.authoring.audio.data import split_nodes
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
@@ -22,16 +22,16 @@ def plate_bench(scale: float = 1.0) -> StrikeBench:
     split = split_nodes(len(modes.points), seed=0)
     mesh = Mesh(modes.points, modes.faces)
     flat = np.abs(modes.normals[split.held_out, 2]) > 0.9
-    return StrikeBench(mesh, MATERIALS["ceramic"].material, modes, split, split.held_out[flat][:3])
+    return StrikeBench(mesh, MATERIALS["ceramic"], modes, split, split.held_out[flat][:3])
 
 
-def test_the_exact_spectrum_is_heard_as_the_sum_of_the_modes_below_8_khz() -> None:
+def test_the_exact_spectrum_sounds_as_the_sum_of_the_modes_below_8_khz() -> None:
     bench = plate_bench()
     basis = SpectrumBasis.of(bench)
     node = bench.nodes[0]
     gains = (bench.modes.shapes[node] @ bench.modes.normals[node])[basis.modes]
     exact = summed(bench.modes.frequencies[basis.modes], bench.rates[basis.modes], gains, "double")
-    sound = heard(basis.spectrum(gains))
+    sound = sound_of_spectrum(basis.spectrum(gains))
     assert sound.shape == exact.shape
     # A sound that begins at once has more than 8 kHz holds: what the resampler leaves out is in its onset.
     rung = slice(2205, 44100)
@@ -39,12 +39,12 @@ def test_the_exact_spectrum_is_heard_as_the_sum_of_the_modes_below_8_khz() -> No
     assert wrong < 0.01
 
 
-def test_nothing_is_heard_behind_two_seconds_nor_of_modes_above_8_khz() -> None:
+def test_nothing_sounds_behind_two_seconds_nor_of_modes_above_8_khz() -> None:
     bench = plate_bench(scale=8.0)
     basis = SpectrumBasis.of(bench)
     assert (bench.modes.frequencies[basis.modes] < 8e3).all()
     assert len(basis.modes) < len(bench.modes.frequencies)
-    assert not heard(basis.spectrum(np.ones(len(basis.modes))))[round(2.01 * 44100) :].any()
+    assert not sound_of_spectrum(basis.spectrum(np.ones(len(basis.modes))))[round(2.01 * 44100) :].any()
 
 
 def test_the_reference_is_no_distance_from_itself_and_silence_is() -> None:

@@ -20,7 +20,7 @@ def require_torch(what: str) -> None:
         raise TorchMissing(f"{what} has to be trained, which needs torch: pip install '.[author]'")
 
 
-def kept_graph(
+def stored_graph(
     store: Store, identity: tuple[object, ...], what: str, train: Callable[[], bytes], torch: bool = True
 ) -> tuple[bytes, float]:
     """The graph of a network from the store, or trained now and put there.
@@ -39,9 +39,9 @@ def kept_graph(
         TorchMissing: it has to be trained and cannot be.
     """
     key = digest(["baseline graph", *identity])
-    kept = store.get(key)
-    if isinstance(kept, Mapping):
-        return kept["graph"].tobytes(), float(kept["seconds"])
+    stored = store.get(key)
+    if isinstance(stored, Mapping):
+        return stored["graph"].tobytes(), float(stored["seconds"])
     if torch:
         require_torch(what)
     begun = time.process_time()
