@@ -10,18 +10,19 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-import trimesh
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import eigsh
 from scipy.spatial import cKDTree
 
+from experiments.baselines.within import is_within
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused
+from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
 
-CELLS = 32
-"""Cubes along the object's longest side, of 1.0's grid."""
+CELLS = 40
+"""Cubes along the object's longest side; 1.0's grid has 32, between whose middles a thin wall may lie."""
 
 NEAREST = 4
 """Nodes whose motion is averaged at a place, as 1.0 averages the sounds of four voxels."""
@@ -60,17 +61,24 @@ class HexahedralModes:
 
 
 def voxel_cubes(mesh: Mesh, cells: int = CELLS) -> tuple[IntArray, FloatArray, float]:
-    """``(c, 3)`` indices of the cubes that hold some of the object, where index 0 begins, and a side in m.
+    """The cubes whose middles an object encloses.
+
+    Returns:
+        ``(c, 3)`` their indices, ``(3,)`` m where index 0 begins, and m, a side.
 
     Raises:
-        MeshRefused: a surface that holds no cube.
+        MeshRefused: a surface that encloses none.
     """
-    side = float((mesh.bounds[1] - mesh.bounds[0]).max()) / cells
-    grid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).voxelized(side).fill()
-    if not grid.filled_count:
-        raise MeshRefused("the object holds no cube of a grid; close its surface")
-    origin = np.asarray(grid.transform[:3, 3]) - 0.5 * side
-    return np.asarray(grid.sparse_indices, np.int64), origin, side
+    low, high = mesh.bounds
+    side = float((high - low).max()) / cells
+    counts = np.ceil((high - low) / side - 1e-9).astype(np.int64)
+    origin = 0.5 * (low + high) - 0.5 * side * counts
+    cubes = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
+    middles = origin + side * (cubes + 0.5)
+    inside = is_within(RayMesh(mesh), middles, mesh.face_normals, np.random.default_rng(0))
+    if not inside.any():
+        raise MeshRefused("the object holds no cube of a grid; close its surface, or take a finer grid")
+    return cubes[inside], origin, side
 
 
 def hexahedral_modes(

@@ -14,12 +14,12 @@ from torch import Tensor, nn
 from experiments.baselines.look.bench import ViewBench
 from experiments.baselines.look.field import REACH, ball_of
 from experiments.baselines.settings import FieldSpec
+from experiments.baselines.within import is_within
 from harness.authoring.perceptron import arrays_of, dense_layers, encode, set_rate
 from harness.authoring.training import Report
 from harness.authoring.vision.lessons import Lessons, draw_for
 from harness.authoring.vision.places import sphere
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray
-from harness.basics.faces.ray_mesh import RayMesh
 from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
 from harness.objectfile.published.graphs import OsfWeights, osf_graph
 from harness.objectfile.published.tensors import osf_tensors
@@ -104,18 +104,6 @@ class FieldRows:
         shown = bytes_from_linear(lessons.colours.astype(np.float64)) / 255.0
         inside = is_within(bench.lit.rays, middle + radius * space, mesh.face_normals, random)
         return cls(lessons, (lessons.points - middle) / radius, shown, space, inside)
-
-
-def is_within(
-    rays: RayMesh, points: FloatArray, face_normals: FloatArray, random: np.random.Generator
-) -> BoolArray:
-    """``(n,)``: whether a closed surface is left, and not entered, by a ray from each ``(n, 3)`` place."""
-    directions = sphere(len(points), random)
-    hits = rays.first_hits(points, directions)
-    found = np.zeros(len(points), np.bool_)
-    met = np.flatnonzero(hits.face >= 0)
-    found[met] = np.einsum("nx,nx->n", face_normals[hits.face[met]], directions[met]) > 0.0
-    return found
 
 
 def train_field(bench: ViewBench, spec: FieldSpec, report: Report) -> bytes:

@@ -6,8 +6,10 @@ import trimesh
 
 from experiments.baselines.look.bench import DISTANCE
 from experiments.baselines.look.field import UniformField, ball_of, stretched
+from experiments.baselines.within import is_within
 from harness.authoring.vision.data import around
 from harness.basics.arrays import FloatArray
+from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.mesh import Mesh
 from harness.objectfile.published.camera import FOCAL, SIZE
 from harness.picture.pinhole import DirectionalLight
@@ -52,10 +54,6 @@ def test_colours_are_stretched_as_published() -> None:
 
 
 def test_places_within_a_closed_surface_are_told_from_those_without() -> None:
-    pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
-    from experiments.baselines.training.field import is_within
-    from harness.basics.faces.ray_mesh import RayMesh
-
     mesh = ball(0.03)
     middle, _ = ball_of(mesh)
     random = np.random.default_rng(3)
