@@ -30,10 +30,17 @@ PEAK = 255.0
 class RenderingBench(Protocol):
     """The queries of one sense with their reference."""
 
-    sense: Sense
-    identity: str
-    """A digest of the object, the queries and the reference."""
-    count: int
+    @property
+    def sense(self) -> Sense:
+        """Of the queries."""
+
+    @property
+    def identity(self) -> str:
+        """A digest of the object, the queries and the reference."""
+
+    @property
+    def count(self) -> int:
+        """Queries."""
 
     def scores(self, number: int, rendered: AnyArray) -> Mapping[str, float]:
         """The paper's metrics of what was rendered for one query."""

@@ -43,7 +43,7 @@ COLOURS: Final = FitSpec(octaves=6)
 AUDIONET: Final = PerceptronSpec(epochs=30)
 """2.0's, with the published layers."""
 
-TOUCHNET: Final = TouchPerceptronSpec(presses=1200, epochs=1, steps=250)
+TOUCHNET: Final = TouchPerceptronSpec(presses=1200, epochs=1, steps=300, rate=2e-3)
 """2.0's, with the published layers."""
 
 SMALL_CODES: Final = CodesSpec(most_bytes=1_000_000, pitch=0.8e-3)

@@ -5,7 +5,7 @@ from dataclasses import astuple
 
 import numpy as np
 
-from experiments.baselines.bench import MadeMethod, Observation, RenderingMethod, RenderingWork
+from experiments.baselines.bench import Column, MadeMethod, Observation, RenderingMethod, RenderingWork
 from experiments.baselines.settings import AUDIONET, SPECTROGRAM
 from experiments.baselines.sound.bench import SEED, StrikeBench, summed
 from experiments.baselines.sound.hexahedra import CELLS, hexahedral_modes
@@ -32,7 +32,11 @@ from harness.sim.modal.modes import dampings
 _ANYWHERE = 1.0
 """m: a network that belongs to no object yet does not limit how near to a surface a point is."""
 
-_PROFILES = (("smoke", "ours, smallest"), ("shipped", "ours"), ("standard", "ours, largest"))
+_PROFILES: tuple[tuple[str, Column], ...] = (
+    ("smoke", "ours, smallest"),
+    ("shipped", "ours"),
+    ("standard", "ours, largest"),
+)
 
 
 def sound_methods(bench: StrikeBench, work: RenderingWork) -> list[RenderingMethod]:
@@ -42,15 +46,7 @@ def sound_methods(bench: StrikeBench, work: RenderingWork) -> list[RenderingMeth
         bench: of the strikes.
         work: where networks are stored.
     """
-    ours = [
-        RenderingMethod(
-            f"modes, gains by waves, profile {name}",
-            column,
-            tuple(astuple(_spec(name))),
-            lambda name=name: _by_waves(bench, _spec(name)),  # type: ignore[misc]
-        )
-        for name, column in _PROFILES
-    ]
+    ours = [_profile(bench, name, column) for name, column in _PROFILES]
     return [
         RenderingMethod("silence", "other", (), lambda: _silence(bench), "costs nothing"),
         RenderingMethod(
@@ -85,10 +81,11 @@ def sound_methods(bench: StrikeBench, work: RenderingWork) -> list[RenderingMeth
     ]
 
 
-def _spec(name: str) -> WavesSpec:
+def _profile(bench: StrikeBench, name: str, column: Column) -> RenderingMethod:
     spec = PROFILES[name].network
     assert isinstance(spec, WavesSpec)
-    return spec
+    row = f"modes, gains by waves, profile {name}"
+    return RenderingMethod(row, column, astuple(spec), lambda: _by_waves(bench, spec))
 
 
 def _silence(bench: StrikeBench) -> MadeMethod:
