@@ -143,6 +143,10 @@ COMMANDS = {
         "calibration.commands.markers:markers",
         "Find the dots printed on a gel, from pictures of it at rest.",
     ),
+    "tables rendering": Command(
+        "experiments.baselines.command:rendering",
+        "Time and quality of rendering: the paper's tables 1 and 2, with its 1.0 trained and measured here.",
+    ),
     "sim modes": Command(
         "harness.commands.sound.modes:modes",
         "Frequencies and dampings of a mesh, counted so that none is missing.",

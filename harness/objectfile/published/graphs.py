@@ -16,7 +16,11 @@ POSITIONS = Encoding.octaves(10)
 
 
 def perceptron_graph_of(
-    tensors: Pair, branches: Sequence[MlpWeights], normaliser: Normaliser, doc: str
+    tensors: Pair,
+    branches: Sequence[MlpWeights],
+    normaliser: Normaliser,
+    doc: str,
+    encoding: Encoding = POSITIONS,
 ) -> ModelProto:
     """Perceptrons side by side on one encoded input.
 
@@ -25,18 +29,19 @@ def perceptron_graph_of(
         branches: each of as many outputs.
         normaliser: of the input, in float64; the published programs round once, to float32, behind it.
         doc: what the graph is.
+        encoding: of the normalised input.
 
     Raises:
         WrongUse: layers that do not fit together, or weights that are not finite.
     """
     taken, given = tensors
     count = len(normaliser.shift)
-    nodes, rows = Nodes(), encoded_rows(count, POSITIONS)
-    encoded = nodes.encoded(nodes.normalised(taken.name, normaliser), count, POSITIONS)
+    nodes, rows = Nodes(), encoded_rows(count, encoding)
+    encoded = nodes.encoded(nodes.normalised(taken.name, normaliser), count, encoding)
     flat = []
     for number, branch in enumerate(branches):
         what = f"branch {number} of {given.name}"
-        check_mlp(branch, POSITIONS.width(count), what)
+        check_mlp(branch, encoding.width(count), what)
         flat.append(nodes.mlp(encoded, branch, rows, what))
     if len(flat) == 1:
         nodes.add("Identity", flat[0], name=given.name)

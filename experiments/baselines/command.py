@@ -1,0 +1,99 @@
+"""``touchstone tables rendering``: the paper's tables 1 and 2, with its 1.0 trained and measured here."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from harness.commands import options
+from harness.commands.output import CONSOLE, emit, share_progress, warn
+
+if TYPE_CHECKING:
+    from experiments.baselines.bench import Sense
+    from harness.objectfile.file import ObjectFile
+
+
+def rendering(
+    object_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--object", help="An ObjectFile: its folder, or a shipped one's name; may be given again."
+        ),
+    ] = None,
+    sense: Annotated[list[str] | None, typer.Option(help="vision, audio or touch; all if left out.")] = None,
+    views: Annotated[int, typer.Option(help="Pictures that vision is measured on.", min=1, max=100)] = 4,
+    strikes: Annotated[int, typer.Option(help="Places that are struck.", min=2, max=1000)] = 30,
+    presses: Annotated[int, typer.Option(help="Presses that are drawn.", min=2, max=1000)] = 60,
+    out: Annotated[
+        Path,
+        typer.Option(help="Folder of networks and measured cells; a stopped table resumes there."),
+    ] = Path("runs/tables/rendering"),
+    json: options.Json = False,
+) -> int:
+    """Time and quality of rendering per sense: quoted of the paper, measured of 1.0, 2.0 and ours.
+
+    The networks of ObjectFolder 1.0 and the layers of 2.0 are trained here on the same object, which needs
+    the extra `author`; without it their rows say so. Ours are the ObjectFile's own and those of other
+    profiles. All are measured against the reference simulation at places, views and presses that none has
+    learned from, by the paper's metrics. Cells are stored as they are measured; rows.csv lies beside them.
+
+    Seconds are CPU seconds of one thread for one observation: methods of one sense render in turn.
+
+    Try: touchstone tables rendering --object mug
+    """
+    from experiments.baselines.bench import RenderingWork
+    from experiments.baselines.table import (
+        RenderingCounts,
+        as_csv,
+        machine_text,
+        measured_rows,
+        plain_rendering,
+        quoted_rows,
+    )
+    from harness.basics.store import Store
+    from harness.basics.whole_file import write_text_whole
+
+    senses, counts = _senses(sense), RenderingCounts(views, strikes, presses)
+    opened = [_opened(name) for name in object_ or ["mug"]]
+    rows = quoted_rows()
+    with share_progress() as report:
+        work = RenderingWork(Store(out / "cells"), report)
+        for of in opened:
+            rows += measured_rows(of, senses, counts, work)
+    for row in rows:
+        if not row.metrics:
+            warn(f"{row.method}: {row.note}")
+    write_text_whole(out / "rows.csv", as_csv(rows))
+    if json:
+        emit({"schema": 1, "machine": machine_text(), "rows": [plain_rendering(row) for row in rows]})
+        return 0
+    from experiments.baselines.printed import print_tables
+
+    print_tables(rows, machine_text())
+    CONSOLE.print(f"rows: {out / 'rows.csv'}", markup=False)
+    return 0
+
+
+def _opened(name: str) -> "ObjectFile":
+    from harness.bench.scene_objectfile import objectfile_folder, require_objectfile
+    from harness.objectfile.file import ObjectFile
+
+    folder = objectfile_folder(name, Path.cwd())
+    require_objectfile(folder, f"--object {name}")
+    return ObjectFile.open(folder)
+
+
+def _senses(wanted: list[str] | None) -> "list[Sense]":
+    """In the tables' order.
+
+    Raises:
+        WrongUse: a sense that there is not.
+    """
+    from experiments.baselines.bench import SENSES
+    from harness.basics.errors import WrongUse
+    from harness.basics.toml_file import nearest
+
+    for name in wanted or []:
+        if name not in SENSES:
+            raise WrongUse(f"--sense {name} is none; {nearest(name, SENSES)}")
+    return [each for each in SENSES if not wanted or each in wanted]

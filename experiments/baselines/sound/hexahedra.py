@@ -1,0 +1,176 @@
+"""Modes of a volume of cubes, as ObjectFolder 1.0 computes them: the object as voxels, eight nodes each.
+
+The trilinear hexahedron with 2 x 2 x 2 Gauss points (Zienkiewicz, Taylor and Zhu, The Finite Element Method,
+7th edition, 2013, section 6). All cubes are alike, so that one stiffness and one mass serve them all. Steps
+replace slopes and a thin wall is one or two cubes thick: what the paper leaves it for.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array
+from scipy.sparse.linalg import eigsh
+from scipy.spatial import cKDTree
+
+from experiments.baselines.within import is_within
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.errors import MeshRefused
+from harness.basics.faces.ray_mesh import RayMesh
+from harness.basics.materials import Material
+from harness.basics.mesh import Mesh
+
+CELLS = 40
+"""Cubes along the object's longest side; 1.0's grid has 32, between whose middles a thin wall may lie."""
+
+NEAREST = 4
+"""Nodes whose motion is averaged at a place, as 1.0 averages the sounds of four voxels."""
+
+_CORNERS = np.array(list(product((0, 1), repeat=3)))
+_RIGID = 6
+_LEAST = 1.0
+"""Hz: slower modes are motions of the whole body."""
+
+
+@dataclass(frozen=True, eq=False)
+class HexahedralModes:
+    """Free vibration of cubes.
+
+    Attributes:
+        frequencies: ``(m,)`` Hz, ascending.
+        nodes: ``(n, 3)`` m, in the object's frame.
+        shapes: ``(n, m, 3)`` 1/sqrt(kg), mass-normalised.
+        cubes: number of elements.
+    """
+
+    frequencies: FloatArray
+    nodes: FloatArray
+    shapes: FloatArray
+    cubes: int
+
+    def at(self, point: FloatArray) -> FloatArray:
+        """``(m, 3)`` 1/sqrt(kg): mean over the nodes nearest to a ``(3,)`` place in m."""
+        _, near = self._tree.query(point, NEAREST)
+        found: FloatArray = self.shapes[near].mean(axis=0)
+        return found
+
+    @cached_property
+    def _tree(self) -> "cKDTree[None]":
+        return cKDTree(self.nodes)
+
+
+def voxel_cubes(mesh: Mesh, cells: int = CELLS) -> tuple[IntArray, FloatArray, float]:
+    """The cubes whose middles an object encloses.
+
+    Returns:
+        ``(c, 3)`` their indices, ``(3,)`` m where index 0 begins, and m, a side.
+
+    Raises:
+        MeshRefused: a surface that encloses none.
+    """
+    low, high = mesh.bounds
+    side = float((high - low).max()) / cells
+    counts = np.ceil((high - low) / side - 1e-9).astype(np.int64)
+    origin = 0.5 * (low + high) - 0.5 * side * counts
+    cubes = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
+    middles = origin + side * (cubes + 0.5)
+    inside = is_within(RayMesh(mesh), middles, mesh.face_normals, np.random.default_rng(0))
+    if not inside.any():
+        raise MeshRefused("the object holds no cube of a grid; close its surface, or take a finer grid")
+    return cubes[inside], origin, side
+
+
+def hexahedral_modes(
+    mesh: Mesh, material: Material, limit: float, most: int, cells: int = CELLS
+) -> HexahedralModes:
+    """The modes of an object made of cubes.
+
+    Args:
+        mesh: closed, in metres.
+        material: of all of it.
+        limit: Hz, above zero.
+        most: modes at most, the lowest.
+        cells: cubes along the longest side.
+
+    Raises:
+        MeshRefused: a surface that holds no cube, or cubes without a mode below the limit.
+    """
+    cubes, origin, side = voxel_cubes(mesh, cells)
+    corners = cubes[:, None] + _CORNERS
+    places, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    stiffness, mass = _assembled(numbers.reshape(len(cubes), 8), material, side)
+    wanted = min(most + _RIGID, stiffness.shape[0] - 2)
+    # A shift below zero: the body is free, and its stiffness alone has no inverse.
+    shift = -((2.0 * np.pi * 0.02 * limit) ** 2)
+    values, vectors = eigsh(stiffness, wanted, mass, sigma=shift)
+    frequencies = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
+    order = np.argsort(frequencies)
+    chosen = order[(frequencies[order] > _LEAST) & (frequencies[order] <= limit)]
+    if not len(chosen):
+        raise MeshRefused(f"cubes of {side * 1e3:.3g} mm have no mode up to {limit:g} Hz; take more of them")
+    shapes = vectors[:, chosen].reshape(len(places), 3, -1).transpose(0, 2, 1)
+    return HexahedralModes(
+        frequencies[chosen], origin + side * places, np.ascontiguousarray(shapes), len(cubes)
+    )
+
+
+def _assembled(numbers: IntArray, material: Material, side: float) -> tuple[csc_array, csc_array]:
+    """Stiffness and mass of ``(c, 8)`` cubes; unknown ``3 n + axis`` is a node's."""
+    stiffness, mass = cube_matrices(material, side)
+    unknowns = (3 * numbers[:, :, None] + np.arange(3)).reshape(len(numbers), 24)
+    rows = np.repeat(unknowns, 24, axis=1).ravel()
+    columns = np.tile(unknowns, (1, 24)).ravel()
+    size = 3 * (int(numbers.max()) + 1)
+    both = (np.tile(each.ravel(), len(numbers)) for each in (stiffness, mass))
+    one, other = (coo_array((values, (rows, columns)), (size, size)).tocsc() for values in both)
+    return one, other
+
+
+def cube_matrices(material: Material, side: float) -> tuple[FloatArray, FloatArray]:
+    """``(24, 24)`` stiffness in N/m and consistent mass in kg of one cube, nodes in binary order.
+
+    Args:
+        material: isotropic.
+        side: m.
+    """
+    elastic = _elastic(material)
+    stiffness, mass = np.zeros((24, 24)), np.zeros((24, 24))
+    weight = (0.5 * side) ** 3
+    for at in product((-1.0 / np.sqrt(3.0), 1.0 / np.sqrt(3.0)), repeat=3):
+        values, slopes = _functions(np.array(at))
+        strain = _strain(slopes * 2.0 / side)
+        stiffness += weight * strain.T @ elastic @ strain
+        mass += weight * material.density * np.kron(np.outer(values, values), np.eye(3))
+    return stiffness, mass
+
+
+def _functions(at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``(8,)`` trilinear functions and ``(8, 3)`` their slopes at a place of -1 .. 1."""
+    signs = 2.0 * _CORNERS - 1.0
+    parts = 0.5 * (1.0 + signs * at)
+    slopes = np.empty((8, 3))
+    for axis in range(3):
+        others = np.delete(parts, axis, axis=1).prod(axis=1)
+        slopes[:, axis] = 0.5 * signs[:, axis] * others
+    return parts.prod(axis=1), slopes
+
+
+def _strain(slopes: FloatArray) -> FloatArray:
+    """``(6, 24)``: strains xx yy zz yz zx xy of the nodes' motion."""
+    found = np.zeros((6, 24))
+    for row, (first, second) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))):
+        found[row, first::3] += slopes[:, second]
+        if first != second:
+            found[row, second::3] += slopes[:, first]
+    return found
+
+
+def _elastic(material: Material) -> FloatArray:
+    """``(6, 6)`` Pa: Hooke's law."""
+    poisson = material.poisson
+    first = material.young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
+    shear = 0.5 * material.young / (1.0 + poisson)
+    found = np.diag([2.0 * shear] * 3 + [shear] * 3)
+    found[:3, :3] += first
+    return found

@@ -1,0 +1,85 @@
+"""1.0's look: rays that meet nothing are white, a solid ball is where it is, training finds the object."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from experiments.baselines.look.bench import DISTANCE
+from experiments.baselines.look.field import UniformField, ball_of, stretched
+from experiments.baselines.within import is_within
+from harness.authoring.vision.data import around
+from harness.basics.arrays import FloatArray
+from harness.basics.faces.ray_mesh import RayMesh
+from harness.basics.mesh import Mesh
+from harness.objectfile.published.camera import FOCAL, SIZE
+from harness.picture.pinhole import DirectionalLight
+
+DENSE = 1e4
+
+
+def ball(radius: float) -> Mesh:
+    solid = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+    return Mesh(np.asarray(solid.vertices) + np.array([0.1, 0.0, -0.05]), np.asarray(solid.faces))
+
+
+def black_ball(points: FloatArray, views: FloatArray, light: FloatArray) -> FloatArray:
+    """Dense and black within half the frame's radius."""
+    found = np.full((len(points), 4), -20.0)
+    found[:, 3] = np.where(np.linalg.norm(points, axis=1) < 0.5, DENSE, 0.0)
+    return found
+
+
+def test_the_ball_around_the_object_fills_the_papers_view() -> None:
+    mesh = ball(0.03)
+    camera = around(mesh, np.array([1.0, 0.0, 0.0]), SIZE, SIZE, DISTANCE)
+    assert camera.focal_px == pytest.approx(FOCAL, rel=1e-9)
+
+
+def test_a_solid_ball_is_drawn_where_it_is_and_the_rest_is_white() -> None:
+    mesh = ball(0.03)
+    middle, radius = ball_of(mesh)
+    camera = around(mesh, np.array([0.6, 0.0, 0.8]), 64, 64, DISTANCE)
+    field = UniformField(black_ball, middle, radius, 128)
+    picture = field.picture(camera, DirectionalLight(np.array([0.0, 0.0, 1.0])))
+    assert (picture[0, 0] == 255).all()
+    assert (picture[32, 32] == 0).all()
+    away = DISTANCE * mesh.diagonal / radius
+    seen = np.pi * (camera.focal_px * np.tan(np.arcsin(0.5 / away))) ** 2
+    assert (picture[..., 0] < 128).sum() == pytest.approx(seen, rel=0.06)
+
+
+def test_colours_are_stretched_as_published() -> None:
+    raw = np.array([-50.0, 0.0, 2.0, 50.0])
+    assert stretched(raw) == pytest.approx(1.2 * (1.0 / (1.0 + np.exp(-raw)) - 0.5) + 0.5)
+
+
+def test_places_within_a_closed_surface_are_told_from_those_without() -> None:
+    mesh = ball(0.03)
+    middle, _ = ball_of(mesh)
+    random = np.random.default_rng(3)
+    points = middle + 0.05 * (random.random((2000, 3)) - 0.5) * 2.0
+    apart = np.linalg.norm(points - middle, axis=1)
+    clear = np.abs(apart - 0.03) > 1e-3
+    found = is_within(RayMesh(mesh), points, mesh.face_normals, random)
+    assert (found[clear] == (apart < 0.03)[clear]).all()
+
+
+def test_a_field_that_was_trained_for_seconds_beats_white_alone() -> None:
+    pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
+    from experiments.baselines.look.bench import ViewBench, shown
+    from experiments.baselines.look.field import opened_field
+    from experiments.baselines.settings import FieldSpec
+    from experiments.baselines.training.field import train_field
+    from harness.authoring.vision.data import held_out_pictures
+    from harness.authoring.vision.metrics import reference_pictures
+    from harness.sim.light.appearance_source import builtin_appearance
+    from harness.sim.light.direct_image import LitObject
+
+    lit = LitObject(builtin_appearance("bowl", edge=6e-3))
+    views = held_out_pictures(lit.appearance.mesh, 1, 48, 48, 0, DISTANCE)
+    bench = ViewBench(lit, views, tuple(shown(each) for each in reference_pictures(lit, views, 3)))
+    spec = FieldSpec(depth=2, width=64, octaves=5, samples=64, places=60_000, steps=150, batch=2048)
+    field = opened_field(train_field(bench, spec, lambda doing, share: None), lit.appearance.mesh, 64)
+    picture = field.picture(views.cameras[0], views.lights[0])
+    white = bench.scores(0, np.full_like(picture, 255))["psnr_db"]
+    assert bench.scores(0, picture)["psnr_db"] > white + 3.0

@@ -1,0 +1,63 @@
+"""1.0's touch, trained for seconds, beats one colour; the untouched gel is known; presses are its kind."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.baselines.bench import RenderingWork
+from experiments.baselines.settings import FitSpec
+from experiments.baselines.touch.bench import MIDDLE, TouchBench, touch_bench
+from experiments.baselines.touch.colours import pixel_places
+from experiments.baselines.touch.methods import first_touch, untouched
+from harness.authoring.touch.data import DEPTHS, MOST_TILT
+from harness.basics.store import Store
+from tests.samples.touch_bench import ball
+
+
+def work(folder: Path) -> RenderingWork:
+    return RenderingWork(Store(folder), lambda doing, share: None)
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> TouchBench:
+    return touch_bench(ball(), 6, "upright", work(tmp_path_factory.mktemp("store")))
+
+
+def test_upright_presses_are_upright_and_equally_deep(bench: TouchBench) -> None:
+    presses = bench.presses
+    assert not presses.tilts.any()
+    assert not presses.yaws.any()
+    assert (presses.depths == MIDDLE).all()
+
+
+def test_other_presses_lean_and_vary_within_the_papers_range(tmp_path: Path) -> None:
+    presses = touch_bench(ball(), 12, "any", work(tmp_path)).presses
+    assert (presses.depths >= DEPTHS[0]).all()
+    assert (presses.depths <= DEPTHS[1]).all()
+    assert 0.0 < presses.tilts.max() <= MOST_TILT
+    assert not presses.yaws.any()  # the paper's networks know none
+
+
+def test_the_reference_scores_as_the_same_and_the_untouched_gel_does_not(bench: TouchBench) -> None:
+    same = bench.scores(0, bench.picture(bench.maps[0]))
+    assert same["ssim"] == pytest.approx(1.0)
+    assert same["psnr_db"] == pytest.approx(10.0 * np.log10(255.0**2 * 12.0))
+    nothing = bench.scores(0, untouched(bench).make().observe(0))
+    assert nothing["psnr_db"] < 40.0
+
+
+def test_pixels_are_placed_row_by_row() -> None:
+    places = pixel_places((2, 3))
+    assert places.tolist() == [[-1, -1], [-1, 0], [-1, 1], [1, -1], [1, 0], [1, 1]]
+
+
+def test_a_network_that_was_trained_for_seconds_beats_one_colour(
+    bench: TouchBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
+    small = FitSpec(depth=3, width=64, octaves=4, steps=150, batch=2048, rate=4e-3)
+    monkeypatch.setattr("experiments.baselines.touch.methods.COLOURS", small)
+    picture = first_touch(bench, work(tmp_path)).make().observe(0)
+    mean = np.broadcast_to(bench.picture(bench.maps[0]).mean(axis=(0, 1)), picture.shape)
+    assert bench.scores(0, picture)["psnr_db"] > bench.scores(0, mean)["psnr_db"] + 3.0
