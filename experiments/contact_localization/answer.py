@@ -10,6 +10,7 @@ from experiments.contact_localization.accuracy.solving import (
     located,
     prepare,
     timed_height_map,
+    unread_of,
 )
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
@@ -40,6 +41,7 @@ class Answer:
             are loaded.
         sense: what ``last`` is by.
         others: the answer by each other sense, or why that sense refused the object.
+        unread: why the picture of a contact, by its number from 0, is left out; its height map is zero.
     """
 
     observations: tuple[Observation, ...]
@@ -50,6 +52,7 @@ class Answer:
     seconds: float
     sense: Senses = "touch"
     others: Mapping[Senses, Estimate | FitRefused] = field(default_factory=dict)
+    unread: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def by_sense(self) -> dict[Senses, Estimate | FitRefused]:
@@ -74,6 +77,7 @@ class ContactAnswering:
         self._accuracy, self._run = accuracy, run
         self._seen: list[Observation] = []
         self._heights: list[FloatArray] = []
+        self._refusals: list[str | None] = []
         self._taken = (0.0, 0.0)
         if self.model.unheard and accuracy.of(SENSES) == "audio":
             raise MeshRefused(f"an estimate by sound alone was asked for, and {self._unheard}")
@@ -95,40 +99,50 @@ class ContactAnswering:
         if not self._seen:
             raise WrongUse("no contact was read; a run needs at least one")
         seed = self._run.recording.header.seed
-        heights = tuple(self._heights)
-        return Readings(in_time(self._seen), heights, self.model, self.prior, seed, self._taken)
+        heights, unread = tuple(self._heights), unread_of(self._refusals)
+        return Readings(in_time(self._seen), heights, self.model, self.prior, seed, self._taken, unread)
 
     def read(self, record: StepRecord) -> None:
         """Take in a contact; its images are turned into heights here, and nowhere else."""
         station = self._run.station
         aspect = aspect_stated(self._run.calibration.header.made_from)
         seen = observe_step(record, station.flange_from_gel, self._run.acquisition, aspect)
-        heights, cpu, wall = loaded(lambda: timed_height_map(seen, self.model))
+        heights, refusal, cpu, wall = loaded(lambda: timed_height_map(seen, self.model))
         self._seen.append(seen)
         self._heights.append(heights)
+        self._refusals.append(refusal)
         self._taken = (self._taken[0] + cpu, self._taken[1] + wall)
 
     def answer(self) -> Answer:
         """By the sense that the accuracy names, and by each other one that was recorded.
 
-        Where the object's sound cannot be compared, by touch; the other senses are refused with the reason.
+        Contacts whose picture is refused count by their pose and strike alone; where no picture is left, an
+        answer by all senses is one by sound. Where the object's sound cannot be compared, touch answers; the
+        other senses are refused with the reason.
 
         Raises:
             WrongUse: no contact was read; or none was struck, and an answer by sound alone was asked for.
-            FitRefused: no place on this object explains the readings.
+            FitRefused: no place on this object explains the readings, or no picture of them may be used.
         """
         readings = self.readings
-        wanted = self._accuracy.of(SENSES)
         struck = any(seen.strike is not None for seen in readings.observations)
-        if wanted == "audio" and not struck:
-            raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
         senses: tuple[Senses, ...] = SENSES.levels if struck else ("touch",)
-        sense = wanted if readings.heard else "touch"
+        sense = self._sense_of(readings, struck)
         last = loaded(lambda: self._by(sense, readings))
         others = {other: self._tried(other, readings) for other in senses if other != sense}
         seconds = sum(last.seconds.values())
         seen, heights = readings.observations, readings.heights
-        return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others)
+        unread = readings.unread
+        return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others, unread)
+
+    def _sense_of(self, readings: Readings, struck: bool) -> Senses:
+        """What the answer is by."""
+        wanted = self._accuracy.of(SENSES)
+        if wanted == "audio" and not struck:
+            raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
+        if not readings.heard:
+            return "touch"
+        return "audio" if wanted == "both" and not readings.pictured else wanted
 
     def history(self, last: Estimate, sense: Senses) -> tuple[Estimate | FitRefused, ...]:
         """The estimates by a sense after each contact, the last of which is known.

@@ -24,5 +24,9 @@ def contact_of(
 
 
 def height_map(observation: Observation, model: Model) -> FloatArray:
-    """``(rows, columns)`` metres of indentation, from the mean of the contact's frames."""
+    """``(rows, columns)`` metres of indentation, from the mean of the contact's frames.
+
+    Raises:
+        PictureRefused: the picture is not what the calibration was made of.
+    """
     return np.asarray(invert_mean(observation.images, model.calibration).height[0])

@@ -24,14 +24,14 @@ from experiments.scale_estimation.unseen.answer import (
 from experiments.scale_estimation.unseen.contact_set import GelWay
 from experiments.scale_estimation.vision.vision import SeenStand, Sight, by_sight, stands_seen
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import DataRefused, FitRefused, MeshRefused, WrongUse
+from harness.basics.errors import DataRefused, FitRefused, MeshRefused, PictureRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
 from harness.experiment.object_modes import carried_by
 from harness.picture.outline import SeenOutline
 from harness.picture.square_pixels import aspect_stated
-from harness.recording.observation import observe_step
+from harness.recording.observation import observe_step, picture_left_out
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.skills.exploring.exploration import SKIPPED
@@ -104,6 +104,7 @@ class ScaleAnswering:
         self.met: list[bool] = []
         self.ways: list[GelWay] = []
         self.left_out: list[str] = []
+        self.unread: list[str] = []
         self.strikes: list[Strike] = []
         self._read = dict.fromkeys(SENSES, 0.0)
         self._peaks: tuple[int, Peaks | None] = (0, None)
@@ -146,15 +147,19 @@ class ScaleAnswering:
         run, began = self.run, time.perf_counter()
         aspect = aspect_stated(run.calibration.header.made_from)
         seen = observe_step(record, run.station.flange_from_gel, run.acquisition, aspect)
-        patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
+        if seen.strike is not None:
+            self.strikes.append(seen.strike)
+        try:
+            patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
+        except PictureRefused as refusal:  # whether the gel met anything is not known either
+            self.unread.append(picture_left_out(record.step.index, refusal))
+            return
         if patch is not None:
             self.patches.append(patch)
         length = float(record.step.parameters["search_m"])
         self.met.append(patch is not None)
         self.ways.append(GelWay.made(seen.base_from_gel, self.model.place, patch))
         self.free.append(free_line(seen.base_from_gel, length, patch is not None))
-        if seen.strike is not None:
-            self.strikes.append(seen.strike)
         self._read["touch"] += time.perf_counter() - began
 
     def answer(self) -> SizeAnswer:
@@ -226,7 +231,7 @@ class ScaleAnswering:
         return {
             "vision": lambda: outline_alone(self._seen(), model.station.camera, model.place, model.sizes),
             "audio": lambda: strikes_alone(self._ringing_strikes(), material, model.sizes),
-            "touch": lambda: ways_alone(self.ways, model.sizes),
+            "touch": self._by_ways,
         }
 
     def _ringing_strikes(self) -> Sequence[Strike]:
@@ -251,6 +256,18 @@ class ScaleAnswering:
 
     def _by_touch(self) -> Touch:
         if not self.patches:
-            raise FitRefused("the gel touched nothing yet")
+            raise self._no_picture(self.met) or FitRefused("the gel touched nothing yet")
         model, starts = self.model, int(self.accuracy[STARTS.name])
         return by_touch(model.stand, self.patches, model.nominal, model.sizes, starts, self.free)
+
+    def _by_ways(self) -> ShapelessAnswer:
+        refusal = self._no_picture(self.ways)
+        if refusal is not None:
+            raise refusal
+        return ways_alone(self.ways, self.model.sizes)
+
+    def _no_picture(self, read: Sequence[object]) -> FitRefused | None:
+        """Why touch has no answer where pictures were taken and none of them was read."""
+        if read or not self.unread:
+            return None
+        return FitRefused(f"no contact's picture may be used; {self.unread[0]}")

@@ -23,7 +23,7 @@ from experiments.scale_estimation.strike_met import strike_met
 from experiments.scale_estimation.touch.patch import Patch
 from experiments.scale_estimation.vision.vision import SeenStand
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import FitRefused, MotionRefused, WrongUse
+from harness.basics.errors import FitRefused, MotionRefused, PictureRefused, WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.reading import Reading
 from harness.experiment.levels import chosen_levels
@@ -136,7 +136,9 @@ class Explorer:
         record = StepRecord(step, {reading.channel.name: reading for reading in read}, 0.0)
         aspect = aspect_stated(run.calibration.header.made_from)
         seen = observe_step(record, run.station.flange_from_gel, aspect=aspect)
-        patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
+        patch = None
+        with suppress(PictureRefused):  # the answer names it
+            patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
         return patch, seen.base_from_gel[:3, :3]
 
     def _take_in(self, recording: Recording, index: int) -> None:

@@ -35,6 +35,9 @@ def patch_of_contact(seen: Observation, calibration: TactileCalibration, pitch: 
         seen: the contact.
         calibration: of the gel.
         pitch: m of gel that a pixel shows.
+
+    Raises:
+        PictureRefused: its picture is not what the calibration was made of.
     """
     return patch_of(invert_mean(seen.images, calibration).height[0], pitch, seen.base_from_gel)
 

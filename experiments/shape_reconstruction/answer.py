@@ -107,7 +107,13 @@ class ShapeAnswering:
         began = time.perf_counter()
         found: ShapeEstimate | FitRefused
         try:
+            self._require_readings(evidence)
             found = estimated(str(self.accuracy[METHOD.name]), evidence)
         except FitRefused as refusal:
             found = refusal
         return found, time.perf_counter() - began
+
+    def _require_readings(self, evidence: ShapeEvidence) -> None:
+        """Methods that know an average answer from nothing: not where all pictures were refused."""
+        if self.readings.unread and not evidence.touches and evidence.look is None:
+            raise FitRefused(f"no reading is left; {self.readings.unread[0]}")

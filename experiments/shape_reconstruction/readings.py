@@ -9,11 +9,12 @@ from experiments.shape_reconstruction.contact_points import contact_points
 from experiments.shape_reconstruction.evidence import GuardedTouch, SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.basics.arrays import ByteArray, FloatArray, read_only
+from harness.basics.errors import PictureRefused
 from harness.basics.geometry import apply, translation
 from harness.picture.object_mask import mask_by_background
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.look_pictures import look_pictures
-from harness.recording.observation import observe_step
+from harness.recording.observation import observe_step, picture_left_out
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.sim.optics.inverse import invert_mean
@@ -36,6 +37,7 @@ class ShapeReadings:
     run: RunFiles
     touches: list[GuardedTouch] = field(default_factory=list, init=False)
     look: SeenMask | None = field(default=None, init=False)
+    unread: list[str] = field(default_factory=list, init=False)
 
     def read(self, record: StepRecord) -> None:
         """Take in a step: a look, a press, or one that was not made."""
@@ -43,7 +45,10 @@ class ShapeReadings:
         if pictures is not None:
             self.look = seen_mask(self.run, *pictures)
         elif "gel.image" in record.readings:
-            self.touches.append(guarded_touch(self.run, record))
+            try:
+                self.touches.append(guarded_touch(self.run, record))
+            except PictureRefused as refusal:  # whether the gel met anything is not known either
+                self.unread.append(picture_left_out(record.step.index, refusal))
 
     def evidence(self) -> ShapeEvidence:
         """All of it."""
@@ -79,6 +84,7 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
 
     Raises:
         RecordingDamaged: the step has no pictures or no poses.
+        PictureRefused: its picture is not what the calibration was made of.
     """
     calibration, settings = run.calibration, run.scene.section(ShapeRun)
     aspect = aspect_stated(calibration.header.made_from)

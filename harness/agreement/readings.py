@@ -1,12 +1,14 @@
 """A run's readings as they are compared: pictures as heights of the gel, poses, strikes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray
+from harness.basics.errors import PictureRefused
 from harness.picture.square_pixels import aspect_stated
-from harness.recording.observation import Observation, in_time, observe_step
+from harness.recording.observation import Observation, in_time, observe_step, picture_left_out
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.inverse import invert_mean
 from harness.sim.optics.tactile_calibration import TactileCalibration
@@ -22,12 +24,14 @@ class PressedContact:
     Attributes:
         step: of the run.
         seen: as it was recorded.
-        heights: ``(rows, columns)`` m of indentation, by its picture.
+        heights: ``(rows, columns)`` m of indentation, by its picture; zeros where that is refused.
+        unread: why its picture is not compared; empty where it is.
     """
 
     step: int
     seen: Observation
     heights: FloatArray
+    unread: str = ""
 
     @property
     def touched(self) -> bool:
@@ -47,11 +51,18 @@ def contacts_of(run: RunFiles) -> tuple[PressedContact, ...]:
         [observe_step(record, run.station.flange_from_gel, run.acquisition, aspect) for record in records]
     )
     return tuple(
-        PressedContact(record.step.index, one, heights_of(one, run.calibration))
-        for record, one in zip(records, seen, strict=True)
+        _contact(record.step.index, one, run.calibration) for record, one in zip(records, seen, strict=True)
     )
 
 
-def heights_of(seen: Observation, calibration: TactileCalibration) -> FloatArray:
-    """``(rows, columns)`` m of indentation, from the mean of a contact's frames."""
-    return np.asarray(invert_mean(seen.images, calibration).height[0])
+def unread_notes(contacts: Sequence[PressedContact]) -> list[str]:
+    """A sentence for each picture that is not compared."""
+    return [picture_left_out(one.step, one.unread) for one in contacts if one.unread]
+
+
+def _contact(step: int, seen: Observation, calibration: TactileCalibration) -> PressedContact:
+    """With its surface from the mean of its frames, where that is of the calibration's gel."""
+    try:
+        return PressedContact(step, seen, np.asarray(invert_mean(seen.images, calibration).height[0]))
+    except PictureRefused as refusal:
+        return PressedContact(step, seen, np.zeros(seen.images.shape[1:3]), str(refusal))

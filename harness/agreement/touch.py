@@ -15,7 +15,7 @@ from scipy.stats import binom, chi2
 from harness.agreement.agreement import Residual, SenseResiduals, SideBySide, Source
 from harness.agreement.likeliest import SurfaceNoise, Surfaces, likeliest
 from harness.agreement.place_noise import PlaceNoise
-from harness.agreement.readings import PressedContact
+from harness.agreement.readings import PressedContact, unread_notes
 from harness.agreement.stated_error import gross_share
 from harness.agreement.subject import Subject
 from harness.basics.arrays import FloatArray
@@ -44,8 +44,10 @@ def compare_touch(
         noise: of the surface; None for the stated one.
     """
     places, noise = places or PlaceNoise(), noise or SurfaceNoise()
-    residuals, notes = [], []
+    residuals, notes = [], unread_notes(contacts)
     for contact in contacts:
+        if contact.unread:
+            continue
         try:
             found = likeliest(subject, source, contact, places, noise)
         except WrongUse as refusal:

@@ -101,3 +101,13 @@ def _needed(record: StepRecord, name: str) -> Reading:
     if name not in record.readings:
         raise RecordingDamaged(f"step {record.step.index} has no {name!r}; it cannot be estimated from")
     return record.readings[name]
+
+
+def picture_left_out(step: int, why: object) -> str:
+    """For people: the gel's picture of a step, from 0, has no part in what is computed.
+
+    Args:
+        step: of the run.
+        why: the refusal.
+    """
+    return f"step {step + 1}: its picture is left out: {why}"

@@ -7,6 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
+
+from harness.basics.arrays import ByteArray
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.station import RunContext
 from harness.bench.station_file import load_station, station_path
@@ -74,3 +78,30 @@ def with_reading(record: StepRecord, name: str, change: Callable[[Any], Any]) ->
     reading = record.readings[name]
     changed = replace(reading, values=change(reading.values.copy()))
     return replace(record, readings={**record.readings, name: changed})
+
+
+SPOILED: dict[str, Callable[[ByteArray], ByteArray]] = {
+    "mirrored": lambda frames: frames[:, :, ::-1],
+    "channels exchanged": lambda frames: frames[..., ::-1],
+    "black": np.zeros_like,
+}
+"""``(n, rows, columns, 3)`` frames of a press that are not what the gel's calibration was made of."""
+
+
+def with_spoiled_pictures(recording: Recording, folder: Path, how: str, *steps: int) -> Recording:
+    """A copy of the run, the gel's pictures of some steps spoiled."""
+
+    def change(record: StepRecord) -> StepRecord:
+        if record.step.index not in steps:
+            return record
+        reading = record.readings["gel.image"]
+        frames = np.ascontiguousarray(SPOILED[how](np.asarray(reading.values)))
+        spoiled = replace(reading, values=frames, encoded=tuple(_jpeg(frame) for frame in frames))
+        return replace(record, readings={**record.readings, "gel.image": spoiled})
+
+    return rewritten(copied(recording, folder), change)
+
+
+def _jpeg(frame: ByteArray) -> bytes:
+    """As a camera sends an RGB frame."""
+    return bytes(cv2.imencode(".jpg", cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))[1])

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+import numpy as np
 from numba.core.event import install_recorder
 
 from experiments.contact_localization.accuracy.dials import (
@@ -19,7 +20,7 @@ from experiments.contact_localization.posterior.dials import BLOCK, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import FitRefused
+from harness.basics.errors import FitRefused, PictureRefused
 from harness.effects.accuracy import Accuracy, Level, Setting
 from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment.solving import Solved
@@ -43,6 +44,7 @@ class Readings:
         prior: of its orientation.
         seed: of the draws.
         shared: s of CPU time and on the clock that the height maps took.
+        unread: why the picture of a contact, by its number from 0, is not used; its height map is zero.
     """
 
     observations: tuple[Observation, ...]
@@ -51,6 +53,12 @@ class Readings:
     prior: Prior
     seed: int
     shared: tuple[float, float]
+    unread: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def pictured(self) -> bool:
+        """Whether not every picture is refused."""
+        return not self.unread or len(self.unread) < len(self.observations)
 
     @property
     def heard(self) -> bool:
@@ -69,6 +77,7 @@ class Readings:
             self,
             observations=self.observations[:count],
             heights=self.heights[:count],
+            unread={contact: why for contact, why in self.unread.items() if contact < count},
             shared=(share * self.shared[0], share * self.shared[1]),
         )
 
@@ -114,16 +123,30 @@ def read(
         images: whether any setting looks at the images.
     """
     cpu, wall = time.process_time(), time.perf_counter()
-    heights = tuple(height_map(observation, model) for observation in observations) if images else ()
+    maps = [checked_height_map(observation, model) for observation in observations] if images else []
     taken = time.process_time() - cpu, time.perf_counter() - wall
-    return Readings(tuple(observations), heights, model, prior, seed, taken)
+    heights, unread = tuple(heights for heights, _ in maps), unread_of([why for _, why in maps])
+    return Readings(tuple(observations), heights, model, prior, seed, taken, unread)
 
 
-def timed_height_map(observation: Observation, model: Model) -> tuple[FloatArray, float, float]:
-    """A contact's height map, and the s of CPU time and on the clock that it took."""
+def checked_height_map(observation: Observation, model: Model) -> tuple[FloatArray, str | None]:
+    """A contact's height map and None; zeros, and the reason, where its picture is refused."""
+    try:
+        return height_map(observation, model), None
+    except PictureRefused as refusal:
+        return np.zeros(observation.images.shape[1:3]), str(refusal)
+
+
+def unread_of(reasons: Sequence[str | None]) -> dict[int, str]:
+    """The reasons that there are, by the contact's number from 0."""
+    return {contact: why for contact, why in enumerate(reasons) if why is not None}
+
+
+def timed_height_map(observation: Observation, model: Model) -> tuple[FloatArray, str | None, float, float]:
+    """A contact's checked height map, and the s of CPU time and on the clock that it took."""
     cpu, wall = time.process_time(), time.perf_counter()
-    heights = height_map(observation, model)
-    return heights, time.process_time() - cpu, time.perf_counter() - wall
+    heights, why = checked_height_map(observation, model)
+    return heights, why, time.process_time() - cpu, time.perf_counter() - wall
 
 
 def loaded(timed: Callable[[], T]) -> T:
@@ -166,9 +189,12 @@ def located(
         judged: whether readings that fit no place are refused, or estimated all the same.
 
     Raises:
-        FitRefused: no place on this object explains the readings, or no image shows a contact.
+        FitRefused: no place on this object explains the readings, no image shows a contact, or no picture
+            of them may be used.
     """
     noise, images = Noise(), needs_images(accuracy)
+    if images and not readings.pictured:
+        raise FitRefused(f"no contact's picture may be used; of contact 1: {readings.unread[0]}")
     contacts = _contacts(readings, accuracy.of(BLOCK), noise, images)
     strikes = [observation.strike for observation in readings.observations] if readings.heard else []
     seconds = readings.shared[1] if images else 0.0
@@ -180,7 +206,10 @@ def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> lis
     if not images:
         return [Contact(observation.base_from_gel) for observation in readings.observations]
     pitch = readings.model.sensor.pitch
+    pairs = zip(readings.observations, readings.heights, strict=True)
     return [
-        contact_of(observation.base_from_gel, heights, pitch, block, noise.touch)
-        for observation, heights in zip(readings.observations, readings.heights, strict=True)
+        Contact(observation.base_from_gel)
+        if index in readings.unread
+        else contact_of(observation.base_from_gel, heights, pitch, block, noise.touch)
+        for index, (observation, heights) in enumerate(pairs)
     ]

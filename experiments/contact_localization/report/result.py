@@ -16,6 +16,7 @@ from harness.basics.errors import FitRefused
 from harness.experiment.experiment import Scored
 
 _UNHEARD = "the object's sound is not compared, and touch alone answers"
+_LEFT_OUT = "its picture is left out"
 
 
 def true_points(scored: Scored) -> FloatArray | None:
@@ -55,6 +56,7 @@ def by_translations(found: Answer, count: int) -> FloatArray:
 def _doubts(found: Answer) -> tuple[str, ...]:
     unheard = found.model.unheard
     of_sound = (f"{_UNHEARD}: {unheard}",) if unheard else doubts_of_sound(found.observations)
+    of_sound = (*(f"contact {k + 1}: {_LEFT_OUT}: {why}" for k, why in found.unread.items()), *of_sound)
     # Sense by sense the doubt may be the same one.
     of_senses = [estimate.doubts for estimate in found.by_sense.values() if isinstance(estimate, Estimate)]
     of_sound += tuple(dict.fromkeys(doubt for doubts in of_senses for doubt in doubts))
@@ -89,7 +91,11 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
         "yaw_sigma_rad": last.yaw_sigma,
         "contacts": [
             _contact(
-                k, point, last.gates[k] if last.gates else None, None if errors is None else float(errors[k])
+                k,
+                point,
+                last.gates[k] if last.gates else None,
+                None if errors is None else float(errors[k]),
+                scored.found.unread.get(k),
             )
             for k, point in enumerate(last.contacts)
         ],
@@ -98,10 +104,17 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
     }
 
 
-def flags_of(gate: Gate) -> list[str]:
-    """What is wrong with a contact, in words."""
+def flags_of(gate: Gate, unread: str | None = None) -> list[str]:
+    """What is wrong with a contact, in words.
+
+    Args:
+        gate: how it fits.
+        unread: why its picture is left out; None where it is not.
+    """
     said = []
-    if gate.missed:
+    if unread is not None:
+        said.append(f"{_LEFT_OUT}: {unread}")
+    elif gate.missed:
         said.append("missed: the image shows no contact; it was not used")
     if gate.slipped:
         said.append("slipped: it fits much worse than the others; its weight is limited")
@@ -115,13 +128,15 @@ def fit_of(gate: Gate) -> float | None:
     return gate.fit if gate.fit is not None and np.isfinite(gate.fit) else None
 
 
-def _contact(index: int, point: FloatArray, gate: Gate | None, error: float | None) -> dict[str, Any]:
+def _contact(
+    index: int, point: FloatArray, gate: Gate | None, error: float | None, unread: str | None
+) -> dict[str, Any]:
     return {
         "contact": index + 1,
         "position_m": point.tolist(),
         "error_m": error,
         "fit_nats": None if gate is None else fit_of(gate),
-        "flags": [] if gate is None else flags_of(gate),
+        "flags": [] if gate is None else flags_of(gate, unread),
     }
 
 

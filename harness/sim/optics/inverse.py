@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import CalibrationRefused, DataRefused
+from harness.sim.optics.check.picture_check import checked_picture
 from harness.sim.optics.poisson import anchored_heights, free_heights
 from harness.sim.optics.slope_kernels import normals_from_colour
 from harness.sim.optics.tactile_calibration import TactileCalibration
@@ -102,8 +103,19 @@ def mean_picture(frames: ByteArray) -> ByteArray:
 
 
 def invert_mean(frames: ByteArray, calibration: TactileCalibration) -> Inversion:
-    """The surface of a gel from the mean of a contact's frames, as ``invert`` of that one picture."""
-    return invert(mean_picture(frames)[None], calibration)
+    """The surface of a gel from the mean of a contact's frames, as ``invert`` of that one picture.
+
+    Args:
+        frames: ``(n, rows, columns, 3)`` RGB of one contact that was held still.
+        calibration: with a smooth model. Light that differs from its own by a gain a channel is corrected;
+            a picture that needs no correction is inverted as it is.
+
+    Raises:
+        DataRefused: frames of another shape or type than the calibration's.
+        PictureRefused: the mean picture is not what the calibration was made of.
+        CalibrationRefused: the calibration has only a table.
+    """
+    return invert(checked_picture(mean_picture(frames), calibration).image[None], calibration)
 
 
 def invert(images: ByteArray, calibration: TactileCalibration, detection: Detection = STEADY) -> Inversion:

@@ -18,6 +18,7 @@ from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
 from tests.experiments.scale_estimation.runs import answered, ran, scene_of, went_on
+from tests.support.whole_run import with_spoiled_pictures
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,21 @@ def test_the_truth_changes_no_estimate(touched: Recording, tmp_path: Path) -> No
         away.rename(touched.truth_path)
     assert after["size_m"] == before["size_m"]
     assert after["estimates"]["fused"]["error_m"] is None
+
+
+def test_a_spoiled_picture_is_named_and_the_rest_answers(touched: Recording, tmp_path: Path) -> None:
+    result = answered(with_spoiled_pictures(touched, tmp_path / "run", "mirrored", 2))
+    assert result["contacts"] == 2
+    assert result["warnings"][0].startswith("step 3: its picture is left out")
+    assert result["estimates"]["touch"]["size_m"] is not None
+
+
+def test_where_no_picture_is_left_touch_is_refused_with_the_reason(
+    touched: Recording, tmp_path: Path
+) -> None:
+    result = answered(with_spoiled_pictures(touched, tmp_path / "run", "black", 1, 2, 3))
+    assert "lights are off" in result["estimates"]["touch"]["refused"]
+    assert result["size_m"] == result["estimates"]["vision"]["size_m"]
 
 
 @pytest.mark.slow  # the same with strikes is tested in test_exploring.py

@@ -29,6 +29,7 @@ from harness.skills.exploring.exploration import MOST_SKIPPED, SKIPPED
 from harness.twin.rehearsal import Segment, rehearse
 from tests.docs.result_keys import COMMON, SHAPE, SHAPE_ESTIMATE
 from tests.experiments.shape_reconstruction.runs import QUICKLY, answered, off_truth, ran, scene_of, went_on
+from tests.support.whole_run import with_spoiled_pictures
 
 pytestmark = pytest.mark.timeout(300)  # explores objects press by press
 
@@ -70,6 +71,18 @@ def test_the_answer_is_the_same_to_the_bit_when_it_is_replayed(touched: Recordin
     assert 0.0 < first["error_m"] < 0.05
     assert first["estimates"]["vision"]["refused"]
     assert (first["presses"], first["choose"]) == (3, "farthest")
+
+
+def test_a_spoiled_picture_is_named_and_the_rest_answers(touched: Recording, tmp_path: Path) -> None:
+    result = answered(with_spoiled_pictures(touched, tmp_path / "run", "channels exchanged", 2))
+    assert result["presses"] == 2
+    assert any(one.startswith("step 3: its picture is left out") for one in result["warnings"])
+
+
+def test_where_no_picture_is_left_the_reason_is_the_refusal(blind: Recording, tmp_path: Path) -> None:
+    spoiled = with_spoiled_pictures(blind, tmp_path / "run", "black", 0, 1, 2, 3)
+    with pytest.raises(FitRefused, match=r"no reading is left; step 1: .* lights are off"):
+        answered(spoiled)
 
 
 def test_the_truth_changes_no_estimate(touched: Recording, tmp_path: Path) -> None:

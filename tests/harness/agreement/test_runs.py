@@ -28,6 +28,7 @@ from harness.objects.builtin import build
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.sim.optics.tactile_calibration import TactileCalibration
+from tests.support.whole_run import with_spoiled_pictures
 
 STATION = load_station(station_path("mock"))
 SEED = 901
@@ -163,10 +164,21 @@ def test_an_object_that_was_moved_by_10_mm_does_not_fit(
     assert found.first_doubt is not None
 
 
-def test_another_sensors_calibration_does_not_fit(run: RunFiles, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_sensors_calibration_is_not_compared(run: RunFiles, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(vars(run), "calibration", other_lamps(run.calibration))
-    verdicts = {one.compared.sense: one.verdict for one in agreement_of(run).senses}
-    assert "does not fit" in verdicts.values()
+    touch = next(one for one in agreement_of(run).senses if one.compared.sense == "touch")
+    assert touch.verdict == "not comparable"
+    assert "step 1: its picture is left out: the press fits its resting gel only with" in touch.compared.why
+
+
+def test_a_spoiled_picture_is_named_and_the_rest_is_compared(recording: Recording, tmp_path: Path) -> None:
+    spoiled = with_spoiled_pictures(recording, tmp_path / "run", "black", 1)
+    found = agreement_of(RunFiles(spoiled))
+    for one in found.senses[:2]:
+        assert one.verdict == "fits"
+        assert "step 2: its picture is left out" in one.compared.why
+    touch = found.senses[1].compared
+    assert [residual.step for residual in touch.residuals] == [0, 2]
 
 
 def test_an_object_of_hidden_size_is_not_compared(run: RunFiles) -> None:

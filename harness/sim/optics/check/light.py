@@ -33,12 +33,14 @@ class LightMatch:
         gain: ``(3,)``, 1 where the light is the same.
         offset: ``(3,)`` grey levels.
         alike: share of the blocks within ``ALIKE`` of that.
+        tight: share of the blocks within ``UNCHANGED`` of it.
         sure: whether enough of the picture follows it closely for a correction.
     """
 
     gain: FloatArray
     offset: FloatArray
     alike: float
+    tight: float
     sure: bool
 
     def shown(self, known: FloatArray) -> FloatArray:
@@ -54,8 +56,10 @@ def fit_light(seen: FloatArray, known: FloatArray) -> LightMatch:
         known: the same, of the reference.
     """
     change = np.abs(seen - known)
-    if (change.max(axis=2) < UNCHANGED).mean() >= _LEAST_UNCHANGED:
-        return LightMatch(np.ones(3), np.zeros(3), float((change.max(axis=2) < ALIKE).mean()), True)
+    unchanged = float((change.max(axis=2) < UNCHANGED).mean())
+    if unchanged >= _LEAST_UNCHANGED:
+        alike = float((change.max(axis=2) < ALIKE).mean())
+        return LightMatch(np.ones(3), np.zeros(3), alike, unchanged, True)
     return _fitted(seen.reshape(-1, 3), known.reshape(-1, 3))
 
 
@@ -69,7 +73,7 @@ def _fitted(y: FloatArray, x: FloatArray) -> LightMatch:
         if near.sum() < _LEAST_BLOCKS:
             break
     tight = float((apart < UNCHANGED).mean())
-    return LightMatch(gain, offset, float((apart < ALIKE).mean()), tight >= _LEAST_TIGHT)
+    return LightMatch(gain, offset, float((apart < ALIKE).mean()), tight, tight >= _LEAST_TIGHT)
 
 
 def _line(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -92,7 +96,7 @@ def orientation(seen: FloatArray, known: FloatArray) -> tuple[str, LightMatch]:
     Returns:
         In words, ``as calibrated`` for the reference as it is.
     """
-    found = [(words, fit_light(seen[::2, ::2], other[::2, ::2])) for words, other in _variants(known)]
+    found = [(words, fit_light(seen[::2, ::2], other[::2, ::2])) for words, other in variants(known)]
     return max(found, key=lambda one: one[1].alike if (one[1].gain > 0.2).all() else 0.0)
 
 
@@ -101,19 +105,28 @@ def same(words: str) -> bool:
     return words == _SAME
 
 
-def _variants(known: FloatArray) -> list[tuple[str, FloatArray]]:
+def variants(picture: FloatArray, back: bool = False) -> list[tuple[str, FloatArray]]:
+    """A picture in every order of channels and orientation, in words; ``as calibrated`` for itself, first.
+
+    Args:
+        picture: ``(rows, columns, 3)``.
+        back: whether the picture is taken to be in each of them, and brought back.
+    """
+    quarter = -1 if back else 1
     turned = {
-        "": known,
-        "mirrored left to right": known[:, ::-1],
-        "upside down": known[::-1],
-        "turned by 180 degrees": known[::-1, ::-1],
+        "": picture,
+        "mirrored left to right": picture[:, ::-1],
+        "upside down": picture[::-1],
+        "turned by 180 degrees": picture[::-1, ::-1],
     }
-    if known.shape[0] == known.shape[1]:
-        turned |= {"turned by 90 degrees": np.rot90(known), "turned by 270 degrees": np.rot90(known, 3)}
-    variants = []
+    if picture.shape[0] == picture.shape[1]:
+        turned["turned by 90 degrees"] = np.rot90(picture, quarter)
+        turned["turned by 270 degrees"] = np.rot90(picture, 3 * quarter)
+    found = []
     for order in permutations(range(3)):
         exchanged = "" if order == (0, 1, 2) else f"channels {', '.join(_CHANNELS[k] for k in order)}"
-        for words, picture in turned.items():
+        taken = np.argsort(order) if back else np.array(order)
+        for words, one in turned.items():
             named = ", ".join(part for part in (exchanged, words) if part)
-            variants.append((named or _SAME, picture[..., list(order)]))
-    return variants
+            found.append((named or _SAME, one[..., taken]))
+    return found

@@ -19,8 +19,10 @@ from harness.sim.optics.check.faults import (
     require_unclipped,
     require_whole,
 )
-from harness.sim.optics.check.light import UNCHANGED, LightMatch, fit_light, orientation, same
-from harness.sim.optics.check.slopes import slope_fit
+from harness.sim.optics.check.light import LightMatch, fit_light, orientation, same
+from harness.sim.optics.check.light_under_contact import light_under_contact
+from harness.sim.optics.check.slopes import SlopeFit, slope_fit, surface_residual
+from harness.sim.optics.check.turned import better_turned, without_drift
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 _BLOCKS = 40
@@ -36,16 +38,21 @@ _SAME_GAIN_PRESSED = 0.08
 _LEAST_ALIKE, _SURE = 0.6, 0.75
 """Shares of a resting picture, and of a reference in another orientation, explained by the light alone."""
 
-_LEAST_ALIKE_PRESSED = 0.5
-_LEAST_EXPLAINED, _LEAST_SURFACE = 0.8, 0.75
-"""Of a press: at least 0.89 and 0.85 over real and mocked ones; mirrored real ones have at most 0.65."""
+_LEAST_EXPLAINED, _LEAST_SURFACE = 0.45, 0.4
+"""Of a press, by slopes small enough for linear shading: steep contacts that fill the window have 0.6."""
+
+_FOREIGN = 15.0
+"""Grey levels rms that no surface of the gel explains: steep contacts that fill the window leave up to 13."""
+
+_MOSTLY = 0.7
+"""Share of a picture in one light, from which no contact can have made it look so."""
+
+_PATTERN = 4.0
+"""Grey levels of standard deviation of a resting gel, from which a light is told from a contact by it."""
 
 _PULLED = -0.5
 _DEEPEST = 0.85
 """Of a gel's thickness: pressed deeper, faces are steeper than calibrations know, and read too low."""
-
-_STILL = 0.25
-"""Share of a picture that is taken to be at rest."""
 
 _TAKE = "take both pictures as the calibration's presses were taken, or calibrate again"
 
@@ -95,20 +102,17 @@ def checked_picture(
     require_light(seen, known)
     require_unclipped(image, calibration.background)
     require_whole(image, calibration.background)
+    rest = known if background is None else block_means(background, block)
+    light = None if background is None else _light_of_rest(rest, known)
+    if len(calibration.smooth):
+        _require_own_orientation(seen, rest, calibration, block)
     if background is None:
-        light = _light_of_press(seen, known)
+        light = _light_of_press(seen, known, calibration, block)
         rest = known if light is None else light.shown(known)
-    else:
-        rest = block_means(background, block)
-        light = _light_of_rest(rest, known)
-        _require_same_gel(seen, rest)
     gain = _gain(light, _SAME_GAIN_PRESSED if background is None else _SAME_GAIN)
     require_lit(seen, rest)
     require_quiet(image, calibration.background if background is None else background)
-    change = seen - rest
-    # Most of what hardly changed has the light of the moment in common.
-    drift = np.zeros(3) if (np.abs(change).max(axis=2) < UNCHANGED).mean() > _STILL else _drift(change)
-    _require_press((change - drift) / gain, calibration, block)
+    _require_press(without_drift(seen - rest) / gain, calibration, block)
     return _corrected(image, calibration, background, light, gain)
 
 
@@ -155,27 +159,32 @@ def _light_of_rest(rest: FloatArray, known: FloatArray) -> LightMatch:
     return light
 
 
-def _light_of_press(seen: FloatArray, known: FloatArray) -> LightMatch | None:
-    """The light of a press's untouched surroundings; None where too little of them is in view."""
-    light = fit_light(seen, known)
-    if light.sure:
-        return light
-    _refuse_turned(seen, known, light)
-    return None
+def _light_of_press(
+    seen: FloatArray, known: FloatArray, calibration: TactileCalibration, block: int
+) -> LightMatch | None:
+    """The light that a press was made in; None where that is the calibration's, or not known.
+
+    A tilted face that fills the window changes its colour as another light does: only beside a contact is
+    the light the picture's own. Under one it is found across the slopes, by the resting gel's pattern.
+    """
+    beside = fit_light(seen, known)
+    if beside.sure and (np.abs(beside.gain - 1.0) <= _SAME_GAIN_PRESSED).all():
+        return None
+    patterned = len(calibration.smooth) > 0 and float(known.std(axis=(0, 1)).min()) > _PATTERN
+    if beside.tight > _MOSTLY or not patterned:
+        return beside if beside.sure else None
+    return light_under_contact(seen, known, calibration, block)
 
 
-def _require_same_gel(seen: FloatArray, rest: FloatArray) -> None:
-    light = fit_light(seen, rest)
-    if light.alike < _LEAST_ALIKE_PRESSED:
-        _refuse_turned(seen, rest, light)
-
-
-def _refuse_turned(seen: FloatArray, rest: FloatArray, light: LightMatch) -> None:
-    words, other = orientation(seen, rest)
-    if not same(words) and other.alike > max(_LEAST_ALIKE_PRESSED, light.alike + 0.2):
+def _require_own_orientation(
+    seen: FloatArray, rest: FloatArray, calibration: TactileCalibration, block: int
+) -> None:
+    found = better_turned(seen, rest, calibration, block)
+    if found is not None:
+        words, turned, as_it_is = found
         raise PictureRefused(
-            f"the press fits its resting gel only with {words} ({other.alike:.0%} of its area, and "
-            f"{light.alike:.0%} as it is); {_TAKE}"
+            f"the press fits its resting gel only with {words}: a surface of the gel then leaves "
+            f"{turned:.0f} grey levels of it unexplained, and {as_it_is:.0f} as it is; {_TAKE}"
         )
 
 
@@ -192,27 +201,26 @@ def _gain(light: LightMatch | None, deadband: float) -> FloatArray:
     return np.where(np.abs(light.gain - 1.0) <= deadband, 1.0, light.gain)
 
 
-def _drift(change: FloatArray) -> FloatArray:
-    """``(3,)`` what the blocks that hardly changed have in common."""
-    size = np.abs(change).max(axis=2)
-    return np.asarray(np.median(change[size <= np.percentile(size, 100.0 * _STILL)], axis=0))
-
-
 def _require_press(change: FloatArray, calibration: TactileCalibration, block: int) -> None:
     fit = slope_fit(change, calibration, block)
     if fit is None:
         return
+    _require_pressed(fit)
+    little = fit.explained < _LEAST_EXPLAINED or fit.surface < _LEAST_SURFACE
+    if not little or surface_residual(change, calibration, block) < _FOREIGN:
+        return
     if fit.explained < _LEAST_EXPLAINED:
         raise PictureRefused(
             f"slopes explain {fit.explained:.0%} of the press's change of colour (at least "
-            f"{_LEAST_EXPLAINED:.0%}): its channels are exchanged, or it is of another sensor; {_TAKE}"
+            f"{_LEAST_EXPLAINED:.0%}): it is of another sensor; {_TAKE}"
         )
-    if fit.surface < _LEAST_SURFACE:
-        raise PictureRefused(
-            f"{fit.surface:.0%} of the press's slopes are the slopes of one surface (at least "
-            f"{_LEAST_SURFACE:.0%}): the picture is mirrored, its channels are exchanged, or it is of "
-            f"another sensor; {_TAKE}"
-        )
+    raise PictureRefused(
+        f"{fit.surface:.0%} of the press's slopes are the slopes of one surface (at least "
+        f"{_LEAST_SURFACE:.0%}): it is of another sensor; {_TAKE}"
+    )
+
+
+def _require_pressed(fit: SlopeFit) -> None:
     if fit.raised < _PULLED:
         raise PictureRefused(
             "by its colours the gel was pulled out, not pressed in: press and resting picture are exchanged, "

@@ -57,7 +57,7 @@ def slope_fit(change: FloatArray, calibration: TactileCalibration, block: int) -
     strong = size > _STRONG**2
     if strong.sum() < _LEAST_BLOCKS or len(calibration.smooth) == 0:
         return None
-    shading, inverse = _linear(calibration, block)
+    shading, inverse = linear_shading(calibration, block)
     normal = np.einsum("ijac,ijc->ija", inverse, change)
     apart = change - np.einsum("ijac,ija->ijc", shading, normal)
     explained = 1.0 - float((apart[strong] ** 2).sum() / size[strong].sum())
@@ -73,6 +73,22 @@ def slope_fit(change: FloatArray, calibration: TactileCalibration, block: int) -
         return SlopeFit(explained, surface, 0.0)
     above = heights[strong] - float(heights[rest].mean())
     return SlopeFit(explained, surface, float(above.mean() / max(float(np.abs(above).mean()), 1e-12)))
+
+
+def surface_residual(change: FloatArray, calibration: TactileCalibration, block: int) -> float:
+    """Grey levels rms of a change of colour that is not that of one surface of the gel.
+
+    Args:
+        change: ``(rows, columns, 3)`` grey levels against the untouched gel, means over blocks.
+        calibration: with a smooth model.
+        block: pixels a side of a block.
+    """
+    shading, inverse = linear_shading(calibration, block)
+    slopes = _slopes(np.einsum("ijac,ijc->ija", inverse, change))
+    down, right = np.gradient(free_heights(slopes[..., 1], slopes[..., 0]))
+    normal = -np.stack([right, down], axis=-1) / np.sqrt(1.0 + right**2 + down**2)[..., None]
+    apart = change - np.einsum("ijac,ija->ijc", shading, normal)
+    return float(np.sqrt((apart**2).sum(axis=2).mean()))
 
 
 def _slopes(normal: FloatArray) -> FloatArray:
@@ -96,8 +112,12 @@ def _around(quiet: BoolArray) -> BoolArray | None:
 
 
 @lru_cache(maxsize=8)
-def _linear(calibration: TactileCalibration, block: int) -> tuple[FloatArray, FloatArray]:
-    """``(rows, columns, 2, 3)`` colours of a normal by block, and the normal of a colour."""
+def linear_shading(calibration: TactileCalibration, block: int) -> tuple[FloatArray, FloatArray]:
+    """The calibration's smooth model made linear, at the middles of blocks.
+
+    Returns:
+        ``(rows, columns, 2, 3)`` colours of a normal by block, and the normal of a colour.
+    """
     rows, columns = calibration.rows, calibration.columns
     by_place = np.einsum(
         "an,npc->apc",

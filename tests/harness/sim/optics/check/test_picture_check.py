@@ -111,8 +111,27 @@ def test_the_same_is_seen_by_the_slopes_of_a_gel_without_a_pattern(fault: Fault)
     even = replace(BENCH, background=np.full_like(REST, 120))
     press = _noisy(np.clip(120.0 + PRESS - REST.astype(np.float64), 0.0, 255.0), 3)
     checked_picture(press, even)
-    with pytest.raises(PictureRefused, match=r"slopes|pulled out"):
+    with pytest.raises(PictureRefused, match=r"only with|pulled out"):
         checked_picture(np.ascontiguousarray(fault(press)), even)
+
+
+WIDE: dict[str, dict[str, float]] = {
+    "a ball that fills the window": {"radius": 40e-3, "depth": 1.0e-3},
+    "the flank of a large ball": {"i": -10.0, "j": 60.0, "radius": 20e-3, "depth": 1.8e-3},
+    "a deep ball": {"radius": 8e-3, "depth": 1.8e-3},
+}
+
+
+@pytest.mark.parametrize("surface", WIDE.values(), ids=WIDE)
+def test_a_contact_that_fills_the_window_is_no_other_light_and_no_other_orientation(
+    surface: dict[str, float],
+) -> None:
+    press, _ = _drawn(_surface(**surface))
+    assert np.array_equal(checked_picture(press, BENCH).image, press)
+    dim = checked_picture(_byte(0.7 * press.astype(np.float64)), BENCH)
+    assert dim.gain == pytest.approx(np.full(3, 0.7), abs=0.03)
+    for fault in TURNS.values():
+        assert "fits its resting gel only with" in _refused(np.ascontiguousarray(fault(press)), None)
 
 
 def test_press_and_rest_exchanged_are_refused() -> None:
