@@ -36,16 +36,38 @@ def light_under_contact(
         calibration: with a smooth model.
         block: pixels a side of a block.
     """
-    shading, _ = linear_shading(calibration, block)
-    across = np.cross(shading[..., 0, :], shading[..., 1, :])
-    across = (across / np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)).reshape(-1, 3)
-    target = (across * seen.reshape(-1, 3)).sum(axis=1)
-    resting = across * known.reshape(-1, 3)
+    across = _across_slopes(calibration, block)
+    target, resting = (across * seen.reshape(-1, 3)).sum(axis=1), across * known.reshape(-1, 3)
     _, added = _fitted(across, target - resting.sum(axis=1))
     (gain,), left = _fitted(resting.sum(axis=1, keepdims=True), target)
     if abs(gain - 1.0) <= _OTHER or left >= _BETTER * added:
         return None
     return _matched(seen, known, np.full(3, gain))
+
+
+def multiplies(
+    light: LightMatch, seen: FloatArray, known: FloatArray, calibration: TactileCalibration, block: int
+) -> bool:
+    """Whether a light explains a press better than one that only adds, its slopes left out.
+
+    Args:
+        light: found beside a contact.
+        seen: ``(rows, columns, 3)`` grey levels, means over blocks.
+        known: the same, of the resting gel.
+        calibration: with a smooth model.
+        block: pixels a side of a block.
+    """
+    across = _across_slopes(calibration, block)
+    change, apart = ((seen - one).reshape(-1, 3) for one in (known, light.shown(known)))
+    _, added = _fitted(across, (across * change).sum(axis=1))
+    return float(np.abs((across * apart).sum(axis=1)).mean()) < _BETTER * added
+
+
+def _across_slopes(calibration: TactileCalibration, block: int) -> FloatArray:
+    """``(blocks, 3)`` of length one, across the colours of both slopes."""
+    shading, _ = linear_shading(calibration, block)
+    across = np.cross(shading[..., 0, :], shading[..., 1, :])
+    return np.asarray(across / np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)).reshape(-1, 3)
 
 
 def _fitted(design: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:

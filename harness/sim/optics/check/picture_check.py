@@ -20,7 +20,7 @@ from harness.sim.optics.check.faults import (
     require_whole,
 )
 from harness.sim.optics.check.light import LightMatch, fit_light, orientation, same
-from harness.sim.optics.check.light_under_contact import light_under_contact
+from harness.sim.optics.check.light_under_contact import light_under_contact, multiplies
 from harness.sim.optics.check.slopes import SlopeFit, slope_fit, surface_residual
 from harness.sim.optics.check.turned import better_turned, without_drift
 from harness.sim.optics.tactile_calibration import TactileCalibration
@@ -171,8 +171,10 @@ def _light_of_press(
     if beside.sure and (np.abs(beside.gain - 1.0) <= _SAME_GAIN_PRESSED).all():
         return None
     patterned = len(calibration.smooth) > 0 and float(known.std(axis=(0, 1)).min()) > _PATTERN
-    if beside.tight > _MOSTLY or not patterned:
+    if not patterned:
         return beside if beside.sure else None
+    if beside.tight > _MOSTLY:
+        return beside if multiplies(beside, seen, known, calibration, block) else None
     return light_under_contact(seen, known, calibration, block)
 
 
