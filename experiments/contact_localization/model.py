@@ -69,6 +69,7 @@ class Model:
         modes: of the object; None where no sound is compared.
         material: of the object; None where no sound is compared.
         seen: the object along the tool, which candidates' tactile images are crops of; None for the mesh's.
+        seen_rms: m, root mean square over a whole image, that ``seen`` is itself off by.
     """
 
     mesh: Mesh
@@ -77,6 +78,7 @@ class Model:
     modes: Modes | None = None
     material: Material | None = None
     seen: FirstSurface | None = None
+    seen_rms: float = 0.0
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
 
     _gains: dict[float, GainTable] = field(init=False, default_factory=dict, repr=False)
