@@ -64,11 +64,12 @@ def model_of_scene(
     chosen = accuracy or Accuracy.default(knobs_of(EFFECTS)).with_(scene_levels(scene))
     sensor = station.gel.sensor
     seen = object_touch(scene, station, mesh, calibration, chosen, objectfile)
+    rms = 0.0 if seen is None else seen.rms
     if not scene.sensors.sound:
-        return Model(mesh, sensor, calibration, seen=seen)
+        return Model(mesh, sensor, calibration, seen=seen, seen_rms=rms)
     modes = object_modes(scene, station, mesh, chosen, objectfile)
     _refuse_loose(modes)
-    return Model(mesh, sensor, calibration, modes, MATERIALS[scene.object.material], seen)
+    return Model(mesh, sensor, calibration, modes, MATERIALS[scene.object.material], seen, seen_rms=rms)
 
 
 def _refuse_loose(modes: Modes) -> None:

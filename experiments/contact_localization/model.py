@@ -70,6 +70,7 @@ class Model:
         material: of the object; None where no sound is compared.
         seen: the object along the tool, which candidates' tactile images are crops of; None for the mesh's.
         unheard: why no sound can be compared that the scene calls for; empty where one can.
+        seen_rms: m, root mean square over a whole image, that ``seen`` is itself off by.
     """
 
     mesh: Mesh
@@ -79,6 +80,7 @@ class Model:
     material: Material | None = None
     seen: FirstSurface | None = None
     unheard: str = ""
+    seen_rms: float = 0.0
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
 
     _gains: dict[float, GainTable] = field(init=False, default_factory=dict, repr=False)

@@ -1,6 +1,7 @@
 """A scene's object along the tool, by the networks of its ObjectFile."""
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
@@ -11,9 +12,11 @@ from harness.effects.file_levels import NETWORK
 from harness.effects.scene_object import known_file
 from harness.effects.touch_file_effects import SHAPES
 from harness.experiment.object_modes import ReadFile
-from harness.sim.gel.view import FirstSurface
 from harness.sim.optics.tactile_calibration import TactileCalibration
 from harness.sim.solid.walls import walled
+
+if TYPE_CHECKING:
+    from harness.objectfile.touch.tool_depth import CodedDepth
 
 
 def object_touch(
@@ -23,7 +26,7 @@ def object_touch(
     calibration: TactileCalibration,
     accuracy: Accuracy,
     objectfile: ReadFile | None = None,
-) -> FirstSurface | None:
+) -> "CodedDepth | None":
     """What candidates' tactile images are crops of; None where the mesh is drawn.
 
     Args:

@@ -148,6 +148,7 @@ class Search:
     ) -> FloatArray:
         term = np.empty(len(at.yaws))
         touch, noise = self.touch(contact, coarse), place_noise(self.noise, at.shared is not None)
+        noise = noise.with_model(self.model.seen_rms, touch)
         for chosen, view, places in self.placed(contact, at, coarse):
             term[chosen] = touch_terms(view, touch, noise, places, step, rings, sigma, temperature)
         return term
@@ -165,7 +166,8 @@ class Search:
         values = np.empty(len(members))
         for column, (k, sigma, _) in enumerate(self._scales(members)):
             ((_, view, places),) = self.placed(k, one)
-            values[column] = best_fit(view, self.touch(k), self.noise.touch, places[0], sigma)
+            noise = self.noise.touch.with_model(self.model.seen_rms, self.touch(k))
+            values[column] = best_fit(view, self.touch(k), noise, places[0], sigma)
         return values
 
     def placed(

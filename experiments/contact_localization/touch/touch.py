@@ -5,7 +5,7 @@ crop of one orthographic depth image along the tool's axis: one render answers f
 candidates of a contact, and what stands in the way of the sensor is in the picture.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +50,19 @@ class TouchNoise:
     def sigmas(self) -> Sigmas:
         """As the loops take them."""
         return float(self.rms), float(self.tilt)
+
+    def with_model(self, rms: float, touch: "TouchMap") -> "TouchNoise":
+        """With what the predicted maps are themselves off by.
+
+        Its square is spread over the whole map, and a misfit is counted over the touched area: an error at a
+        narrow edge weighs as much there as the same one over a full face, of fewer pixels.
+
+        Args:
+            rms: m, root mean square over a whole map.
+            touch: that is compared.
+        """
+        share = touch.heights.size / max(1, len(touch.touched))
+        return replace(self, rms=float(np.hypot(self.rms, rms * np.sqrt(share))))
 
 
 @dataclass(frozen=True, eq=False)

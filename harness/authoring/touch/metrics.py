@@ -14,7 +14,7 @@ from harness.objectfile.surface_search import SurfaceSearch
 from harness.objectfile.touch.graph import MOST_TILT as CODED_TILT
 from harness.objectfile.touch.nodes import NodeSearch, SurfaceNodes
 from harness.objectfile.touch.touch import Maps
-from harness.objectfile.touch_entries import CARD_RANGE
+from harness.objectfile.touch_entries import MAP_RANGE
 from harness.sim.gel.gel import GelSkirt
 from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.presses import Presses
@@ -27,7 +27,7 @@ _EXACT = 200.0
 
 
 def psnr(found: AnyArray, reference: FloatArray) -> FloatArray:
-    """``(n,)`` dB: ``10 log10(CARD_RANGE^2 / mean squared difference)`` over all pixels of each map.
+    """``(n,)`` dB: ``10 log10(MAP_RANGE^2 / mean squared difference)`` over all pixels of each map.
 
     Args:
         found: ``(n, rows, columns)`` m.
@@ -38,7 +38,7 @@ def psnr(found: AnyArray, reference: FloatArray) -> FloatArray:
     """
     if found.shape != reference.shape or found.ndim != 3:
         raise WrongUse(f"maps of shapes {found.shape} and {reference.shape} cannot be compared")
-    wrong = ((found - reference) ** 2).mean(axis=(1, 2)) / CARD_RANGE**2
+    wrong = ((found - reference) ** 2).mean(axis=(1, 2)) / MAP_RANGE**2
     decibels: FloatArray = -10.0 * np.log10(np.maximum(wrong, 10.0 ** (-0.1 * _EXACT)))
     return decibels
 

@@ -52,6 +52,7 @@ class CodedDepth:
         gel: whose rays they are.
         places: of tiles.
         owners: ``(n,)`` node of each tile.
+        rms: m, that the codes' maps are off by as their card states it (``CodesEntry.stated_rms``).
     """
 
     network: Network
@@ -59,6 +60,7 @@ class CodedDepth:
     gel: GelEntry
     places: SurfaceNodes
     owners: IntArray
+    rms: float = 0.0
 
     def __call__(self, view_from_object: FloatArray, pitch: float, rows: int, columns: int) -> FloatArray:
         """``(rows, columns)`` m along the view's z axis to the first surface; inf where there is none.
@@ -163,7 +165,7 @@ def open_tool_depth(of: ObjectFile, threads: int = 1) -> CodedDepth:
     owners, gaps = nodes.nearest_to(places)
     reached = gaps <= entry.most_off_m
     network = open_network(of.read(entry.network), entry.network, threads, ("gaps",))
-    return CodedDepth(network, nodes, touch.gel, places[reached], owners[reached])
+    return CodedDepth(network, nodes, touch.gel, places[reached], owners[reached], entry.stated_rms)
 
 
 def _spread(mesh: Mesh) -> SurfaceNodes:

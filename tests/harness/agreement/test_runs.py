@@ -23,7 +23,7 @@ from harness.bench.scene_objectfile import shipped_objectfiles
 from harness.bench.station_file import load_station, station_path
 from harness.effects.evaluate import Evaluation, evaluate
 from harness.experiment.in_process import performed
-from harness.objectfile.touch_entries import CARD_RANGE
+from harness.objectfile.touch_entries import MAP_RANGE
 from harness.objects.builtin import build
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -119,7 +119,7 @@ def test_a_network_is_off_by_what_its_card_states_and_the_reference_by_nothing(r
     assert subject.objectfile is not None
     measured = subject.objectfile.description.networks["touch"].measured
     assert np.all(errors > 0.0)
-    decibels = -20.0 * np.log10(errors / CARD_RANGE)
+    decibels = -20.0 * np.log10(errors / MAP_RANGE)
     assert np.median(decibels) == pytest.approx(measured["unseen_places_psnr_db_median"])
     assert np.mean(decibels < measured["unseen_places_psnr_db_p10"]) == pytest.approx(0.1)
     assert map_errors(subject, "reference").tolist() == [0.0]

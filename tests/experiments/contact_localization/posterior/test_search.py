@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import without_images
@@ -261,3 +262,25 @@ def test_hypotheses_of_one_contact_are_where_its_gel_was_pressed_in(search: Sear
         place = search.contact_places(k, here)[0]
         # The image's own depth at the centre is a little less than the press over edges.
         assert np.linalg.norm(place - press.point) < 0.4e-3
+
+
+def test_a_models_stated_error_keeps_the_truth_in_the_running(
+    contacts: tuple[Contact, ...], block: Model, prior: Prior
+) -> None:
+    """Unstated, every contact costs all that it may, at the truth as anywhere else."""
+    rms = 0.3e-3
+
+    def bumpy(view_from_object: FloatArray, pitch: float, rows: int, columns: int) -> FloatArray:
+        bumps = gaussian_filter(np.random.default_rng(0).normal(size=(rows, columns)), 3.0)
+        depth = block.first_surface(view_from_object, pitch, rows, columns)
+        return np.asarray(depth + rms * bumps / bumps.std())
+
+    off, far = replace(block, seen=bumpy), np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]])
+    fits, ahead = [], []
+    for model in (off, replace(off, seen_rms=rms)):
+        search = Search(contacts, model, prior, 3e-3, Noise())
+        pair = at(true_gel(search) + far, np.zeros(2))
+        fits.append(search.gates(truth(search), ALL))
+        ahead.append(float(np.subtract(*search.weigh(pair, ALL, 1, 2).log_weights)))
+    assert np.all(fits[1] > fits[0])
+    assert ahead[1] > ahead[0] + len(ALL)

@@ -1,9 +1,11 @@
 """The touch term: highest where the press was, never below its cap, forgiving what is unknown."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from experiments.contact_localization.touch.touch import (
     TouchMap,
@@ -236,3 +238,34 @@ def test_the_paper_s_cosine_is_highest_near_the_true_place_and_between_0_and_1(b
     assert np.linalg.norm(places[np.argmax(found)][:2] - centre_in(view, press)[:2]) < 1e-3
     true = similarities(view, touch, centre_in(view, press)[None] - np.array([0.0, 0.0, press.depth]))
     assert true[0] > found.max() - 0.01
+
+
+def off_by(view: ToolView, rms: float) -> ToolView:
+    """The view as a model has it that errs smoothly, with nothing filled in yet."""
+    bumps = gaussian_filter(np.random.default_rng(1).normal(size=view.depth.shape), 3.0)
+    missing = np.full(view.depth.shape, np.nan)
+    depth = view.depth + rms * bumps / bumps.std()
+    return replace(view, depth=depth, score=missing, gel_depth=missing.copy())
+
+
+@pytest.mark.parametrize("name", PRESSES)
+def test_what_a_model_is_off_by_as_stated_costs_a_true_place_one_sigma_at_most(
+    block: RasterMesh, name: str
+) -> None:
+    """Of root mean squares: that of a sum is no more than the sum of both."""
+    press, rms = PRESSES[name], 0.15e-3
+    view, touch = seen(block, press), read(block, press)
+    exact, unstated, stated = (
+        best_fit(each, touch, noise, centre_in(view, press), NOISE.shift)
+        for each, noise in (
+            (view, NOISE),
+            (off_by(view, rms), NOISE),
+            (off_by(view, rms), NOISE.with_model(rms, touch)),
+        )
+    )
+    assert stated >= -0.5 * (np.sqrt(-2.0 * exact) + 1.0) ** 2
+    assert stated > unstated
+
+
+def test_an_exact_model_adds_nothing(block: RasterMesh) -> None:
+    assert NOISE.with_model(0.0, read(block, PRESSES["deep"])) == NOISE

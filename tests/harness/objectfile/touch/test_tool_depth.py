@@ -105,6 +105,18 @@ def test_pixels_that_are_no_whole_number_of_rays_are_refused(coded: CodedDepth, 
         coded(view(0), factor * RAYS, *SHAPE)
 
 
+@pytest.mark.parametrize(("measured", "rms"), [({"unseen_places_psnr_db_p10": 40.0}, 20e-6), ({}, 0.0)])
+def test_its_error_is_what_the_card_states(tmp_path: Path, measured: dict[str, float], rms: float) -> None:
+    """Forty decibels below a press of 2 mm."""
+    part = tb.peg_part()
+    assert part.codes is not None
+    stated = with_touch(
+        create_object(tmp_path / "peg", "peg", tb.peg(), STEEL, tb.PROVENANCE),
+        replace(part, codes=replace(part.codes, measured=measured)),
+    )
+    assert open_tool_depth(stated).rms == pytest.approx(rms, rel=1e-12)
+
+
 def test_an_object_without_codes_is_refused(egg_object: ObjectFile) -> None:
     with pytest.raises(DataRefused, match="--only touch"):
         open_tool_depth(egg_object)
