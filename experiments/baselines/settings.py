@@ -34,16 +34,16 @@ class FitSpec:
     rate: float = 2e-3
 
 
-SPECTROGRAM: Final = FitSpec(steps=400)
+SPECTROGRAM: Final = FitSpec(steps=320)
 """1.0's AudioNet: 4 layers of 256 for its 3 x 8."""
 
-COLOURS: Final = FitSpec(octaves=6)
+COLOURS: Final = FitSpec(octaves=6, steps=200)
 """1.0's TouchNet: 4 layers of 256, and 6 octaves for its 10, of which the last are noise between places."""
 
-AUDIONET: Final = PerceptronSpec(epochs=30)
+AUDIONET: Final = PerceptronSpec(epochs=12)
 """2.0's, with the published layers."""
 
-TOUCHNET: Final = TouchPerceptronSpec(presses=1200, epochs=1, steps=300, rate=2e-3)
+TOUCHNET: Final = TouchPerceptronSpec(presses=1200, epochs=1, steps=150, rate=2e-3)
 """2.0's, with the published layers."""
 
 SMALL_CODES: Final = CodesSpec(most_bytes=1_000_000, pitch=0.8e-3)

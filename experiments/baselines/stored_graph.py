@@ -9,6 +9,9 @@ import numpy as np
 from harness.basics.errors import WrongUse
 from harness.basics.store import Store, digest
 
+VERSION = "baseline graph"
+"""Of what trainings compute; another text with every change of it, so that stored networks are dropped."""
+
 
 class TorchMissing(WrongUse):
     """A baseline has to be trained, and torch is not installed."""
@@ -38,7 +41,7 @@ def stored_graph(
     Raises:
         TorchMissing: it has to be trained and cannot be.
     """
-    key = digest(["baseline graph", *identity])
+    key = digest([VERSION, *identity])
     stored = store.get(key)
     if isinstance(stored, Mapping):
         return stored["graph"].tobytes(), float(stored["seconds"])

@@ -17,6 +17,7 @@ from harness.bench.scene import BUILTIN
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.camera import FOCAL, SIZE
 from harness.picture.linear_image import LinearImage
+from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance_source import appearance_of
 from harness.sim.light.direct_image import LitObject
 
@@ -55,7 +56,7 @@ class ViewBench:
         return digest([*eyes, *self.references])
 
     @property
-    def _pairs(self) -> "zip[tuple[object, object]]":
+    def _pairs(self) -> "zip[tuple[Pinhole, DirectionalLight]]":
         return zip(self.views.cameras, self.views.lights, strict=True)
 
     def scores(self, number: int, rendered: AnyArray) -> Mapping[str, float]:

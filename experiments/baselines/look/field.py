@@ -62,7 +62,9 @@ class UniformField:
         points = eye + directions[:, None] * depths[..., None]
         views = np.broadcast_to(directions[:, None], points.shape)
         raw = self.field(points.reshape(-1, 3), views.reshape(-1, 3), light).reshape(*depths.shape, 4)
-        weights = ray_weights(raw[..., 3], depths, directions)
+        # Nothing was learned outside of the ball, and the object lies within it.
+        density = np.where(np.linalg.norm(points, axis=-1) <= 1.0, raw[..., 3], 0.0)
+        weights = ray_weights(density, depths, directions)
         colour = np.einsum("rs,rsc->rc", weights, stretched(raw[..., :3]))
         found: FloatArray = colour + (1.0 - weights.sum(axis=1))[:, None]
         return found

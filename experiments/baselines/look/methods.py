@@ -42,7 +42,7 @@ def look_methods(bench: ViewBench, of: ObjectFile, work: RenderingWork) -> list[
         RenderingMethod(
             "one field, samples evenly (1.0)",
             "1.0 here",
-            astuple(FIELD),
+            ("within the ball", *astuple(FIELD)),
             lambda: _by_field(bench, work),
             f"{FIELD.samples} samples a ray, {FIELD.depth} x {FIELD.width}",
         ),

@@ -85,7 +85,9 @@ def summed(
     frequencies: FloatArray, rates: FloatArray, gains: AnyArray, level: SynthesisLevel = "fast"
 ) -> FloatArray:
     """``(t,)``: the sound of ``(m,)`` gains, as long and at the rate that distances are defined for."""
-    return synthesize(frequencies, rates, np.asarray(gains)[None], DURATION, RATE, level).sound[0]
+    made = synthesize(frequencies, rates, np.asarray(gains)[None], DURATION, RATE, level)
+    sound: FloatArray = made.sound[0]
+    return sound
 
 
 def strike_bench(mesh: Mesh, material: Material, strikes: int, work: RenderingWork) -> StrikeBench:

@@ -86,7 +86,8 @@ class TouchBench:
 
     def picture(self, indentation: AnyArray) -> ByteArray:
         """``(rows, columns, 3)`` of ``(rows, columns)`` m."""
-        return self.optics.render(np.asarray(indentation, np.float64)[None]).images[0]
+        drawn: ByteArray = self.optics.render(np.asarray(indentation, np.float64)[None]).images[0]
+        return drawn
 
     def scores(self, number: int, rendered: AnyArray) -> Mapping[str, float]:
         """PSNR and SSIM of the whole picture."""

@@ -35,7 +35,7 @@ def first_touch(bench: TouchBench, work: RenderingWork, suffix: str = "") -> Ren
         work: where it is stored.
         suffix: added to its name.
     """
-    column = "other" if suffix else "1.0 here"
+    column: Column = "other" if suffix else "1.0 here"
     note = "one picture a place, whatever the tilt and depth"
     return RenderingMethod(
         f"DIGIT-like TouchNet (1.0){suffix}", column, astuple(COLOURS), lambda: _by_colours(bench, work), note

@@ -13,7 +13,14 @@ from harness.objectfile.graph import Encoding, MlpWeights, Normaliser
 
 Drawn = Callable[[np.random.Generator], tuple[FloatArray, AnyArray, AnyArray]]
 """From a generator to ``(batch, inputs)`` normalised inputs, ``(batch, outputs)`` targets and ``(batch,)``
-weights of their squared errors."""
+weights of their squared errors where the last layer is solved."""
+
+
+_SOLVED = 16
+"""Draws of rows that the last layer is solved over."""
+
+_RIDGE = 1e-6
+"""Of the mean square of the features."""
 
 
 class EncodedPerceptron(nn.Module):
@@ -29,11 +36,13 @@ class EncodedPerceptron(nn.Module):
 
     def forward(self, rows: FloatArray) -> Tensor:
         """Of normalised rows, which are encoded as the graph encodes them."""
+        return self.layers[-1](self.features(rows))
+
+    def features(self, rows: FloatArray) -> Tensor:
+        """``(k, width)``: what the last layer takes."""
         hidden = encode(rows, self._as_it_is, self._encoding)
-        for index, layer in enumerate(self.layers):
-            hidden = layer(hidden)
-            if index < len(self.layers) - 1:
-                hidden = torch.relu(hidden)
+        for layer in self.layers[:-1]:
+            hidden = torch.relu(layer(hidden))
         return hidden
 
     def weights(self) -> MlpWeights:
@@ -44,7 +53,7 @@ class EncodedPerceptron(nn.Module):
 def fitted(
     spec: FitSpec, sizes: tuple[int, int], draw: Drawn, seed: int, report: Callable[[float], None]
 ) -> MlpWeights:
-    """The weights after all steps of least squares.
+    """The weights after all steps; the last layer is then solved for what those before it give.
 
     Args:
         spec: of the network and its training.
@@ -59,11 +68,27 @@ def fitted(
     random = np.random.default_rng([seed, 5])
     for step in range(spec.steps):
         set_rate(adam, spec.rate, step / spec.steps)
-        rows, wanted, weights = draw(random)
+        rows, wanted, _ = draw(random)
         adam.zero_grad()
-        wrong = ((network(rows) - torch.from_numpy(np.float32(wanted))) ** 2).mean(dim=1)
-        loss = (wrong * torch.from_numpy(np.float32(weights))).mean()
+        loss = ((network(rows) - torch.from_numpy(np.float32(wanted))) ** 2).mean()
         torch.autograd.backward(loss)
         adam.step()
         report((step + 1) / spec.steps)
-    return network.weights()
+    return _solved(network, draw, random)
+
+
+def _solved(network: EncodedPerceptron, draw: Drawn, random: np.random.Generator) -> MlpWeights:
+    """The network with the last layer of least weighted squares over fresh rows."""
+    products: FloatArray = np.zeros(())
+    targets: FloatArray = np.zeros(())
+    for _ in range(_SOLVED):
+        rows, wanted, weights = draw(random)
+        with torch.no_grad():
+            found = network.features(rows).numpy().astype(np.float64)
+        features = np.concatenate([found, np.ones((len(found), 1))], axis=1)
+        weighted = features * weights[:, None]
+        products, targets = products + weighted.T @ features, targets + weighted.T @ wanted
+    ridge = _RIDGE * float(np.trace(products)) / len(products)
+    last = np.linalg.solve(products + ridge * np.eye(len(products)), targets)
+    inner = network.weights().layers[:-1]
+    return MlpWeights((*inner, (last[:-1], last[-1])))

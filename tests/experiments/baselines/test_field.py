@@ -48,6 +48,20 @@ def test_a_solid_ball_is_drawn_where_it_is_and_the_rest_is_white() -> None:
     assert (picture[..., 0] < 128).sum() == pytest.approx(seen, rel=0.06)
 
 
+def test_what_a_field_holds_outside_of_the_ball_is_not_drawn() -> None:
+    def black_outside(points: FloatArray, views: FloatArray, light: FloatArray) -> FloatArray:
+        found = np.full((len(points), 4), -20.0)
+        found[:, 3] = np.where(np.linalg.norm(points, axis=1) > 1.0, DENSE, 0.0)
+        return found
+
+    mesh = ball(0.03)
+    camera = around(mesh, np.array([0.0, 1.0, 0.0]), 16, 16, DISTANCE)
+    picture = UniformField(black_outside, *ball_of(mesh), 64).picture(
+        camera, DirectionalLight(np.array([0.0, 0.0, 1.0]))
+    )
+    assert (picture == 255).all()
+
+
 def test_colours_are_stretched_as_published() -> None:
     raw = np.array([-50.0, 0.0, 2.0, 50.0])
     assert stretched(raw) == pytest.approx(1.2 * (1.0 / (1.0 + np.exp(-raw)) - 0.5) + 0.5)

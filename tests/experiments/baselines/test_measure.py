@@ -106,7 +106,11 @@ def test_methods_render_in_turn(tmp_path: Path) -> None:
     order: list[str] = []
 
     def observe(name: str) -> MadeMethod:
-        return MadeMethod(lambda _: np.array(order.append(name) is None))
+        def render(number: int) -> AnyArray:
+            order.append(name)
+            return np.array(number)
+
+        return MadeMethod(render)
 
     timed_in_turn({"a": observe("a"), "b": observe("b")}, 2, rounds=3)
     assert order == ["a", "b"] * 4  # one round to warm up

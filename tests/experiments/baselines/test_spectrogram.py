@@ -59,7 +59,7 @@ def test_a_network_that_was_trained_for_seconds_is_nearer_than_silence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
-    small = FitSpec(depth=2, width=128, steps=150, batch=4096, rate=4e-3)
+    small = FitSpec(depth=2, width=64, steps=100, batch=2048, rate=4e-3)
     monkeypatch.setattr("experiments.baselines.sound.methods.SPECTROGRAM", small)
     bench = plate_bench()
     work = RenderingWork(Store(tmp_path), lambda doing, share: None)
