@@ -128,11 +128,16 @@ def gel_from_object(place: ContactPlace, depth: float, tilt: float, azimuth: flo
 
 def _nearest(mesh: Mesh, points: FloatArray) -> tuple[FloatArray, IntArray]:
     """``(n, 3)`` places of the surface nearest to ``(n, 3)`` points, and their ``(n,)`` faces."""
-    low, high = mesh.bounds
-    # No place of the surface is farther than the far corner of its box.
-    farthest = np.maximum(np.abs(points - low), np.abs(points - high))
-    reach = np.linalg.norm(farthest, axis=1) * (1.0 + 1e-9)
-    return nearest_on_surface(mesh, points, np.zeros(points.shape), reach)
+    anywhere = np.zeros(points.shape)
+    places, faces = nearest_on_surface(mesh, points, anywhere, np.full(len(points), MOST_MOVED))
+    far = np.flatnonzero(faces < 0)
+    if len(far):
+        low, high = mesh.bounds
+        # No place of the surface is farther than the far corner of its box.
+        farthest = np.maximum(np.abs(points[far] - low), np.abs(points[far] - high))
+        reach = np.linalg.norm(farthest, axis=1) * (1.0 + 1e-9)
+        places[far], faces[far] = nearest_on_surface(mesh, points[far], anywhere[far], reach)
+    return places, faces
 
 
 def _hint(mesh: Mesh, point: FloatArray, nearest: FloatArray) -> str:

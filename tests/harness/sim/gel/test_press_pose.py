@@ -11,8 +11,10 @@ from harness.basics.errors import OutOfDomain, WrongUse
 from harness.basics.geometry import inverse
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import GELSIGHT_R15
+from harness.objects.builtin import build
 from harness.sim.gel.height_map import RasterMesh, height_maps
-from harness.sim.gel.press_pose import MOST_MOVED, ContactPlace, contact_place, gel_from_object
+from harness.sim.gel.press_pose import MOST_MOVED, ContactPlace, _nearest, contact_place, gel_from_object
+from harness.sim.solid.surface_measure import nearest_on_surface
 
 ANGLES = st.floats(-np.pi, np.pi)
 
@@ -95,6 +97,17 @@ def test_a_point_near_the_surface_is_moved_onto_it_and_it_is_said() -> None:
     place = contact_place(BOX, np.array([0.01, 0.01, 0.0212]))
     assert place.moved == pytest.approx(1.2e-3)
     assert place.point == pytest.approx([0.01, 0.01, 0.02])
+
+
+def test_places_near_and_far_are_the_nearest_of_all() -> None:
+    mesh = build("mug")
+    points = np.random.default_rng(0).uniform(*(1.3 * bound for bound in mesh.bounds), size=(40, 3))
+    points[:20] = mesh.vertices[::400][:20] + 1e-4
+    diagonal = np.full(len(points), 2.0 * mesh.diagonal)
+    wanted, _ = nearest_on_surface(mesh, points, np.zeros(points.shape), diagonal)
+    found, faces = _nearest(mesh, points)
+    assert found == pytest.approx(wanted, abs=1e-12)
+    assert (faces >= 0).all()
 
 
 def test_a_point_off_the_surface_is_refused_with_its_distance() -> None:
