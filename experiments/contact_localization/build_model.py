@@ -65,10 +65,11 @@ def model_of_scene(
     sensor = station.gel.sensor
     seen = object_touch(scene, station, mesh, calibration, chosen, objectfile)
     if not scene.sensors.sound:
-        return Model(mesh, sensor, calibration, seen=seen)
+        return Model(mesh, sensor, calibration, seen=seen, errors=station.errors)
     modes = object_modes(scene, station, mesh, chosen, objectfile)
     _refuse_loose(modes)
-    return Model(mesh, sensor, calibration, modes, MATERIALS[scene.object.material], seen)
+    material = MATERIALS[scene.object.material]
+    return Model(mesh, sensor, calibration, modes, material, seen, station.errors)
 
 
 def _refuse_loose(modes: Modes) -> None:

@@ -12,6 +12,7 @@ from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import WrongUse
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
+from harness.bench.bench_errors import USUAL, BenchErrors
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.height_map import RasterMesh, first_surface
 from harness.sim.gel.view import FirstSurface
@@ -32,7 +33,7 @@ class Prior:
 
     base_from_object: FloatArray
     yaw: Literal["known", "unknown"] = "known"
-    yaw_sigma: float = np.radians(1.5)
+    yaw_sigma: float = USUAL.yaw
 
     def __post_init__(self) -> None:
         rotation = np.asarray(self.base_from_object, dtype=np.float64)
@@ -69,6 +70,7 @@ class Model:
         modes: of the object; None where no sound is compared.
         material: of the object; None where no sound is compared.
         seen: the object along the tool, which candidates' tactile images are crops of; None for the mesh's.
+        errors: of the bench that the readings are from, as its station states them.
         unheard: why no sound can be compared that the scene calls for; empty where one can.
     """
 
@@ -78,6 +80,7 @@ class Model:
     modes: Modes | None = None
     material: Material | None = None
     seen: FirstSurface | None = None
+    errors: BenchErrors = field(default_factory=BenchErrors)
     unheard: str = ""
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
 

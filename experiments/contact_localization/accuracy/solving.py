@@ -15,6 +15,7 @@ from experiments.contact_localization.accuracy.dials import (
 )
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import contact_of, height_map
+from experiments.contact_localization.posterior.bench_noise import noise_at
 from experiments.contact_localization.posterior.dials import BLOCK, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
@@ -168,7 +169,7 @@ def located(
     Raises:
         FitRefused: no place on this object explains the readings, or no image shows a contact.
     """
-    noise, images = Noise(), needs_images(accuracy)
+    noise, images = noise_at(readings.model.errors), needs_images(accuracy)
     contacts = _contacts(readings, accuracy.of(BLOCK), noise, images)
     strikes = [observation.strike for observation in readings.observations] if readings.heard else []
     seconds = readings.shared[1] if images else 0.0

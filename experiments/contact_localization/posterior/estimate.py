@@ -135,7 +135,7 @@ def locate(
             lap(seconds, "sounds", start)
         found = solve_run(search, k, accuracy, seed, seconds, heard)
         doubts = _judged(search, found, accuracy, heard, k, seconds) if judged and k == count else ()
-        floor = FLOORS[senses if heard else "touch"]
+        floor = noise.floor * FLOORS[senses if heard else "touch"]
         answers.append(_answer(search, k, found, seconds, floor, doubts))
     return tuple(answers)
 
