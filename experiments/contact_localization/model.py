@@ -1,6 +1,6 @@
 """What an estimator is given beside the readings: the object, the sensor and what is believed of the pose."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Literal
 
@@ -43,6 +43,10 @@ class Prior:
                 "the prior's base_from_object must be a right-handed (3, 3) rotation; pass pose[:3, :3]"
             )
         object.__setattr__(self, "base_from_object", read_only(rotation.copy()))
+
+    def times(self, factor: float) -> "Prior":
+        """The same, its yaw believed so many times less surely."""
+        return replace(self, yaw_sigma=factor * self.yaw_sigma)
 
     @property
     def up(self) -> FloatArray:
