@@ -190,7 +190,7 @@ class ContactAnswering:
 def prior_of(run: RunFiles) -> Prior:
     """The orientation the scene states, or only that it stands upright; never the position."""
     rotation = run.scene.base_from_object(run.mesh)[:3, :3]
-    return Prior(rotation, run.scene.section(Localization).yaw)
+    return Prior(rotation, run.scene.section(Localization).yaw, run.station.errors.yaw)
 
 
 def observe(run: RunFiles) -> tuple[Observation, ...]:

@@ -66,10 +66,11 @@ def model_of_scene(
     seen = object_touch(scene, station, mesh, calibration, chosen, objectfile)
     rms = 0.0 if seen is None else seen.rms
     if not scene.sensors.sound:
-        return Model(mesh, sensor, calibration, seen=seen, seen_rms=rms)
+        return Model(mesh, sensor, calibration, seen=seen, seen_rms=rms, errors=station.errors)
     modes = object_modes(scene, station, mesh, chosen, objectfile)
     _refuse_loose(modes)
-    return Model(mesh, sensor, calibration, modes, MATERIALS[scene.object.material], seen, seen_rms=rms)
+    material = MATERIALS[scene.object.material]
+    return Model(mesh, sensor, calibration, modes, material, seen=seen, seen_rms=rms, errors=station.errors)
 
 
 def _refuse_loose(modes: Modes) -> None:

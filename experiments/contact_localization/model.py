@@ -1,6 +1,6 @@
 """What an estimator is given beside the readings: the object, the sensor and what is believed of the pose."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Literal
 
@@ -12,6 +12,7 @@ from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import WrongUse
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
+from harness.bench.bench_errors import USUAL, BenchErrors
 from harness.bench.sensor import TactileSensor
 from harness.sim.gel.height_map import RasterMesh, first_surface
 from harness.sim.gel.view import FirstSurface
@@ -32,7 +33,7 @@ class Prior:
 
     base_from_object: FloatArray
     yaw: Literal["known", "unknown"] = "known"
-    yaw_sigma: float = np.radians(1.5)
+    yaw_sigma: float = USUAL.yaw
 
     def __post_init__(self) -> None:
         rotation = np.asarray(self.base_from_object, dtype=np.float64)
@@ -42,6 +43,10 @@ class Prior:
                 "the prior's base_from_object must be a right-handed (3, 3) rotation; pass pose[:3, :3]"
             )
         object.__setattr__(self, "base_from_object", read_only(rotation.copy()))
+
+    def times(self, factor: float) -> "Prior":
+        """The same, its yaw believed so many times less surely."""
+        return replace(self, yaw_sigma=factor * self.yaw_sigma)
 
     @property
     def up(self) -> FloatArray:
@@ -69,6 +74,7 @@ class Model:
         modes: of the object; None where no sound is compared.
         material: of the object; None where no sound is compared.
         seen: the object along the tool, which candidates' tactile images are crops of; None for the mesh's.
+        errors: of the bench that the readings are from, as its station states them.
         unheard: why no sound can be compared that the scene calls for; empty where one can.
         seen_rms: m, root mean square over a whole image, that ``seen`` is itself off by.
     """
@@ -79,6 +85,7 @@ class Model:
     modes: Modes | None = None
     material: Material | None = None
     seen: FirstSurface | None = None
+    errors: BenchErrors = field(default_factory=BenchErrors)
     unheard: str = ""
     seen_rms: float = 0.0
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)

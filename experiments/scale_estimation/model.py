@@ -103,7 +103,7 @@ class ObjectModel:
         """For contacts."""
         surface = sample_surface(self.mesh, self.nominal / _SAMPLES)
         asked = self.scene.section(Scale)
-        errors = StandErrors(asked.place_error, asked.support_error)
+        errors = StandErrors(asked.place_error, asked.support_error, self.station.errors.tilt)
         return Stand.of(surface, self.upright, self.anchor, self.place, errors)
 
     @property
@@ -115,6 +115,7 @@ class ObjectModel:
             rotation=asked.camera_rotation_error,
             focal_length=asked.focal_length_error,
             support=asked.support_error,
+            tilt=self.station.errors.tilt,
             place=asked.place_error,
         )
 

@@ -92,6 +92,7 @@ class ShapeExplorer:
             rotation=settings.camera_rotation_error,
             focal_length=settings.focal_length_error,
             support=settings.support_error,
+            tilt=self._run.station.errors.tilt,
             place=settings.place_error,
         )
         return UnknownStand(self.place, errors, self._run.station.camera)

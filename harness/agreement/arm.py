@@ -67,7 +67,7 @@ def compare_with_twin(
     Raises:
         WrongUse: the object cannot stand in the scene.
     """
-    run, noise = subject.run, noise or PlaceNoise()
+    run, noise = subject.run, noise or PlaceNoise.at(subject.run.station.errors)
     bench = twin_of(subject.scene, run.station, subject.mesh, subject.base_from_object)
     joints = [found for record in run.recording.steps() if (found := joint_residual(run, record)) is not None]
     read = [contact for contact in contacts if not contact.unread]

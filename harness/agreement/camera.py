@@ -64,7 +64,7 @@ def compare_camera(
     ]
     if camera is None or not looks:
         return SenseResiduals("camera", "reference", (), "no picture by the scene camera was recorded")
-    places, noise = places or PlaceNoise(), noise or OutlineNoise()
+    places, noise = places or PlaceNoise.at(subject.run.station.errors), noise or OutlineNoise()
     view = OutlineView(subject.mesh, subject.base_from_object, camera)
     residuals: list[Residual] = []
     refusals = []

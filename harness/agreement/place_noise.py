@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.basics.arrays import FloatArray
+from harness.bench.bench_errors import USUAL, BenchErrors
 
 SHARED = 13
 """Object's place (3), rotation (3) and size, gel's centre (3) and attitude (3), each over its sigma."""
@@ -32,14 +33,28 @@ class PlaceNoise:
     """
 
     position: float = 0.5e-3
-    yaw: float = np.radians(1.5)
-    tilt: float = np.radians(0.5)
-    scale: float = 0.005
-    gel_centre: float = 0.5e-3
-    gel_tilt: float = np.radians(0.7)
-    gel_yaw: float = np.radians(1.0)
-    arm: float = 0.45e-3
-    arm_tilt: float = np.radians(0.8)
+    yaw: float = USUAL.yaw
+    tilt: float = USUAL.tilt
+    scale: float = USUAL.scale
+    gel_centre: float = USUAL.gel_centre
+    gel_tilt: float = USUAL.gel_tilt
+    gel_yaw: float = USUAL.gel_yaw
+    arm: float = USUAL.arm
+    arm_tilt: float = USUAL.arm_tilt
+
+    @classmethod
+    def at(cls, errors: BenchErrors) -> "PlaceNoise":
+        """Of a bench, as its station states its errors."""
+        return cls(
+            yaw=errors.yaw,
+            tilt=errors.tilt,
+            scale=errors.scale,
+            gel_centre=errors.gel_centre,
+            gel_tilt=errors.gel_tilt,
+            gel_yaw=errors.gel_yaw,
+            arm=errors.arm,
+            arm_tilt=errors.arm_tilt,
+        )
 
     @property
     def own(self) -> FloatArray:

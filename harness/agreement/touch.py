@@ -43,7 +43,7 @@ def compare_touch(
         places: of the gel's pose; None for the stated one.
         noise: of the surface; None for the stated one.
     """
-    places, noise = places or PlaceNoise(), noise or SurfaceNoise()
+    places, noise = places or PlaceNoise.at(subject.run.station.errors), noise or SurfaceNoise()
     residuals, notes = [], unread_notes(contacts)
     for contact in contacts:
         if contact.unread:

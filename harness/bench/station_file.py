@@ -10,6 +10,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.files.named_file import real_path
 from harness.basics.geometry import apply
 from harness.basics.toml_file import StrictModel, load_toml, validate
+from harness.bench.bench_errors import USUAL, BenchErrors
 from harness.bench.named_files import named_file
 from harness.bench.station_sections import (
     ArmSection,
@@ -55,6 +56,7 @@ class Station(StrictModel):
         hammer: on its flange, None without.
         microphone: that hears the strikes, None without.
         frames: what the flange carries.
+        errors: how far the bench may be from what station and scene state.
         mock: present if the bench is a mocked one.
     """
 
@@ -66,6 +68,7 @@ class Station(StrictModel):
     hammer: HammerSection | None = None
     microphone: MicrophoneSection | None = None
     frames: Frames
+    errors: BenchErrors = USUAL
     mock: MockSection | None = None
 
     @property

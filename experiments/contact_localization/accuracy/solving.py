@@ -16,11 +16,14 @@ from experiments.contact_localization.accuracy.dials import (
 )
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import contact_of, height_map
-from experiments.contact_localization.posterior.dials import BLOCK, SPACING
+from experiments.contact_localization.posterior.bench_noise import noise_at
+from experiments.contact_localization.posterior.dials import BLOCK, METHOD, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
+from experiments.contact_localization.posterior.strain import times_stated
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused, PictureRefused
+from harness.bench.bench_errors import BenchErrors
 from harness.effects.accuracy import Accuracy, Level, Setting
 from harness.effects.touch_file_effects import SHAPES as TOUCH
 from harness.experiment.solving import Solved
@@ -182,6 +185,9 @@ def located(
 ) -> tuple[Estimate, ...]:
     """The estimates after each contact from the ``first`` on; after the last alone where None.
 
+    Where the last one's residuals are larger than the bench's stated errors allow, it is estimated again
+    under errors so much larger, and says so.
+
     Args:
         readings: of the run.
         accuracy: of the estimates.
@@ -192,7 +198,24 @@ def located(
         FitRefused: no place on this object explains the readings, no image shows a contact, or no picture
             of them may be used.
     """
-    noise, images = Noise(), needs_images(accuracy)
+    errors = readings.model.errors
+    found = _located_at(errors, readings, accuracy, first, judged)
+    factor = times_stated(found[-1].strain) if judged and accuracy.of(METHOD) == "grid" else 1.0
+    if factor == 1.0:
+        return found
+    less_sure = replace(readings, prior=readings.prior.times(factor))
+    wider = _located_at(errors.times(factor), less_sure, accuracy)[-1]
+    return (*found[:-1], _widened(found[-1], wider, factor))
+
+
+def _located_at(
+    errors: BenchErrors,
+    readings: Readings,
+    accuracy: Accuracy,
+    first: int | None = None,
+    judged: bool = True,
+) -> tuple[Estimate, ...]:
+    noise, images = noise_at(errors), needs_images(accuracy)
     if images and not readings.pictured:
         raise FitRefused(f"no contact's picture may be used; of contact 1: {readings.unread[0]}")
     contacts = _contacts(readings, accuracy.of(BLOCK), noise, images)
@@ -200,6 +223,17 @@ def located(
     seconds = readings.shared[1] if images else 0.0
     model, prior, seed = readings.model, readings.prior, readings.seed
     return locate(contacts, model, prior, accuracy, noise, seed, first, seconds, strikes, judged)
+
+
+def _widened(stated: Estimate, wider: Estimate, factor: float) -> Estimate:
+    """The answer under errors larger than stated; its seconds are those of both but for the images."""
+    before = {stage: took for stage, took in stated.seconds.items() if stage != "images"}
+    seconds = {stage: took + before.get(stage, 0.0) for stage, took in wider.seconds.items()}
+    doubt = (
+        f"the readings are {factor:.1f} times further off than the station's [errors] allow, by the fit's "
+        "own residuals: the region is that of errors so large; check the bench, or state them"
+    )
+    return replace(wider, seconds=seconds, doubts=(*wider.doubts, doubt))
 
 
 def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> list[Contact]:

@@ -10,9 +10,10 @@ from experiments.contact_localization.accuracy.benchmark_runs import Cell, perfo
 from experiments.contact_localization.accuracy.dials import accuracy_at, needs_images
 from experiments.contact_localization.accuracy.solving import Readings, solve
 from experiments.contact_localization.posterior.baselines import mean_random_error, without_images
+from experiments.contact_localization.posterior.bench_noise import noise_at
 from experiments.contact_localization.posterior.dials import METHOD, PARTICLES, SENSES, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate
-from experiments.contact_localization.posterior.hypotheses import Contact, Noise
+from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.report.result import fit_of
 from experiments.contact_localization.sound.mfcc import MfccTable, mfcc_filter
@@ -77,7 +78,7 @@ def _by_mfcc(readings: Readings) -> FloatArray:
     spacing, rate = SPACING.default, next(strike.rate for strike in strikes if strike is not None)
     table = MfccTable(model.gains(spacing), model.modes, model.material, rate)
     contacts = [Contact(observation.base_from_gel) for observation in readings.observations]
-    search = Search(contacts, model, readings.prior, spacing, Noise())
+    search = Search(contacts, model, readings.prior, spacing, noise_at(model.errors))
     particles = mfcc_filter(search, table, strikes, accuracy_at(PAPER).of(PARTICLES), readings.seed)
     return np.asarray(particles.candidates().mean(axis=0))
 

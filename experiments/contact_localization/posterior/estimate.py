@@ -26,6 +26,7 @@ from experiments.contact_localization.posterior.posterior import (
     settled,
 )
 from experiments.contact_localization.posterior.search import Search
+from experiments.contact_localization.posterior.strain import strain_of
 from experiments.contact_localization.sound.consistency import (
     distinct_strikes,
     doubts_of_sound_at,
@@ -67,7 +68,10 @@ class Estimate:
         points: ``(n, 3)`` metres: hypotheses of the last contact, for pictures.
         weights: ``(n,)`` of the hypotheses, summing to 1.
         seconds: by stage.
-        doubts: what a reader must know of an answer whose sound may be another object's.
+        doubts: what a reader must know of an answer whose sound may be another object's, or whose bench is
+            further off than stated.
+        strain: how many times further off the readings are than the bench's stated errors allow
+            (``strain``); 0 where no image says.
     """
 
     position_in_object: FloatArray
@@ -83,6 +87,7 @@ class Estimate:
     weights: FloatArray
     seconds: dict[str, float]
     doubts: tuple[str, ...] = ()
+    strain: float = 0.0
 
 
 def locate(
@@ -135,7 +140,7 @@ def locate(
             lap(seconds, "sounds", start)
         found = solve_run(search, k, accuracy, seed, seconds, heard)
         doubts = _judged(search, found, accuracy, heard, k, seconds) if judged and k == count else ()
-        floor = FLOORS[senses if heard else "touch"]
+        floor = noise.floor * FLOORS[senses if heard else "touch"]
         answers.append(_answer(search, k, found, seconds, floor, doubts))
     return tuple(answers)
 
@@ -194,6 +199,7 @@ def _answer(
         weights=read_only(weights),
         seconds=seconds,
         doubts=doubts,
+        strain=strain_of(search, found.hypotheses, found.fits) if len(found.fits) else 0.0,
     )
     lap(seconds, "answer", start)
     return result

@@ -117,6 +117,7 @@ class Noise:
         touch: of the images.
         temperature: factor on the images' share: their errors are shared between contacts.
         shared: of what all contacts share, and of what is left to each where that is named.
+        floor: factor on what regions are widened by beside the hypotheses' own spread (``estimate.FLOORS``).
     """
 
     geometry: GeometryNoise = field(default_factory=GeometryNoise)
@@ -124,6 +125,7 @@ class Noise:
     touch: TouchNoise = field(default_factory=TouchNoise)
     temperature: float = 0.8
     shared: SharedNoise = field(default_factory=SharedNoise)
+    floor: float = 1.0
 
 
 def anchors(members: IntArray, most: int) -> IntArray:

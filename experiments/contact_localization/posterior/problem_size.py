@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.posterior.hypotheses import Contact, Noise
+from experiments.contact_localization.posterior.bench_noise import noise_at
+from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.posterior.search import Search
 from harness.recording.observation import Observation
 
@@ -30,7 +31,7 @@ def places_left(observations: Sequence[Observation], model: Model, prior: Prior)
         At least 1.
     """
     contacts = [Contact(observation.base_from_gel) for observation in observations]
-    search = Search(contacts, model, prior, SPACING, Noise())
+    search = Search(contacts, model, prior, SPACING, noise_at(model.errors))
     everyone = np.arange(len(contacts), dtype=np.int64)
     gels, _, _ = search.places(everyone, 0, most=_ALL)
     return float(max(1, len(gels)))

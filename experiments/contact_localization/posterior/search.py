@@ -16,10 +16,14 @@ from experiments.contact_localization.posterior.shared_errors import log_prior, 
 from experiments.contact_localization.touch.contact_scales import contact_scales, place_noise
 from experiments.contact_localization.touch.touch import TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
+from harness.bench.bench_errors import USUAL
 from harness.sim.gel.view import ToolView, half_as_fine, view_along
 from harness.sim.solid.surface_samples import Surface
 
-_KNOWN_YAWS = np.radians(np.arange(-5.0, 5.5, 1.0))
+_YAWS_TO = 5
+"""Degrees from the nominal yaw to the last of the grid's, where it is known as well as usual; in proportion
+to its sigma."""
+
 _YAW_STEP = 2.0
 """Degrees between the yaws of the grid, and between pictures, where the yaw is unknown."""
 
@@ -46,7 +50,8 @@ class Search:
         self.geometry = noise.geometry if read else noise.unread
         self.surface: Surface = model.surface(spacing)
         self.turning = model.turning(prior.up) if prior.yaw == "unknown" else None
-        self.yaws = _KNOWN_YAWS if self.turning is None else _yaws_over(self.turning.period)
+        known = _yaws_about(prior.yaw_sigma)
+        self.yaws = known if self.turning is None else _yaws_over(self.turning.period)
         self._rough = False
         self.positions = np.array([contact.base_from_gel[:3, 3] for contact in contacts])
         self.positions -= self.positions[0]
@@ -256,7 +261,7 @@ class Search:
     @property
     def yaw_step(self) -> float:
         """Between the grid's yaws, in rad."""
-        return float(_KNOWN_YAWS[1] - _KNOWN_YAWS[0]) if self.turning is None else np.radians(_YAW_STEP)
+        return float(self.yaws[1] - self.yaws[0]) if self.turning is None else np.radians(_YAW_STEP)
 
     @property
     def yaw_observable(self) -> bool:
@@ -278,6 +283,12 @@ class Search:
         shared = _SHARED_COARSELY if coarse else 1
         numbers = shared * np.round(np.degrees(yaws) / (_YAW_STEP * shared))
         return np.asarray(numbers.astype(np.int64) % _PICTURES)
+
+
+def _yaws_about(sigma: float) -> FloatArray:
+    """The grid's yaws in rad about the nominal one, a degree apart: at least those of the usual ``sigma``."""
+    to = _YAWS_TO * max(1, int(np.ceil(sigma / USUAL.yaw)))
+    return np.asarray(np.radians(np.arange(-to, to + 0.5, 1.0)))
 
 
 def _yaws_over(period: float) -> FloatArray:

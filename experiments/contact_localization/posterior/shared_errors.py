@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.basics.arrays import BoolArray, FloatArray
+from harness.bench.bench_errors import USUAL
 
 UNKNOWNS = 6
 """Tilt about base x and y, scale, and the gel's centre in its own frame, each in units of its sigma."""
@@ -30,11 +31,11 @@ class SharedNoise:
             error is not, a scale.
     """
 
-    tilt: float = np.radians(0.5)
-    scale: float = 0.005
-    gel_centre: float = 0.5e-3
-    shift: float = 0.45e-3
-    depth: float = 0.45e-3
+    tilt: float = USUAL.tilt
+    scale: float = USUAL.scale
+    gel_centre: float = USUAL.gel_centre
+    shift: float = USUAL.arm
+    depth: float = USUAL.arm
     per_metre: float = 2.0e-3
 
 

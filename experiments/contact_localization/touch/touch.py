@@ -17,6 +17,7 @@ from experiments.contact_localization.touch.kernels import (
     terms_at,
 )
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
+from harness.bench.bench_errors import USUAL
 from harness.sim.gel.view import ToolView
 
 LEVEL_SLOPE = 0.06
@@ -38,7 +39,7 @@ class TouchNoise:
         cap: the most that one contact may cost, nats.
     """
 
-    rms: float = 0.064e-3
+    rms: float = USUAL.gel_depth
     tilt: float = np.radians(1.75)
     skirt: float = 1.0e-3
     edge: float = 0.6e-3

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.sim.solid.mesh_repair import RepairedSurface, bodies, boundary_edges
 
 _SAME_ANGLE = 1e-6
@@ -64,7 +64,7 @@ def _angles(surface: RepairedSurface, edge: IntArray, around: IntArray) -> Float
     return np.asarray(np.round(angles / _SAME_ANGLE) % steps)
 
 
-def _with_material_between(angles: FloatArray, forward: IntArray) -> IntArray:
+def _with_material_between(angles: FloatArray, forward: BoolArray) -> IntArray:
     """``(p, 2)`` of faces about an edge, those that bound one material; none where they do not take turns.
 
     A face that runs forward along the edge has its material before it, one that runs backward behind it.

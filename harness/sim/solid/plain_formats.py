@@ -4,6 +4,8 @@ A file that was cut short is refused here, where it can still be told from one t
 """
 
 import re
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,23 +44,19 @@ def read_obj(path: Path) -> PlainMesh:
         MeshRefused: a face names a vertex that is not there.
         ValueError: a number that is none.
     """
-    vertices: list[list[float]] = []
-    polygons: list[list[int]] = []
+    vertices, corners, lengths = array("d"), array("q"), array("q")
     relative = False
-    for line in path.read_bytes().replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
-        words = line.split()
-        if not words:
-            continue
+    for words in _logical_lines(path):
         if words[0] == b"v":
-            vertices.append([float(word) for word in words[1:4]])
+            vertices.extend(_place(words))
         elif words[0] == b"f":
-            numbers = [int(word.split(b"/", 1)[0]) for word in words[1:] if not word.startswith(b"#")]
+            numbers = [int(word.split(b"/", 1)[0]) for word in words[1:]]
             relative |= min(numbers, default=1) < 0
-            polygons.append([_absolute(number, len(vertices), path.name) for number in numbers])
-    first, notes = _first_number(polygons, len(vertices), relative, path.name)
-    places = np.array(vertices, dtype=np.float64).reshape(-1, 3)
-    faces = triangulated(places, [[number - first for number in polygon] for polygon in polygons])
-    return PlainMesh(places, faces, notes)
+            corners.extend([_absolute(number, len(vertices) // 3, path.name) for number in numbers])
+            lengths.append(len(numbers))
+    places, used = np.array(vertices).reshape(-1, 3), np.array(corners, dtype=np.int64)
+    first, notes = _first_number(used, len(places), relative, path.name)
+    return PlainMesh(places, triangulated(places, used - first, np.array(lengths, dtype=np.int64)), notes)
 
 
 def read_stl(path: Path) -> PlainMesh:
@@ -91,9 +89,33 @@ def read_off(path: Path) -> PlainMesh:
             "lines follow; export it again"
         )
     places = np.array([[float(word) for word in words[:3]] for words in rest[:points]], np.float64)
-    places = places.reshape(-1, 3)
     polygons = [_counted(words, points, path.name) for words in rest[points : points + faces]]
-    return PlainMesh(places, triangulated(places, polygons))
+    corners = np.array([corner for polygon in polygons for corner in polygon], dtype=np.int64)
+    lengths = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
+    places = places.reshape(-1, 3)
+    return PlainMesh(places, triangulated(places, corners, lengths))
+
+
+def _logical_lines(path: Path) -> Iterator[list[bytes]]:
+    """The words of each line that has any, comments left out; one that ends in a backslash goes on."""
+    begun: list[bytes] = []
+    with path.open("rb") as lines:
+        for line in lines:
+            words = begun + line.split(b"#", 1)[0].split()
+            goes_on = bool(words) and words[-1].endswith(b"\\")
+            begun = [*words[:-1], words[-1][:-1]] if goes_on else []
+            if words and not goes_on:
+                yield [word for word in words if word]
+
+
+def _place(words: list[bytes]) -> list[float]:
+    """Of a vertex line; colours may follow it.
+
+    Raises:
+        ValueError: fewer than three numbers.
+    """
+    x, y, z = (float(word) for word in words[1:4])
+    return [x, y, z]
 
 
 def _absolute(number: int, so_far: int, name: str) -> int:
@@ -108,19 +130,25 @@ def _absolute(number: int, so_far: int, name: str) -> int:
     return so_far + 1 + number
 
 
-def _first_number(
-    polygons: list[list[int]], count: int, relative: bool, name: str
-) -> tuple[int, tuple[str, ...]]:
+def _first_number(used: IntArray, count: int, relative: bool, name: str) -> tuple[int, tuple[str, ...]]:
     """The number of the first vertex, and what is odd of it."""
-    used = [number for polygon in polygons for number in polygon]
-    if not used or min(used) > 0:
+    if not len(used) or used.min() > 0:
+        _refuse_beyond(used, count, name)
         return 1, ()
-    if relative or max(used) >= count:
+    if relative or used.max() >= count:
         raise MeshRefused(
-            f"{name} has a face with vertex 0 and others with vertex {max(used)} of {count}: an OBJ counts "
+            f"{name} has a face with vertex 0 and others with vertex {used.max()} of {count}: an OBJ counts "
             "from 1, and this one from neither 0 nor 1; export it again"
         )
     return 0, ("its faces count vertices from 0, where an OBJ counts from 1: taken as they are meant",)
+
+
+def _refuse_beyond(used: IntArray, count: int, name: str) -> None:
+    if len(used) and used.max() > count:
+        raise MeshRefused(
+            f"{name} has a face with vertex {used.max()}, but {count} vertices; the file is cut short or "
+            "damaged, export it again"
+        )
 
 
 def _counted(words: list[bytes], points: int, name: str) -> list[int]:
@@ -165,7 +193,7 @@ def _binary_stl(data: bytes, name: str) -> PlainMesh:
             f"{name} is cut short: its header announces {announced} triangles, and {max(held, 0)} follow; "
             "export it again"
         )
-    notes = ()
+    notes: tuple[str, ...] = ()
     # A whole number of triangles to the end of the file: the header is wrong, not the file.
     count = held if after == 0 else announced
     if count != announced:

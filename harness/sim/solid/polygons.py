@@ -1,30 +1,26 @@
 """Polygons of a mesh file as triangles, whichever way their corners turn."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from manifold3d import triangulate
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 
 
-def triangulated(vertices: FloatArray, polygons: Sequence[Sequence[int]]) -> IntArray:
+def triangulated(vertices: FloatArray, corners: IntArray, lengths: IntArray) -> IntArray:
     """``(m, 3)`` corners of triangles that fill every polygon and turn as it does.
 
     Args:
         vertices: ``(n, 3)``.
-        polygons: each its corners in order; of fewer than three there is none.
+        corners: of all polygons, one after the other.
+        lengths: how many corners each has; of fewer than three there is no triangle.
 
     Raises:
         IndexError: a corner that is no vertex.
     """
-    found = [np.zeros((0, 3), dtype=np.int64)]
-    by_length: dict[int, list[Sequence[int]]] = {}
-    for polygon in polygons:
-        by_length.setdefault(len(polygon), []).append(polygon)
-    for length, alike in by_length.items():
-        if length >= 3:
-            found.append(_triangles(vertices, np.array(alike, dtype=np.int64)))
+    found, starts = [np.zeros((0, 3), dtype=np.int64)], np.cumsum(lengths) - lengths
+    for length in np.unique(lengths[lengths >= 3]):
+        places = starts[lengths == length][:, None] + np.arange(length)
+        found.append(_triangles(vertices, corners[places]))
     return np.concatenate(found)
 
 

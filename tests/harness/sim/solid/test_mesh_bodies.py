@@ -1,6 +1,7 @@
 """Solids that meet keep their volume: joined in a face they are one, at an edge or a point they are two."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,13 +29,17 @@ def block(at: FloatArray, mirrored: bool = False) -> trimesh.Trimesh:
     return trimesh.Trimesh(places + at, faces, process=False)
 
 
+def written(mesh: Any, path: Path) -> None:
+    mesh.export(path)
+
+
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("suffix", ["stl", "ply"])
 @pytest.mark.parametrize("meet", APART)
 def test_two_blocks_hold_what_each_holds(meet: str, suffix: str, mirrored: bool, tmp_path: Path) -> None:
     at, pieces = APART[meet]
     both = trimesh.util.concatenate([block(np.zeros(3)), block(at, mirrored)])
-    both.export(tmp_path / f"both.{suffix}")
+    written(both, tmp_path / f"both.{suffix}")
     taken = take_in(tmp_path / f"both.{suffix}", "mm")
     assert taken.report.watertight
     assert taken.report.bodies == pieces
@@ -45,7 +50,7 @@ def test_two_blocks_hold_what_each_holds(meet: str, suffix: str, mirrored: bool,
 
 
 def test_a_stack_of_blocks_is_one(tmp_path: Path) -> None:
-    trimesh.util.concatenate([block(SIDES * [0, 0, k]) for k in range(5)]).export(tmp_path / "stack.stl")
+    written(trimesh.util.concatenate([block(SIDES * [0, 0, k]) for k in range(5)]), tmp_path / "stack.stl")
     report = take_in(tmp_path / "stack.stl", "mm").report
     assert (report.bodies, report.watertight) == (1, True)
     assert report.volume == pytest.approx(5 * SIDES.prod() * 1e-9, rel=1e-6)

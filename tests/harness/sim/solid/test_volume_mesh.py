@@ -60,7 +60,7 @@ def test_ten_node_cells_of_any_format_are_solved_as_they_are(
     file = written(tmp_path / name, mesh.nodes * 1e3, mesh.cells, file_format=kind)
     found = modes_of_file(file, STEEL, "mm", count=6)
     assert found.volume
-    assert found.said == ()
+    assert len(found.said) == 1, "nothing but what was read"
     assert found.solution.certified
     assert found.solution.unknowns == 3 * len(mesh.nodes)
     assert found.solution.modes.frequencies == pytest.approx(reference, rel=1e-8)
@@ -77,7 +77,7 @@ def test_abaqus_input_as_its_manual_writes_it(tmp_path: Path) -> None:
     file = tmp_path / "one.inp"
     file.write_text(text)
     found = read(file)
-    assert found.said == ()
+    assert len(found.said) == 1, "nothing but what was read"
     assert found.mesh.nodes == pytest.approx(nodes)
     assert found.quality == pytest.approx(0.77, abs=0.01)
 
