@@ -101,7 +101,8 @@ def test_a_point_near_the_surface_is_moved_onto_it_and_it_is_said() -> None:
 
 def test_places_near_and_far_are_the_nearest_of_all() -> None:
     mesh = build("mug")
-    points = np.random.default_rng(0).uniform(*(1.3 * bound for bound in mesh.bounds), size=(40, 3))
+    low, high = (1.3 * bound for bound in mesh.bounds)
+    points = np.random.default_rng(0).uniform(low, high, size=(40, 3))
     points[:20] = mesh.vertices[::400][:20] + 1e-4
     diagonal = np.full(len(points), 2.0 * mesh.diagonal)
     wanted, _ = nearest_on_surface(mesh, points, np.zeros(points.shape), diagonal)
