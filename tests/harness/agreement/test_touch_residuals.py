@@ -34,7 +34,7 @@ def test_noises_that_are_drawn_give_a_chi_square() -> None:
     gaps = rng.normal(size=(2000, 6)) * np.sqrt(rng.choice(variances, size=(2000, 1)))
     squares = (gaps**2).sum(axis=1)[:, None] / variances
     found = np.array([mixed(each, DOF) for each in squares])
-    # The probability of a mean over noises is not uniform: it is below none of its levels too often.
+    # A mean over noises need not be uniform; no level may be undercut more often than it says.
     for level in (0.5, 0.1, 0.01):
         assert np.mean(chi2.sf(found, DOF) < level) < level + 3.0 * np.sqrt(level / len(found))
 
