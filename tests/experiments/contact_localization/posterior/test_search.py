@@ -278,9 +278,10 @@ def test_a_models_stated_error_keeps_the_truth_in_the_running(
     off, far = replace(block, seen=bumpy), np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]])
     fits, ahead = [], []
     for model in (off, replace(off, seen_rms=rms)):
-        search = Search(contacts, model, prior, 3e-3, Noise())
-        pair = at(true_gel(search) + far, np.zeros(2))
-        fits.append(search.gates(truth(search), ALL))
-        ahead.append(float(np.subtract(*search.weigh(pair, ALL, 1, 2).log_weights)))
+        # A search keeps the scores of its views: each of both fills in its own.
+        gating, weighing = (Search(contacts, model, prior, 3e-3, Noise()) for _ in range(2))
+        fits.append(gating.gates(truth(gating), ALL))
+        pair = at(true_gel(weighing) + far, np.zeros(2))
+        ahead.append(float(np.subtract(*weighing.weigh(pair, ALL, 1, 2).log_weights)))
     assert np.all(fits[1] > fits[0])
     assert ahead[1] > ahead[0] + len(ALL)
