@@ -15,7 +15,7 @@ USUAL_FIT = 2.6
 """Twice the nats that a contact's own fit costs at the best hypothesis, on average over calibration runs (24:
 four objects, three seeds, close and spread)."""
 
-_WORST_FIT = 40.0
+_SLIPPED = 40.0
 """Twice the nats from which on a contact counts as slipped, and says nothing of the bench."""
 
 STRAINED = 1.3
@@ -34,7 +34,7 @@ def strain_of(search: Search, hypotheses: Hypotheses, fits: FloatArray) -> float
         hypotheses: the posterior.
         fits: ``(m,)`` nats of the contacts at the best hypothesis.
     """
-    own = np.minimum(-2.0 * fits, _WORST_FIT)
+    own = -2.0 * fits[-2.0 * fits < _SLIPPED]
     squares, expected = float(own.sum()), USUAL_FIT * len(own)
     if hypotheses.shared is not None:
         squares += float(hypotheses.weights @ (hypotheses.shared**2).sum(axis=1))
