@@ -187,7 +187,10 @@ HOPELESS = {
     "only_words.obj": (b"this is not a mesh\n", "no triangle|does not read"),
     "only_points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no triangle"),
     "noise.stl": (bytes(range(256)) * 3, "cut short"),
-    "cut_short.stl": (b"\0" * 80 + (5000).to_bytes(4, "little") + b"\0" * 400, "announces 5000 triangles, and 8 follow"),
+    "cut_short.stl": (
+        b"\0" * 80 + (5000).to_bytes(4, "little") + b"\0" * 400,
+        "announces 5000 triangles, and 8 follow",
+    ),
     "noise.ply": (b"ply\nformat ascii 1.0\nelement vertex 9\n", "does not read|no triangle"),
     "unknown.xyzzy": (b"data", "is not that of a mesh"),
     "one_triangle.off": (TRIANGLE.encode(), "at least 4 faces"),
