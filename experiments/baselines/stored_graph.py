@@ -6,15 +6,14 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from harness.basics.errors import WrongUse
 from harness.basics.store import Store, digest
 
 VERSION = "baseline graph"
 """Of what trainings compute; another text with every change of it, so that stored networks are dropped."""
 
 
-class TorchMissing(WrongUse):
-    """A baseline has to be trained, and torch is not installed."""
+class TorchMissing(Exception):
+    """A baseline has to be trained, and torch is not installed; its row of the table says so."""
 
 
 def require_torch(what: str) -> None:

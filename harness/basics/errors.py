@@ -13,8 +13,12 @@ class TouchstoneError(Exception):
 
     @classmethod
     def kind(cls) -> str:
-        """The class's name in words, by which a program tells failures apart: ``"recording damaged"``."""
-        return re.sub(r"(?<!^)(?=[A-Z])", " ", cls.__name__).lower()
+        """The class's name in words, by which a program tells failures apart: ``"recording damaged"``.
+
+        A private class is of the kind of the public one that it refines.
+        """
+        public = next(each for each in cls.__mro__ if not each.__name__.startswith("_"))
+        return re.sub(r"(?<!^)(?=[A-Z])", " ", public.__name__).lower()
 
 
 class WrongUse(TouchstoneError):
