@@ -75,6 +75,8 @@ class SenseResiduals:
         residuals: in order of the steps; empty where it cannot be compared.
         why: it cannot be compared, or what a reader must know of how it was.
         seconds: of CPU that the comparison took.
+        refused_at: step of the first reading, where the calibration refuses all of them: none is left to
+            compare, and the sense does not fit.
     """
 
     sense: Sense
@@ -82,6 +84,7 @@ class SenseResiduals:
     residuals: tuple[Residual, ...]
     why: str = ""
     seconds: float = 0.0
+    refused_at: int | None = None
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,11 @@ class JudgedSense:
         """The first residual beyond its limit."""
         pairs = zip(self.compared.residuals, self.limits, strict=True)
         return next((residual for residual, limit in pairs if residual.chi_square > limit), None)
+
+    @property
+    def first_doubt(self) -> int | None:
+        """Step, from 0, of the first reading that does not fit."""
+        return self.compared.refused_at if self.doubted is None else self.doubted.step
 
 
 @dataclass(frozen=True)
@@ -128,7 +136,7 @@ class Agreement:
     @property
     def first_doubt(self) -> tuple[int, Sense] | None:
         """Step, from 0, and sense of the earliest reading that does not fit."""
-        found = [(one.doubted.step, one.compared.sense) for one in self.senses if one.doubted is not None]
+        found = [(one.first_doubt, one.compared.sense) for one in self.senses if one.first_doubt is not None]
         return min(found, key=lambda pair: pair[0], default=None)
 
     def as_json(self) -> dict[str, Any]:
@@ -174,7 +182,7 @@ def judged(about: str, senses: Sequence[SenseResiduals], false_alarm: float = FA
 
 def _judged(one: SenseResiduals, rate: float) -> JudgedSense:
     if not one.residuals:
-        return JudgedSense(one, "not comparable", ())
+        return JudgedSense(one, "not comparable" if one.refused_at is None else "does not fit", ())
     each = rate / len(one.residuals)
     limits = tuple(np.atleast_1d(chi2.isf(each, [residual.dof for residual in one.residuals])).tolist())
     beyond = any(r.chi_square > limit for r, limit in zip(one.residuals, limits, strict=True))
@@ -203,7 +211,7 @@ def _sense_json(one: JudgedSense) -> dict[str, Any]:
 
 
 def _sentence(one: JudgedSense) -> str:
-    if one.verdict == "not comparable":
+    if not one.compared.residuals:
         return one.compared.why
     note = f" ({one.compared.why})" if one.compared.why else ""
     worst = one.doubted or max(one.compared.residuals, key=lambda r: r.chi_square / r.dof)

@@ -62,7 +62,8 @@ def compare_touch(
     if gross_share(source) and residuals:
         residuals.append(counted_residual(residuals, gross_share(source)))
     why = "; ".join(notes) or ("" if contacts else "no picture of the gel was recorded")
-    return SenseResiduals("touch", source, tuple(residuals), why)
+    refused = contacts[0].step if contacts and all(contact.unread for contact in contacts) else None
+    return SenseResiduals("touch", source, tuple(residuals), why, refused_at=refused)
 
 
 def surface_residual(step: int, found: Surfaces, noise: SurfaceNoise, gross: float = 0.0) -> Residual:

@@ -164,10 +164,13 @@ def test_an_object_that_was_moved_by_10_mm_does_not_fit(
     assert found.first_doubt is not None
 
 
-def test_another_sensors_calibration_is_not_compared(run: RunFiles, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_sensors_calibration_does_not_fit(run: RunFiles, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(vars(run), "calibration", other_lamps(run.calibration))
-    touch = next(one for one in agreement_of(run).senses if one.compared.sense == "touch")
-    assert touch.verdict == "not comparable"
+    found = agreement_of(run)
+    touch = next(one for one in found.senses if one.compared.sense == "touch")
+    assert touch.verdict == "does not fit"
+    assert not found.fits
+    assert found.first_doubt == (0, "touch")
     assert "step 1: its picture is left out: the press fits its resting gel only with" in touch.compared.why
 
 
