@@ -144,13 +144,16 @@ class Child:
 
     def _switch(self, index: int, on: bool) -> None:
         """On by an arm that nothing has latched, as what is at the tool may move by it; off always."""
-        if on and self._latched is not None:
-            raise self._latched
+        if on:
+            self._require_unlatched()
         self._link.set_tool_output(index, on)
 
-    def _require_calm(self, what: str) -> None:
+    def _require_unlatched(self) -> None:
         if self._latched is not None:
             raise self._latched
+
+    def _require_calm(self, what: str) -> None:
+        self._require_unlatched()
         if self._motion is not None:
             raise BenchFault(f"the arm was asked to {what} during a motion; wait for it to end")
         if not self._stream.becomes_younger(STALE * self._patience, LOST_MOVING * self._patience):

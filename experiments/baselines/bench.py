@@ -1,4 +1,4 @@
-"""What a row of the tables is measured by: the queries of one sense, and one way to answer them."""
+"""What a row of the tables is measured by: the queries of one sense, and one way to render them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ Column = Literal["1.0 here", "2.0 here", "ours, smallest", "ours", "ours, larges
 COLUMNS: tuple[Column, ...] = ("1.0 here", "2.0 here", "ours, smallest", "ours", "ours, largest")
 """Rows of tables 1 and 2 that are measured; ``"other"`` stands in a sense's own table alone."""
 
-Observation = Callable[[int], AnyArray]
+Render = Callable[[int], AnyArray]
 """From a query's number to what is rendered for it: a sound, or a picture of 8 bits."""
 
 ROUNDING = 1.0 / 12.0
@@ -51,11 +51,11 @@ class MadeMethod:
     """A method ready to render.
 
     Attributes:
-        observe: renders one query.
+        render: renders one query.
         seconds: CPU s of fitting or training; 0 where nothing was made here.
     """
 
-    observe: Observation
+    render: Render
     seconds: float = 0.0
 
 

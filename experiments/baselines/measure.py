@@ -97,7 +97,7 @@ def _quality(
     if isinstance(stored, Mapping):
         return stored
     made = workshop.made(method)
-    rows = [bench.scores(number, made.observe(number)) for number in range(bench.count)]
+    rows = [bench.scores(number, made.render(number)) for number in range(bench.count)]
     found = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     found["made_s"] = np.array(made.seconds)
     work.store.put(key, found)
@@ -141,5 +141,5 @@ def timed_in_turn(made: Mapping[str, MadeMethod], count: int, rounds: int = ROUN
 
 def _seconds(made: MadeMethod, number: int) -> float:
     begun = time.process_time()
-    made.observe(number)
+    made.render(number)
     return time.process_time() - begun

@@ -10,7 +10,6 @@ from experiments.contact_localization.accuracy.solving import (
     located,
     prepare,
     timed_height_map,
-    unread_of,
 )
 from experiments.contact_localization.build_model import model_of_run
 from experiments.contact_localization.model import Model, Prior
@@ -41,7 +40,7 @@ class Answer:
             are loaded.
         sense: what ``last`` is by.
         others: the answer by each other sense, or why that sense refused the object.
-        unread: why the picture of a contact, by its number from 0, is left out; its height map is zero.
+        refused_pictures: why a contact's picture is left out, by its number from 0; its height map is zero.
     """
 
     observations: tuple[Observation, ...]
@@ -52,7 +51,7 @@ class Answer:
     seconds: float
     sense: Senses = "touch"
     others: Mapping[Senses, Estimate | FitRefused] = field(default_factory=dict)
-    unread: Mapping[int, str] = field(default_factory=dict)
+    refused_pictures: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def by_sense(self) -> dict[Senses, Estimate | FitRefused]:
@@ -77,10 +76,10 @@ class ContactAnswering:
         self._accuracy, self._run = accuracy, run
         self._seen: list[Observation] = []
         self._heights: list[FloatArray] = []
-        self._refusals: list[str | None] = []
+        self._refused_pictures: dict[int, str] = {}
         self._taken = (0.0, 0.0)
-        if self.model.unheard and accuracy.of(SENSES) == "audio":
-            raise MeshRefused(f"an estimate by sound alone was asked for, and {self._unheard}")
+        if self.model.sound_refusal and accuracy.of(SENSES) == "audio":
+            raise MeshRefused(f"an estimate by sound alone was asked for, and {self._sound_refusal}")
         prepare(self.model, accuracy)
         _ = self.symmetry
 
@@ -99,8 +98,8 @@ class ContactAnswering:
         if not self._seen:
             raise WrongUse("no contact was read; a run needs at least one")
         seed = self._run.recording.header.seed
-        heights, unread = tuple(self._heights), unread_of(self._refusals)
-        return Readings(in_time(self._seen), heights, self.model, self.prior, seed, self._taken, unread)
+        seen, heights, refused = in_time(self._seen), tuple(self._heights), dict(self._refused_pictures)
+        return Readings(seen, heights, self.model, self.prior, seed, self._taken, refused)
 
     def read(self, record: StepRecord) -> None:
         """Take in a contact; its images are turned into heights here, and nowhere else."""
@@ -108,9 +107,10 @@ class ContactAnswering:
         aspect = aspect_stated(self._run.calibration.header.made_from)
         seen = observe_step(record, station.flange_from_gel, self._run.acquisition, aspect)
         heights, refusal, cpu, wall = loaded(lambda: timed_height_map(seen, self.model))
+        if refusal:
+            self._refused_pictures[len(self._seen)] = refusal
         self._seen.append(seen)
         self._heights.append(heights)
-        self._refusals.append(refusal)
         self._taken = (self._taken[0] + cpu, self._taken[1] + wall)
 
     def answer(self) -> Answer:
@@ -132,8 +132,8 @@ class ContactAnswering:
         others = {other: self._tried(other, readings) for other in senses if other != sense}
         seconds = sum(last.seconds.values())
         seen, heights = readings.observations, readings.heights
-        unread = readings.unread
-        return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others, unread)
+        refused_pictures = readings.refused_pictures
+        return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others, refused_pictures)
 
     def _sense_of(self, readings: Readings, struck: bool) -> Senses:
         """What the answer is by."""
@@ -169,13 +169,13 @@ class ContactAnswering:
         return self._located(sense, readings, None)[-1]
 
     @property
-    def _unheard(self) -> str:
+    def _sound_refusal(self) -> str:
         """Why only touch answers."""
-        return f"sound cannot be compared: {self.model.unheard}"
+        return f"sound cannot be compared: {self.model.sound_refusal}"
 
     def _tried(self, sense: Senses, readings: Readings) -> Estimate | FitRefused:
-        if self.model.unheard and sense != "touch":
-            return FitRefused(self._unheard)
+        if self.model.sound_refusal and sense != "touch":
+            return FitRefused(self._sound_refusal)
         try:
             return loaded(lambda: self._by(sense, readings))
         except FitRefused as refusal:

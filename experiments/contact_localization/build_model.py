@@ -25,7 +25,7 @@ from harness.sim.optics.tactile_calibration import TactileCalibration
 def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
     """The object and the sensor as a recording carries them.
 
-    An object whose modes cannot be found is touched all the same; ``Model.unheard`` says why it is not heard.
+    An object whose modes cannot be found is touched all the same; ``Model.sound_refusal`` is the reason.
 
     Args:
         run: the folder.
@@ -35,7 +35,7 @@ def model_of_run(run: RunFiles, accuracy: Accuracy | None = None) -> Model:
     try:
         return model_of_scene(run.scene, *rest)
     except MeshRefused as refusal:
-        return replace(model_of_scene(without_sound(run.scene), *rest), unheard=str(refusal))
+        return replace(model_of_scene(without_sound(run.scene), *rest), sound_refusal=str(refusal))
 
 
 def model_of_scene(

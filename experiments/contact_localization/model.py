@@ -75,7 +75,7 @@ class Model:
         material: of the object; None where no sound is compared.
         seen: the object along the tool, which candidates' tactile images are crops of; None for the mesh's.
         errors: of the bench that the readings are from, as its station states them.
-        unheard: why no sound can be compared that the scene calls for; empty where one can.
+        sound_refusal: why no sound can be compared that the scene calls for; empty where one can.
         seen_rms: m, root mean square over a whole image, that ``seen`` is itself off by.
     """
 
@@ -86,7 +86,7 @@ class Model:
     material: Material | None = None
     seen: FirstSurface | None = None
     errors: BenchErrors = field(default_factory=BenchErrors)
-    unheard: str = ""
+    sound_refusal: str = ""
     seen_rms: float = 0.0
     _surfaces: dict[float, Surface] = field(init=False, default_factory=dict, repr=False)
 

@@ -1,13 +1,11 @@
 """From what was recorded at each contact to what the estimator compares."""
 
-import numpy as np
-
 from experiments.contact_localization.model import Model
 from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise, touch_map
 from harness.basics.arrays import FloatArray
 from harness.recording.observation import Observation
-from harness.sim.optics.inverse import invert_mean
+from harness.sim.optics.inverse import heights_or_refusal
 
 CONTACT_THRESHOLD = 0.12e-3
 """Metres of indentation, averaged over a compared pixel, below which no contact is seen."""
@@ -23,10 +21,9 @@ def contact_of(
     return Contact(base_from_gel, fine, coarse)
 
 
-def height_map(observation: Observation, model: Model) -> FloatArray:
-    """``(rows, columns)`` metres of indentation, from the mean of the contact's frames.
+def height_map(observation: Observation, model: Model) -> tuple[FloatArray, str]:
+    """``(rows, columns)`` metres of indentation, from the mean of the contact's frames, and no text.
 
-    Raises:
-        PictureRefused: the picture is not what the calibration was made of.
+    Zeros, and why, where the picture is not what the calibration was made of.
     """
-    return np.asarray(invert_mean(observation.images, model.calibration).height[0])
+    return heights_or_refusal(observation.images, model.calibration)

@@ -104,7 +104,7 @@ class ScaleAnswering:
         self.met: list[bool] = []
         self.ways: list[GelWay] = []
         self.left_out: list[str] = []
-        self.unread: list[str] = []
+        self.refused_pictures: list[str] = []
         self.strikes: list[Strike] = []
         self._read = dict.fromkeys(SENSES, 0.0)
         self._peaks: tuple[int, Peaks | None] = (0, None)
@@ -152,7 +152,7 @@ class ScaleAnswering:
         try:
             patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
         except PictureRefused as refusal:  # whether the gel met anything is not known either
-            self.unread.append(picture_left_out(record.step.index, refusal))
+            self.refused_pictures.append(picture_left_out(record.step.index, refusal))
             return
         if patch is not None:
             self.patches.append(patch)
@@ -268,6 +268,6 @@ class ScaleAnswering:
 
     def _no_picture(self, read: Sequence[object]) -> FitRefused | None:
         """Why touch has no answer where pictures were taken and none of them was read."""
-        if read or not self.unread:
+        if read or not self.refused_pictures:
             return None
-        return FitRefused(f"no contact's picture may be used; {self.unread[0]}")
+        return FitRefused(f"no contact's picture may be used; {self.refused_pictures[0]}")

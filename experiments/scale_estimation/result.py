@@ -42,7 +42,11 @@ def result_of(scored: Scored) -> dict[str, Any]:
         "estimates": estimates,
         "sqrt_young_over_density": _material(scored),
         "seconds": seconds,
-        "warnings": [*scored.answering.unread, *_left_out(scored.answering.left_out), *_doubts(found)],
+        "warnings": [
+            *scored.answering.refused_pictures,
+            *_left_out(scored.answering.left_out),
+            *_doubts(found),
+        ],
     }
 
 

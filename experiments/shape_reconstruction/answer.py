@@ -115,5 +115,5 @@ class ShapeAnswering:
 
     def _require_readings(self, evidence: ShapeEvidence) -> None:
         """Methods that know an average answer from nothing: not where all pictures were refused."""
-        if self.readings.unread and not evidence.touches and evidence.look is None:
-            raise FitRefused(f"no reading is left; {self.readings.unread[0]}")
+        if self.readings.refused_pictures and not evidence.touches and evidence.look is None:
+            raise FitRefused(f"no reading is left; {self.readings.refused_pictures[0]}")

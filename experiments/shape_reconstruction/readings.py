@@ -37,7 +37,7 @@ class ShapeReadings:
     run: RunFiles
     touches: list[GuardedTouch] = field(default_factory=list, init=False)
     look: SeenMask | None = field(default=None, init=False)
-    unread: list[str] = field(default_factory=list, init=False)
+    refused_pictures: list[str] = field(default_factory=list, init=False)
 
     def read(self, record: StepRecord) -> None:
         """Take in a step: a look, a press, or one that was not made."""
@@ -48,7 +48,7 @@ class ShapeReadings:
             try:
                 self.touches.append(guarded_touch(self.run, record))
             except PictureRefused as refusal:  # whether the gel met anything is not known either
-                self.unread.append(picture_left_out(record.step.index, refusal))
+                self.refused_pictures.append(picture_left_out(record.step.index, refusal))
 
     def evidence(self) -> ShapeEvidence:
         """All of it."""

@@ -110,7 +110,7 @@ def write_files(scored: Scored, folder: Path) -> None:
 def _warnings(scored: Scored, answer: ShapeAnswer) -> list[str]:
     said = [f"{sense}: {one}" for sense, one in answer.by_sense.items() if isinstance(one, FitRefused)]
     fused, left_out = answer.fused, scored.answering.left_out
-    said += [*scored.answering.readings.unread, *(f"shape: {flag}" for flag in fused.flags)]
+    said += [*scored.answering.readings.refused_pictures, *(f"shape: {flag}" for flag in fused.flags)]
     if fused.not_bounded:
         said.append(f"nothing bounds the object along {', '.join(fused.not_bounded)}: press there, or look")
     said += [

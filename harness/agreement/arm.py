@@ -8,7 +8,7 @@ from scipy.linalg import solve_triangular
 
 from harness.agreement.agreement import Residual, SenseResiduals
 from harness.agreement.place_noise import PlaceNoise, shared_twists
-from harness.agreement.readings import PressedContact, unread_notes
+from harness.agreement.readings import PressedContact, refusal_notes
 from harness.agreement.subject import Subject
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import rotation_from_quaternion, rotation_from_vector, transform
@@ -70,10 +70,10 @@ def compare_with_twin(
     run, noise = subject.run, noise or PlaceNoise.at(subject.run.station.errors)
     bench = twin_of(subject.scene, run.station, subject.mesh, subject.base_from_object)
     joints = [found for record in run.recording.steps() if (found := joint_residual(run, record)) is not None]
-    read = [contact for contact in contacts if not contact.unread]
+    read = [contact for contact in contacts if not contact.refusal]
     depths = [contact_depth(bench, subject.base_from_object, contact, noise) for contact in read]
     residuals = sorted((*joints, *depth_residuals(depths)), key=lambda residual: residual.step)
-    why = "; ".join(unread_notes(contacts)) or ("" if residuals else "no pose of the arm was recorded")
+    why = "; ".join(refusal_notes(contacts)) or ("" if residuals else "no pose of the arm was recorded")
     return SenseResiduals("arm", "twin", tuple(residuals), why)
 
 

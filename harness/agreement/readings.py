@@ -3,14 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import PictureRefused
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import Observation, in_time, observe_step, picture_left_out
 from harness.recording.run_folder import RunFiles
-from harness.sim.optics.inverse import invert_mean
+from harness.sim.optics.inverse import heights_or_refusal
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 SEEN = 0.12e-3
@@ -25,13 +22,13 @@ class PressedContact:
         step: of the run.
         seen: as it was recorded.
         heights: ``(rows, columns)`` m of indentation, by its picture; zeros where that is refused.
-        unread: why its picture is not compared; empty where it is.
+        refusal: why its picture is not compared; empty where it is.
     """
 
     step: int
     seen: Observation
     heights: FloatArray
-    unread: str = ""
+    refusal: str = ""
 
     @property
     def touched(self) -> bool:
@@ -55,14 +52,11 @@ def contacts_of(run: RunFiles) -> tuple[PressedContact, ...]:
     )
 
 
-def unread_notes(contacts: Sequence[PressedContact]) -> list[str]:
+def refusal_notes(contacts: Sequence[PressedContact]) -> list[str]:
     """A sentence for each picture that is not compared."""
-    return [picture_left_out(one.step, one.unread) for one in contacts if one.unread]
+    return [picture_left_out(one.step, one.refusal) for one in contacts if one.refusal]
 
 
 def _contact(step: int, seen: Observation, calibration: TactileCalibration) -> PressedContact:
     """With its surface from the mean of its frames, where that is of the calibration's gel."""
-    try:
-        return PressedContact(step, seen, np.asarray(invert_mean(seen.images, calibration).height[0]))
-    except PictureRefused as refusal:
-        return PressedContact(step, seen, np.zeros(seen.images.shape[1:3]), str(refusal))
+    return PressedContact(step, seen, *heights_or_refusal(seen.images, calibration))

@@ -8,7 +8,7 @@ from harness.agreement.subject import Subject
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.objectfile.entries import Modality
-from harness.objectfile.touch_entries import MAP_RANGE, WORST_OF_TEN
+from harness.objectfile.touch_entries import WORST_OF_TEN, rms_at
 
 _MAPS = "unseen_places_psnr_db_median", WORST_OF_TEN
 """Of half, and of nine in ten, of presses at places that were never coded the map is at least as good."""
@@ -37,7 +37,7 @@ def map_errors(subject: Subject, source: Source) -> FloatArray:
         return np.zeros(1)
     median, tenth = (_stated(subject, "touch", name) for name in _MAPS)
     decibels = median + max(0.0, median - tenth) / norm.isf(0.1) * norm.ppf(_SLICES)
-    return np.asarray(MAP_RANGE * 10.0 ** (-decibels / 20.0))
+    return rms_at(decibels)
 
 
 def gross_share(source: Source) -> float:

@@ -158,9 +158,9 @@ def _off(peak: Peak, modes: StruckModes, group: slice, noise: ShareNoise) -> flo
     energy = float(np.linalg.norm(y) ** 2)
     outside = max(energy - float(np.linalg.norm(along) ** 2), _LEAST * energy) / (len(y) - gains.shape[1])
     ways = right.T @ (along * sizes / (sizes**2 + _WEAK**2 * surface))
-    heard = float(np.linalg.norm(gains @ ways) ** 2) / len(y)
+    fitted = float(np.linalg.norm(gains @ ways) ** 2) / len(y)
     loud = surface * float(np.linalg.norm(ways) ** 2)
-    allowed = noise.gain**2 * (loud + heard) + modes.error**2 * loud
+    allowed = noise.gain**2 * (loud + fitted) + modes.error**2 * loud
     around = skirts_at(peak, modes.frequencies) * modes.mean_squares
     skirts = noise.skirts**2 * float(np.linalg.norm(ways) ** 2 * (around.sum() - around[group].sum()))
     noisy = float(np.mean(peak.sigma[peak.heard] ** 2)) + _LEAST * energy

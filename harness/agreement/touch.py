@@ -15,7 +15,7 @@ from scipy.stats import binom, chi2
 from harness.agreement.agreement import Residual, SenseResiduals, SideBySide, Source
 from harness.agreement.likeliest import SurfaceNoise, Surfaces, likeliest
 from harness.agreement.place_noise import PlaceNoise
-from harness.agreement.readings import PressedContact, unread_notes
+from harness.agreement.readings import PressedContact, refusal_notes
 from harness.agreement.stated_error import gross_share
 from harness.agreement.subject import Subject
 from harness.basics.arrays import FloatArray
@@ -44,9 +44,9 @@ def compare_touch(
         noise: of the surface; None for the stated one.
     """
     places, noise = places or PlaceNoise.at(subject.run.station.errors), noise or SurfaceNoise()
-    residuals, notes = [], unread_notes(contacts)
+    residuals, notes = [], refusal_notes(contacts)
     for contact in contacts:
-        if contact.unread:
+        if contact.refusal:
             continue
         try:
             found = likeliest(subject, source, contact, places, noise)
@@ -62,7 +62,7 @@ def compare_touch(
     if gross_share(source) and residuals:
         residuals.append(counted_residual(residuals, gross_share(source)))
     why = "; ".join(notes) or ("" if contacts else "no picture of the gel was recorded")
-    refused = contacts[0].step if contacts and all(contact.unread for contact in contacts) else None
+    refused = contacts[0].step if contacts and all(contact.refusal for contact in contacts) else None
     return SenseResiduals("touch", source, tuple(residuals), why, refused_at=refused)
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from harness.basics.arrays import FloatArray
 from harness.bench.sensor import TactileSensor
 from harness.objectfile.entries import Entry, FileEntry, Modality, NetworkEntry, Provenance
 from harness.sim.gel.gel import GelSkirt
@@ -22,6 +23,11 @@ WORST_OF_TEN = "unseen_places_psnr_db_p10"
 """On a model card: nine of ten maps at places that were never coded are at least so near."""
 
 _COARSE = 4
+
+
+def rms_at(decibels: FloatArray | float) -> FloatArray:
+    """m, root mean square over a whole map, of a model card's PSNR in dB."""
+    return np.asarray(MAP_RANGE * 10.0 ** (-0.05 * np.asarray(decibels)))
 
 
 def ray_pixels(rows: int, columns: int) -> int:
@@ -106,7 +112,7 @@ class CodesEntry(Entry):
         What its card states, for whoever compares readings with it; 0 where the card states no error.
         """
         decibels = self.network.measured.get(WORST_OF_TEN, np.inf)
-        return float(MAP_RANGE * 10.0 ** (-0.05 * decibels))
+        return float(rms_at(decibels))
 
 
 class TouchEntry(Entry):

@@ -220,9 +220,8 @@ def _identified(lines: SpectralLines, search: PoleSearch, rounding: float) -> Id
 def _searched(lines: SpectralLines, search: PoleSearch, rounding: float) -> Identified:
     fit = fit_poles(lines, np.zeros(0), np.zeros(0), search.skirt)
     most = min(search.most, len(lines.frequencies) // _LINES_A_MODE)
-    full = False
+    moved, full = moved_modes(lines, fit, search), False
     while not full:
-        moved = moved_modes(lines, fit, search)
         new = [one for one in new_poles(lines, fit, search, rounding) if not _stands_for(moved, one[0])]
         room = most - len(fit.omegas)
         full = len(new) > room
@@ -231,7 +230,8 @@ def _searched(lines: SpectralLines, search: PoleSearch, rounding: float) -> Iden
         omegas = np.concatenate([fit.omegas, [omega for omega, _ in new[:room]]])
         decays = np.concatenate([fit.decays, [decay for _, decay in new[:room]]])
         fit = fit_poles(lines, omegas, decays, search.skirt)
-    return _described(lines, fit, moved_modes(lines, fit, search), full)
+        moved = moved_modes(lines, fit, search)
+    return _described(lines, fit, moved, full)
 
 
 def _stands_for(moved: Sequence[MovedMode], omega: float) -> bool:

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from experiments.baselines.bench import Column, MadeMethod, Observation, RenderingMethod, RenderingWork
+from experiments.baselines.bench import Column, MadeMethod, Render, RenderingMethod, RenderingWork
 from experiments.baselines.look.bench import ViewBench, shown
 from experiments.baselines.look.field import opened_field
 from experiments.baselines.settings import FIELD, KILO_OSF
@@ -112,7 +112,7 @@ def _own(bench: ViewBench, of: ObjectFile) -> list[RenderingMethod]:
     return rows
 
 
-def _pictures(bench: ViewBench, renderer: VisionRenderer, settings: RenderSettings) -> Observation:
+def _pictures(bench: ViewBench, renderer: VisionRenderer, settings: RenderSettings) -> Render:
     def observe(number: int) -> AnyArray:
         camera, light = bench.views.cameras[number], bench.views.lights[number]
         return shown(renderer.render(camera, light, settings).image)

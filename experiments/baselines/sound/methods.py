@@ -5,7 +5,7 @@ from dataclasses import astuple
 
 import numpy as np
 
-from experiments.baselines.bench import Column, MadeMethod, Observation, RenderingMethod, RenderingWork
+from experiments.baselines.bench import Column, MadeMethod, Render, RenderingMethod, RenderingWork
 from experiments.baselines.settings import AUDIONET, SPECTROGRAM
 from experiments.baselines.sound.bench import SEED, StrikeBench, summed
 from experiments.baselines.sound.hexahedra import CELLS, hexahedral_modes
@@ -114,7 +114,7 @@ def _by_audionet(bench: StrikeBench, work: RenderingWork) -> MadeMethod:
     return MadeMethod(_by_gains(bench, Network(data, NETWORK, [points], [gains])), seconds)
 
 
-def _by_gains(bench: StrikeBench, network: Network) -> Observation:
+def _by_gains(bench: StrikeBench, network: Network) -> Render:
     def observe(number: int) -> AnyArray:
         point, normal = bench.strike(number)
         gains = network({"points": point[None]})["gains"][0].astype(np.float64) @ normal

@@ -5,7 +5,7 @@ from dataclasses import astuple
 
 import numpy as np
 
-from experiments.baselines.bench import Column, MadeMethod, Observation, RenderingMethod, RenderingWork
+from experiments.baselines.bench import Column, MadeMethod, Render, RenderingMethod, RenderingWork
 from experiments.baselines.settings import COLOURS, SMALL_CODES, TOUCHNET
 from experiments.baselines.stored_graph import stored_graph
 from experiments.baselines.touch.bench import TouchBench
@@ -145,7 +145,7 @@ def _gel(bench: TouchBench) -> GelEntry:
     return GelEntry.of(bench.places.sensor, bench.places.skirt)
 
 
-def _drawn(bench: TouchBench, maps: Maps) -> Observation:
+def _drawn(bench: TouchBench, maps: Maps) -> Render:
     def observe(number: int) -> AnyArray:
         return bench.picture(maps(bench.presses[number : number + 1])[0])
 

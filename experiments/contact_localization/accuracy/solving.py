@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-import numpy as np
 from numba.core.event import install_recorder
 
 from experiments.contact_localization.accuracy.dials import (
@@ -22,7 +21,7 @@ from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.strain import times_stated
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import FitRefused, PictureRefused
+from harness.basics.errors import FitRefused
 from harness.bench.bench_errors import BenchErrors
 from harness.effects.accuracy import Accuracy, Level, Setting
 from harness.effects.touch_file_effects import SHAPES as TOUCH
@@ -47,7 +46,7 @@ class Readings:
         prior: of its orientation.
         seed: of the draws.
         shared: s of CPU time and on the clock that the height maps took.
-        unread: why the picture of a contact, by its number from 0, is not used; its height map is zero.
+        refused_pictures: why a contact's picture is not used, by its number from 0; its height map is zero.
     """
 
     observations: tuple[Observation, ...]
@@ -56,18 +55,18 @@ class Readings:
     prior: Prior
     seed: int
     shared: tuple[float, float]
-    unread: Mapping[int, str] = field(default_factory=dict)
+    refused_pictures: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def pictured(self) -> bool:
         """Whether not every picture is refused."""
-        return not self.unread or len(self.unread) < len(self.observations)
+        return not self.refused_pictures or len(self.refused_pictures) < len(self.observations)
 
     @property
     def heard(self) -> bool:
         """Whether any contact was struck, and the object has modes to compare its sound with."""
         struck = any(observation.strike is not None for observation in self.observations)
-        return struck and not self.model.unheard
+        return struck and not self.model.sound_refusal
 
     def under(self, model: Model) -> "Readings":
         """The same readings, to be compared with another model of the object."""
@@ -80,7 +79,7 @@ class Readings:
             self,
             observations=self.observations[:count],
             heights=self.heights[:count],
-            unread={contact: why for contact, why in self.unread.items() if contact < count},
+            refused_pictures={k: why for k, why in self.refused_pictures.items() if k < count},
             shared=(share * self.shared[0], share * self.shared[1]),
         )
 
@@ -126,30 +125,18 @@ def read(
         images: whether any setting looks at the images.
     """
     cpu, wall = time.process_time(), time.perf_counter()
-    maps = [checked_height_map(observation, model) for observation in observations] if images else []
+    maps = [height_map(observation, model) for observation in observations] if images else []
     taken = time.process_time() - cpu, time.perf_counter() - wall
-    heights, unread = tuple(heights for heights, _ in maps), unread_of([why for _, why in maps])
-    return Readings(tuple(observations), heights, model, prior, seed, taken, unread)
+    heights = tuple(heights for heights, _ in maps)
+    refused_pictures = {contact: refusal for contact, (_, refusal) in enumerate(maps) if refusal}
+    return Readings(tuple(observations), heights, model, prior, seed, taken, refused_pictures)
 
 
-def checked_height_map(observation: Observation, model: Model) -> tuple[FloatArray, str | None]:
-    """A contact's height map and None; zeros, and the reason, where its picture is refused."""
-    try:
-        return height_map(observation, model), None
-    except PictureRefused as refusal:
-        return np.zeros(observation.images.shape[1:3]), str(refusal)
-
-
-def unread_of(reasons: Sequence[str | None]) -> dict[int, str]:
-    """The reasons that there are, by the contact's number from 0."""
-    return {contact: why for contact, why in enumerate(reasons) if why is not None}
-
-
-def timed_height_map(observation: Observation, model: Model) -> tuple[FloatArray, str | None, float, float]:
-    """A contact's checked height map, and the s of CPU time and on the clock that it took."""
+def timed_height_map(observation: Observation, model: Model) -> tuple[FloatArray, str, float, float]:
+    """A contact's height map, why its picture is refused, and the s of CPU time and on the clock it took."""
     cpu, wall = time.process_time(), time.perf_counter()
-    heights, why = checked_height_map(observation, model)
-    return heights, why, time.process_time() - cpu, time.perf_counter() - wall
+    heights, refusal = height_map(observation, model)
+    return heights, refusal, time.process_time() - cpu, time.perf_counter() - wall
 
 
 def loaded(timed: Callable[[], T]) -> T:
@@ -217,7 +204,7 @@ def _located_at(
 ) -> tuple[Estimate, ...]:
     noise, images = noise_at(errors), needs_images(accuracy)
     if images and not readings.pictured:
-        raise FitRefused(f"no contact's picture may be used; of contact 1: {readings.unread[0]}")
+        raise FitRefused(f"no contact's picture may be used; of contact 1: {readings.refused_pictures[0]}")
     contacts = _contacts(readings, accuracy.of(BLOCK), noise, images)
     strikes = [observation.strike for observation in readings.observations] if readings.heard else []
     seconds = readings.shared[1] if images else 0.0
@@ -243,7 +230,7 @@ def _contacts(readings: Readings, block: int, noise: Noise, images: bool) -> lis
     pairs = zip(readings.observations, readings.heights, strict=True)
     return [
         Contact(observation.base_from_gel)
-        if index in readings.unread
+        if index in readings.refused_pictures
         else contact_of(observation.base_from_gel, heights, pitch, block, noise.touch)
         for index, (observation, heights) in enumerate(pairs)
     ]

@@ -104,7 +104,7 @@ def _contacts(
             posterior=Missing(str(after)) if isinstance(after, FitRefused) else posterior_of(after),
             truth=None if true is None else true[k],
             error=None if true is None else _error(after, true[k]),
-            flags=() if gate is None else tuple(flags_of(gate, scored.found.unread.get(k))),
+            flags=() if gate is None else tuple(flags_of(gate, scored.found.refused_pictures.get(k))),
             notes=(("fit", _fit(gate)),),
         )
         for k, (after, gate) in enumerate(zip(history, _gates(scored.found, len(history)), strict=True))

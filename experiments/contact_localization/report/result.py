@@ -15,7 +15,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.experiment.experiment import Scored
 
-_UNHEARD = "the object's sound is not compared, and touch alone answers"
+_NO_SOUND = "the object's sound is not compared, and touch alone answers"
 _LEFT_OUT = "its picture is left out"
 
 
@@ -54,9 +54,10 @@ def by_translations(found: Answer, count: int) -> FloatArray:
 
 
 def _doubts(found: Answer) -> tuple[str, ...]:
-    unheard = found.model.unheard
-    of_sound = (f"{_UNHEARD}: {unheard}",) if unheard else doubts_of_sound(found.observations)
-    of_sound = (*(f"contact {k + 1}: {_LEFT_OUT}: {why}" for k, why in found.unread.items()), *of_sound)
+    refusal = found.model.sound_refusal
+    of_sound = (f"{_NO_SOUND}: {refusal}",) if refusal else doubts_of_sound(found.observations)
+    pictures = found.refused_pictures.items()
+    of_sound = (*(f"contact {k + 1}: {_LEFT_OUT}: {why}" for k, why in pictures), *of_sound)
     # Sense by sense the doubt may be the same one.
     of_senses = [estimate.doubts for estimate in found.by_sense.values() if isinstance(estimate, Estimate)]
     of_sound += tuple(dict.fromkeys(doubt for doubts in of_senses for doubt in doubts))
@@ -95,7 +96,7 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
                 point,
                 last.gates[k] if last.gates else None,
                 None if errors is None else float(errors[k]),
-                scored.found.unread.get(k),
+                scored.found.refused_pictures.get(k),
             )
             for k, point in enumerate(last.contacts)
         ],
@@ -104,16 +105,16 @@ def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:
     }
 
 
-def flags_of(gate: Gate, unread: str | None = None) -> list[str]:
+def flags_of(gate: Gate, refusal: str | None = None) -> list[str]:
     """What is wrong with a contact, in words.
 
     Args:
         gate: how it fits.
-        unread: why its picture is left out; None where it is not.
+        refusal: why its picture is left out; None where it is not.
     """
     said = []
-    if unread is not None:
-        said.append(f"{_LEFT_OUT}: {unread}")
+    if refusal is not None:
+        said.append(f"{_LEFT_OUT}: {refusal}")
     elif gate.missed:
         said.append("missed: the image shows no contact; it was not used")
     if gate.slipped:
@@ -129,14 +130,14 @@ def fit_of(gate: Gate) -> float | None:
 
 
 def _contact(
-    index: int, point: FloatArray, gate: Gate | None, error: float | None, unread: str | None
+    index: int, point: FloatArray, gate: Gate | None, error: float | None, refusal: str | None
 ) -> dict[str, Any]:
     return {
         "contact": index + 1,
         "position_m": point.tolist(),
         "error_m": error,
         "fit_nats": None if gate is None else fit_of(gate),
-        "flags": [] if gate is None else flags_of(gate, unread),
+        "flags": [] if gate is None else flags_of(gate, refusal),
     }
 
 

@@ -29,8 +29,8 @@ def sound_of(scored: Scored) -> Sound | Missing:
     found = scored.found
     if not scored.run.scene.sensors.sound:
         return Missing("the scene called for no sound")
-    if found.model.unheard:
-        return Missing(found.model.unheard)
+    if found.model.sound_refusal:
+        return Missing(found.model.sound_refusal)
     heard = hear(
         [observation.strike for observation in found.observations],
         found.model,

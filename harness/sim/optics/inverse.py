@@ -11,7 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
-from harness.basics.errors import CalibrationRefused, DataRefused
+from harness.basics.errors import CalibrationRefused, DataRefused, PictureRefused
 from harness.sim.optics.check.picture_check import checked_picture
 from harness.sim.optics.poisson import anchored_heights, free_heights
 from harness.sim.optics.slope_kernels import normals_from_colour
@@ -116,6 +116,19 @@ def invert_mean(frames: ByteArray, calibration: TactileCalibration) -> Inversion
         CalibrationRefused: the calibration has only a table.
     """
     return invert(checked_picture(mean_picture(frames), calibration).image[None], calibration)
+
+
+def heights_or_refusal(frames: ByteArray, calibration: TactileCalibration) -> tuple[FloatArray, str]:
+    """``(rows, columns)`` m of indentation by ``invert_mean``, and no text; zeros and why where it refuses.
+
+    Args:
+        frames: ``(n, rows, columns, 3)`` RGB of one contact that was held still.
+        calibration: with a smooth model.
+    """
+    try:
+        return np.asarray(invert_mean(frames, calibration).height[0]), ""
+    except PictureRefused as refusal:
+        return np.zeros(frames.shape[1:3]), str(refusal)
 
 
 def invert(images: ByteArray, calibration: TactileCalibration, detection: Detection = STEADY) -> Inversion:

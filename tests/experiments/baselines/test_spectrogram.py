@@ -64,7 +64,7 @@ def test_a_network_that_was_trained_for_seconds_is_nearer_than_silence(
     bench = plate_bench()
     work = RenderingWork(Store(tmp_path), lambda doing, share: None)
     method = next(each for each in sound_methods(bench, work) if each.column == "1.0 here")
-    sound = method.make().observe(0)
+    sound = method.make().render(0)
     assert np.isfinite(sound).all()
     silence = bench.scores(0, np.zeros_like(sound))
     assert bench.scores(0, sound)["stft_distance"] < silence["stft_distance"]

@@ -43,7 +43,7 @@ def test_the_reference_scores_as_the_same_and_the_untouched_gel_does_not(bench: 
     same = bench.scores(0, bench.picture(bench.maps[0]))
     assert same["ssim"] == pytest.approx(1.0)
     assert same["psnr_db"] == pytest.approx(10.0 * np.log10(255.0**2 * 12.0))
-    nothing = bench.scores(0, untouched(bench).make().observe(0))
+    nothing = bench.scores(0, untouched(bench).make().render(0))
     assert nothing["psnr_db"] < 40.0
 
 
@@ -58,6 +58,6 @@ def test_a_network_that_was_trained_for_seconds_beats_one_colour(
     pytest.importorskip("torch", reason="torch is in the extra `author`, which is not installed")
     small = FitSpec(depth=3, width=64, octaves=4, steps=150, batch=2048, rate=4e-3)
     monkeypatch.setattr("experiments.baselines.touch.methods.COLOURS", small)
-    picture = first_touch(bench, work(tmp_path)).make().observe(0)
+    picture = first_touch(bench, work(tmp_path)).make().render(0)
     mean = np.broadcast_to(bench.picture(bench.maps[0]).mean(axis=(0, 1)), picture.shape)
     assert bench.scores(0, picture)["psnr_db"] > bench.scores(0, mean)["psnr_db"] + 3.0

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.model import Model, Prior
-from experiments.contact_localization.observation import contact_of, height_map
+from experiments.contact_localization.observation import contact_of
+from experiments.contact_localization.observation import height_map as checked_height_map
 from experiments.contact_localization.posterior.hypotheses import Contact
 from experiments.contact_localization.touch.touch import TouchNoise
 from harness.basics.arrays import ByteArray, FloatArray
@@ -26,6 +27,13 @@ POSE = Channel("arm.base_from_flange", "m", (7,), "float64", "base")
 FLANGE_FROM_GEL = transform(rotation_from_vector(np.array([0.0, 0.0, 0.5])), np.array([0.0, 0.0, 0.06]))
 AT = transform(rotation_from_vector(np.array([2.9, 0.4, -0.2])), np.array([0.4, -0.2, 0.3]))
 EDGE = Press((0.008, -0.005, 0.025), (0.0, 0.0, -1.0), yaw=0.3)
+
+
+def height_map(observation: Observation, model: Model) -> FloatArray:
+    """Of a picture that is not refused."""
+    heights, refusal = checked_height_map(observation, model)
+    assert not refusal
+    return heights
 
 
 @pytest.fixture(scope="module")
