@@ -129,6 +129,7 @@ def hashes(recording: Recording) -> dict[str, str]:
     return {path.name: sha256(path.read_bytes()).hexdigest() for path in steps}
 
 
+@pytest.mark.slow  # in motion in test_arm_alarm.py, pressed on the object in test_sessions.py
 def test_a_stalled_camera(resume: Resume, begun: Recording) -> None:
     """Whichever motion it ends, or the reading: the gel is not left on the object."""
     before = hashes(begun)

@@ -23,7 +23,7 @@ pytestmark = [
     pytest.mark.timeout(180, func_only=True),  # on a cold machine the first run compiles
 ]
 
-CONTACTS = 3
+CONTACTS = 2
 MUG = (
     *("run", "contact-localization", "--object", "builtin:mug"),
     *("--contacts", str(CONTACTS), "--spacing", "spread", "--seed", "3"),
