@@ -25,6 +25,8 @@ IN_ORDER = (
     "sim modes",
     "explain",
     "replay",
+    "compare",
+    "catalogue check",
     "object build",
     "object render",
     "object verify",
@@ -47,6 +49,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("readme")
     in_process_run(folder / "RUN", touch_scene(contacts=2), seed=3)
     (folder / "scenes").symlink_to(ROOT / "scenes")
+    (folder / "objects.csv").write_text("name,material,mesh\nbowl,ceramic,builtin:bowl\n", encoding="utf-8")
     return folder
 
 
