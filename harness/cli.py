@@ -131,6 +131,10 @@ COMMANDS = {
     "catalogue status": Command(
         "harness.commands.catalogue.status:status", "What a build has made, how well, and what failed why."
     ),
+    "catalogue publish": Command(
+        "harness.commands.catalogue.publish:publish",
+        "Copy what a build has made to a folder or an object store.",
+    ),
     "catalogue page": Command(
         "harness.commands.catalogue.status:page",
         "One page of all objects of a build, with a picture of each.",
