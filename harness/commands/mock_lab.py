@@ -28,11 +28,11 @@ def mock_lab(
     from harness.bench.gap import gap_path
     from harness.bench.mock_lab import MockLab
     from harness.bench.station_file import load_station, station_path
-    from harness.commands.scenes import resolve
+    from harness.commands.scenes import SceneOptions, resolve
     from harness.effects.scene_object import known_object
 
     default = "builtin:mug" if scene is None and object_ is None else object_
-    wanted = resolve(scene, default, material, units)
+    wanted = resolve(SceneOptions(scene, default, material, units))
     bench = load_station(station_path(station))
     gap_file = gap_path(gap or (bench.mock.gap if bench.mock is not None else "default"))
     with TemporaryDirectory(prefix="touchstone-truth-") as folder:

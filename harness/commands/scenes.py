@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -10,47 +11,75 @@ from harness.basics.toml_file import nearest
 from harness.bench.scene import SceneFile, Section, load_scene, scene_from_json, scene_from_options
 
 
+@dataclass(frozen=True)
+class SceneOptions:
+    """What a command line says of a scene; None where it says nothing.
+
+    Attributes:
+        scene: a file.
+        object: a mesh, a built-in object or an ObjectFile instead.
+        material, units, wall, objectfile: of that object.
+        sense: ``"both"``, or senses with commas between.
+        sizes: between which the longest side of an object of unknown size is.
+        keys: of the experiment's table.
+        assignments: the same, as ``KEY=VALUE``.
+    """
+
+    scene: Path | None = None
+    object: str | None = None
+    material: str | None = None
+    units: str | None = None
+    wall: str | None = None
+    objectfile: str | None = None
+    sense: str | None = None
+    sizes: tuple[str, str] | None = None
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    assignments: Sequence[str] = ()
+
+    @property
+    def of_object(self) -> tuple[str | None, ...]:
+        """What belongs to ``object`` alone."""
+        return self.material, self.units, self.wall, self.objectfile
+
+
 def resolve(
-    scene: Path | None,
-    object_: str | None,
-    material: str | None = None,
-    units: str | None = None,
-    wall: str | None = None,
-    sense: str | None = None,
-    objectfile: str | None = None,
+    options: SceneOptions,
     section: type[Section] | None = None,
-    keys: Mapping[str, Any] | None = None,
-    assignments: Sequence[str] = (),
-    sizes: tuple[str, str] | None = None,
     assumed: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> SceneFile:
-    """The scene of a file or of ``--object``, with what the command line changes of it.
+    """The scene that a command line means.
 
-    ``assumed`` are keys of its tables that a scene from ``--object`` has where no option says otherwise.
+    Args:
+        options: of the command line.
+        section: model of the experiment's table; None where it has none.
+        assumed: keys of tables that a scene of ``--object`` has where no option says otherwise.
 
     Raises:
-        WrongUse: neither or both are given, or something that the scene does not allow.
+        WrongUse: neither or both of scene and object are given, or something that the scene does not allow.
     """
-    if (scene is None) == (object_ is None):
-        raise WrongUse("say what is on the table: either --scene FILE or --object FILE --material M")
-    if scene is not None:
-        if any(option is not None for option in (material, units, wall, objectfile)):
-            raise WrongUse(
-                "--material, --units, --wall and --objectfile belong to --object; a scene file says its own"
-            )
-        found = load_scene(scene)
-    else:
-        assert object_ is not None
-        found = scene_from_options(object_, material, units, wall, objectfile)
-        found = _with(found, assumed or {})
+    found = _chosen(options, assumed or {})
     tables: dict[str, Mapping[str, Any]] = {}
     if section is not None:
-        tables[section.table] = _asked(section, keys or {}, assignments)
-    if sense is not None:
-        tables["sensors"] = _sensors(sense)
-    if sizes is not None:
-        tables["object"] = {"scale": "hidden", "sizes": sizes}
+        tables[section.table] = _asked(section, options.keys, options.assignments)
+    if options.sense is not None:
+        tables["sensors"] = _sensors(options.sense)
+    if options.sizes is not None:
+        tables["object"] = {"scale": "hidden", "sizes": options.sizes}
     return _with(found, tables)
+
+
+def _chosen(options: SceneOptions, assumed: Mapping[str, Mapping[str, Any]]) -> SceneFile:
+    """The scene of the file, or that of the object."""
+    if (options.scene is None) == (options.object is None):
+        raise WrongUse("say what is on the table: either --scene FILE or --object FILE --material M")
+    if options.object is not None:
+        return _with(scene_from_options(options.object, *options.of_object), assumed)
+    if any(option is not None for option in options.of_object):
+        raise WrongUse(
+            "--material, --units, --wall and --objectfile belong to --object; a scene file says its own"
+        )
+    assert options.scene is not None
+    return load_scene(options.scene)
 
 
 def with_assignments(

@@ -21,7 +21,7 @@ from experiments.contact_localization.posterior.dials import METHOD, SPACING
 from harness.basics.errors import WrongUse
 from harness.bench.station_file import Station, load_station, station_path
 from harness.cli import invoke
-from harness.commands.run import run as run_command
+from harness.commands.run.planned_run import target_of_options
 from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import curve_path, load, save
 from harness.cost.provenance import code, machine
@@ -227,9 +227,8 @@ def test_what_cannot_be_asked_is_refused_before_a_folder_is_made(
 
 @pytest.mark.parametrize("text", ["2s", "2 s", "2000ms", "2000 ms"])
 def test_a_budget_may_be_written_with_or_without_a_space(text: str) -> None:
-    target = run_command._target(text, None, None)
-    assert target.seconds == 2.0
-    assert run_command._target(None, "5mm", None).error == 5e-3
+    assert target_of_options(text, None, []) == Target(seconds=2.0)
+    assert target_of_options(None, "5mm", []) == Target(error=5e-3)
 
 
 @pytest.mark.slow  # resuming and budgets are tested each by themselves

@@ -7,7 +7,6 @@ import typer
 
 from harness.commands import options
 from harness.commands.output import warn
-from harness.commands.run.run import drawing, publisher, show_report
 
 
 def replay(
@@ -32,6 +31,7 @@ def replay(
     Try: touchstone replay runs/... --level localization.method=particle
     """
     from harness.basics.errors import RecordingDamaged
+    from harness.commands.run.answered_run import drawing, publisher, show_report
     from harness.experiment.answer import finish, levels_of_result
     from harness.experiment.levels import chosen_levels
     from harness.experiment.lookup import experiment_of

@@ -20,7 +20,7 @@ from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.station_file import load_station, station_path
-from harness.commands.scenes import resolve
+from harness.commands.scenes import SceneOptions, resolve
 from harness.cost.curve import Point, Sample
 from harness.effects import sound_effects
 from harness.effects.accuracy import Accuracy, Level
@@ -145,9 +145,10 @@ def test_a_budget_chooses_no_objectfile_where_the_scene_names_none() -> None:
 
 
 def test_an_option_names_it_beside_an_object_and_not_beside_a_scene(of: ObjectFile) -> None:
-    assert resolve(None, "builtin:mug", objectfile=str(of.folder)).object.objectfile == str(of.folder)
+    options = SceneOptions(object="builtin:mug", objectfile=str(of.folder))
+    assert resolve(options).object.objectfile == str(of.folder)
     with pytest.raises(WrongUse, match="--objectfile belong to --object"):
-        resolve(Path("scenes/mug_both.toml"), None, objectfile=str(of.folder))
+        resolve(replace(options, object=None, scene=Path("scenes/mug_both.toml")))
 
 
 def test_what_the_modes_took_is_said_by_level(of: ObjectFile) -> None:
