@@ -76,7 +76,7 @@ def test_a_complete_run_is_resumed_without_a_bench(
     def open_nothing(*_: object) -> None:
         raise AssertionError("a bench was opened for a run that is complete")
 
-    def finish(_kind: object, recording: Recording, *_: object) -> dict[str, Any]:
+    def finish(_kind: object, recording: Recording, *_: object, **__: object) -> dict[str, Any]:
         return {"schema": 1, "warnings": [], "recording": str(recording.folder)}
 
     monkeypatch.setattr("harness.experiment.perform.open_station", open_nothing)
