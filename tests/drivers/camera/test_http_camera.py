@@ -235,6 +235,41 @@ def test_the_rate_is_that_of_the_connection_there_is() -> None:
     assert camera.rate == pytest.approx(25.0)
 
 
+class Connections:
+    """Captures at 25 frames a second on a clock of their own: each sends some frames and is then dead."""
+
+    def __init__(self, *frames: int) -> None:
+        self.clock, self._left, self._next = 0.0, 0, list(frames)
+        self.camera = stream()
+
+    def now(self) -> float:
+        return self.clock
+
+    def connect(self, _url: str = "") -> "Connections":
+        self.clock += 10.0
+        self._left = self._next.pop(0)
+        return self
+
+    def read(self) -> tuple[bool, ByteArray]:
+        self.clock += 0.04
+        self._left -= 1
+        if self._left == 0 and not self._next:
+            self.camera._closing.set()
+        return self._left >= 0, np.frombuffer(b"\xff\xd8\xff\xd9", np.uint8)
+
+    def release(self) -> None:
+        pass
+
+
+def test_the_time_without_a_connection_is_no_part_of_the_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    link = Connections(6, 3)
+    monkeypatch.setattr("drivers.camera.mjpeg.now", link.now)
+    monkeypatch.setattr("drivers.camera.mjpeg._capture", link.connect)
+    link.camera._drain(link.connect())
+    assert len(link.camera._frames) == 9
+    assert link.camera.rate == pytest.approx(25.0)
+
+
 @pytest.mark.parametrize("size", [30_000, 60_000])
 def test_a_head_that_states_a_vast_picture_takes_no_memory(size: int) -> None:
     data = bytearray(lit())

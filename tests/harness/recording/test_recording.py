@@ -3,10 +3,13 @@
 import errno
 import json
 import os
+import struct
 import subprocess
 import sys
 import textwrap
 import time
+import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +52,23 @@ def test_an_image_is_recorded_as_the_jpeg_it_arrived_as(tmp_path: Path) -> None:
     again = read_step(tmp_path / "000.mcap", OFFSET_NS).readings["gel.image"]
     assert again.encoded == reading.encoded
     assert np.array_equal(again.values, reading.values)
+
+
+@pytest.mark.parametrize("side", [7_000, 30_000])
+def test_an_image_that_states_more_pixels_than_a_camera_has_is_not_unpacked(
+    tmp_path: Path, side: int
+) -> None:
+    vast = bytearray(images(1).encoded[0])
+    at = vast.index(b"\xff\xc0")
+    vast[at + 5 : at + 9] = struct.pack(">HH", side, side)
+    reading = replace(images(1), encoded=(bytes(vast),))
+    record = StepRecord(Step(0, "press", {}), {"gel.image": reading}, 0.0)
+    write_step(tmp_path / "000.mcap", record, OFFSET_NS)
+    tracemalloc.start()
+    with pytest.raises(RecordingDamaged, match="does not decode"):
+        read_step(tmp_path / "000.mcap", OFFSET_NS)
+    assert tracemalloc.get_traced_memory()[1] < 1e7
+    tracemalloc.stop()
 
 
 def test_readings_refuse_to_be_written_to(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from harness.basics.errors import MeshRefused
 from harness.sim.solid.intake import take_in
 from harness.sim.solid.mesh_read import METRES, read_mesh
+from harness.sim.solid.volume_mesh import read_volume
 
 CORNERS = "0 0 0 40 0 0 0 40 0 0 0 40"
 FACES = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
@@ -74,3 +75,14 @@ def test_what_is_read_is_said_where_something_else_is_given(tmp_path: Path, name
     (tmp_path / name).write_text("ISO-10303-21;")
     with pytest.raises(MeshRefused, match="give OBJ, STL, PLY"):
         read_mesh(tmp_path / name)
+
+
+def test_what_the_library_prints_is_not_on_standard_output(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cut.msh"
+    path.write_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n8\n1 0 0 0\n")
+    for read in (lambda: read_mesh(path), lambda: read_volume(path, "mm")):
+        with pytest.raises(MeshRefused, match=r"cut\.msh"):
+            read()
+    assert capsys.readouterr().out == ""
