@@ -51,6 +51,8 @@ def answer_of(made: "MarkFree", artefact: Path, polycalib: Path | None, page: Pa
         "smooth_lean_rad": made.lean,
         "covered": float((made.coverage > 0).mean()),
         "steepest": header.slope_limit,
+        "misfit_grey": None if header.misfit is None else header.misfit.rms,
+        "misfit_alike": None if header.misfit is None else header.misfit.alike,
         **shadow_answer(made),
         "background": made.background_from,
         "polycalib": None if polycalib is None else str(polycalib),
@@ -71,6 +73,11 @@ def say(made: "MarkFree", answer: dict[str, Any], scale: "ArmScale | None") -> N
     drawn.add_row("table, centre as detected", f"{answer['psnr_contact_unrefitted_db']:.2f}")
     drawn.add_row("untouched gel", f"{answer['psnr_untouched_db']:.2f}")
     ANSWERS.print(drawn)
+    if answer["misfit_grey"] is not None:
+        ANSWERS.print(
+            f"held-out colours are off by {answer['misfit_grey']:.1f} grey levels beside the noise, "
+            f"alike over a sine of {answer['misfit_alike']:.2f} of the slope"
+        )
     for line in shadow_lines(made):
         ANSWERS.print(escape(line))
     for line in [escape(answer["scale_reason"])] if scale is None else scale_lines(scale):

@@ -12,6 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from calibration.taxim.artefact import calibration_of
+from calibration.taxim.colour_misfit import colour_misfit
 from calibration.taxim.explained import contact_radius, too_large, unexplained
 from calibration.taxim.gates import CONTACT, LEAST_PRESSES, check_set, reached, refusals, sightings
 from calibration.taxim.held_out import WITHIN, FittedModel, Score, held_out, teach
@@ -26,7 +27,7 @@ from harness.basics.arrays import FloatArray, IntArray, read_only
 from harness.basics.errors import CalibrationRefused
 from harness.picture.square_pixels import stated
 from harness.sim.optics.lit_calibration import LitCalibration, with_shadow
-from harness.sim.optics.tactile_calibration import Float32Array, TactileCalibration
+from harness.sim.optics.tactile_calibration import ColourMisfit, Float32Array, TactileCalibration
 
 LEAST_GAIN = 12.0
 """dB over predicting nothing that presses left out must gain in the median; published sets gain 19."""
@@ -170,7 +171,8 @@ def _calibrated(
         pack, change, kept = pack.of(np.nonzero(fine)[0]), change[fine], kept[fine]
         _still_enough(pack, refused)
         model = teach(pack, change, ball)
-    out = held_out(pack, change, ball, WITHIN * model.fit.edge)
+    radius = WITHIN * model.fit.edge
+    out = held_out(pack, change, ball, radius)
     scores = out.scores
     names = [ordered.names[k] for k in kept]
     used = [
@@ -178,12 +180,13 @@ def _calibrated(
         for k in range(len(names))
     ]
     _check_gain(scores)
+    misfit = colour_misfit(pack, change, out, ball, radius)
     error = table_error(pack, change - model.rest, model.fit, ball)
     shadow = fit_shadow(pack, change - model.rest, model.fit.centres, model.light)
     worth = None if shadow.table is None else score_shadow(pack, change, out, identity.pitch, ball)
     drawn = None if worth is None or not worth.worth else shadow
     return MarkFree(
-        _artefact(pictures, len(pack.images), model, identity, scores, drawn, error),
+        _artefact(pictures, len(pack.images), model, identity, scores, drawn, error, misfit),
         tuple(sorted(used, key=lambda press: pictures.names.index(press.name))),
         tuple(sorted([*refused, *pictures.refused], key=lambda one: one.name)),
         model.fit.edge,
@@ -272,6 +275,7 @@ def _artefact(
     scores: list[Score],
     shadow: ShadowFit | None,
     error: Float32Array,
+    misfit: ColourMisfit,
 ) -> LitCalibration:
     made_from = f"sha256 {pictures.sha256}, {presses} presses without marks{stated(pictures.aspect)}"
     made = calibration_of(pictures.background, model, identity, made_from, error)
@@ -279,6 +283,7 @@ def _artefact(
         made.header,
         held_out_db=float(np.median([one.smooth for one in scores])),
         held_out_table_db=float(np.median([one.table for one in scores])),
+        misfit=misfit,
     )
     scored = replace(made, header=header)
     table = None if shadow is None else shadow.in_metres(identity.pitch)

@@ -1,13 +1,14 @@
 """Recovered height maps of ball presses held against the ball."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from calibration.taxim.artefact import calibration_of
+from calibration.taxim.colour_misfit import colour_misfit
 from calibration.taxim.gates import CONTACT, check_set, refusals, sightings
-from calibration.taxim.held_out import teach
+from calibration.taxim.held_out import held_out, teach
 from calibration.taxim.mark_free import Identity
 from calibration.taxim.pack import PressPack
 from calibration.taxim.pictures import Pictures
@@ -121,12 +122,27 @@ def usable(pictures: Pictures, ball: float) -> PressPack:
     )
 
 
-def taught(pack: PressPack, change: FloatArray | None, which: IntArray, who: Identity) -> Taught:
-    """Calibrate from some of the presses, as ``calibration.taxim.mark_free`` does from all."""
+def taught(
+    pack: PressPack, change: FloatArray | None, which: IntArray, who: Identity, misfit: bool = False
+) -> Taught:
+    """Calibrate from some of the presses, as ``calibration.taxim.mark_free`` does from all.
+
+    Args:
+        pack: the presses.
+        change: of all of them; None where it is not known yet.
+        which: of them the calibration is made of.
+        who: names, pitch and ball.
+        misfit: whether the calibration states what folds of these presses show of its misfit.
+    """
     change = changes(pack) if change is None else change
     model = teach(pack.of(which), change[which], who.ball)
     made_from = f"sha256 {pack.sha256}, {len(which)} presses"
-    calibration = calibration_of(pack.background, model, who, made_from)
+    calibration: TactileCalibration = calibration_of(pack.background, model, who, made_from)
+    if misfit:
+        radius = WITHIN * model.fit.edge
+        out = held_out(pack.of(which), change[which], who.ball, radius)
+        found = colour_misfit(pack.of(which), change[which], out, who.ball, radius)
+        calibration = replace(calibration, header=replace(calibration.header, misfit=found))
     return Taught(calibration, model.bias, model.fit.edge)
 
 

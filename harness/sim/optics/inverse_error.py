@@ -18,7 +18,7 @@ from harness.sim.optics.contact_depth import Depth
 from harness.sim.optics.poisson import anchored_heights, free_heights
 from harness.sim.optics.shading import shades
 from harness.sim.optics.slope_kernels import normals_from_colour
-from harness.sim.optics.tactile_calibration import TactileCalibration
+from harness.sim.optics.tactile_calibration import ColourMisfit, TactileCalibration
 
 _RIDGE = 16.0
 """Grey levels squared: as the inversion's own."""
@@ -49,8 +49,10 @@ class ColourError:
 
     Attributes:
         camera: grey levels rms, from pixel to pixel.
-        alike: sine of the slope over which the calibration's misfit is alike (a Gaussian's sigma).
-        share: of the calibration's residual that is misfit, and not texture or noise.
+        alike: sine of the slope over which the calibration's misfit is alike (a Gaussian's sigma), where its
+            file does not state it.
+        share: of the calibration's residual that is misfit, and not texture or noise, where its file does not
+            state what held-out presses showed.
         dimming: share by which a contact may be darker or brighter than the calibration's were.
         draws: how many; the spread of 32 is known to an eighth.
     """
@@ -157,7 +159,8 @@ class _Slopes:
         normals_from_colour(change, by.smooth, header.slope_limit, noise, _RIDGE, normal, fit)
         rows, columns = change.shape[:2]
         place = np.minimum(np.argwhere(~still) * block + block // 2, (rows - 1, columns - 1))
-        self._where, self._camera, self._alike = ~still, assumed.camera / block, assumed.alike
+        misfit = header.misfit or ColourMisfit(assumed.share * noise, assumed.alike)
+        self._where, self._camera, self._alike = ~still, assumed.camera / block, misfit.alike
         self._dimming = assumed.dimming * dimming[place[:, 0], place[:, 1]].T
         self._normal = normal[place[:, 0], place[:, 1]]
         shade, slope = np.empty((len(place), 3)), np.empty((len(place), 3, 2))
@@ -169,7 +172,7 @@ class _Slopes:
         around = uniform_filter(fit[..., 0] ** 2, _WINDOW, mode="nearest")
         left = np.sqrt(3.0 * np.maximum(around, 0.0))
         left = left[place[:, 0], place[:, 1]]
-        self._misfit = np.where(left > _STRANGE * noise, left, assumed.share * noise)
+        self._misfit = np.where(left > _STRANGE * noise, np.maximum(left, misfit.rms), misfit.rms)
         size = np.hypot(*self._normal.T)
         held = size > _HELD * header.slope_limit
         # Held at the limit, the sine may be anything from there to one.

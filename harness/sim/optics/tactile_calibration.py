@@ -24,7 +24,30 @@ TABLE_TERMS = 6
 
 Float32Array = npt.NDArray[np.float32]
 
+_MISFIT = "misfit"
+"""Key of the header, absent in files of calibrations whose misfit was not measured."""
+
 _SHIPPED = Path(__file__).parent / "data"
+
+
+@dataclass(frozen=True)
+class ColourMisfit:
+    """What a calibration's colours are off by on presses that it was not fitted to, the camera's noise aside.
+
+    Attributes:
+        rms: grey levels, of one channel.
+        alike: sine of the slope over which it is alike (a Gaussian's sigma).
+    """
+
+    rms: float
+    alike: float
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.rms < np.inf and 0.0 < self.alike <= 1.0):
+            raise CalibrationRefused(
+                f"a misfit of {self.rms} grey levels over a sine of {self.alike} cannot be: 0 or more, "
+                "and above 0 up to 1, are wanted; fit the calibration again"
+            )
 
 
 @dataclass(frozen=True)
@@ -45,6 +68,7 @@ class CalibrationHeader:
         residual_rms: grey levels, of the smooth model over the presses.
         condition: of the normalised least-squares problem.
         skirt: of the gel.
+        misfit: on presses left out of the fit; None where it was not measured.
         schema: of the file.
         channel_order: of every image and coefficient.
     """
@@ -62,6 +86,7 @@ class CalibrationHeader:
     residual_rms: float
     condition: float
     skirt: GelSkirt = field(default_factory=GelSkirt)
+    misfit: ColourMisfit | None = None
     schema: int = SCHEMA
     channel_order: str = CHANNEL_ORDER
 
@@ -154,7 +179,7 @@ def save_calibration(calibration: TactileCalibration, path: Path) -> None:
         calibration: what to write.
         path: ending in ``.npz``.
     """
-    text = json.dumps({"header": asdict(calibration.header), "sha256": calibration.sha256}, sort_keys=True)
+    text = json.dumps({"header": _said(calibration.header), "sha256": calibration.sha256}, sort_keys=True)
     write_arrays(path, {"header": np.array(text), **calibration.arrays}, compressed=True)
 
 
@@ -205,7 +230,12 @@ def with_background(calibration: TactileCalibration, background: ByteArray) -> T
 
 
 def _header_text(header: CalibrationHeader) -> str:
-    return json.dumps(asdict(header), sort_keys=True)
+    return json.dumps(_said(header), sort_keys=True)
+
+
+def _said(header: CalibrationHeader) -> dict[str, Any]:
+    """The header as its file has it: what was not measured is left out, so that its hash is as it was."""
+    return {name: value for name, value in asdict(header).items() if name != _MISFIT or value is not None}
 
 
 def _parse(text: str, path: Path) -> tuple[CalibrationHeader, str]:
@@ -216,10 +246,12 @@ def _parse(text: str, path: Path) -> tuple[CalibrationHeader, str]:
             raise CalibrationRefused(
                 f"{path} has schema {inner['schema']}; this version reads {SCHEMA}: fit it again"
             )
-        if set(inner) != {item.name for item in fields(CalibrationHeader)}:
+        if set(inner) | {_MISFIT} != {item.name for item in fields(CalibrationHeader)}:
             raise CalibrationRefused(f"{path} has header keys {sorted(inner)}; fit it again")
         skirt = inner.pop("skirt")
         inner["skirt"] = GelSkirt(tuple(skirt["kernels"]), skirt["final"], skirt["core"])
+        if _MISFIT in inner:
+            inner[_MISFIT] = ColourMisfit(**inner[_MISFIT])
         return CalibrationHeader(**inner), str(outer["sha256"])
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise CalibrationRefused(f"{path} has no readable header; fit the calibration again") from error

@@ -2,7 +2,10 @@
 
 ``python tests/benchmarks/touch/real_depth.py [fots] [r15] [tmd] [--folds N] [--only-fold K] [--every N]``
 needs the real data. Folds are by press; a calibration is fitted without marks to the presses of the other
-folds; of the sphere only centre and offset are fitted to what was read, within 0.95 of the contact's radius.
+folds, and its misfit measured on folds of those presses alone; of the sphere only centre and offset are
+fitted to what was read, within 0.95 of the contact's radius. ``--presses FOLDER --rest PICTURE`` reads a
+folder of presses of the ball and pitch of FOTS instead, of a DIGIT for one; ``--unmeasured`` states errors as
+for calibrations whose files have no misfit.
 """
 
 import argparse
@@ -59,6 +62,12 @@ class Measured:
 def main() -> None:
     """Measure what was asked for; all of it without a word."""
     options = _options()
+    known = not options.unmeasured
+    if options.presses is not None:
+        pictures = read_pictures(options.presses, options.rest)
+        chosen = list(range(options.folds)) if options.only_fold is None else [options.only_fold]
+        _report(str(options.presses), _presses(pictures, FOTS, options.folds, chosen, options.every, known))
+        return
     data = find_shared_data()
     if data is None:
         raise SystemExit(WHY_NOT)
@@ -67,7 +76,7 @@ def main() -> None:
     if "fots" in wanted:
         folder = data / "tactile/fots_ball_presses"
         pictures = read_pictures(folder / "gelsight", folder / "gelsight_bg.png")
-        measured = _presses(pictures, FOTS, options.folds, list(folds), options.every)
+        measured = _presses(pictures, FOTS, options.folds, list(folds), options.every, known)
         _report("FOTS GelSight, 240 x 320, ball of 4.70 mm", measured)
         if options.picture is not None:
             _draw(measured, options.picture)
@@ -75,20 +84,23 @@ def main() -> None:
         pictures = read_pictures(data / "tactile/objectfolder_calibs")
         _report(
             "GelSight R1.5, 160 x 120, ball of 4 mm",
-            _presses(pictures, R15, options.folds, list(folds), options.every),
+            _presses(pictures, R15, options.folds, list(folds), options.every, known),
         )
     if "tmd" in wanted:
         _round_trip(data / "tactile/gelsight_groove/heightmap.tmd")
 
 
-def _presses(pictures: Pictures, who: Identity, folds: int, chosen: list[int], every: int) -> list[Measured]:
+def _presses(
+    pictures: Pictures, who: Identity, folds: int, chosen: list[int], every: int, measured_misfit: bool
+) -> list[Measured]:
     pack = usable(pictures, who.ball)
     change = changes(pack)
     measured = []
     for fold in chosen:
         out = np.arange(len(change)) % folds == fold
         began = time.process_time()
-        made = taught(pack, change, np.nonzero(~out)[0], who)
+        made = taught(pack, change, np.nonzero(~out)[0], who, measured_misfit)
+        CONSOLE.print(f"misfit of the colours: {made.calibration.header.misfit}")
         CONSOLE.print(
             f"fold {fold}: {int((~out).sum())} presses fitted in {time.process_time() - began:.1f} s"
         )
@@ -197,6 +209,9 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--only-fold", type=int)
     parser.add_argument("--every", type=int, default=1, help="of the held-out presses, one in so many")
     parser.add_argument("--picture", type=Path)
+    parser.add_argument("--presses", type=Path, help="a folder of ball presses of its own")
+    parser.add_argument("--rest", type=Path, help="the untouched gel of them")
+    parser.add_argument("--unmeasured", action="store_true")
     return parser.parse_args()
 
 

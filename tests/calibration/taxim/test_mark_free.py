@@ -55,6 +55,8 @@ def test_presses_left_out_are_drawn_almost_to_the_noise(
     assert made.median("nothing") < 20.0
     assert made.calibration.header.held_out_table_db == made.median("table")
     assert made.calibration.header.held_out_db == made.median("smooth")
+    assert made.calibration.header.misfit is not None
+    assert 0.0 < made.calibration.header.misfit.rms < 1.6
 
 
 def test_the_contact_line_is_a_circle_smaller_than_the_ball(

@@ -1,5 +1,7 @@
 """The error stated of a height: against noise drawn anew, against surfaces known exactly, and its laws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,9 @@ from harness.sim.gel.gel import R15_SKIRT, deform
 from harness.sim.optics.contact_depth import Depth, read_depth
 from harness.sim.optics.inverse_error import ColourError, height_errors
 from harness.sim.optics.optics import Optics
-from harness.sim.optics.tactile_calibration import TactileCalibration, shipped_calibration
+from harness.sim.optics.tactile_calibration import ColourMisfit, TactileCalibration, shipped_calibration
 from tests.samples.ball_depth import sigma_without
+from tests.samples.smooth_colours import SmoothColours
 
 PITCH = 0.1245e-3
 CAMERA = 1.5
@@ -68,6 +71,37 @@ def test_two_thirds_lie_within_one_deviation_and_nearly_all_within_two(
     )
     assert 0.60 < (scores < 1.0).mean() < 0.90
     assert (scores < 2.0).mean() > 0.93
+
+
+def test_deviations_hold_a_smooth_misfit_that_the_calibration_states(
+    bench: TactileCalibration, gel: FloatArray
+) -> None:
+    """Tables wrong by a smooth function of the normal, another in each picture, as presses left out are."""
+    stated = replace(bench, header=replace(bench.header, misfit=ColourMisfit(9.0, 0.2)))
+    balls = np.repeat(gel[:3], 3, axis=0)
+    images = _off_by(Optics(bench, "smooth").render(balls).images, balls, 9.0, 0.2)
+    within = {}
+    for by in (bench, stated):
+        depth = read_depth(images, by)
+        errors = height_errors(images, depth)
+        scores = [
+            (np.abs(depth.read.height[k] - balls[k]) / errors[k].sigma)[balls[k] > 0.3e-3]
+            for k in range(len(balls))
+        ]
+        within[by.header.misfit is not None] = np.mean(np.concatenate(scores) < [[1.0], [2.0]], axis=1)
+    assert (within[True] > (0.60, 0.90)).all(), within
+    assert (within[False] < within[True] - 0.1).all(), within
+
+
+def _off_by(images: ByteArray, gel: FloatArray, rms: float, alike: float) -> ByteArray:
+    """The same pictures with colours that are off where the gel is not at rest."""
+    moved = images.astype(np.float64)
+    for k, heights in enumerate(gel):
+        down, right = np.gradient(heights / PITCH)
+        normal = -np.stack([right, down], axis=-1) / np.sqrt(1.0 + right**2 + down**2)[..., None]
+        let_in = np.minimum(1.0, heights / 0.1e-3)[..., None]
+        moved[k] += rms * let_in * SmoothColours(alike, seed=k).at(normal)
+    return np.clip(np.rint(moved), 0.0, 255.0).astype(np.uint8)
 
 
 def test_what_the_cameras_noise_does_is_what_is_stated(bench: TactileCalibration, gel: FloatArray) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from harness.basics.errors import CalibrationRefused
 from harness.sim.optics.tactile_calibration import (
+    ColourMisfit,
     TactileCalibration,
     load_calibration,
     save_calibration,
@@ -31,6 +32,27 @@ def test_it_reads_back_as_it_was_written(bench: TactileCalibration, tmp_path: Pa
     assert all(np.array_equal(again.arrays[name], array) for name, array in bench.arrays.items())
     save_calibration(again, tmp_path / "b.npz")
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_a_misfit_is_stated_where_it_was_measured_alone(bench: TactileCalibration, tmp_path: Path) -> None:
+    """Files of before it was measured keep their bytes, and so their hash."""
+    save_calibration(bench, tmp_path / "a.npz")
+    assert bench.header.misfit is None
+    assert "misfit" not in str(np.load(tmp_path / "a.npz")["header"])
+    measured = dataclasses.replace(
+        bench, header=dataclasses.replace(bench.header, misfit=ColourMisfit(4.0, 0.2))
+    )
+    save_calibration(measured, tmp_path / "b.npz")
+    assert load_calibration(tmp_path / "b.npz").header == measured.header
+    assert measured.sha256 != bench.sha256
+
+
+@pytest.mark.parametrize(
+    ("rms", "alike"), [(np.nan, 0.2), (-1.0, 0.2), (np.inf, 0.2), (1.0, 0.0), (1.0, np.nan)]
+)
+def test_a_misfit_that_cannot_be_is_refused(rms: float, alike: float) -> None:
+    with pytest.raises(CalibrationRefused, match="misfit of"):
+        ColourMisfit(rms, alike)
 
 
 def test_the_two_that_are_shipped_saw_different_presses(bench: TactileCalibration) -> None:
