@@ -29,10 +29,8 @@ def block_means(picture: AnyArray, by: int) -> FloatArray:
     """
     rows, columns = picture.shape[0] // by, picture.shape[1] // by
     rest = picture.shape[2:]
-    if picture.dtype == np.uint8:
-        # One axis after the other, in whole numbers: four times as fast, and as exact.
-        across = columns * by * int(np.prod(rest))
-        strips = picture[: rows * by, : columns * by].reshape(rows, by, across).sum(axis=1, dtype=np.uint32)
-        return np.asarray(strips.reshape(rows, columns, by, *rest).sum(axis=2, dtype=np.uint32) / by**2)
-    blocks = picture[: rows * by, : columns * by].reshape(rows, by, columns, by, *rest)
-    return np.asarray(blocks.mean(axis=(1, 3)), dtype=np.float64)
+    # One axis after the other: four times as fast; of bytes in whole numbers, which is as exact.
+    exact = np.uint32 if picture.dtype == np.uint8 else np.float64
+    across = columns * by * int(np.prod(rest))
+    strips = picture[: rows * by, : columns * by].reshape(rows, by, across).sum(axis=1, dtype=exact)
+    return np.asarray(strips.reshape(rows, columns, by, *rest).sum(axis=2, dtype=exact) / by**2)

@@ -5,7 +5,7 @@ from itertools import permutations
 
 import numpy as np
 
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import FloatArray, IntArray
 
 ALIKE = 12.0
 """Grey levels within which a block is explained by the light alone; a contact changes more."""
@@ -112,6 +112,16 @@ def variants(picture: FloatArray, back: bool = False) -> list[tuple[str, FloatAr
         picture: ``(rows, columns, 3)``.
         back: whether the picture is taken to be in each of them, and brought back.
     """
+    every = turns(picture, back)
+    return [
+        (both_in_words(exchanged, words), one[..., taken])
+        for exchanged, taken in channel_orders(back)
+        for words, one in every.items()
+    ]
+
+
+def turns(picture: FloatArray, back: bool = False) -> dict[str, FloatArray]:
+    """A picture in every orientation, by its words, as ``variants`` has them; empty for itself, first."""
     quarter = -1 if back else 1
     turned = {
         "": picture,
@@ -122,11 +132,20 @@ def variants(picture: FloatArray, back: bool = False) -> list[tuple[str, FloatAr
     if picture.shape[0] == picture.shape[1]:
         turned["turned by 90 degrees"] = np.rot90(picture, quarter)
         turned["turned by 270 degrees"] = np.rot90(picture, 3 * quarter)
-    found = []
-    for order in permutations(range(3)):
-        exchanged = "" if order == (0, 1, 2) else f"channels {', '.join(_CHANNELS[k] for k in order)}"
-        taken = np.argsort(order) if back else np.array(order)
-        for words, one in turned.items():
-            named = ", ".join(part for part in (exchanged, words) if part)
-            found.append((named or _SAME, one[..., taken]))
-    return found
+    return turned
+
+
+def channel_orders(back: bool = False) -> list[tuple[str, IntArray]]:
+    """Every order of channels, in words, and ``(3,)`` the channels to take for it; the given one first."""
+    return [
+        (
+            "" if order == (0, 1, 2) else f"channels {', '.join(_CHANNELS[k] for k in order)}",
+            np.argsort(order) if back else np.array(order),
+        )
+        for order in permutations(range(3))
+    ]
+
+
+def both_in_words(exchanged: str, turned: str) -> str:
+    """Words for an order of channels and an orientation together; ``as calibrated`` for neither."""
+    return ", ".join(part for part in (exchanged, turned) if part) or _SAME

@@ -8,7 +8,7 @@ steeper than the linear shading, are explained badly as they are, and worse in e
 import numpy as np
 
 from harness.basics.arrays import FloatArray, block_means
-from harness.sim.optics.check.light import UNCHANGED, variants
+from harness.sim.optics.check.light import UNCHANGED, both_in_words, channel_orders, turns
 from harness.sim.optics.check.slopes import surface_residual
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
@@ -29,6 +29,9 @@ _NO_MORE = 1.1
 
 _STILL = 0.25
 """Share of a picture that is taken to be at rest."""
+
+_OWN = np.arange(3)
+"""Channels in their own order."""
 
 
 def without_drift(change: FloatArray) -> FloatArray:
@@ -65,8 +68,7 @@ def better_turned(
         return None
     ways = {
         words: surface_residual(without_drift(other - coarse), calibration, own)
-        for words, other in variants(picture, back=True)[1:]
-        if _size(other - coarse) < _NO_MORE * size
+        for words, other in _nearer(picture, coarse, _NO_MORE * size)
     }
     least = min(ways.values(), default=np.inf)
     if least >= _FAR_BETTER * left:
@@ -74,6 +76,25 @@ def better_turned(
     # On an evenly lit gel half a turn more explains as much; the plainest comes first.
     words = next(words for words, one in ways.items() if one < _AS_GOOD * least)
     return words, ways[words], left
+
+
+def _nearer(picture: FloatArray, rest: FloatArray, limit: float) -> list[tuple[str, FloatArray]]:
+    """The picture in every other way, in words, in which it is by less than ``limit`` from the rest.
+
+    ``_size`` of the difference, by products of channels, which all orders of an orientation share.
+    """
+    count, every, orders = picture.size / 3, turns(picture, back=True), channel_orders(back=True)
+    taken = np.array([channels for _, channels in orders])
+    products = np.stack([np.einsum("ijc,ijd->cd", one, rest) for one in every.values()])
+    moved = picture.mean(axis=(0, 1))[taken] - rest.mean(axis=(0, 1))
+    apart = np.vdot(picture, picture) + np.vdot(rest, rest) - 2.0 * products[:, taken, _OWN].sum(axis=2)
+    near = apart / count - (moved**2).sum(axis=1) < limit**2  # (orientations, orders)
+    return [
+        (both_in_words(exchanged, words), one[..., channels])
+        for k, (exchanged, channels) in enumerate(orders)
+        for t, (words, one) in enumerate(every.items())
+        if near[t, k] and (exchanged or words)
+    ]
 
 
 def _size(change: FloatArray) -> float:
