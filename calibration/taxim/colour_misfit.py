@@ -67,7 +67,8 @@ def _products(place: IntArray, left: FloatArray, reach: int) -> tuple[FloatArray
     down, right = np.indices(total.shape) - (np.array(there.shape) - 1)[:, None, None]
     apart = np.minimum(np.rint(np.hypot(down, right)).astype(np.int64), reach - 1).ravel()
     pairs = correlate(there, there, method="fft")
-    return np.bincount(apart, total.ravel(), reach), np.bincount(apart, pairs.ravel(), reach)
+    of_products, of_pairs = (np.bincount(apart, each.ravel(), reach) for each in (total, pairs))
+    return of_products.astype(np.float64), of_pairs.astype(np.float64)
 
 
 def _pooled(parts: Iterable[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:

@@ -55,10 +55,10 @@ def fit_light(seen: FloatArray, known: FloatArray) -> LightMatch:
         seen: ``(rows, columns, 3)`` grey levels, means over blocks.
         known: the same, of the reference.
     """
-    change = np.abs(seen - known)
-    unchanged = float((change.max(axis=2) < UNCHANGED).mean())
+    change = np.abs(seen - known).max(axis=2)
+    unchanged = float((change < UNCHANGED).mean())
     if unchanged >= _LEAST_UNCHANGED:
-        alike = float((change.max(axis=2) < ALIKE).mean())
+        alike = float((change < ALIKE).mean())
         return LightMatch(np.ones(3), np.zeros(3), alike, unchanged, True)
     return _fitted(seen.reshape(-1, 3), known.reshape(-1, 3))
 
