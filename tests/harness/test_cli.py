@@ -1,6 +1,7 @@
 """The command line keeps its promises: fast help, exit codes, one JSON object."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import pytest
 
 from drivers.dataq.link import LinkCut
 from harness.basics.answers import answers_alone, write_answer
-from harness.basics.errors import TouchstoneError
+from harness.basics.errors import TouchstoneError, WrongUse
 from harness.cli import COMMANDS, SYSTEM, UNFORESEEN, Interrupted, invoke, load
 
 FORBIDDEN_AT_START = ("torch", "mujoco", "numba", "scipy", "cv2", "matplotlib", "pydantic")
@@ -131,6 +132,22 @@ def test_a_failure_says_its_kind(capsys: pytest.CaptureFixture[str]) -> None:
     assert json.loads(capsys.readouterr().out)["kind"] == "wrong use"
     assert invoke(["sim", "modes", "--no-such-option", "--json"]) == 2
     assert json.loads(capsys.readouterr().out)["kind"] == "wrong use"
+
+
+def test_what_a_library_prints_is_beside_the_one_json_object(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def printing(*_: object, **__: object) -> None:
+        sys.stdout.write("\n")
+        os.write(1, b"a compiled library prints\n")
+        raise WrongUse("no such thing")
+
+    monkeypatch.setattr("harness.cli._app", lambda *_: printing)
+    assert invoke(["explain", "--json"]) == 2
+    captured = capfd.readouterr()
+    assert json.loads(captured.out)["error"] == "no such thing"
+    assert captured.out.count("\n") == 1
+    assert "a compiled library prints" in captured.err
 
 
 def test_what_nobody_foresaw_is_one_json_object_too(
