@@ -179,7 +179,7 @@ def save_calibration(calibration: TactileCalibration, path: Path) -> None:
         calibration: what to write.
         path: ending in ``.npz``.
     """
-    text = json.dumps({"header": _said(calibration.header), "sha256": calibration.sha256}, sort_keys=True)
+    text = json.dumps({"header": _written(calibration.header), "sha256": calibration.sha256}, sort_keys=True)
     write_arrays(path, {"header": np.array(text), **calibration.arrays}, compressed=True)
 
 
@@ -230,10 +230,10 @@ def with_background(calibration: TactileCalibration, background: ByteArray) -> T
 
 
 def _header_text(header: CalibrationHeader) -> str:
-    return json.dumps(_said(header), sort_keys=True)
+    return json.dumps(_written(header), sort_keys=True)
 
 
-def _said(header: CalibrationHeader) -> dict[str, Any]:
+def _written(header: CalibrationHeader) -> dict[str, Any]:
     """The header as its file has it: what was not measured is left out, so that its hash is as it was."""
     return {name: value for name, value in asdict(header).items() if name != _MISFIT or value is not None}
 
