@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from experiments.scale_estimation.dials import STARTS, YAWS
+from experiments.scale_estimation.dials import STARTS, TURNS, YAWS
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.readings import outline_of, patch_of_contact, peaks_of
 from experiments.scale_estimation.section import Scale
@@ -264,7 +264,7 @@ class ScaleAnswering:
         refusal = self._no_picture(self.ways)
         if refusal is not None:
             raise refusal
-        return ways_alone(self.ways, self.model.sizes)
+        return ways_alone(self.ways, self.model.sizes, int(self.accuracy[TURNS.name]))
 
     def _no_picture(self, read: Sequence[object]) -> FitRefused | None:
         """Why touch has no answer where pictures were taken and none of them was read."""

@@ -13,6 +13,14 @@ STARTS = Knob(
     12,
     "best places of the contacts' first scan that are refined",
 )
+TURNS = Knob(
+    "scale.turns",
+    (1, 4, 12, 24),
+    "",
+    "number",
+    12,
+    "turns about the vertical over which touch of an unknown shape is averaged",
+)
 
-OWN: tuple[Knob[Level], ...] = (YAWS, STARTS)
+OWN: tuple[Knob[Level], ...] = (YAWS, STARTS, TURNS)
 KNOBS: tuple[Knob[Level], ...] = (*OWN, *knobs_of(EFFECTS))

@@ -20,6 +20,10 @@ BEYOND = 2.0
 """Factor by which every sense searches beyond the range it is asked about, each way: an object outside is
 recognised as such. A search within the range would pile it up at the border, or take a wrong place inside."""
 
+ENDS = 0.01
+"""Of the logarithm, beyond each end of a range, that belongs to it: a thing is made half a per cent off its
+drawing, so that one of the least size asked about may measure a little less."""
+
 FLOOR = 0.02
 """Share of the uniform density that every sense is mixed with before the product is taken."""
 
@@ -58,8 +62,16 @@ class SizeRange:
     @cached_property
     def inside(self) -> FloatArray:
         """``(n,)`` bool: which of them are in the range that was asked about."""
+        return self._within(0.5 * STEP)
+
+    @cached_property
+    def possible(self) -> FloatArray:
+        """``(n,)`` bool: which of them an object of that range may measure, ``ENDS`` beyond it included."""
+        return self._within(ENDS + 0.5 * STEP)
+
+    def _within(self, beyond: float) -> FloatArray:
         logs = self.logs
-        return read_only((logs >= np.log(self.low) - 0.5 * STEP) & (logs <= np.log(self.high) + 0.5 * STEP))
+        return read_only((logs >= np.log(self.low) - beyond) & (logs <= np.log(self.high) + beyond))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +105,12 @@ class Belief:
     @classmethod
     def ignorant(cls, range_: SizeRange) -> "Belief":
         """Every size of the range as likely, in its logarithm; none beyond."""
-        return cls.of(range_, np.where(range_.inside, 0.0, -np.inf))
+        return cls.of(range_, np.where(range_.possible, 0.0, -np.inf))
 
     @cached_property
     def _shares(self) -> FloatArray:
         """``(n,)`` probabilities of the sizes in the range, as the answer is about those."""
-        found = np.where(self.range.inside, np.exp(self.log_density), 0.0)
+        found = np.where(self.range.possible, np.exp(self.log_density), 0.0)
         total = found.sum()
         # Nothing inside: the border nearest to what is believed.
         return found / total if total > 0.0 else _nearest(self.range, self.log_density)
@@ -106,7 +118,7 @@ class Belief:
     @property
     def outside(self) -> float:
         """Probability that the size is not in the range that was asked about, which is thought of as rare."""
-        density, inside = np.exp(self.log_density), self.range.inside.astype(bool)
+        density, inside = np.exp(self.log_density), self.range.possible.astype(bool)
         beyond = STRANGE * float(density[~inside].sum())
         return beyond / (beyond + float(density[inside].sum())) if beyond > 0.0 else 0.0
 
@@ -149,7 +161,7 @@ class Belief:
     @cached_property
     def _weights(self) -> FloatArray:
         """``(n,)`` density, not normalised, of sizes in the range and, as rare, beyond."""
-        return np.asarray(np.exp(self.log_density) * np.where(self.range.inside, 1.0, STRANGE))
+        return np.asarray(np.exp(self.log_density) * np.where(self.range.possible, 1.0, STRANGE))
 
     def doubted(self, share: float) -> "Belief":
         """The same with so much probability spread evenly over all that is searched."""
@@ -191,7 +203,7 @@ def _quantile(logs: FloatArray, shares: FloatArray, share: float) -> float:
 
 def _nearest(range_: SizeRange, log_density: FloatArray) -> FloatArray:
     shares = np.zeros(len(log_density))
-    inside = np.flatnonzero(range_.inside)
+    inside = np.flatnonzero(range_.possible)
     best = int(np.argmax(log_density))
     shares[inside[0] if best < inside[0] else inside[-1]] = 1.0
     return shares

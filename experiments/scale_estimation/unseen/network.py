@@ -8,6 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from experiments.scale_estimation.dials import TURNS
 from experiments.scale_estimation.size import Belief, SizeRange
 from experiments.scale_estimation.unseen import contact_set, spectrogram
 from harness.basics.arrays import FloatArray, read_only
@@ -30,9 +31,6 @@ UNKNOWN_SHARE = 0.02
 
 _GREATEST = 30.0
 """Of any number that a network is given."""
-
-YAWS = 12
-"""Turns of the contacts about the vertical, over which touch is averaged: no bearing is special."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +91,7 @@ class SizeNetwork:
 
 def _in_range(sizes: SizeRange, belief: Belief, strange: float) -> Belief:
     """With a share spread evenly over the range alone: beyond it nothing was learnt."""
-    inside = sizes.inside.astype(bool)
+    inside = sizes.possible.astype(bool)
     even = np.where(inside, 1.0, 0.0)
     density = np.exp(belief.log_density)
     mixed = (1.0 - strange) * density / density.sum() + strange * even / even.sum()
@@ -108,10 +106,18 @@ def by_strikes(
     return shipped("sound").belief([{"bands": bands, "extras": extras}], sizes)
 
 
-def by_ways(ways: Sequence[contact_set.GelWay], sizes: SizeRange) -> tuple[Belief, float]:
-    """What the ways of the gel say, and how far they are from the family."""
+def by_ways(
+    ways: Sequence[contact_set.GelWay], sizes: SizeRange, turns: int = TURNS.default
+) -> tuple[Belief, float]:
+    """What the ways of the gel say, and how far they are from the family.
+
+    Args:
+        ways: of one exploration.
+        sizes: asked about.
+        turns: about the vertical, over which the answer is averaged: no bearing is special.
+    """
     views = []
-    for yaw in np.arange(YAWS) * 2.0 * np.pi / YAWS:
+    for yaw in np.arange(turns) * 2.0 * np.pi / turns:
         rows, kinds, whole = contact_set.features([way.turned(float(yaw)) for way in ways])
         views.append({"ways": rows, "kinds": kinds, "whole": whole})
     return shipped("touch").belief(views, sizes)

@@ -14,6 +14,7 @@ from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import finish
 from harness.experiment.begin import begin
+from harness.experiment.experiment import Scored
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
@@ -48,6 +49,21 @@ def test_the_truth_changes_no_estimate(touched: Recording, tmp_path: Path) -> No
         away.rename(touched.truth_path)
     assert after["size_m"] == before["size_m"]
     assert after["estimates"]["fused"]["error_m"] is None
+
+
+def test_a_size_beyond_the_range_that_was_asked_about_is_named(touched: Recording) -> None:
+    true = answered(touched)["size_m"]
+    run = RunFiles(touched)
+    wrong = run.scene.object.model_copy(update={"sizes": (1.3 * true, 2.6 * true)})
+    object.__setattr__(run, "scene", run.scene.model_copy(update={"object": wrong}))
+    accuracy = Accuracy.default(EXPERIMENT.knobs)
+    answering = EXPERIMENT.answering(run, accuracy)
+    for record in touched.steps():
+        answering.read(record)
+    result = EXPERIMENT.result(Scored(run, answering, answering.answer(), None, accuracy, ()))
+    for sense in ("vision", "fused"):  # three contacts alone fit sizes of the range too
+        assert result["estimates"][sense]["outside_range"] > 0.5
+    assert any(one.startswith("vision:") and "widen object.sizes" in one for one in result["warnings"])
 
 
 def test_a_spoiled_picture_is_named_and_the_rest_answers(touched: Recording, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.scale_estimation.size import STEP, Belief, SizeRange, fused
+from experiments.scale_estimation.size import ENDS, STEP, Belief, SizeRange, fused
 from harness.basics.errors import OutOfDomain
 
 RANGE = SizeRange(0.05, 0.4)
@@ -26,7 +26,7 @@ def test_a_normal_density_has_its_own_median_width_and_interval(sigma: float) ->
 def test_knowing_nothing_is_the_whole_range() -> None:
     belief = Belief.ignorant(RANGE)
     low, high = belief.interval
-    assert np.log(high / low) == pytest.approx(0.9 * np.log(0.4 / 0.05), abs=3 * STEP)
+    assert np.log(high / low) == pytest.approx(0.9 * (np.log(0.4 / 0.05) + 2.0 * ENDS), abs=3 * STEP)
     assert belief.outside == 0.0
 
 
@@ -56,8 +56,19 @@ def test_an_error_on_top_adds_in_squares() -> None:
 def test_a_size_beyond_the_range_is_seen_there() -> None:
     belief = normal(0.55, 0.02)
     assert belief.outside > 0.99
-    assert belief.size == pytest.approx(0.4, rel=0.01)  # the nearest that was asked about
+    assert belief.size == pytest.approx(0.4, rel=ENDS + STEP)  # the nearest that was asked about
     assert np.isfinite(belief.interval).all()
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.3])
+@pytest.mark.parametrize("end", [RANGE.low, RANGE.high])
+def test_an_object_made_at_the_end_of_the_range_and_a_little_off_is_in_the_interval(
+    end: float, sigma: float
+) -> None:
+    for off in (-0.005, 0.005):
+        low, high = normal(end, sigma).interval
+        assert low <= end * (1.0 + off) <= high
+        assert normal(end * (1.0 + off), 0.002).outside < 0.05
 
 
 def test_what_is_no_density_is_refused() -> None:

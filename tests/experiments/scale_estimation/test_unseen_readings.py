@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from experiments.scale_estimation.dials import TURNS
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.unseen.answer import strikes_alone, ways_alone
+from experiments.scale_estimation.unseen.answer import NOVEL_SIGMA, strikes_alone, ways_alone
 from experiments.scale_estimation.unseen.contact_set import MOST, GelWay
 from experiments.scale_estimation.unseen.contact_set import features as features_of_ways
-from experiments.scale_estimation.unseen.network import YAWS, by_strikes, by_ways, shipped
+from experiments.scale_estimation.unseen.network import by_strikes, by_ways, shipped
 from experiments.scale_estimation.unseen.spectrogram import BANDS, features
 from experiments.scale_estimation.unseen.training.contact_samples import TouchableShape, contact_sample
 from harness.basics.arrays import FloatArray
@@ -87,11 +88,25 @@ def ways(size: float = 0.15, family: str = "cup", seed: int = 3) -> list[GelWay]
 def test_no_bearing_is_special() -> None:
     made = ways()
     belief, distance = by_ways(made, RANGE)
-    turned, far = by_ways([way.turned(4.0 * np.pi / YAWS) for way in made], RANGE)
+    turned, far = by_ways([way.turned(4.0 * np.pi / TURNS.default) for way in made], RANGE)
     assert turned.log_density == pytest.approx(belief.log_density, abs=1e-3)
     assert far == pytest.approx(distance, rel=1e-3)
     between, _ = by_ways([way.turned(0.37) for way in made], RANGE)
     assert between.size == pytest.approx(belief.size, rel=0.03)
+
+
+def test_more_turns_bring_the_answer_nearer_to_that_of_all_turns() -> None:
+    made = [ways(seed=seed) for seed in range(3, 7)]
+    exact = [by_ways(one, RANGE, 48)[0] for one in made]
+
+    def off(turns: int) -> float:
+        found = [by_ways(one, RANGE, turns)[0] for one in made]
+        pairs = zip(found, exact, strict=True)
+        return float(sum(np.abs(np.exp(a.log_density) - np.exp(b.log_density)).sum() for a, b in pairs))
+
+    coarse, *_, fine = (off(turns) for turns in TURNS.levels)
+    assert off(TURNS.default) < 0.5 * coarse
+    assert fine < off(TURNS.default)
 
 
 def test_the_order_of_contacts_does_not_matter() -> None:
@@ -135,6 +150,16 @@ def test_readings_unlike_all_that_was_learnt_are_noticed_and_widen_the_answer() 
     belief, far = by_ways(strange, RANGE)
     assert near < 1.0 < far
     assert belief.spread > usual.spread
+
+
+def test_touch_is_as_wide_as_its_ways_are_unlike_those_learnt() -> None:
+    wide = SizeRange(0.02, 1.5)  # cuts off neither density
+    made = ways()
+    stated, distance = by_ways(made, wide)
+    answer = ways_alone(made, wide)
+    assert answer.distance == distance
+    expected = float(np.hypot(stated.spread, NOVEL_SIGMA * distance))
+    assert answer.belief.spread == pytest.approx(expected, rel=0.1)
 
 
 @pytest.mark.parametrize("sense", ["sound", "touch"])
