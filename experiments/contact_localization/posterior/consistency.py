@@ -132,7 +132,8 @@ def refuse_inside_out(search: Search, one: Hypotheses, members: IntArray) -> Non
         FitRefused: naming the contact that faces away most.
     """
     facing = np.array([_facing(search, int(k), one) for k in members])
-    if np.median(facing) > 0.0:
+    # Beside a thin wall the nearest sample may be of its other face: half of the contacts are no majority.
+    if np.mean(facing > 0.0) > 0.5:
         worst = int(members[np.argmax(facing)])
         raise FitRefused(
             f"the object is inside out: its normals point away from the gel at most contacts, the worst is "

@@ -59,12 +59,15 @@ class Hypotheses:
         yaws: ``(n,)`` rad away from the nominal one.
         log_weights: ``(n,)`` nats, the greatest 0.
         shared: ``(n, 6)`` errors that all contacts share (``shared_errors``); None where not named.
+        log_drawn: ``(n,)`` nats, up to a constant: the density that each was drawn from, by one over which
+            it is weighed; None where all were drawn alike.
     """
 
     gels: FloatArray
     yaws: FloatArray
     log_weights: FloatArray
     shared: FloatArray | None = None
+    log_drawn: FloatArray | None = None
 
     @property
     def weights(self) -> FloatArray:
@@ -97,12 +100,17 @@ class Hypotheses:
     def taken(self, chosen: IntArray, log_weights: FloatArray) -> "Hypotheses":
         """Those of ``(m,)`` indices, with other weights."""
         shared = None if self.shared is None else self.shared[chosen]
-        return Hypotheses(self.gels[chosen], self.yaws[chosen], log_weights, shared)
+        drawn = None if self.log_drawn is None else self.log_drawn[chosen]
+        return Hypotheses(self.gels[chosen], self.yaws[chosen], log_weights, shared, drawn)
 
     @property
     def top(self) -> "Hypotheses":
-        """The most probable one alone."""
-        best = int(np.argmax(self.log_weights))
+        """The most probable one alone: of the greatest density, which its weight is not.
+
+        A draw from the far tail of what it was drawn from weighs much however badly it fits.
+        """
+        density = self.log_weights if self.log_drawn is None else self.log_weights + self.log_drawn
+        best = int(np.argmax(density))
         return self.taken(np.array([best], dtype=np.int64), np.zeros(1))
 
 

@@ -66,11 +66,11 @@ class _Axes:
         places = (at.gels + self.search.prior.object_from_base(at.yaws) @ self.middle) / _PLACE
         return places if self._yaw is None else np.column_stack([places, at.yaws / self._yaw])
 
-    def hypotheses(self, points: FloatArray, shared: FloatArray, log_weights: FloatArray) -> Hypotheses:
-        """Of ``(n, 3 or 4)`` points in units and ``(n, 6)`` shared errors."""
+    def hypotheses(self, points: FloatArray, shared: FloatArray, log_density: FloatArray) -> Hypotheses:
+        """Of ``(n, 3 or 4)`` points in units and ``(n, 6)`` shared errors, drawn from a density."""
         yaws = np.zeros(len(points)) if self._yaw is None else points[:, 3] * self._yaw
         gels = points[:, :3] * _PLACE - self.search.prior.object_from_base(yaws) @ self.middle
-        return Hypotheses(gels, yaws, log_weights, shared)
+        return Hypotheses(gels, yaws, -log_density, shared, log_density)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,7 @@ def drawn(
     if current.shared is None:
         points = np.repeat(places[parents], repeats, axis=0) + steps[0]
         log_density = _mixture(points, places[parents], repeats / draws) + log_prior(steps[1])
-        return axes.hypotheses(points, steps[1], -log_density)
+        return axes.hypotheses(points, steps[1], log_density)
     few = systematic(weights, _LOOKED_AT, rng)
     shape = _Shape.of(places[few], current.shared[few], current.effective, _NARROW**attempt)
     centres = _whitened(shape, places[parents], current.shared[parents])
@@ -157,7 +157,7 @@ def drawn(
     centres[:, -UNKNOWNS:] *= np.sqrt(1.0 - _STEP**2)
     points = np.repeat(centres, repeats, axis=0) + np.hstack(steps)
     log_density = _mixture(points, centres, repeats / draws)
-    return axes.hypotheses(*_unwhitened(shape, points), -log_density)
+    return axes.hypotheses(*_unwhitened(shape, points), log_density)
 
 
 def _chosen_by(search: Search, current: Hypotheses, attempt: int) -> FloatArray:

@@ -6,6 +6,7 @@ only through differences, so where the bench stands cannot matter.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise, best_of
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores, possible_anchors
 from experiments.contact_localization.posterior.shared_errors import log_prior, moves
-from experiments.contact_localization.touch.contact_scales import contact_scales, place_noise
+from experiments.contact_localization.touch.contact_scales import cap_of, contact_scales, place_noise
 from experiments.contact_localization.touch.touch import TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
 from harness.bench.bench_errors import USUAL
@@ -113,14 +114,17 @@ class Search:
             members: ``(m,)`` indices of contacts whose image shows a contact.
             within: nats behind the best at which a hypothesis is dropped as contacts come in.
         """
-        # Between samples the best place is up to half their spacing away.
-        off, pitch = 0.4 * self.surface.spacing, self._pitch
-        step = max(1, round(self.surface.spacing / pitch))
+        step = max(1, round(self.surface.spacing / self._pitch))
         at = at.told(self.log_yaw_prior(at.yaws))
         for k, sigma, temperature in self._scales(members):
-            term = self._term(k, at, step, 1, float(np.hypot(sigma, off)), temperature, True)
+            wide = self._with_spacing(sigma)
+            term = self._term(k, at, step, 1, wide, temperature, True, self.noise.touch.cap)
             at = at.told(term).best(within, len(term))
         return at
+
+    def _with_spacing(self, sigma: float) -> float:
+        """Metres: between samples the best place is up to half their spacing away."""
+        return float(np.hypot(sigma, 0.4 * self.surface.spacing))
 
     def weigh(
         self, at: Hypotheses, members: IntArray, step: int, rings: int, within: float = np.inf
@@ -135,9 +139,9 @@ class Search:
             within: nats behind the best at which a hypothesis is dropped as contacts come in.
         """
         at = at.told(self.log_yaw_prior(at.yaws) + log_prior(at.shared))
-        cells = max(1, step // 2) if self._rough else step
+        cells, cap = max(1, step // 2) if self._rough else step, cap_of(self.noise.touch, len(members))
         for k, sigma, temperature in self._scales(members, at.shared is not None):
-            term = self._term(k, at, cells, rings, sigma, temperature, self._rough)
+            term = self._term(k, at, cells, rings, sigma, temperature, self._rough, cap)
             at = at.told(term).best(within, len(term))
         return at
 
@@ -150,10 +154,11 @@ class Search:
         sigma: float,
         temperature: float,
         coarse: bool,
+        cap: float,
     ) -> FloatArray:
         term = np.empty(len(at.yaws))
         touch, noise = self.touch(contact, coarse), place_noise(self.noise, at.shared is not None)
-        noise = noise.with_model(self.model.seen_rms, touch)
+        noise = replace(noise.with_model(self.model.seen_rms, touch), cap=cap)
         for chosen, view, places in self.placed(contact, at, coarse):
             term[chosen] = touch_terms(view, touch, noise, places, step, rings, sigma, temperature)
         return term
@@ -166,13 +171,14 @@ class Search:
     def gates(self, one: Hypotheses, members: IntArray) -> FloatArray:
         """``(m,)`` nats: how well each contact fits at one hypothesis, untempered and uncapped.
 
-        Its places may be off by all that a bench may be off by, named or not.
+        Its places may be off by all that a bench may be off by, named or not; a sample's by its spacing too.
         """
         values = np.empty(len(members))
         for column, (k, sigma, _) in enumerate(self._scales(members)):
             ((_, view, places),) = self.placed(k, one)
             noise = self.noise.touch.with_model(self.model.seen_rms, self.touch(k))
-            values[column] = best_fit(view, self.touch(k), noise, places[0], sigma)
+            wide = sigma if one.shared is not None else self._with_spacing(sigma)
+            values[column] = best_fit(view, self.touch(k), noise, places[0], wide)
         return values
 
     def placed(

@@ -15,6 +15,9 @@ SAME_PLACE = 1.5e-3
 SAME_AXIS = np.radians(4.0)
 """rad between their tools."""
 
+_CAP_ALONE = 1000.0
+"""Nats: beyond what any place that fits costs, and a number where none does."""
+
 
 def contact_scales(
     positions: FloatArray,
@@ -48,6 +51,15 @@ def place_noise(noise: Noise, named: bool) -> TouchNoise:
     if not named:
         return noise.touch
     return replace(noise.touch, shift=noise.shared.shift, depth=noise.shared.depth)
+
+
+def cap_of(noise: TouchNoise, contacts: int) -> float:
+    """Nats that each of so many contacts may cost: one alone is no outlier.
+
+    An outlier fits every place alike, and where other contacts fit they say where it was. Of a contact alone
+    it would make all places alike, of which there are many more than such as fit.
+    """
+    return noise.cap if contacts > 1 else _CAP_ALONE
 
 
 def _alike(positions: FloatArray, axes: FloatArray) -> FloatArray:

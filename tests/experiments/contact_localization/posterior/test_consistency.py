@@ -162,3 +162,17 @@ def test_an_object_inside_out_is_refused_and_one_that_is_not_is_not(
     inverted = Model(Mesh(block.mesh.vertices, block.mesh.faces[:, ::-1]), block.sensor, block.calibration)
     with pytest.raises(FitRefused, match=r"inside out.*contact \d.*turn the faces"):
         refuse_inside_out(Search(contacts, inverted, prior, 3e-3, Noise()), truth, members)
+
+
+def test_a_contact_of_two_that_seems_to_be_from_inside_is_no_object_inside_out(
+    block: Model, contacts: tuple[Contact, ...], prior: Prior
+) -> None:
+    """Of a mesh whose faces to the top alone are turned: one contact is on them, the other on a side."""
+    up = block.mesh.face_normals[:, 2] > 0.5
+    faces = np.where(up[:, None], block.mesh.faces[:, ::-1], block.mesh.faces)
+    partly = Model(Mesh(block.mesh.vertices, faces), block.sensor, block.calibration)
+    search = Search(contacts, partly, prior, 3e-3, Noise())
+    truth = Hypotheses(PRESSES[0].object_from_gel[None, :3, 3], np.zeros(1), np.zeros(1))
+    refuse_inside_out(search, truth, np.array([1, 2]))
+    with pytest.raises(FitRefused, match="inside out"):
+        refuse_inside_out(search, truth, np.array([1]))

@@ -106,6 +106,17 @@ def test_the_weights_fill_the_posterior() -> None:
     assert effective(found) > 0.05 * 2000
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_best_hypothesis_is_the_one_of_the_greatest_density(seed: int) -> None:
+    """A draw from the tail of what it was drawn from weighs more than many that fit better."""
+    known, found = Known(), refined(Known(), seed=seed)
+    bare = Hypotheses(found.gels, found.yaws, np.zeros(len(found.yaws)), found.shared)
+    density = known.weigh(bare, MEMBERS, 2, 1).log_weights
+    best = int(np.argmax(density))
+    assert best != int(np.argmax(found.log_weights))
+    np.testing.assert_array_equal(found.top.gels[0], found.gels[best])
+
+
 @pytest.mark.parametrize("heavy", [0.5, 0.7, 0.9])
 def test_two_bumps_keep_their_shares(heavy: float) -> None:
     """Neither is favoured for having more draws near it, nor lost."""

@@ -1,0 +1,287 @@
+"""How often contact localization refuses the right object, at every level of its dials, and another object.
+
+``python tests/benchmarks/touch/bench_refused.py [OBJECT ...] [--seeds 20] [--first-seed 31000] [--spacing
+close] [--sense touch] [--level default] [--another] [--rows FILE]`` performs runs of six contacts on the
+mocked bench in process, gap default, yaw known. It answers each contact by itself, each two that follow
+each other and all six, with every dial at its default, at its cheapest and at its finest level, one dial at
+a time and all together; ``--sense`` and ``--level`` choose among those. By touch alone nothing is struck.
+Without OBJECT the nine objects of the tables, as far as their meshes are there; a seed of every object
+comes before the next seed, so a table that was stopped is even over objects. With ``--another`` each run is
+answered by the next object's model instead, and should be refused. With ``--rows`` every answer is appended
+to a file of JSON lines, and a run that lies in it is not performed again; ``--seeds 0`` prints what there
+is.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).parents[3]))
+
+from experiments.contact_localization.accuracy.benchmark_runs import Case, cells, perform, scene_of
+from experiments.contact_localization.accuracy.solving import Models, Readings, prepare, solve
+from experiments.contact_localization.build_model import model_of_scene
+from experiments.contact_localization.posterior.dials import (
+    BLOCK,
+    METHOD,
+    ROUNDS,
+    SAMPLES,
+    SENSES,
+    SPACING,
+    Senses,
+)
+from harness.basics.errors import TouchstoneError
+from harness.bench.scene import SceneFile
+from harness.bench.station_file import Station, load_station, station_path
+from harness.effects.accuracy import Knob, Level, Setting
+from harness.effects.scene_object import known_object
+from harness.effects.sound_effects import EDGE, MODES
+from harness.experiment.subjects import objects
+from harness.recording.run_folder import station_calibration
+from tests.support.real_data import find_shared_data
+
+COUNTS = (1, 2, 6)
+"""Contacts that are answered together: all of them, or as many groups of a run's as there are."""
+
+DEFAULT = "default"
+_OWN = (SPACING, ROUNDS, SAMPLES, BLOCK)
+
+
+@dataclass(frozen=True)
+class CheckedAnswer:
+    """One answer, or refusal, of some contacts of a run.
+
+    Attributes:
+        object: its name.
+        seed: of the run.
+        spacing: of its contacts.
+        model: name of the object that it was answered by.
+        sense: that answered.
+        level: which dial was turned, and to what.
+        contacts: how many were used.
+        first: the first of them, from 0.
+        refusal: the program's sentence; empty where it answered.
+        error: m, of the last of them; None where it was refused.
+        inside: whether the truth is in the region of 90 %.
+        fits: nats of the contacts' own fits at the answer; None for one that was not used.
+    """
+
+    object: str
+    seed: int
+    spacing: str
+    model: str
+    sense: Senses
+    level: str
+    contacts: int
+    first: int
+    refusal: str
+    error: float | None
+    inside: bool
+    fits: tuple[float | None, ...]
+
+
+def settings(sense: Senses) -> Mapping[str, Setting]:
+    """The default, every dial at its cheapest and its finest level, and all of them so together."""
+    method: Setting = {SENSES.name: sense, METHOD.name: "grid"}
+    own: tuple[Knob[Level], ...] = (*_OWN, MODES) if sense == "both" else _OWN
+    default = {knob.name: knob.default for knob in own}
+    turned: dict[str, Setting] = {DEFAULT: {**method, **default}}
+    for knob in own:
+        for level in (knob.levels[0], knob.levels[-1]):
+            if level != knob.default:
+                turned[f"{knob.name} {level}"] = {**method, **default, knob.name: level}
+    cheap: Setting = {EDGE.name: EDGE.levels[0]} if sense == "both" else {}
+    turned["all cheapest"] = {**method, **{knob.name: knob.levels[0] for knob in own}, **cheap}
+    # Finer elements than the default take minutes an object, and a refusal is by the images.
+    turned["all finest"] = {**method, **{knob.name: knob.levels[-1] for knob in own}}
+    return turned
+
+
+def checked(
+    case: Case, model: str, models: Models, senses: Collection[Senses], levels: Collection[str]
+) -> Iterator[CheckedAnswer]:
+    """A run's contacts, answered by an object's model at some levels, all where none is named."""
+    readings = case.run.read({})
+    for sense in senses:
+        for level, setting in settings(sense).items():
+            if not levels or level in levels:
+                under = readings.under(models.at(setting))
+                prepare(under.model, setting)
+                for count, first in _groups(case.steps):
+                    some = _group(under, count, first)
+                    yield _checked(case, model, sense, level, first, some, setting)
+
+
+def _groups(contacts: int) -> Iterator[tuple[int, int]]:
+    """How many contacts are answered together, and the first of them."""
+    for count in COUNTS:
+        yield from ((count, first) for first in range(0, contacts - count + 1, count))
+
+
+def _group(readings: Readings, count: int, first: int) -> Readings:
+    """Of some contacts that follow each other alone."""
+    chosen = range(first, first + count)
+    return replace(
+        readings,
+        observations=tuple(readings.observations[k] for k in chosen),
+        heights=tuple(readings.heights[k] for k in chosen),
+        refused_pictures={k - first: why for k, why in readings.refused_pictures.items() if k in chosen},
+    )
+
+
+def _checked(
+    case: Case, model: str, sense: Senses, level: str, first: int, readings: Readings, setting: Setting
+) -> CheckedAnswer:
+    cell, count = case.cell, len(readings.observations)
+    solved, true = solve(readings, setting), case.true_points[first + count - 1]
+    found = solved.found
+    return CheckedAnswer(
+        object=cell.object,
+        seed=cell.seed,
+        spacing=cell.spacing,
+        model=model,
+        sense=sense,
+        level=level,
+        contacts=count,
+        first=first,
+        refusal=solved.refusal or "",
+        error=None if found is None else float(np.linalg.norm(found.position_in_object - true)),
+        inside=found is not None and bool(found.region.contains(true)),
+        fits=() if found is None else tuple(gate.fit for gate in found.gates),
+    )
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is answered of every run.
+
+    Attributes:
+        spacing: of the contacts.
+        senses: that answer.
+        levels: that are answered at; none for all.
+        another: whether the next object's model answers in place of the run's own.
+    """
+
+    spacing: str
+    senses: Collection[Senses]
+    levels: Collection[str]
+    another: bool
+
+
+def checked_runs(
+    scenes: Mapping[str, SceneFile], seeds: range, choice: Choice, rows: Path | None
+) -> list[CheckedAnswer]:
+    """Every answer of every run, and those that a file holds already."""
+    console, station = Console(stderr=True), load_station(station_path("mock"))
+    found, names = [] if rows is None else rows_of(rows), list(scenes)
+    there = {(row.object, row.seed, row.spacing) for row in found}
+    answering = dict(zip(names, names[1:] + names[:1] if choice.another else names, strict=True))
+    models: dict[str, Models] = {}
+    for cell in cells(names, seeds, [choice.spacing], ["default"], ["known"], "both" in choice.senses):
+        if (cell.object, cell.seed, cell.spacing) in there:
+            continue
+        model = answering[cell.object]
+        if model not in models:
+            models[model] = _models(scene_of(replace(cell, object=model), scenes[model]), station)
+        try:
+            case = perform(cell, scenes[cell.object], station, {})
+        except TouchstoneError as error:
+            console.print(f"{cell.name} was not performed: {error}")
+            continue
+        new = list(checked(case, model, models[model], choice.senses, choice.levels))
+        found += new
+        _append(rows, new)
+        console.print(f"{cell.name} answered")
+    return found
+
+
+def _models(scene: SceneFile, station: Station) -> Models:
+    mesh, calibration = known_object(scene).mesh, station_calibration(station)
+    return Models(lambda accuracy: model_of_scene(scene, station, mesh, calibration, accuracy))
+
+
+def rows_of(path: Path) -> list[CheckedAnswer]:
+    """What a file of JSON lines holds; nothing where there is none yet."""
+    if not path.exists():
+        return []
+    lines = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+    return [CheckedAnswer(**{**line, "fits": tuple(line["fits"])}) for line in lines]
+
+
+def _append(path: Path | None, new: Iterable[CheckedAnswer]) -> None:
+    if path is not None:
+        with path.open("a", encoding="utf-8") as stream:
+            stream.writelines(f"{json.dumps(asdict(row))}\n" for row in new)
+
+
+def table_of(rows: Sequence[CheckedAnswer]) -> Table:
+    """By sense, level and contacts: refused of answered, mean error of the rest, in their region, lost.
+
+    Lost are answers that hold the truth at the default levels, and here are refused or do not.
+    """
+    columns = (f"{count}: refused / of, mean mm, in region, lost" for count in COUNTS)
+    table = Table("sense", "level", *columns)
+    right = {_run_of(row) for row in rows if row.level == DEFAULT and row.inside}
+    for sense, level in dict.fromkeys((row.sense, row.level) for row in rows):
+        of = [row for row in rows if (row.sense, row.level) == (sense, level)]
+        parts = ([row for row in of if row.contacts == count] for count in COUNTS)
+        table.add_row(sense, level, *(_counted(part, right) for part in parts))
+    return table
+
+
+def refusals_of(rows: Sequence[CheckedAnswer]) -> Table:
+    """By object and contacts: refused answers of all levels and senses, and the runs that these are of."""
+    table = Table("object", *(f"{count}: refused / of, runs" for count in COUNTS))
+    for name in (*dict.fromkeys(row.object for row in rows), "all"):
+        cells_of = []
+        for count in COUNTS:
+            of = [row for row in rows if name in (row.object, "all") and row.contacts == count]
+            refused = [row for row in of if row.refusal]
+            runs = {(row.object, row.seed, row.spacing) for row in refused}
+            cells_of.append(f"{len(refused)} / {len(of)}, {len(runs)}")
+        table.add_row(name, *cells_of)
+    return table
+
+
+def _counted(rows: Sequence[CheckedAnswer], right: Collection[tuple[object, ...]]) -> str:
+    errors = [row.error for row in rows if row.error is not None]
+    lost = sum(_run_of(row) in right and not row.inside for row in rows)
+    mean = f"{1e3 * sum(errors) / len(errors):.1f}" if errors else "-"
+    return f"{len(rows) - len(errors)} / {len(rows)}, {mean}, {sum(row.inside for row in rows)}, {lost}"
+
+
+def _run_of(row: CheckedAnswer) -> tuple[object, ...]:
+    return row.object, row.seed, row.spacing, row.model, row.sense, row.contacts, row.first
+
+
+def main() -> None:
+    """Perform, answer, and print two tables."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("objects", nargs="*")
+    options.add_argument("--seeds", type=int, default=20)
+    options.add_argument("--first-seed", type=int, default=31000)
+    options.add_argument("--spacing", choices=("close", "spread"), default="close")
+    options.add_argument("--sense", action="append", choices=("touch", "both"))
+    options.add_argument("--level", action="append", default=[])
+    options.add_argument("--another", action="store_true")
+    options.add_argument("--rows", type=Path)
+    given = options.parse_args()
+    every = objects(find_shared_data())
+    scenes = {name: every[name] for name in given.objects or every}
+    choice = Choice(given.spacing, given.sense or ("touch", "both"), given.level, given.another)
+    seeds = range(given.first_seed, given.first_seed + given.seeds)
+    rows = checked_runs(scenes, seeds, choice, given.rows)
+    console = Console(width=140)
+    console.print(table_of(rows))
+    console.print(refusals_of(rows))
+
+
+if __name__ == "__main__":
+    main()
