@@ -42,7 +42,6 @@ class ObjectStore:
     """
 
     def __init__(self, url: str) -> None:
-        self.url = url
         try:
             found: tuple[AbstractFileSystem, str] = url_to_fs(url)
         except (ValueError, ImportError) as error:
@@ -63,10 +62,10 @@ class ObjectStore:
             DataRefused: a file is not the one that was built.
             OSError: the store refused it.
         """
-        if self._holds(record):
-            return 0
         place = f"{self._root.rstrip('/')}/{record.name}"
         description = f"{place}/{DESCRIPTION}"
+        if self._holds(description, record.object_json_sha256):
+            return 0
         with _named(description):
             self._system.makedirs(place, exist_ok=True)
             if self._system.exists(description):
@@ -77,15 +76,14 @@ class ObjectStore:
             for name, expected in (*sums.items(), (DESCRIPTION, record.object_json_sha256))
         )
 
-    def _holds(self, record: ObjectRecord) -> bool:
-        """Whether it is there: its description by its bytes, and so every file that was sent before it."""
-        path = f"{self._root.rstrip('/')}/{record.name}/{DESCRIPTION}"
-        with _named(path):
+    def _holds(self, description: str, expected: str) -> bool:
+        """Whether an object is there: its description by its bytes, and so every file sent before it."""
+        with _named(description):
             try:
-                data: bytes = self._system.cat_file(path)
+                data: bytes = self._system.cat_file(description)
             except FileNotFoundError:
                 return False
-        return sha256(data).hexdigest() == record.object_json_sha256
+        return sha256(data).hexdigest() == expected
 
     def _send(self, path: Path, to: str, expected: str) -> int:
         data = path.read_bytes()
