@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 OVER_WIRES = ("run ", "demo ", "check ", "calibrate taxim --station")
-MEASURED = ("tables ", "cost ", "replay RUN --level ")
+MEASURED = ("tables ", "cost ", "replay RUN")
 LONG = (*OVER_WIRES, *MEASURED)
 """A run over every wire takes a minute, and each of these commands has quicker tests of its own."""
 

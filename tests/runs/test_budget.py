@@ -304,6 +304,7 @@ def test_a_measurement_performs_once_answers_everywhere_and_resumes(
     assert len(joined(EXPERIMENT, curve, curve).points) == 4
 
 
+@pytest.mark.slow  # a measurement of a whole run; its parts stay
 def test_the_command_measures_keeps_and_draws(
     cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

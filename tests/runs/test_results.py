@@ -212,6 +212,7 @@ def test_a_replay_gives_the_same_numbers_to_the_bit(finished: tuple[dict[str, An
 SCORES = ("error_m", "error_symmetric_m", "error_mean_m", "error_top10_m", "in_region90")
 
 
+@pytest.mark.slow  # a whole replay; that the truth is not looked at stays in test_estimates_of_a_recording.py
 def test_a_replay_without_the_truth_has_the_same_answer_and_no_scores(
     finished: tuple[dict[str, Any], Counting, Path],
     done: Recording,

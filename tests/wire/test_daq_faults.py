@@ -109,6 +109,7 @@ def test_a_driver_that_does_not_get_to_read_overflows_the_box() -> None:
         read_whole(hammer)
 
 
+@pytest.mark.slow  # as one that keeps its lock
 def test_a_driver_that_is_briefly_away_loses_nothing(bench: Bench) -> None:
     with opened(bench) as hammer:
         counts = captured(hammer, 0.1)
@@ -193,6 +194,7 @@ def test_an_unplugged_box_is_named_with_its_cable(bench: Bench) -> None:
         opened(bench).__enter__()
 
 
+@pytest.mark.slow  # losses during a strike stay
 def test_a_loss_between_two_strikes_does_not_spoil_the_next(bench: Bench) -> None:
     with opened(bench) as hammer:
         read_whole(hammer)

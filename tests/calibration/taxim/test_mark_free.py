@@ -91,6 +91,7 @@ def test_the_untouched_gel_is_the_background(twenty: tuple[Pictures, FloatArray,
         assert np.array_equal(flat, made.calibration.background)
 
 
+@pytest.mark.slow  # a second fit of the same presses
 def test_the_order_of_the_presses_changes_nothing(twenty: tuple[Pictures, FloatArray, MarkFree]) -> None:
     pictures, _, made = twenty
     order = np.random.default_rng(1).permutation(20)
@@ -100,6 +101,7 @@ def test_the_order_of_the_presses_changes_nothing(twenty: tuple[Pictures, FloatA
     assert {press.name: press for press in again.used} == {press.name: press for press in made.used}
 
 
+@pytest.mark.slow  # a second fit of the same presses
 def test_a_held_out_press_has_no_part_in_its_own_score(monkeypatch: pytest.MonkeyPatch) -> None:
     """Spoiling press 3 changes no score of its own fold, for which it is not taught; it changes others'."""
     monkeypatch.setattr("calibration.taxim.held_out.FOLDS", 4)

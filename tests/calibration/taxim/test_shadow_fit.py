@@ -144,6 +144,7 @@ def test_rays_begin_where_the_rim_of_the_simulator_ends() -> None:
         assert not ring[tuple(np.rint(beyond).astype(int))]
 
 
+@pytest.mark.slow  # measured data that do not change
 def test_real_presses_throw_a_blue_shadow_away_from_the_blue_light(shared_data: Path) -> None:
     """Slopes within the contact and the dark wedge outside it know nothing of each other, and agree."""
     pack = usable(set_of(shared_data, "r15"), R15.ball)

@@ -50,10 +50,12 @@ def assert_as_far_off_as_both_say(pair: tuple[Taught, Taught]) -> None:
     assert (off_by(pair, kinds["neither"]) < 1.5).all()
 
 
+@pytest.mark.slow  # measured data that do not change
 def test_tables_of_other_presses_are_as_far_off_as_both_say(pair: tuple[Taught, Taught]) -> None:
     assert_as_far_off_as_both_say(pair)
 
 
+@pytest.mark.slow  # measured data that do not change
 def test_presses_of_the_papers_sensor_say_how_far_they_are_off(shared_data: Path) -> None:
     pictures = set_of(shared_data, "r15")
     assert pictures.marks is not None

@@ -77,6 +77,7 @@ def heard(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recordi
     return ran(tmp_path_factory.mktemp("heard") / "run", scene, station, 60)
 
 
+@pytest.mark.slow  # a whole run with strikes
 def test_an_object_never_seen_is_struck_where_the_gel_has_just_met_it(heard: Recording) -> None:
     """A tip that follows the gel needs nothing to be believed: the first contacts are struck already."""
     struck = [record.step.index for record in heard.steps() if POSE in record.readings]
@@ -120,6 +121,7 @@ def refuses(monkeypatch: pytest.MonkeyPatch, at: set[int]) -> None:
     monkeypatch.setattr(Explorer, "plan", planned)
 
 
+@pytest.mark.slow  # a whole run; a run without any free way stays
 def test_a_contact_without_a_free_way_is_left_out_and_the_run_goes_on(
     tmp_path: Path, station: Station, monkeypatch: pytest.MonkeyPatch
 ) -> None:

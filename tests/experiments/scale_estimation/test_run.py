@@ -51,6 +51,7 @@ def test_the_truth_changes_no_estimate(touched: Recording, tmp_path: Path) -> No
     assert after["estimates"]["fused"]["error_m"] is None
 
 
+@pytest.mark.slow  # a whole run; each sense names it in its own tests
 def test_a_size_beyond_the_range_that_was_asked_about_is_named(touched: Recording) -> None:
     true = answered(touched)["size_m"]
     run = RunFiles(touched)

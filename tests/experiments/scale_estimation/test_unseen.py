@@ -44,6 +44,7 @@ def test_the_cells_of_a_shape_are_one_body_and_fill_its_surface(family: str, see
     assert enclosed_volume(surface) == pytest.approx(inside.volumes.sum(), rel=0.05)
 
 
+@pytest.mark.slow  # of a shipped fit, which does not change
 def test_shapes_that_were_held_out_are_sized_better_than_by_their_widest_side() -> None:
     features, targets, sizes, numbers = pictures(360, seed=4)
     held = numbers >= 288
@@ -55,6 +56,7 @@ def test_shapes_that_were_held_out_are_sized_better_than_by_their_widest_side() 
     assert ours.mean() < 0.85 * box.mean()
 
 
+@pytest.mark.slow  # of a shipped fit, which does not change
 def test_nine_tenths_of_new_shapes_are_within_the_interval_of_the_shipped_fit() -> None:
     features, targets, _, _ = pictures(360, seed=77)
     expected, sigma = shipped().size(features)

@@ -67,6 +67,7 @@ def test_boxes_in_each_other_are_as_far_apart_as_their_walls() -> None:
     assert found.f_score == 0.0
 
 
+@pytest.mark.slow  # many drawn cases of a statistic
 def test_cutting_the_faces_of_either_changes_no_more_than_other_samples_do() -> None:
     finer = trimesh.Trimesh(MUG.vertices, MUG.faces, process=False).subdivide()
     same = Mesh(np.asarray(finer.vertices), np.asarray(finer.faces))
@@ -75,6 +76,7 @@ def test_cutting_the_faces_of_either_changes_no_more_than_other_samples_do() -> 
     assert cut == pytest.approx(whole, rel=0.02)
 
 
+@pytest.mark.slow  # many drawn cases of a statistic
 def test_four_times_the_samples_halve_the_scatter() -> None:
     scatters = []
     for samples in (250, 4000):

@@ -131,6 +131,7 @@ def travels(recording: Recording) -> list[Segment]:
     return found
 
 
+@pytest.mark.slow  # a whole run; resuming is tested with two other experiments
 def test_a_run_that_was_stopped_goes_on_with_the_same_presses(
     touched: Recording, tmp_path: Path, station: Station
 ) -> None:

@@ -36,6 +36,7 @@ def compared(view: OutlineView, extents: FloatArray, hidden: BoolArray = OPEN) -
     return outline_residuals(0, view, SeenOutline(extents, hidden), PLACES, NOISE)
 
 
+@pytest.mark.slow  # many drawn cases of a statistic
 def test_outlines_with_the_stated_errors_are_chi_squares(view: OutlineView) -> None:
     rng, found = np.random.default_rng(0), []
     for _ in range(150):

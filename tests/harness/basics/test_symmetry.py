@@ -43,6 +43,7 @@ def test_built_in_objects_have_the_symmetry_they_were_given(name: str, fold: int
         assert np.linalg.norm(group.centre[:2]) < 0.2e-3
 
 
+@pytest.mark.slow  # measured data that do not change
 @pytest.mark.parametrize(("name", "expected"), REAL.items())
 def test_scanned_objects_are_symmetric_as_people_say(
     shared_data: Path, name: str, expected: tuple[str, int]

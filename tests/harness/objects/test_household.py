@@ -15,7 +15,7 @@ def as_trimesh(mesh: Mesh) -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
 
-@pytest.mark.parametrize("edge", [*EDGES, 0.7e-3, 9.7e-3])
+@pytest.mark.parametrize("edge", [*EDGES, pytest.param(0.7e-3, marks=pytest.mark.slow), 9.7e-3])
 @pytest.mark.parametrize("name", MATERIALS)
 def test_a_built_object_is_one_closed_outward_solid_on_the_table(name: str, edge: float) -> None:
     mesh = build(name, edge)

@@ -70,6 +70,7 @@ def off_by(noise: float, quality: int, spread: float, wide: float) -> dict[str, 
     return {name: np.concatenate(each) for name, each in rows.items()}
 
 
+@pytest.mark.slow  # many drawn cases of a statistic
 @pytest.mark.parametrize("case", CASES)
 def test_stated_errors_cover_the_true_ones(case: str) -> None:
     """A normal error is beyond two standard errors once in 22 times; here at most once in eight."""

@@ -203,6 +203,7 @@ def test_what_is_missing_is_said_to_be_with_its_reason(report_data: ReportData, 
     assert "nan" not in text
 
 
+@pytest.mark.slow  # a whole page; what is missing is said by the test above
 def test_a_run_without_a_contact_has_a_report(report_data: ReportData, tmp_path: Path) -> None:
     empty = replace(
         report_data, contacts=(), answer=Missing("the gel met nothing"), bench=Missing("no contact")

@@ -109,6 +109,7 @@ def test_damping_may_be_critical_or_beyond(natural: float, ratio: float) -> None
     assert mode.ratio == pytest.approx(ratio, rel=1e-7)
 
 
+@pytest.mark.slow  # many drawn cases of a statistic
 def test_noise_alone_is_no_mode() -> None:
     """A false alarm in a thousand records at most; two in two hundred would be one chance in sixty."""
     random = np.random.default_rng(0)

@@ -176,6 +176,7 @@ def test_a_gel_that_never_rests_is_waited_for_then_refused(tmp_path: Path) -> No
         read_arm_run(recording.folder)
 
 
+@pytest.mark.slow  # a whole run of a rule tested by itself
 def test_a_light_that_fades_stops_the_run_between_two_presses_and_says_so(tmp_path: Path) -> None:
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)
@@ -204,6 +205,7 @@ def test_a_little_drift_is_told_and_goes_on(tmp_path: Path) -> None:
     assert abs(run.scale().pitch.value / GELSIGHT_R15.pitch - 1.0) < 0.03
 
 
+@pytest.mark.slow  # a whole run of a rule tested by itself
 def test_where_no_ball_stands_the_run_ends_after_three_presses(tmp_path: Path) -> None:
     recording = begun(tmp_path / "run").recording
     bench = opened(recording)

@@ -167,6 +167,7 @@ def test_the_density_integrates_to_one() -> None:
     assert np.mean(densities) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.slow  # the kernel's density stays
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10_000), peaks=st.integers(1, 40), strikes=st.integers(2, 30))
 def test_scores_are_the_sums_that_they_say(seed: int, peaks: int, strikes: int) -> None:

@@ -94,6 +94,7 @@ def test_a_body_moves_with_its_pose(name: str) -> None:
     np.testing.assert_allclose(there, distances(shape.code, shape.theta, points), atol=1e-12)
 
 
+@pytest.mark.slow  # a law of one kernel
 @pytest.mark.parametrize("name", ["mug", "jug", "teapot", "spanner"])
 def test_filling_holes_only_adds(name: str) -> None:
     for shape in drawn(name):

@@ -44,6 +44,7 @@ def twice(tmp_path_factory: pytest.TempPathFactory) -> TwoBuilds:
     return TwoBuilds(folder, first, second, (one, done(tiny_job(folder, "block", second, BOTH))))
 
 
+@pytest.mark.slow  # two builds; each sense's own build is compared in quick tests
 def test_two_builds_of_one_object_are_the_same_bytes(twice: TwoBuilds) -> None:
     assert [record.outcome for record in twice.records] == ["built", "built"]
     assert all(part.made for record in twice.records for part in record.senses.values())

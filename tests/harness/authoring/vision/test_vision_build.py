@@ -57,6 +57,7 @@ def built(block: Path, *more: str) -> int:
     )  # fmt: skip
 
 
+@pytest.mark.slow  # a training; builds of touch and sound stay
 def test_a_block_becomes_an_object_file_that_can_be_looked_at(
     block: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

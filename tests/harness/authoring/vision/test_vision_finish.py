@@ -124,6 +124,7 @@ def test_rays_of_pictures_keep_their_own_samples_together(lit: LitObject, pictur
     assert np.array_equal(np.diff(both.first), np.tile(np.diff(rays.first), 2))
 
 
+@pytest.mark.slow  # of the longest training alone
 @pytest.mark.parametrize("kind", ["osf-v", "osf"])
 def test_pictures_bring_networks_nearer_to_them(lit: LitObject, pictures: list[Exact], kind: Kind) -> None:
     """Taught a surface of half its colours, they have less than half of the error after pictures of it."""

@@ -41,6 +41,7 @@ def test_what_is_finished_is_so_once_and_all_of_it() -> None:
     assert finished.finished() == finished
 
 
+@pytest.mark.slow  # of the longest training alone
 def test_networks_of_the_papers_size_learn_too(lit: LitObject, tmp_path: Path) -> None:
     """Ten octaves, of which the highest turn 160 times in a cell, do not spoil what lies between places."""
     wide = replace(vision_profile("paper").networks, cells=4, places=6000, steps=100, batch=64)

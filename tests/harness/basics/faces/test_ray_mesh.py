@@ -32,7 +32,7 @@ def unit_vectors(count: int, seed: int) -> FloatArray:
     return np.asarray(drawn / np.linalg.norm(drawn, axis=1, keepdims=True))
 
 
-@pytest.mark.parametrize("name", ["mug", "wrench", "tray"])
+@pytest.mark.parametrize("name", ["mug", "wrench", pytest.param("tray", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("away", [0.0, 0.3, 25.0])
 def test_all_faces_asked_one_by_one_say_the_same(name: str, away: float) -> None:
     mesh = build(name, 8e-3)

@@ -28,6 +28,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow  # as a mesh clear of the gel
 def test_a_map_without_contact_is_the_untouched_gel_byte_for_byte(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -246,6 +246,7 @@ def test_near_is_what_the_nearest_place_of_any_face_says(seed: int, most: float,
                 search.require_within(point[None], most, "it")
 
 
+@pytest.mark.slow  # odd meshes of one table
 def test_shares_rebuild_every_place_on_needles_and_points_too() -> None:
     random = np.random.default_rng(0)
     corners = random.normal(size=(60, 3, 3))

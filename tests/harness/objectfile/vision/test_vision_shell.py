@@ -189,7 +189,7 @@ def never_missed(mesh: Mesh, away: float) -> int:
     return hits
 
 
-@pytest.mark.parametrize("away", [0.5, 2.0, 25.0])
+@pytest.mark.parametrize("away", [0.5, 2.0, pytest.param(25.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_march_misses_no_surface(name: str, away: float) -> None:
     never_missed(SHAPES[name](), away)

@@ -104,6 +104,7 @@ def test_coverage_of_a_disc_is_its_area() -> None:
     np.testing.assert_array_equal(found.image.colour, 0.0)
 
 
+@pytest.mark.slow  # a statistic of many pictures
 @pytest.mark.parametrize("name", ["mug", "wrench"])
 def test_more_samples_come_nearer_and_the_stated_noise_is_true(name: str) -> None:
     made = LitObject(builtin_appearance(name, edge=5e-3))

@@ -52,6 +52,7 @@ def test_a_ball_is_filled_and_every_cell_turned_the_right_way(filled: Tetrahedra
     assert signed_volume(filled.surface) == pytest.approx(filled.volumes.sum())
 
 
+@pytest.mark.slow  # fTetWild twice
 def test_nodes_on_the_surface_are_worth_finer_cells(filled: Tetrahedra) -> None:
     """Lamb's lowest mode of a ball, ``w R / c_s = 2.5011`` to 2.5014 whatever Poisson's ratio."""
     shear = np.sqrt(CERAMIC.young / (2.0 * (1.0 + CERAMIC.poisson) * CERAMIC.density))
@@ -132,6 +133,7 @@ def test_edges_that_cannot_be_are_refused() -> None:
             tetrahedralize(sphere(0.03), edge)
 
 
+@pytest.mark.slow  # fTetWild twice
 def test_cells_kept_nearer_to_the_surface_hold_its_volume_better() -> None:
     ball = sphere(0.03, 128)
     whole = enclosed_volume(ball)
@@ -176,6 +178,7 @@ def test_modes_are_computed_once_and_then_read(
         modes_of(sphere(0.03), CERAMIC, 60e3, 0.029, store=store)
 
 
+@pytest.mark.slow  # fTetWild twice
 def test_tetrahedra_outlive_a_change_of_the_material(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = Store(tmp_path)
     first = modes_of(sphere(0.03), CERAMIC, 60e3, 0.03, store=store)

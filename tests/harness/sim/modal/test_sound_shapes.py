@@ -313,6 +313,7 @@ print("onnxruntime" in sys.modules)
 """
 
 
+@pytest.mark.slow  # loads in a process of its own
 def test_networks_are_loaded_by_their_own_level_alone(of: ObjectFile) -> None:
     said = subprocess.run(
         [sys.executable, "-c", _LOADING, str(of.folder)], capture_output=True, text=True, check=False
