@@ -5,12 +5,25 @@ from typing import Any, TypeVar, cast
 
 import numba
 
+from harness.basics.arrays import AnyArray
+
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def compiled(function: _F) -> _F:
     """The function compiled on first call, kept on disk, holding no lock while it runs."""
     return cast(_F, numba.njit(cache=True, nogil=True)(function))
+
+
+@compiled
+def copy_line(target: AnyArray, source: AnyArray) -> None:
+    """Write ``(n,)`` values over the first n of ``target``, which is at least as long.
+
+    In a kernel, ``target[:n] = source`` says the same, and costs seconds to compile: numba compiles the
+    message about unequal shapes with it.
+    """
+    for i in range(len(source)):
+        target[i] = source[i]
 
 
 def compiled_fast(function: _F) -> _F:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from harness.basics.arrays import FloatArray, read_only
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
 from harness.basics.errors import MeshRefused
 from harness.basics.geometry import apply, inverse
 from harness.basics.mesh import Mesh
@@ -118,14 +118,15 @@ def _clip(polygon: FloatArray, spare: FloatArray, count: int, plane: FloatArray)
         here = plane[0] * polygon[i, 0] + plane[1] * polygon[i, 1] + plane[2] * polygon[i, 2] + plane[3]
         there = plane[0] * polygon[j, 0] + plane[1] * polygon[j, 1] + plane[2] * polygon[j, 2] + plane[3]
         if here <= 0.0:
-            spare[kept] = polygon[i]
+            copy_line(spare[kept], polygon[i])
             kept += 1
         if (here < 0.0 < there) or (there < 0.0 < here):
             share = here / (here - there)
             for k in range(3):
                 spare[kept, k] = polygon[i, k] + share * (polygon[j, k] - polygon[i, k])
             kept += 1
-    polygon[:kept] = spare[:kept]
+    for i in range(kept):
+        copy_line(polygon[i], spare[i])
     return kept
 
 
@@ -139,8 +140,9 @@ def _cut(corners: FloatArray, polygon: FloatArray, spare: FloatArray, planes: Fl
             outside = outside and reach + planes[p, 3] > 0.0
         if outside:
             return 0
-    polygon[:3] = corners
     count = 3
+    for c in range(count):
+        copy_line(polygon[c], corners[c])
     for p in range(len(planes)):
         count = _clip(polygon, spare, count, planes[p])
         if count == 0:
@@ -196,16 +198,24 @@ def _least_along(
 
 
 @compiled
+def _cross(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    """As ``np.cross``, without the messages about shapes that numba would compile for seconds."""
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
 def _first_hit(corners: FloatArray, start: FloatArray, direction: FloatArray) -> float:
     """Moeller and Trumbore, J. Graphics Tools 2(1), 1997; from either side.
 
     Not by ``harness.basics.faces.ray_triangle``: its sums are those of ``np.dot``, another rounding, and
     rehearsed contacts are written with these.
     """
-    first = np.inf
+    first, p, q = np.inf, np.empty(3), np.empty(3)
     for f in range(len(corners)):
         e1, e2 = corners[f, 1] - corners[f, 0], corners[f, 2] - corners[f, 0]
-        p = np.cross(direction, e2)
+        _cross(direction, e2, p)
         volume = np.dot(e1, p)
         if volume == 0.0:
             continue
@@ -213,7 +223,7 @@ def _first_hit(corners: FloatArray, start: FloatArray, direction: FloatArray) ->
         u = np.dot(s, p) / volume
         if u < -1e-12 or u > 1.0 + 1e-12:
             continue
-        q = np.cross(s, e1)
+        _cross(s, e1, q)
         v = np.dot(direction, q) / volume
         if v < -1e-12 or u + v > 1.0 + 1e-12:
             continue

@@ -7,7 +7,7 @@ Shapes: ``reading`` is the tuple ``(heights, pitch, touched, flat, skirt, edge)`
 import numpy as np
 
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
 from harness.sim.gel.view import POOL
 
 Reading = tuple[FloatArray, float, IntArray, BoolArray, FloatArray, FloatArray]
@@ -188,7 +188,8 @@ def _hang(image: FloatArray, skirt: FloatArray, edge: FloatArray, scratch: Float
     """The gel's skirt: blurred, with what the object surely shapes put back (Taxim, section III-A)."""
     work, kept = scratch[0], scratch[1]
     core = _CORE * image.max()
-    kept[:] = image
+    for i in range(image.shape[0]):
+        copy_line(kept[i], image[i])
     _blur(image, skirt, work)
     for i in range(image.shape[0]):
         for j in range(image.shape[1]):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
 
 
 @compiled
@@ -123,7 +123,7 @@ def nearest_places(
                         gap = nearest_on_triangle(points[n], corners[f], here)
                         if gap < best:
                             best = gap
-                            places[n] = here
+                            copy_line(places[n], here)
                             found[n] = f
     return places, found
 

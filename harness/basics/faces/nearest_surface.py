@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
 from harness.basics.faces.face_grid import FaceGrid, build_face_grid
 from harness.basics.faces.nearest_kernels import nearest_on_triangle
 from harness.basics.mesh import Mesh
@@ -88,7 +88,7 @@ def _nearest_faces(
                         gap = nearest_on_triangle(points[n], corners[faces[at]], here)
                         if gap <= best:
                             best, found[n] = gap, faces[at]
-                            places[n] = here
+                            copy_line(places[n], here)
     return places, found
 
 

@@ -13,7 +13,7 @@ import pymetis
 import scipy.sparse as sp
 
 from harness.basics.arrays import IntArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
 
 Pattern: TypeAlias = "sp.csr_array[Any] | sp.csc_array[Any]"
 
@@ -235,7 +235,7 @@ def _structure(
     for s in range(count):
         if total + len(order) > len(rows):
             longer = np.empty(2 * len(rows) + len(order), np.int64)
-            longer[:total] = rows[:total]
+            copy_line(longer, rows[:total])
             rows = longer
         for column in range(ends[s], ends[s + 1]):
             for p in range(starts[order[column]], starts[order[column] + 1]):
@@ -253,7 +253,7 @@ def _structure(
                     rows[total] = rows[p]
                     total += 1
             child = following[child]
-        rows[row_starts[s] : total] = np.sort(rows[row_starts[s] : total])
+        copy_line(rows[row_starts[s] :], np.sort(rows[row_starts[s] : total]))
         row_starts[s + 1] = total
         if total > row_starts[s]:
             above = holder[rows[row_starts[s]]]

@@ -8,7 +8,7 @@ then the rows below. What it takes from the rows below is the front ``(r, r)`` t
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
 from harness.sim.factor.dense_elimination import DONE, eliminate, subtract_lower
 from harness.sim.factor.elimination import Elimination
 
@@ -183,7 +183,8 @@ def factorise(
         high, at, end = wide + rest, panel_at[s], first + wide
         panels[at : at + high * wide] = 0.0
         front[: rest * rest] = 0.0
-        where[first:end] = np.arange(wide)
+        for i in range(wide):
+            where[first + i] = i
         for i in range(rest):
             where[under[i]] = wide + i
         if _add_original(data, indices, indptr, plan, first, wide, high, where, panels, at) != DONE:
@@ -200,7 +201,7 @@ def factorise(
         _grow(panels, at, wide, high, pivots[first:end], first, under, sums)
         if rest > 0:
             _subtract_front(routines, panels, at, wide, high, pivots[first:end], work, front)
-            stack[top : top + rest * rest] = front[: rest * rest]
+            copy_line(stack[top:], front[: rest * rest])
             waiting[depth] = s
             depth, top = depth + 1, top + rest * rest
     return DONE

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
 from harness.sim.factor.eight_wide import (
     EIGHT,
     gather_1,
@@ -106,10 +106,12 @@ def solve(
     for s in range(supernodes):
         first, end = plan.firsts[s], plan.firsts[s + 1]
         rows, wide = plan.rows[plan.starts[s] : plan.starts[s + 1]], end - first
-        lines[:wide] = block[first:end]
+        for i in range(wide):
+            copy_line(lines[i], block[first + i])
         lines[wide : wide + len(rows)] = 0.0
         _forward(panel_place + 8 * panel_at[s], wide + len(rows), wide, line_place)
-        block[first:end] = lines[:wide]
+        for i in range(wide):
+            copy_line(block[first + i], lines[i])
         for i in range(len(rows)):
             for c in range(EIGHT):
                 block[rows[i], c] += lines[wide + i, c]
@@ -119,9 +121,11 @@ def solve(
     for s in range(supernodes - 1, -1, -1):
         first, end = plan.firsts[s], plan.firsts[s + 1]
         rows, wide = plan.rows[plan.starts[s] : plan.starts[s + 1]], end - first
-        lines[:wide] = block[first:end]
+        for i in range(wide):
+            copy_line(lines[i], block[first + i])
         for i in range(len(rows)):
             for c in range(EIGHT):
                 lines[wide + i, c] = block[rows[i], c]
         _backward(panel_place + 8 * panel_at[s], wide + len(rows), wide, line_place)
-        block[first:end] = lines[:wide]
+        for i in range(wide):
+            copy_line(block[first + i], lines[i])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.basics.arrays import FloatArray
-from harness.basics.compiled import compiled, compiled_fast
+from harness.basics.compiled import compiled, compiled_fast, copy_line
 
 _COARSE = 4
 
@@ -15,12 +15,13 @@ def blur(image: FloatArray, half: FloatArray) -> None:
     reach = len(half) - 1
     line = np.empty(columns + 2 * reach)
     for i in range(rows):
-        line[reach : reach + columns] = image[i]
+        copy_line(line[reach:], image[i])
         for k in range(1, reach + 1):
             line[reach - k] = image[i, _mirrored(-k, columns)]
             line[reach + columns - 1 + k] = image[i, _mirrored(columns - 1 + k, columns)]
-        image[i] = half[0] * line[reach : reach + columns]
         out = image[i]
+        for j in range(columns):
+            out[j] = half[0] * line[reach + j]
         for k in range(1, reach + 1):
             weight = half[k]
             left = line[reach - k : reach - k + columns]

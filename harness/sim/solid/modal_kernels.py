@@ -9,7 +9,7 @@ straight element is the consistent one to rounding.
 import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray, read_only
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
 
 EDGES = read_only(np.array([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)], dtype=np.int64))
 """``(6, 2)``: the corners whose middle is node ``4 + row``."""
@@ -137,7 +137,7 @@ def pattern(cells: IntArray, count: int) -> tuple[IntArray, IntArray]:
                     seen[other] = node
                     columns[total] = other
                     total += 1
-        columns[first:total] = np.sort(columns[first:total])
+        copy_line(columns[first:], np.sort(columns[first:total]))
         rows[node + 1] = total
     return rows, columns[:total].copy()
 
@@ -236,9 +236,16 @@ def _scatter(
     for a in range(10):
         for b in range(a, 10):
             there = _position(rows, columns, cell[a], cell[b])
-            stiffness[there] += block[a, b]
+            _add(stiffness[there], block[a, b])
             mass[there] += share[a, b]
             if a != b:
                 back = _position(rows, columns, cell[b], cell[a])
-                stiffness[back] += block[a, b].T
+                _add(stiffness[back], block[a, b].T)
                 mass[back] += share[a, b]
+
+
+@compiled
+def _add(target: FloatArray, more: FloatArray) -> None:
+    for i in range(3):
+        for j in range(3):
+            target[i, j] += more[i, j]

@@ -7,7 +7,7 @@ camera are cut first.
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
 
 NEAREST = 1e-6
 """m before the camera: what is nearer is not seen."""
@@ -110,7 +110,7 @@ def _cut(seen: FloatArray, face: AnyArray, focal: float, x: float, y: float, out
     for c in range(3):
         a, b = seen[face[c]], seen[face[(c + 1) % 3]]
         if a[5] >= NEAREST:
-            out[count] = a[:3]
+            copy_line(out[count], a[:3])
             count += 1
         if (a[5] >= NEAREST) != (b[5] >= NEAREST):
             share = (NEAREST - a[5]) / (b[5] - a[5])
