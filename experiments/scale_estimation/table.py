@@ -136,6 +136,7 @@ def run_cell(
             raise DataRefused("no instrument read anything in this run: no way to the object was free")
         run = RunFiles(recording)
         answering = ScaleAnswering(run, chosen_levels(experiment.knobs, (), run.network_levels))
+        answering.load()  # as a run does while the arm moves: the seconds of a row are of readings alone
         pictures = None
         for record in recording.steps():
             answering.read(record)

