@@ -7,13 +7,24 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from experiments.scale_estimation.size import Belief, SizeRange
-from experiments.scale_estimation.vision.fit import OutlineFit, OutlineProblem, View
+from experiments.scale_estimation.vision.fit import (
+    ALIKE,
+    PIXEL_SIGMA,
+    UNKNOWNS,
+    OutlineFit,
+    OutlineProblem,
+    View,
+)
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
-from harness.picture.outline import SeenOutline
+from harness.picture.outline import DIRECTIONS, SeenOutline
 
 MISFIT = 0.9
 """Pixels rms between the outlines beyond which the picture is not of this object."""
+
+MISFIT_COST = 0.5 * DIRECTIONS * (MISFIT / PIXEL_SIGMA) ** 2 / ALIKE
+"""What such a misfit costs, all else as stated. A fit that costs more, far from what is stated, is not of
+this object either: tilted by ten standard deviations, a wrench has the outline of a mug."""
 
 NO_SIZE = 0.3
 """Deviation of the size's logarithm beyond which a picture says nothing of it."""
@@ -63,16 +74,33 @@ def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange,
     begun = sorted(problem.fit(_starts(view, outline, yaws), _FIRST_ROUNDS), key=lambda fit: fit.cost)
     fits = problem.fit(np.array([fit.unknowns for fit in begun[:_FOLLOWED]]), _ROUNDS)
     best = min(fits, key=lambda fit: fit.cost)
-    if best.rms > MISFIT:
-        raise FitRefused(
-            f"the outline in the picture is {best.rms:.1f} px (rms) off this object's at any size and turn "
-            f"(limit {MISFIT:g} px); check that it is this object, upright, with nothing in front of it"
-        )
+    _require_same(view, best)
     log_nominal = np.log(nominal)
     density = np.full(len(sizes.logs), -np.inf)
     for fit in _apart(fits, best.cost):
         density = np.logaddexp(density, _scanned(problem, fit, sizes.logs - log_nominal))
     return Sight(Belief.of(sizes, density), best, time.perf_counter() - began)
+
+
+def _require_same(view: View, best: OutlineFit) -> None:
+    """Refuse an outline that is another object's.
+
+    Raises:
+        FitRefused: at no size and turn, and with nothing far from what is stated, is it this object's.
+    """
+    if best.rms > MISFIT:
+        raise FitRefused(
+            f"the outline in the picture is {best.rms:.1f} px (rms) off this object's at any size and turn "
+            f"(limit {MISFIT:g} px); check that it is this object, upright, with nothing in front of it"
+        )
+    if best.cost > MISFIT_COST:
+        off = np.where(np.isinf(view.sigmas), 0.0, np.abs(best.unknowns) / view.sigmas)
+        worst = int(off.argmax())
+        raise FitRefused(
+            f"the outline in the picture is this object's only if {UNKNOWNS[worst]} were {off[worst]:.0f} "
+            "standard deviations off what is stated; check that it is this object, upright, and that the "
+            "camera is where the station states"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +140,8 @@ def stands_seen(view: View, outline: SeenOutline) -> tuple[SeenStand, ...]:
     found: list[OutlineFit] = []
     for fit in sorted(fits, key=lambda one: one.cost):
         turns = [(fit.unknowns[3] - one.unknowns[3] + np.pi) % (2.0 * np.pi) - np.pi for one in found]
-        if fit.rms <= MISFIT and all(abs(turn) > _TURNS_APART for turn in turns):
+        same = fit.rms <= MISFIT and fit.cost <= MISFIT_COST
+        if same and all(abs(turn) > _TURNS_APART for turn in turns):
             found.append(fit)
     return tuple(_stand(problem, fit) for fit in found)
 
