@@ -32,6 +32,11 @@ class Material:
     alpha: float
     beta: float
 
+    @property
+    def speed(self) -> float:
+        """M/s, sqrt(young / density): of sound along a thin bar, and all frequencies of a body go with it."""
+        return float(np.sqrt(self.young / self.density))
+
 
 @dataclass(frozen=True)
 class Uncertainty:

@@ -167,7 +167,7 @@ def _matches(
     size is one that was asked about.
     """
     logs = sizes.logs - np.log(nominal)
-    speeds = np.array([_speed(guess) for guess in materials]) / _speed(materials[0])
+    speeds = np.array([guess.model.material.speed for guess in materials]) / materials[0].model.material.speed
     slower, faster = np.log(speeds.min()), np.log(speeds.max())
     few = np.linspace(logs[0] - faster, logs[-1] - slower, round((np.ptp(logs) + faster - slower) / GRID))
     likelihood = log_likelihood(peaks, materials[0].model, few)
@@ -179,11 +179,6 @@ def _matches(
         sigma = float(np.hypot(guess.sigma, SHAPE_SIGMA))
         matches.append(Match(Belief.of(sizes, TEMPER * own), evidence, sigma, float(speed), nats))
     return tuple(matches)
-
-
-def _speed(guess: MaterialGuess) -> float:
-    """M/s, sqrt(E / density)."""
-    return float(np.sqrt(guess.model.material.young / guess.model.material.density))
 
 
 def _mixed(matches: Sequence[Match], beliefs: Sequence[Belief]) -> Belief:

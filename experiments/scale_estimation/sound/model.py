@@ -44,7 +44,7 @@ class RingingModel:
         """
         if material == self.material:
             return self
-        faster = np.sqrt(material.young / material.density * self.material.density / self.material.young)
+        faster = material.speed / self.material.speed
         lighter = self.material.density / material.density
         return RingingModel(
             read_only(self.frequencies * faster), read_only(self.amplitudes * lighter), material

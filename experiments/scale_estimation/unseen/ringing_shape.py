@@ -66,8 +66,7 @@ class RingingShape:
             highest: Hz, up to which modes are given.
             random: draws those that were not solved.
         """
-        speed, reference = (m.young / m.density for m in (material, SOLVED_OF))
-        scale = np.sqrt(speed / reference) * SOLVED_AT / size
+        scale = material.speed / SOLVED_OF.speed * SOLVED_AT / size
         louder = SOLVED_OF.density / material.density * (SOLVED_AT / size) ** 2
         frequencies, amplitudes = self.frequencies * scale, self.amplitudes * louder
         last = frequencies[-_SPACED_BY:]

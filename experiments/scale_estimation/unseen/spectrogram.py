@@ -76,19 +76,15 @@ def band_levels(
 
 def _bands(band: tuple[float, float], material: Material) -> tuple[FloatArray, BoolArray]:
     """``(BANDS,)`` Hz, the middles; which of them were excited."""
-    middles = np.sqrt(_EDGES[1:] * _EDGES[:-1]) * _speed(material)
+    middles = np.sqrt(_EDGES[1:] * _EDGES[:-1]) * material.speed
     return middles, (middles >= band[0]) & (middles <= band[1])
-
-
-def _speed(material: Material) -> float:
-    return float(np.sqrt(material.young / material.density))
 
 
 def _levels(
     responses: FloatArray, rate: float, inside: BoolArray, material: Material
 ) -> tuple[FloatArray, float]:
     """``(FRAMES, BANDS)`` dB below the loudest, and its power."""
-    edges = _EDGES * _speed(material)
+    edges = _EDGES * material.speed
     powers = np.array([_band_powers(responses, rate, frame, edges) for frame in FRAMES])
     powers = np.where(inside, powers, 0.0)
     loudest = max(float(powers.max()), 1e-30)
