@@ -1,5 +1,7 @@
 """The dials of a scale estimation: its estimators' own, and the simulation's."""
 
+from collections.abc import Mapping
+
 from harness.effects.accuracy import Knob, Level
 from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import knobs_of
@@ -23,4 +25,7 @@ TURNS = Knob(
 )
 
 OWN: tuple[Knob[Level], ...] = (YAWS, STARTS, TURNS)
+OF_SHAPE: Mapping[str, tuple[Knob[Level], ...]] = {"known": (YAWS, STARTS), "unknown": (TURNS,)}
+"""Those that an answer turns on, where the shape is known and where it is not."""
+
 KNOBS: tuple[Knob[Level], ...] = (*OWN, *knobs_of(EFFECTS))

@@ -1,11 +1,11 @@
 """Scale estimation as an experiment: how big is an object of known shape?"""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from experiments.scale_estimation.answer import ScaleAnswering
-from experiments.scale_estimation.dials import KNOBS, OWN
+from experiments.scale_estimation.dials import KNOBS, OF_SHAPE, OWN
 from experiments.scale_estimation.explore import performer, plan, steps_of
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
@@ -20,7 +20,7 @@ from experiments.scale_estimation.table import (
     run_cell,
     scene_of,
 )
-from harness.effects.accuracy import Accuracy
+from harness.effects.accuracy import Accuracy, Setting
 from harness.experiment.experiment import Experiment, MeasuredCondition, Scored
 from harness.experiment.plain import PlainPerforms, plain_budgets, plain_measurement
 from harness.recording.run_folder import RunFiles
@@ -40,14 +40,29 @@ def _sources(_scored: Scored) -> Mapping[str, Any]:
     return {}
 
 
+_ALL_DIALS = plain_measurement(NAME, *OWN)
+
+
+def _settings(thorough: bool, chosen: Mapping[str, Sequence[str]], scenes: Any) -> tuple[Setting, ...]:
+    """Every dial at its default, and each that matters to a chosen shape turned from there."""
+    matter = {knob.name for shape in chosen["shape"] for knob in OF_SHAPE[shape]}
+    defaults = {knob.name: knob.default for knob in OWN}
+    return tuple(
+        setting
+        for setting in _ALL_DIALS.settings(thorough, chosen, scenes)
+        if all(level == defaults[name] or name in matter for name, level in setting.items())
+    )
+
+
 MEASUREMENT = replace(
-    plain_measurement(NAME, *OWN),
+    _ALL_DIALS,
     conditions=(
         MeasuredCondition("look", LOOKING, ("yes",), ("yes",)),
         MeasuredCondition("shape", DRAWN, ("known",), ("known",)),
     ),
     cells=cells,
     run_cell=run_cell,
+    settings=_settings,
     methods=METHODS,
     performed=PlainPerforms(NAME, scene_of),
     counts=(4, 11),
