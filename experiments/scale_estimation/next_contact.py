@@ -13,6 +13,7 @@ import numpy as np
 
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.believed import believed
+from experiments.scale_estimation.blind_aims import aims_unmet, is_flat
 from experiments.scale_estimation.dials import KNOBS
 from experiments.scale_estimation.envelope import blind_envelope, seen_envelope
 from experiments.scale_estimation.model import ObjectModel
@@ -194,6 +195,8 @@ class Explorer:
         model = self._model
         if self._thing is not None:
             return aims_of_seen(self._thing, float(model.place[2]), self._contacts, random)
+        if self._drawn and not self._seen and is_flat(model):
+            return aims_unmet(model, self._answering.patches, self._answering.free, random)
         middle = model.place
         if self._seen:
             middle = middle + np.array([*self._seen[0].unknowns[1:3], 0.0])

@@ -21,7 +21,7 @@ SLANTS = (0.0, 0.0, 0.45, 0.9, 1.3)
 """Rad from straight down, of lines into the unknown: a flat thing is met from above alone."""
 
 LOWEST = 6.0e-3
-"""M above the support where a line from above ends."""
+"""M above the support where a line from above ends, unless what it leads to is known to be flatter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,13 @@ class LineTarget:
         end: ``(3,)`` m in base, of the gel's middle were nothing there; a line from above goes on down.
         bearing: rad about the vertical, the side that a slanting line comes from; None for any.
         above: whether it comes straight from above.
+        lowest: m above the support where it ends, coming from above.
     """
 
     end: FloatArray
     bearing: float | None = None
     above: bool = False
+    lowest: float = LOWEST
 
 
 def lines_to(
@@ -55,7 +57,7 @@ def lines_to(
         slant = 0.0 if aim.above else random.choice(SLANTS)
         way = random.uniform(-np.pi, np.pi) if aim.bearing is None else aim.bearing
         inward = -np.array([np.sin(slant) * np.cos(way), np.sin(slant) * np.sin(way), np.cos(slant)])
-        lowest = support + LOWEST + half * np.sin(slant)
+        lowest = support + aim.lowest + half * np.sin(slant)
         height = lowest if slant == 0.0 else max(lowest, aim.end[2])
         end = np.array([*aim.end[:2], height])
         yield transform(frame_facing(inward, random.uniform(0.0, 2.0 * np.pi)), end)
