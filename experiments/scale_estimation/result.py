@@ -1,14 +1,26 @@
 """A scale estimation's answer as JSON values, and in lines for people."""
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
-from experiments.scale_estimation.answer import OUTSIDE, SizeAnswer
+import numpy as np
+
+from experiments.scale_estimation.answer import OUTSIDE, Said, SizeAnswer
 from experiments.scale_estimation.size import Belief
 from experiments.scale_estimation.sound.hearing import Hearing
 from experiments.scale_estimation.unseen.answer import ShapelessAnswer
 from harness.basics.errors import FitRefused
 from harness.experiment.experiment import Scored
+
+OPEN = 0.5
+"""Of the width of what is known without any reading: an interval wider than that leaves the size open."""
+
+_NARROWED_BY = {
+    "vision": "state more surely where the camera is and how high the support, or touch the object",
+    "audio": "strike more places, or state what it is made of",
+    "touch": "touch other sides of the object",
+}
 
 
 def result_of(scored: Scored) -> dict[str, Any]:
@@ -77,8 +89,7 @@ def _material(scored: Scored) -> dict[str, Any] | None:
     if not isinstance(heard, Hearing) or other is None:
         return None
     material = scored.answering.model.ringing(scored.accuracy).material
-    stated = (material.young / material.density) ** 0.5
-    return heard.speed(stated, other.belief)
+    return heard.speed(material.speed, other.belief)
 
 
 def _left_out(reasons: Sequence[str]) -> list[str]:
@@ -86,31 +97,49 @@ def _left_out(reasons: Sequence[str]) -> list[str]:
 
 
 def _doubts(found: SizeAnswer) -> list[str]:
-    said = []
-    for sense, one in found.by_sense.items():
-        if isinstance(one, FitRefused):
-            said.append(f"{sense}: {one}")
-        elif isinstance(one, ShapelessAnswer) and one.strange:
-            said.append(
-                f"{sense}: the reading is unlike the household shapes that were learnt ({one.distance:.1f} "
-                "times the usual distance from them); its interval is widened for it"
-            )
-        elif one.belief.outside > OUTSIDE:
-            said.append(
-                f"{sense}: the size is likely outside the range that was asked about "
-                f"({100 * one.belief.outside:.0f} %); widen object.sizes"
-            )
-        else:
-            low, high = one.belief.interval
-            if not low <= found.fused.size <= high and not _wider(one.belief, found.fused):
-                said.append(
-                    f"{sense} alone says {1e2 * low:.1f} to {1e2 * high:.1f} cm, which leaves the fused "
-                    "answer out: look at its readings"
-                )
-    return said
+    answers = [(sense, one) for sense, one in found.by_sense.items() if not isinstance(one, FitRefused)]
+    stated = [f"{sense}: {one}" for sense, one in found.by_sense.items() if isinstance(one, FitRefused)]
+    stated += [doubt for sense, one in answers if (doubt := _doubt(sense, one))]
+    stated += [
+        f"{a} ({_span(one.belief)}) and {b} ({_span(other.belief)}) contradict each other: one of them read "
+        "another object, or a bench unlike what the station states; look at the readings of both"
+        for (a, one), (b, other) in combinations(answers, 2)
+        if not _meet(one.belief, other.belief)
+    ]
+    return stated
 
 
-def _wider(one: Belief, other: Belief) -> bool:
+def _doubt(sense: str, one: Said) -> str | None:
+    """What is wrong with an answer, by itself; None where nothing is."""
+    if isinstance(one, ShapelessAnswer):
+        if not one.strange:
+            return None
+        return (
+            f"{sense}: the reading is unlike the household shapes that were learnt ({one.distance:.1f} "
+            "times the usual distance from them); its interval is widened for it"
+        )
+    if one.belief.outside > OUTSIDE:
+        return (
+            f"{sense}: the size is likely outside the range that was asked about "
+            f"({100 * one.belief.outside:.0f} %); widen object.sizes"
+        )
+    if _width(one.belief) > OPEN * _width(Belief.ignorant(one.belief.range)):
+        return f"{sense} leaves the size open ({_span(one.belief)}); {_NARROWED_BY[sense]}"
+    return None
+
+
+def _width(belief: Belief) -> float:
+    """Of its nine-tenths interval, in the logarithm."""
+    low, high = belief.interval
+    return float(np.log(high / low))
+
+
+def _span(belief: Belief) -> str:
+    low, high = belief.interval
+    return f"{1e2 * low:.1f} to {1e2 * high:.1f} cm"
+
+
+def _meet(one: Belief, other: Belief) -> bool:
     """Whether two nine-tenths intervals overlap at all."""
     (a, b), (c, d) = one.interval, other.interval
     return max(a, c) <= min(b, d)

@@ -4,22 +4,30 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.experiment import EXPERIMENT
 from experiments.scale_estimation.model import ObjectModel
+from experiments.scale_estimation.section import Scale
+from experiments.scale_estimation.size import Belief
+from experiments.scale_estimation.touch.touch import Touch
 from harness.basics.errors import MeshRefused, WrongUse
+from harness.bench.acquisition import Strike
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import finish
 from harness.experiment.begin import begin
 from harness.experiment.experiment import Scored
+from harness.objects.household import build
+from harness.recording.look_pictures import BARE_IMAGE, IMAGE
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
+from harness.recording.step_file import StepRecord
 from tests.experiments.scale_estimation.runs import answered, ran, scene_of, went_on
-from tests.support.whole_run import with_spoiled_pictures
+from tests.support.whole_run import with_reading, with_spoiled_pictures
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +147,89 @@ def test_an_object_that_cannot_be_filled_with_elements_leaves_out_sound_alone(
     found = answering.answer()
     assert "cannot be filled" in str(found.by_sense["audio"])
     assert found.sight is not None
+
+
+def of_run(recording: Recording, **changed: Any) -> ScaleAnswering:
+    """What answers it, nothing taken in yet; attributes of the run's files changed."""
+    run = RunFiles(recording)
+    for name, value in changed.items():
+        object.__setattr__(run, name, value)
+    return ScaleAnswering(run, Accuracy.default(EXPERIMENT.knobs))
+
+
+def without_the_object(record: StepRecord) -> StepRecord:
+    """Its look shows the bare bench twice."""
+    if IMAGE not in record.readings:
+        return record
+    bare = record.readings[BARE_IMAGE].values
+    return with_reading(record, IMAGE, lambda _: bare)
+
+
+def result_of(answering: ScaleAnswering) -> dict[str, Any]:
+    found = answering.answer()
+    return EXPERIMENT.result(Scored(answering.run, answering, found, None, answering.accuracy, ()))
+
+
+def test_where_nothing_is_seen_heard_or_touched_the_answer_is_the_range_and_every_sense_has_a_reason(
+    touched: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.scale_estimation.answer.patch_of_contact", lambda *_: None)
+    scene = RunFiles(touched).scene
+    sensors = scene.sensors.model_copy(update={"sound": True})
+    answering = of_run(touched, scene=scene.model_copy(update={"sensors": sensors}))
+    for record in touched.steps():
+        answering.read(without_the_object(record))
+    nothing = np.zeros(25_000)
+    answering.strikes.append(
+        Strike(50e3, nothing, nothing, 0, 0.0, overload=False, double_hit=False, silent=True)
+    )
+    result = result_of(answering)
+    reasons = {"vision": "covers 0 pixels", "audio": "nothing was heard", "touch": "touched nothing"}
+    for sense, reason in reasons.items():
+        assert reason in result["estimates"][sense]["refused"]
+        assert any(one.startswith(f"{sense}:") and reason in one for one in result["warnings"])
+    low, high = Belief.ignorant(answering.model.sizes).interval
+    assert result["estimates"]["fused"]["low90_m"] == low
+    assert result["estimates"]["fused"]["high90_m"] == high
+
+
+def test_a_run_of_another_object_is_refused_by_sight_and_no_narrow_answer_remains(touched: Recording) -> None:
+    true = answered(touched)["size_m"]
+    for name in ("wrench", "bowl"):
+        answering = of_run(touched, mesh=build(name))
+        for record in touched.steps():
+            answering.read(record)
+        result = result_of(answering)
+        assert "this object's" in result["estimates"]["vision"]["refused"]
+        fused = result["estimates"]["fused"]
+        assert fused["low90_m"] <= true <= fused["high90_m"] or fused["high90_m"] > 1.5 * fused["low90_m"]
+
+
+def test_senses_that_contradict_each_other_are_named(
+    touched: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def elsewhere(answering: ScaleAnswering) -> Touch:
+        sizes = answering.model.sizes
+        belief = Belief.of(sizes, -0.5 * ((sizes.logs - np.log(0.9 * sizes.high)) / 0.02) ** 2)
+        return Touch(belief, np.zeros(8), 0.0, 0.0)
+
+    monkeypatch.setattr(ScaleAnswering, "_by_touch", elsewhere)
+    result = answered(touched)
+    assert any("vision (" in one and "and touch (" in one for one in result["warnings"])
+
+
+def test_where_nobody_knows_how_far_the_camera_is_sight_leaves_the_size_open_and_a_warning_names_it(
+    touched: Recording,
+) -> None:
+    scene = RunFiles(touched).scene
+    far = scene.section(Scale).model_copy(update={"camera_position_error": 10.0})
+    answering = of_run(touched, scene=scene.with_section(far))
+    answering.read(touched.step(0))
+    result = result_of(answering)
+    assert any(one.startswith("vision leaves the size open") for one in result["warnings"])
+    low, high = Belief.ignorant(answering.model.sizes).interval
+    vision = result["estimates"]["vision"]
+    assert vision["high90_m"] / vision["low90_m"] > (high / low) ** 0.75
 
 
 def test_a_scene_that_reads_nothing_is_refused_before_anything_moves(
