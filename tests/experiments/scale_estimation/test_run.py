@@ -194,15 +194,15 @@ def test_where_nothing_is_seen_heard_or_touched_the_answer_is_the_range_and_ever
 
 
 def test_a_run_of_another_object_is_refused_by_sight_and_no_narrow_answer_remains(touched: Recording) -> None:
+    """This mug's outline is a wrench's that leans by ten standard deviations of its tilt."""
     true = answered(touched)["size_m"]
-    for name in ("wrench", "bowl"):
-        answering = of_run(touched, mesh=build(name))
-        for record in touched.steps():
-            answering.read(record)
-        result = result_of(answering)
-        assert "this object's" in result["estimates"]["vision"]["refused"]
-        fused = result["estimates"]["fused"]
-        assert fused["low90_m"] <= true <= fused["high90_m"] or fused["high90_m"] > 1.5 * fused["low90_m"]
+    answering = of_run(touched, mesh=build("wrench"))
+    for record in touched.steps():
+        answering.read(record)
+    result = result_of(answering)
+    assert "this object's only if its tilt" in result["estimates"]["vision"]["refused"]
+    fused = result["estimates"]["fused"]
+    assert fused["low90_m"] <= true <= fused["high90_m"] or fused["high90_m"] > 1.5 * fused["low90_m"]
 
 
 def test_senses_that_contradict_each_other_are_named(
