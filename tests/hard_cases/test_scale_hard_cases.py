@@ -9,7 +9,7 @@ from experiments.scale_estimation.size import Belief, SizeRange, fused
 from experiments.scale_estimation.sound.hearing import Hearing, MaterialGuess, by_sound
 from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.touch.patch import POINTS, Patch
-from experiments.scale_estimation.touch.touch import by_touch
+from experiments.scale_estimation.touch.touch import DOUBTED, by_touch
 from experiments.scale_estimation.vision.vision import by_sight, stands_seen
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
@@ -17,7 +17,7 @@ from harness.basics.materials import MATERIALS
 from harness.picture.camera_errors import CameraErrors
 from harness.picture.outline import read_outline
 from tests.experiments.scale_estimation.test_sound import BAND, DECAY, NOMINAL, model, of, peaks_at
-from tests.experiments.scale_estimation.test_touch import PLACE, stand_of
+from tests.experiments.scale_estimation.test_touch import PLACE, contacts, stand_of
 from tests.experiments.scale_estimation.test_vision import mask_at, nominal, outline_at, view_of
 
 RANGE = SizeRange(0.05, 0.45)
@@ -91,6 +91,19 @@ def test_two_senses_that_contradict_each_other_leave_both_sizes_open() -> None:
         low, high = fused([one, other]).interval
         assert low <= min(0.15, wrong)
         assert high >= max(0.15, wrong)
+
+
+@pytest.mark.parametrize(
+    ("known", "touched"), [("mug", "plate"), pytest.param("pitcher", "mug", marks=pytest.mark.slow)]
+)
+def test_contacts_on_another_object_are_refused_or_leave_the_size_open(known: str, touched: str) -> None:
+    stand, size = stand_of(known)
+    try:
+        found = by_touch(stand, contacts(touched, 1.0, 10), size, RANGE)
+    except FitRefused:
+        return
+    assert found.cost > DOUBTED
+    assert width(found.belief) > 0.5 * width(Belief.ignorant(RANGE))
 
 
 # What is seen, or where the camera is.

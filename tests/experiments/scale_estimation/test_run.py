@@ -205,17 +205,18 @@ def test_a_run_of_another_object_is_refused_by_sight_and_no_narrow_answer_remain
     assert fused["low90_m"] <= true <= fused["high90_m"] or fused["high90_m"] > 1.5 * fused["low90_m"]
 
 
-def test_senses_that_contradict_each_other_are_named(
+def test_senses_that_contradict_each_other_and_contacts_that_fit_badly_are_named(
     touched: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def elsewhere(answering: ScaleAnswering) -> Touch:
         sizes = answering.model.sizes
         belief = Belief.of(sizes, -0.5 * ((sizes.logs - np.log(0.9 * sizes.high)) / 0.02) ** 2)
-        return Touch(belief, np.zeros(8), 0.0, 0.0)
+        return Touch(belief, np.zeros(8), 2.5, 0.0)  # a cost that is seldom the right object's
 
     monkeypatch.setattr(ScaleAnswering, "_by_touch", elsewhere)
     result = answered(touched)
     assert any("vision (" in one and "and touch (" in one for one in result["warnings"])
+    assert any(one.startswith("touch: the contacts may be of another object") for one in result["warnings"])
 
 
 def test_where_nobody_knows_how_far_the_camera_is_sight_leaves_the_size_open_and_a_warning_names_it(
