@@ -191,7 +191,7 @@ class OutlineProblem:
         """``(k, 72 + 14)`` in deviations, and their slopes ``(k, 72 + 14, 14)``."""
         view, towards = self.view, directions()
         places = view.project(unknowns, view.corners)
-        reach = np.einsum("knj,dj->kdn", places, towards)
+        reach = towards @ places.swapaxes(1, 2)
         farthest = reach.argmax(axis=2)
         extents = np.take_along_axis(reach, farthest[..., None], axis=2)[..., 0]
         # The corner that is farthest stays so for a nudge: only its own motion counts (the envelope theorem).
