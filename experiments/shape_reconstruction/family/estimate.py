@@ -14,7 +14,7 @@ from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contacts_fit import ContactFit, contact_fit, moved_points
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import median_surface
-from experiments.shape_reconstruction.family.known import known_by, not_bounded
+from experiments.shape_reconstruction.family.known import beyond_contacts, known_by, not_bounded
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import FamilySettings
@@ -85,17 +85,22 @@ def family_estimate(
         mesh=mesh,
         deviation=_deviation(plain, mixture, mesh) * np.sqrt(1.0 + MISFIT * fit.typical),
         known_by=known_by(mesh.vertices, evidence),
-        not_bounded=not_bounded(evidence),
+        not_bounded=not_bounded(evidence, mesh, fit.typical > OUTSIDE),
         doubtful=doubtful,
         flags=_flags(mixture, fit, doubtful),
         seconds=time.perf_counter() - began,
-        details={**_details(mixture, fit), "foreign": _is_foreign(fit)},
+        details={**_details(mixture, fit), "foreign": _is_foreign(fit), "beyond_m": _beyond(mesh, evidence)},
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
 
 
 def _is_foreign(fit: ContactFit) -> bool:
     return bool(len(fit.sums)) and fit.typical > FOREIGN * (1.0 + SURE / len(fit.sums))
+
+
+def _beyond(mesh: Mesh, evidence: ShapeEvidence) -> float:
+    """M, mean over the answer of how far it lies beyond its contacts."""
+    return float(np.linalg.norm(beyond_contacts(mesh.vertices, evidence), axis=1).mean())
 
 
 def _by_picture_alone(found: ShapeEstimate, evidence: ShapeEvidence) -> ShapeEstimate:
