@@ -13,7 +13,7 @@ ENOUGH = 6
 
 
 MANY, BEYOND = 12, 10.0e-3
-"""Contacts without a picture, and m beyond them that the household shape lies in the mean, from which on it is
+"""Contacts without a picture, and m beyond them that a household shape lies in the mean, from which on it is
 not believed: so many presses would have met it there."""
 
 

@@ -12,7 +12,7 @@ from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidenc
 from harness.basics.arrays import FloatArray
 
 SLACK = 4.0e-3
-"""M inside turned room that the body may seem to be: errors of the axis, and bodies that are not quite round."""
+"""M inside turned room that the body may seem to be: errors of the axis, bodies that are not quite round."""
 
 BELOW = 15.0e-3
 """M below the highest contact, from which on a touch went down into the body or beside its upper part."""
@@ -28,7 +28,7 @@ class TurnedRoom:
 
     Attributes:
         centre: ``(2,)`` m, of the axis in ``stand``.
-        depth: ``(radii, heights)`` m, ``PITCH`` apart from zero on, that a place is deep in it; below 0 beside.
+        depth: ``(radii, heights)`` m, ``PITCH`` apart from zero, that a place is deep in it; below 0 beside.
     """
 
     centre: FloatArray

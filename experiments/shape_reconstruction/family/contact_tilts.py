@@ -28,6 +28,13 @@ POINT_SIGMA, NORMAL_SIGMA = 0.6e-3, float(np.radians(4.0))
 SHIFT_SIGMA = (1.0e-3, 1.0e-3, 2.0e-3)
 """M along x, y and z of the gel that the nearest shape lies beside a real one at a contact."""
 
+TURNED, APART, GAIN = float(np.radians(9.0)), 3.0, 8.0
+"""Rad, times the median contact, and the sum of squares: more than errors of gel and shape explain."""
+
+WIDE, SMOOTH = 1.2e-3, float(np.radians(10.0))
+"""M rms of a contact's points across its narrower side, and rad of its normals about their mean: of a press
+on an edge normals are off by 30 degrees and more at a right pose."""
+
 TILT_SIGMA = float(np.radians(30.0))
 
 OUT, STEP = 1.5e-3, 1.0e-3
@@ -38,38 +45,46 @@ _STEPS = np.array([1e-4, 1e-4, 1e-4, 1e-2, 1e-2])
 _ROUNDS = 5
 
 
-@dataclass(frozen=True, eq=False)
-class ContactTilts:
-    """Of every contact, in their order.
+def turned_contacts(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
+    """``(contacts,)`` rad by which the pose of each contact is turned against a shape; 0 where it is right.
 
-    Attributes:
-        angles: ``(contacts,)`` rad, by which each is turned about axes in the gel's face to fit best.
-        gains: ``(contacts,)`` by how much the sum of squares is less for that.
+    It is turned where it fits much better turned, by more than ``TURNED`` and thrice as far as the others.
+    Contacts of edges and corners are not judged, and 0.
     """
+    found = np.zeros(len(evidence.contacts))
+    judged = [k for k, touch in enumerate(evidence.contacts) if _is_face(touch)]
+    if not judged:
+        return found
+    tilts = np.array([_tilt(shape, evidence.contacts[k]) for k in judged])
+    least = max(TURNED, APART * float(np.median(tilts[:, 0])))
+    turned = (tilts[:, 0] > least) & (tilts[:, 1] > GAIN)
+    found[judged] = np.where(turned, tilts[:, 0], 0.0)
+    return found
 
-    angles: FloatArray
-    gains: FloatArray
 
-
-def contact_tilts(shape: FamilyShape, evidence: ShapeEvidence) -> ContactTilts:
-    """How the contacts are turned against a shape."""
-    found = [_tilt(shape, touch) for touch in evidence.contacts]
-    return ContactTilts(np.array([angle for angle, _ in found]), np.array([gain for _, gain in found]))
+def _is_face(touch: GuardedTouch) -> bool:
+    """Whether it met a smooth piece of surface, wide both ways: an edge has no one normal."""
+    middle = touch.points.mean(axis=0)
+    widths = np.linalg.svd(touch.points - middle, compute_uv=False) / np.sqrt(len(touch.points))
+    mean = touch.normals.mean(axis=0)
+    spread = np.arccos(np.clip(touch.normals @ mean / max(float(np.linalg.norm(mean)), 1e-9), -1.0, 1.0))
+    return bool(len(widths) > 1 and widths[1] > WIDE and spread.mean() < SMOOTH)
 
 
 def _tilt(shape: FamilyShape, touch: GuardedTouch) -> tuple[float, float]:
+    """Rad that it is turned to fit best, and by how much its sum of squares is less for that."""
     patch = _Patch.of(touch, shape.theta[layout.GEL : layout.GEL + 3])
     _, shifted = _least(shape, patch, 3)
     moved, turned = _least(shape, patch, 5)
-    return float(np.linalg.norm(moved[3:])), max(shifted - turned, 0.0)
+    return float(np.linalg.norm(moved[3:])), shifted - turned
 
 
 @dataclass(frozen=True, eq=False)
 class _Patch:
-    """Points and the normals there in the frame of the gel, and where that is."""
+    """Points and their mean normal in the frame of the gel, about their middle, and where that is."""
 
     points: FloatArray
-    normals: FloatArray
+    normal: FloatArray
     turn: FloatArray
     place: FloatArray
 
@@ -77,29 +92,29 @@ class _Patch:
     def of(cls, touch: GuardedTouch, gel: FloatArray) -> "_Patch":
         rows = farthest_points(touch.points, POINTS)
         turn, place = touch.stand_from_gel[:3, :3], touch.points[rows].mean(axis=0)
-        return cls(
-            (touch.points[rows] - place) @ turn, touch.normals[rows] @ turn, turn, place + turn @ gel
-        )
+        total = touch.normals.sum(axis=0) @ turn
+        normal = total / max(float(np.linalg.norm(total)), 1e-9)
+        return cls((touch.points[rows] - place) @ turn, normal, turn, place + turn @ gel)
 
     def residuals(self, shape: FamilyShape, moved: FloatArray) -> FloatArray:
-        """``(5 + 4 n,)``: of the move itself, of each point, and of each normal's components."""
+        """``(5 + n + 3,)``: of the move itself, of each point, and of the normal."""
         about = rotation_from_vector(np.array([moved[3], moved[4], 0.0]))
         points = (self.points @ about.T + moved[:3]) @ self.turn.T + self.place
-        normals = self.normals @ about.T @ self.turn.T
+        normal = self.turn @ about @ self.normal
         share = np.sqrt(INDEPENDENT / len(points))
         gap = distances(shape.code, shape.theta, points) * share / POINT_SIGMA
-        bent = (_slopes(shape, points + OUT * normals) - normals) * share / NORMAL_SIGMA
-        return np.concatenate([moved / _PRIOR, gap, bent.ravel()])
+        bent = (_slope(shape, points.mean(axis=0) + OUT * normal) - normal) / NORMAL_SIGMA
+        return np.concatenate([moved / _PRIOR, gap, bent])
 
 
-def _slopes(shape: FamilyShape, points: FloatArray) -> FloatArray:
+def _slope(shape: FamilyShape, point: FloatArray) -> FloatArray:
     steps = STEP * np.concatenate([np.eye(3), -np.eye(3)])
-    around = distances(shape.code, shape.theta, (points[:, None] + steps).reshape(-1, 3)).reshape(-1, 6)
-    return np.asarray((around[:, :3] - around[:, 3:]) / (2.0 * STEP))
+    around = distances(shape.code, shape.theta, point + steps)
+    return np.asarray((around[:3] - around[3:]) / (2.0 * STEP))
 
 
 def _least(shape: FamilyShape, patch: _Patch, free: int) -> tuple[FloatArray, float]:
-    """The move of least sum of squares, its first ``free`` numbers free, by Gauss and Newton; and that sum."""
+    """The move of least sum of squares with its first ``free`` numbers free (Gauss-Newton), and that sum."""
     moved = np.zeros(5)
     rows = patch.residuals(shape, moved)
     for _ in range(_ROUNDS):

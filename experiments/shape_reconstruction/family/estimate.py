@@ -11,6 +11,7 @@ from experiments.shape_reconstruction.estimators.knowledge import not_bounded as
 from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.classes import FamilyShape
+from experiments.shape_reconstruction.family.contact_tilts import turned_contacts
 from experiments.shape_reconstruction.family.contacts_fit import ContactFit, contact_fit, moved_points
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import median_surface
@@ -73,7 +74,9 @@ def family_estimate(
     search = FamilySearch(evidence, settings)
     seeds = [seed for estimate in previous for seed in _seeds_of(search, estimate)]
     mixture = mixture_of(search.found(seeds), sighted, bool(evidence.contacts), settings.seed)
+    turned = turned_contacts(mixture.best.shape, evidence)
     fit = contact_fit(mixture.best.shape, search.full)
+    fit = replace(fit, doubtful=fit.doubtful | (turned > 0.0))
     plain = median_surface(mixture, settings.pitch)
     mesh = _warped(plain, mixture.best.shape, evidence, fit)
     doubtful = {
@@ -87,7 +90,7 @@ def family_estimate(
         known_by=known_by(mesh.vertices, evidence),
         not_bounded=not_bounded(evidence, mesh, fit.typical > OUTSIDE),
         doubtful=doubtful,
-        flags=_flags(mixture, fit, doubtful),
+        flags=(*_flags(mixture, fit, doubtful), *_turned_flags(evidence, turned)),
         seconds=time.perf_counter() - began,
         details={**_details(mixture, fit), "foreign": _is_foreign(fit), "beyond_m": _beyond(mesh, evidence)},
     )
@@ -165,6 +168,15 @@ def _flags(mixture: Mixture, fit: ContactFit, doubtful: dict[int, float]) -> tup
     if doubtful:
         flags.append(f"contacts that do not fit the rest: {', '.join(str(index) for index in doubtful)}")
     return tuple(flags)
+
+
+def _turned_flags(evidence: ShapeEvidence, turned: FloatArray) -> list[str]:
+    named = [
+        f"{touch.index} ({np.degrees(angle):.0f} deg)"
+        for touch, angle in zip(evidence.contacts, turned, strict=True)
+        if angle > 0.0
+    ]
+    return [f"contacts whose pose is turned against the rest: {', '.join(named)}"] if named else []
 
 
 def _details(mixture: Mixture, fit: ContactFit) -> dict[str, object]:

@@ -43,9 +43,7 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
     sighted: bool,
     smooth: bool,
 ) -> None:
-    part = replace(
-        readings, touches=readings.touches[:contacts], look=readings.look if sighted else None
-    )
+    part = replace(readings, touches=readings.touches[:contacts], look=readings.look if sighted else None)
     by_rbf = by_hermite(part, symmetric=False)
     fitted: ShapeEstimate = replace(
         by_rbf,

@@ -1,4 +1,4 @@
-"""Free space of a round body, turned about its axis: a vessel is hollow where the sensor went down into it."""
+"""Free space of a round body, turned about its axis: a vessel is hollow where the sensor was in it."""
 
 from dataclasses import replace
 
