@@ -19,6 +19,6 @@ def interpolated(points: FloatArray, neighbours: int = NEIGHBOURS) -> FloatArray
         points: ``(n, 3)`` m, more than ``neighbours``.
         neighbours: of each point.
     """
-    nearest = cKDTree(points).query(points, k=neighbours + 1)[1][:, 1:]
+    nearest = np.asarray(cKDTree(points).query(points, k=neighbours + 1)[1])[:, 1:]
     middles = 0.5 * (points[:, None] + points[nearest])
     return np.concatenate([points, middles.reshape(-1, 3)])

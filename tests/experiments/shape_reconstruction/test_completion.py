@@ -93,7 +93,7 @@ def test_points_between_neighbours_lie_on_the_surface_to_second_order_and_fill_i
         assert points.shape == (9 * count, 3)
         np.testing.assert_array_equal(points[:count], sphere[:count])
         off.append(np.abs(np.linalg.norm(points, axis=1) - 1.0).mean())
-        gaps.append([cKDTree(some).query(sphere)[0].mean() for some in (sphere[:count], points)])
+        gaps.append([np.mean(cKDTree(some).query(sphere)[0]) for some in (sphere[:count], points)])
     assert off[1] == pytest.approx(off[0] / 8.0, rel=0.2)  # eight times as many: the square of the spacing
     assert all(after < 0.7 * before for before, after in gaps)
 

@@ -45,7 +45,8 @@ def axis_of(samples: ContactSamples) -> Revolution:
 
 def circle(radius: float, z: float) -> FloatArray:
     angles = np.linspace(0.0, 2.0 * np.pi, 9)
-    return CENTRE + np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(9, z)])
+    places = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(9, z)])
+    return np.asarray(CENTRE + places)
 
 
 def test_room_is_as_free_as_the_sensor_left_it_and_the_same_all_around() -> None:
