@@ -38,6 +38,9 @@ wrong elsewhere too."""
 OUTSIDE = 6.0
 """A contact's typical sum of squares, of some five numbers, above which the object is of no class."""
 
+LOOSE = 10.0
+"""The same above which the class does not limit what no reading does."""
+
 FOREIGN, SURE = 20.0, 6.0
 """A contact's typical sum of squares above which no class fits at all, were contacts without number; of so
 many contacts it is twice that."""
@@ -88,7 +91,7 @@ def family_estimate(
         mesh=mesh,
         deviation=_deviation(plain, mixture, mesh) * np.sqrt(1.0 + MISFIT * fit.typical),
         known_by=known_by(mesh.vertices, evidence),
-        not_bounded=not_bounded(evidence, mesh, fit.typical > OUTSIDE),
+        not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE),
         doubtful=doubtful,
         flags=(*_flags(mixture, fit, doubtful), *_turned_flags(evidence, turned)),
         seconds=time.perf_counter() - began,

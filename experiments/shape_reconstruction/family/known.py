@@ -65,7 +65,7 @@ def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str
     Args:
         evidence: one contact or a silhouette at least.
         mesh: the answer.
-        outside: whether its contacts say that the object is of no class.
+        outside: whether its contacts do not fit any class.
     """
     if evidence.look is not None and _limits(evidence.look):
         return _open_without_class(evidence, mesh) if outside else ()
