@@ -69,8 +69,9 @@ def test_contacts_of_no_object_at_all_are_foreign_to_the_family(readings: ShapeE
     random = np.random.default_rng(0)
     scattered = tuple(
         replace(touch, points=touch.points + random.uniform(-0.03, 0.03, 3), normals=-touch.normals)
-        for touch in readings.touches
+        for touch in readings.touches[:8]
     )
     few = replace(LEVELS["coarse"], draws=42)
     assert family_estimate(replace(readings, touches=scattered), few).details["foreign"]
-    assert not family_estimate(readings, few).details["foreign"]
+    right = replace(readings, touches=readings.touches[:8])
+    assert not family_estimate(right, few).details["foreign"]
