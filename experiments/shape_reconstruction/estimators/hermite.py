@@ -22,6 +22,7 @@ from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.estimators.revolution import Revolution, find_revolution
 from experiments.shape_reconstruction.estimators.silhouette_rim import rim_data
 from experiments.shape_reconstruction.estimators.thin_plate import SurfaceData, ThinPlateField, fitted
+from experiments.shape_reconstruction.estimators.turned_room import SLACK, TurnedRoom, turned_room
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
@@ -53,17 +54,23 @@ _NEAR = 2.0 * PITCH
 
 @dataclass(frozen=True, eq=False)
 class _Bounds:
-    """Where the object is at most: not beyond the hull of ``(n, 3)`` m of its places, nor in free space."""
+    """Where the object is at most: not beyond the hull of ``(n, 3)`` m of its places, nor in free space.
+
+    Of a round body free space is turned about its axis as well.
+    """
 
     evidence: ShapeEvidence
     places: FloatArray
     silhouette: Silhouette | None
+    room: TurnedRoom | None
 
     def beyond(self, points: FloatArray) -> FloatArray:
         """``(n,)`` m that points are outside; below 0 within."""
         outside = np.maximum(sensor_depth(self.evidence, points) - CLEARANCE, -points[:, 2])
         near = cKDTree(self.places).query(points)[0]
         outside = np.maximum(outside, _outside_hull(self._hull_points, points) - _HULL - SLOPE * near)
+        if self.room is not None:
+            outside = np.maximum(outside, self.room.at(points) - SLACK)
         if self.silhouette is not None:
             outside = np.maximum(outside, self.silhouette.outside_metres(points) - _SILHOUETTE)
         return outside
@@ -99,7 +106,8 @@ def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate
         data = data.joined(_copies(axis, samples, evidence, silhouette))
         low, high = _box(data.points, evidence.largest)
         field = fitted(data, low, high, by_contacts.amplitude)
-    bounds = _Bounds(evidence, data.points, silhouette)
+    room = None if axis is None else turned_room(axis, samples, evidence)
+    bounds = _Bounds(evidence, data.points, silhouette, room)
     if silhouette is not None:
         rim = rim_data(silhouette, _cut(field, bounds), data.points, low, high)
         field = fitted(data.joined(rim), low, high, by_contacts.amplitude)

@@ -26,6 +26,9 @@ SHARE, AGREEING = 0.6, 0.5
 PLACES, TOUCHES = 10, 6
 """With partners, and of how many touches, before an axis is believed."""
 
+OPEN = float(np.radians(200.0))
+"""Rad around the axis without a place of the body, at most: a rounded corner is part of a circle too."""
+
 COPIES = 16
 """Of each place, around the axis."""
 
@@ -89,7 +92,15 @@ def find_revolution(samples: ContactSamples, seed: int = 0) -> Revolution | None
     agreeing = float((radial & (off < OFF))[paired].mean())
     of_body = np.ones(len(samples.points), dtype=bool)
     of_body[side] = radial & ~(off >= OFF)
-    return Revolution(centre, share, of_body) if share >= SHARE and agreeing >= AGREEING else None
+    believed = share >= SHARE and agreeing >= AGREEING and _widest_gap(upright, radial, centre) <= OPEN
+    return Revolution(centre, share, of_body) if believed else None
+
+
+def _widest_gap(side: ContactSamples, radial: BoolArray, centre: FloatArray) -> float:
+    """Rad around an axis between neighbouring places whose normals meet it."""
+    out = side.points[radial, :2] - centre
+    angles = np.sort(np.arctan2(out[:, 1], out[:, 0]))
+    return float(np.diff(angles, append=angles[:1] + 2.0 * np.pi).max(initial=0.0))
 
 
 def _best_centre(side: ContactSamples) -> FloatArray:

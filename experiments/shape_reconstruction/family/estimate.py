@@ -11,10 +11,11 @@ from experiments.shape_reconstruction.estimators.knowledge import not_bounded as
 from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.classes import FamilyShape
+from experiments.shape_reconstruction.family.contact_tilts import turned_contacts
 from experiments.shape_reconstruction.family.contacts_fit import ContactFit, contact_fit, moved_points
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import median_surface
-from experiments.shape_reconstruction.family.known import known_by, not_bounded
+from experiments.shape_reconstruction.family.known import beyond_contacts, known_by, not_bounded
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import FamilySettings
@@ -36,6 +37,9 @@ wrong elsewhere too."""
 
 OUTSIDE = 6.0
 """A contact's typical sum of squares, of some five numbers, above which the object is of no class."""
+
+LOOSE = 10.0
+"""The same above which the class does not limit what no reading does."""
 
 FOREIGN, SURE = 20.0, 6.0
 """A contact's typical sum of squares above which no class fits at all, were contacts without number; of so
@@ -73,7 +77,9 @@ def family_estimate(
     search = FamilySearch(evidence, settings)
     seeds = [seed for estimate in previous for seed in _seeds_of(search, estimate)]
     mixture = mixture_of(search.found(seeds), sighted, bool(evidence.contacts), settings.seed)
+    turned = turned_contacts(mixture.best.shape, evidence)
     fit = contact_fit(mixture.best.shape, search.full)
+    fit = replace(fit, doubtful=fit.doubtful | (turned > 0.0))
     plain = median_surface(mixture, settings.pitch)
     mesh = _warped(plain, mixture.best.shape, evidence, fit)
     doubtful = {
@@ -85,17 +91,22 @@ def family_estimate(
         mesh=mesh,
         deviation=_deviation(plain, mixture, mesh) * np.sqrt(1.0 + MISFIT * fit.typical),
         known_by=known_by(mesh.vertices, evidence),
-        not_bounded=not_bounded(evidence),
+        not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE),
         doubtful=doubtful,
-        flags=_flags(mixture, fit, doubtful),
+        flags=(*_flags(mixture, fit, doubtful), *_turned_flags(evidence, turned)),
         seconds=time.perf_counter() - began,
-        details={**_details(mixture, fit), "foreign": _is_foreign(fit)},
+        details={**_details(mixture, fit), "foreign": _is_foreign(fit), "beyond_m": _beyond(mesh, evidence)},
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
 
 
 def _is_foreign(fit: ContactFit) -> bool:
     return bool(len(fit.sums)) and fit.typical > FOREIGN * (1.0 + SURE / len(fit.sums))
+
+
+def _beyond(mesh: Mesh, evidence: ShapeEvidence) -> float:
+    """M, mean over the answer of how far it lies beyond its contacts."""
+    return float(np.linalg.norm(beyond_contacts(mesh.vertices, evidence), axis=1).mean())
 
 
 def _by_picture_alone(found: ShapeEstimate, evidence: ShapeEvidence) -> ShapeEstimate:
@@ -160,6 +171,15 @@ def _flags(mixture: Mixture, fit: ContactFit, doubtful: dict[int, float]) -> tup
     if doubtful:
         flags.append(f"contacts that do not fit the rest: {', '.join(str(index) for index in doubtful)}")
     return tuple(flags)
+
+
+def _turned_flags(evidence: ShapeEvidence, turned: FloatArray) -> list[str]:
+    named = [
+        f"{touch.index} ({np.degrees(angle):.0f} deg)"
+        for touch, angle in zip(evidence.contacts, turned, strict=True)
+        if angle > 0.0
+    ]
+    return [f"contacts whose pose is turned against the rest: {', '.join(named)}"] if named else []
 
 
 def _details(mixture: Mixture, fit: ContactFit) -> dict[str, object]:

@@ -4,10 +4,15 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from experiments.shape_reconstruction.estimators.contact_samples import all_samples
+from experiments.shape_reconstruction.estimators.knowledge import limited_sides
+from experiments.shape_reconstruction.estimators.knowledge import not_bounded as open_axes
+from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.geometry import apply, inverse
+from harness.basics.mesh import Mesh
 
 UNDER_GEL = 6.0e-3
 """M from a contact's points within which a surface counts as touched."""
@@ -17,6 +22,9 @@ BORDER = 1.5
 
 LIMITING = 0.4
 """Part of a contact's normal along an axis from which on it limits the extent there."""
+
+SHORT = 25.0e-3
+"""M that an answer may go on beyond its last contact along an axis before nothing bounds it there."""
 
 MOST_HIDDEN = 0.4
 """Share of the silhouette's border that may be hidden before it limits no extent."""
@@ -47,21 +55,48 @@ def _at_border(vertices: FloatArray, look: SeenMask) -> BoolArray:
     return near
 
 
-def not_bounded(evidence: ShapeEvidence) -> tuple[str, ...]:
-    """Names of the axes of ``stand`` along which neither a contact nor the silhouette limits the object.
+def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str, ...]:
+    """Names of the axes of ``stand`` along which nothing limits the object; by the support it is from below.
 
-    Along z the support limits it from below.
+    The silhouette and a class that fits limit it all around. Where the class does not, the silhouette limits
+    what the camera looks across, and the rest is limited by contacts near its ends alone. Without a
+    silhouette contacts must look both ways along an axis, and end no more than ``SHORT`` before the answer.
+
+    Args:
+        evidence: one contact or a silhouette at least.
+        mesh: the answer.
+        outside: whether its contacts do not fit any class.
     """
     if evidence.look is not None and _limits(evidence.look):
-        return ()
+        return _open_without_class(evidence, mesh) if outside else ()
     normals = np.array([_mean(touch.normals) for touch in evidence.contacts]).reshape(-1, 3)
+    supposed = beyond_contacts(mesh.vertices, evidence).max(axis=0)
     free = []
     for axis, name in enumerate("xyz"):
         upper = bool((normals[:, axis] > LIMITING).any())
         lower = axis == 2 or bool((normals[:, axis] < -LIMITING).any())
-        if not (upper and lower):
+        if not (upper and lower) or supposed[axis] > SHORT:
             free.append(name)
     return tuple(free)
+
+
+def _open_without_class(evidence: ShapeEvidence, mesh: Mesh) -> tuple[str, ...]:
+    samples = all_samples(evidence)
+    return open_axes(limited_sides(mesh, samples, silhouette_of(evidence, samples.points)))
+
+
+def beyond_contacts(vertices: FloatArray, evidence: ShapeEvidence) -> FloatArray:
+    """``(n, 3)`` m along each axis by which vertices lie outside of the box of all contacts and the support.
+
+    Zero for all without a contact.
+    """
+    points = [touch.points for touch in evidence.contacts]
+    if not points:
+        return np.zeros_like(vertices)
+    met = np.concatenate(points)
+    low, high = met.min(axis=0), met.max(axis=0)
+    low[2] = min(low[2], 0.0)
+    return np.asarray(np.maximum(np.maximum(low - vertices, vertices - high), 0.0))
 
 
 def _mean(normals: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from experiments.shape_reconstruction.estimators.knowledge import (
     not_bounded,
 )
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.pcn.network import by_completion, shipped
+from experiments.shape_reconstruction.pcn.network import shipped
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.mesh import Mesh
@@ -41,8 +41,8 @@ def by_completed_surface(evidence: ShapeEvidence) -> ShapeEstimate:
     """
     start = time.perf_counter()
     samples = all_samples(evidence)
-    found = by_completion(evidence)
-    mesh = closed_around(found.points)
+    points = shipped().completed(samples.points)
+    mesh = closed_around(points)
     known, sides = known_by(mesh, samples, None), limited_sides(mesh, samples, None)
     beyond = beyond_deviation(mesh, known, sides, evidence.largest)
     return ShapeEstimate(
@@ -53,7 +53,7 @@ def by_completed_surface(evidence: ShapeEvidence) -> ShapeEstimate:
         doubtful={},
         flags=(),
         seconds=time.perf_counter() - start,
-        details={"estimator": "pcn", "points": len(found.points)},
+        details={"estimator": "pcn", "points": len(points)},
     )
 
 

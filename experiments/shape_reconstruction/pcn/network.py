@@ -12,6 +12,7 @@ import numpy as np
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.pcn.interpolated import interpolated
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN, TAKEN, PointFrame, taken
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused
@@ -62,7 +63,7 @@ class TouchCompletion:
 
 
 def by_completion(evidence: ShapeEvidence) -> PointEstimate:
-    """Points all over the object, by the network that was shipped; it looks at no picture.
+    """Points all over the object, by the network that was shipped, and between them; it looks at no picture.
 
     Raises:
         FitRefused: no touch met the object.
@@ -70,7 +71,7 @@ def by_completion(evidence: ShapeEvidence) -> PointEstimate:
     """
     start = time.perf_counter()
     points = shipped().completed(all_samples(evidence).points)
-    return PointEstimate(points, time.perf_counter() - start, {"estimator": "pcn"})
+    return PointEstimate(interpolated(points), time.perf_counter() - start, {"estimator": "pcn"})
 
 
 @cache

@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
+from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.estimators.point_answer import by_raw_points
 from experiments.shape_reconstruction.metric import points_error
 from experiments.shape_reconstruction.pcn.completed_surface import (
@@ -15,6 +17,7 @@ from experiments.shape_reconstruction.pcn.completed_surface import (
     by_completed_surface,
     closed_around,
 )
+from experiments.shape_reconstruction.pcn.interpolated import interpolated
 from experiments.shape_reconstruction.pcn.network import by_completion, opened, shipped
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN, TAKEN, PointFrame, taken
 from experiments.shape_reconstruction.pcn.train import main
@@ -76,9 +79,23 @@ def test_its_surface_is_closed_around_its_points_and_as_sure_as_it_was_on_shapes
     assert body.volume > 0.0
     assert np.isfinite(answer.mesh.vertices).all()
     assert answer.mesh.bounds[0, 2] >= 0.0
-    apart = NearestSurface(answer.mesh).distances(by_completion(evidence).points)
+    apart = NearestSurface(answer.mesh).distances(shipped().completed(all_samples(evidence).points))
     assert float(np.median(apart)) < 2.0 * PITCH
     assert (answer.deviation >= shipped().held_out).all()
+
+
+def test_points_between_neighbours_lie_on_the_surface_to_second_order_and_fill_its_gaps() -> None:
+    sphere = np.random.default_rng(0).normal(size=(16_000, 3))
+    sphere /= np.linalg.norm(sphere, axis=1)[:, None]
+    off, gaps = [], []
+    for count in (500, 4000):
+        points = interpolated(sphere[:count], 8)
+        assert points.shape == (9 * count, 3)
+        np.testing.assert_array_equal(points[:count], sphere[:count])
+        off.append(np.abs(np.linalg.norm(points, axis=1) - 1.0).mean())
+        gaps.append([np.mean(cKDTree(some).query(sphere)[0]) for some in (sphere[:count], points)])
+    assert off[1] == pytest.approx(off[0] / 8.0, rel=0.2)  # eight times as many: the square of the spacing
+    assert all(after < 0.7 * before for before, after in gaps)
 
 
 def test_closing_fills_a_ball_and_leaves_a_bowl_open() -> None:

@@ -198,6 +198,23 @@ def test_contacts_of_a_round_body_find_its_axis_and_those_of_a_box_do_not() -> N
     assert find_revolution(thinned(all_samples(wrench))) is None
 
 
+@pytest.mark.parametrize(("around", "found"), [(0.8 * np.pi, False), (1.4 * np.pi, True)])
+def test_places_on_one_side_of_an_axis_do_not_show_it(around: float, found: bool) -> None:
+    """A rounded corner is part of a circle as well."""
+    touches = []
+    for k, angle in enumerate(np.linspace(0.0, around, 14)):
+        out = np.array([np.cos(angle), np.sin(angle), 0.0])
+        across = np.array([-out[1], out[0], 0.0])
+        middle = 0.05 * out + np.array([0.0, 0.0, 0.02 + 0.005 * (k % 4)])
+        points = middle + np.array([[0.0], [3e-3], [-3e-3]]) * np.array([[0.0, 0.0, 1.0]])
+        points = np.concatenate([points, points + 1e-3 * across])
+        touches.append(touch_of(points, out, np.repeat(out[None], len(points), axis=0), k))
+    axis = find_revolution(thinned(all_samples(evidence_of(tuple(touches)))))
+    assert (axis is not None) == found
+    if axis is not None:
+        assert np.linalg.norm(axis.centre) < 2e-3
+
+
 def test_a_round_body_s_axis_brings_its_surface_to_where_nothing_was_touched() -> None:
     """Half of it was touched; the other half is as the axis says."""
     body = build("bowl", 6e-3)
