@@ -171,6 +171,7 @@ def assert_nothing_was_heard(
     assert alone.credible90 > 2.0 * whole["audio"].credible90
     both, touched = by("both", observations, run), by("touch", observations, run)
     np.testing.assert_array_equal(both.position_in_object, touched.position_in_object)
+    np.testing.assert_array_equal(both.region.inside, touched.region.inside)
     assert both.region.contains(run.true)
 
 

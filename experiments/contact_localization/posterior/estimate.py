@@ -138,9 +138,11 @@ def locate(
             raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
         if heard is not None:
             lap(seconds, "sounds", start)
-        found = solve_run(search, k, accuracy, seed, seconds, heard)
+        # Sound that tells no places apart leaves both senses with the answer and the floor of touch.
+        weighed = heard if heard is not None and (alone or heard.term.says_something) else None
+        found = solve_run(search, k, accuracy, seed, seconds, weighed)
         doubts = _judged(search, found, accuracy, heard, k, seconds) if judged and k == count else ()
-        floor = noise.floor * FLOORS[senses if heard else "touch"]
+        floor = noise.floor * FLOORS[senses if weighed else "touch"]
         answers.append(_answer(search, k, found, seconds, floor, doubts))
     return tuple(answers)
 

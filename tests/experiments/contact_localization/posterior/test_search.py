@@ -15,6 +15,8 @@ from experiments.contact_localization.posterior.shared_errors import SharedNoise
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest import nearest_point
 from harness.basics.geometry import rotation_about, rotation_from_vector, translation
+from harness.basics.materials import MATERIALS
+from tests.samples import sounding_plate as plate
 from tests.samples.synthetic_press import BASE_FROM_OBJECT, PRESSES
 from tests.support.localization import dials
 
@@ -54,6 +56,21 @@ def test_exact_presses_are_found(found: Estimate) -> None:
     assert np.linalg.norm(found.contacts - TRUE, axis=1).max() < 1.2e-3
     assert found.region.contains(TRUE[-1])
     assert abs(found.yaw) < np.radians(1.5)
+
+
+def test_strikes_of_an_object_without_modes_leave_touch_as_sure_as_it_is(
+    found: Estimate, contacts: tuple[Contact, ...], block: Model, prior: Prior
+) -> None:
+    """As a steel cube is, whose lowest mode no microphone hears."""
+    sounding = plate.plate_modes()
+    places = plate.places(len(contacts), np.random.default_rng(0))
+    strikes = plate.strikes(sounding, places, np.random.default_rng(1))
+    silent = replace(sounding, frequencies=np.zeros(0), shapes=np.zeros((len(sounding.points), 0, 3)))
+    struck = replace(block, modes=silent, material=MATERIALS["steel"])
+    both = locate(contacts, struck, prior, QUICK, Noise(), strikes=strikes)[-1]
+    np.testing.assert_array_equal(both.position_in_object, found.position_in_object)
+    np.testing.assert_array_equal(both.region.inside, found.region.inside)
+    assert both.credible90 == found.credible90
 
 
 def test_the_answer_is_on_the_surface(found: Estimate, block: Model) -> None:
