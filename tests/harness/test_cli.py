@@ -163,6 +163,18 @@ def test_what_nobody_foresaw_is_one_json_object_too(
     assert "ZeroDivisionError" in captured.err
 
 
+def test_what_is_not_built_is_wrong_use_in_its_own_words(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    words = ["tables", "contact-localization", "--recordings", str(tmp_path), "--out", str(tmp_path / "out")]
+    assert invoke([*words, "--only", "mug", "--seeds", "1", "--json"]) == 2
+    captured = capsys.readouterr()
+    answer = json.loads(captured.out)
+    assert answer["kind"] == WrongUse.kind()
+    assert answer["error"].startswith("tables contact-localization --recordings: ")
+    assert "Traceback" not in captured.err
+
+
 NOISY = """
 import os, sys
 from harness.basics.answers import answers_alone, write_answer
