@@ -96,6 +96,7 @@ def add_densities(
 @compiled
 def _weigh_peak(
     gains: AnyArray,
+    scales: FloatArray,
     rows: AnyArray,
     real: AnyArray,
     imaginary: AnyArray,
@@ -104,35 +105,19 @@ def _weigh_peak(
     factors: AnyArray,
     groups: AnyArray,
     group_starts: IntArray,
-    group_modes: IntArray,
-    group_scales: FloatArray,
     work: FloatArray,
-    together: AnyArray,
     fits: AnyArray,
 ) -> None:
-    """Set ``(Q, B)`` ``fits`` to each group's density at one peak, see ``sound_scores``.
-
-    ``together``, ``(MOST_RANK, K, B)``, is written: the scaled gains of one group after another.
-    """
+    """Set ``(Q, B)`` ``fits`` to each group's density at one peak, see ``sound_scores``."""
+    scaled = np.empty(rows.shape[1])
     for q in range(len(groups)):
         first, last = group_starts[groups[q]], group_starts[groups[q] + 1]
-        for column in range(first, last):
-            mode, scale = group_modes[column], group_scales[column]
-            for k in range(gains.shape[1]):
-                for h in range(gains.shape[2]):
-                    together[column - first, k, h] = scale * gains[mode, k, h]
         fits[q] = 0.0
         for c in range(len(factors)):
+            for k in range(len(scaled)):
+                scaled[k] = rows[c, k] * scales[c, first]
             add_densities(
-                together[: last - first],
-                rows[c],
-                real[c],
-                imaginary[c],
-                count,
-                floor,
-                factors[c],
-                work,
-                fits[q],
+                gains[first:last], scaled, real[c], imaginary[c], count, floor, factors[c], work, fits[q]
             )
 
 
@@ -142,6 +127,7 @@ def sound_scores(
     samples: IntArray,
     blend: FloatArray,
     directions: FloatArray,
+    scales: FloatArray,
     rows: FloatArray,
     real: FloatArray,
     imaginary: FloatArray,
@@ -150,8 +136,6 @@ def sound_scores(
     pair_starts: IntArray,
     pair_groups: IntArray,
     group_starts: IntArray,
-    group_modes: IntArray,
-    group_scales: FloatArray,
     shares: FloatArray,
     clutter: FloatArray,
     weight: float,
@@ -160,20 +144,20 @@ def sound_scores(
     """``(h,)`` nats of hypotheses.
 
     Args:
-        shapes: ``(n, m, 3)`` modes at the surface's samples.
+        shapes: ``(n, m, 3)`` modes at the surface's samples, groups of modes side by side.
         samples: ``(h, K, J)`` samples about the place that each strike of a hypothesis hit.
         blend: ``(h, K, J)`` their shares in it.
         directions: ``(h or 1, K, 3)`` unit, of the strikes.
-        rows: ``(C, P, K)`` what makes a scaled gain one of unit noise, under each of the spreads.
+        scales: ``(C, m)`` what makes a gain one of unit noise, under each of the spreads; one figure a
+            group.
+        rows: ``(C, P, K)`` further factor of each strike at each peak.
         real: ``(C, P, K)`` of the peaks' directions.
         imaginary: ``(C, P, K)``.
         counts: ``(P,)`` strikes that each peak was heard in.
         offsets: ``(C, P)`` nats of a spread at a peak, with the logarithm of the spread's own share.
         pair_starts: ``(P + 1,)`` first pair of each peak.
         pair_groups: ``(Q,)`` group of modes of each pair.
-        group_starts: ``(G + 1,)`` first column of each group, of ``MOST_RANK`` columns at most.
-        group_modes: ``(M,)`` the mode of each column.
-        group_scales: ``(M,)`` factor on its gains.
+        group_starts: ``(G + 1,)`` first mode of each group.
         shares: ``(S, Q)`` prior share of a pair in its peak, under each frequency scale.
         clutter: ``(S, P)`` share left for anything else.
         weight: factor on the peaks' nats.
@@ -187,10 +171,9 @@ def sound_scores(
     result = np.empty(hypotheses)
     flat = shapes.reshape(shapes.shape[0], -1)
     blended = np.zeros(flat.shape[1])
-    first, last = _asked_for(shapes.shape[1], pair_groups, group_starts, group_modes)
+    first, last = _asked_for(pair_groups, group_starts)
     gains = np.zeros((shapes.shape[1], strikes, _SIDE_BY_SIDE))
     work = np.empty((MOST_RANK + 2, MOST_RANK, _SIDE_BY_SIDE))
-    together = np.empty((MOST_RANK, strikes, _SIDE_BY_SIDE))
     fits = np.empty((len(pair_groups), _SIDE_BY_SIDE))
     products = np.empty((len(log_scale_shares), _SIDE_BY_SIDE))
     nats = np.empty((len(log_scale_shares), _SIDE_BY_SIDE))
@@ -207,6 +190,7 @@ def sound_scores(
             pairs = slice(pair_starts[p], pair_starts[p + 1])
             _weigh_peak(
                 gains,
+                scales,
                 rows[:, p],
                 real[:, p],
                 imaginary[:, p],
@@ -215,10 +199,7 @@ def sound_scores(
                 factors[:, p],
                 pair_groups[pairs],
                 group_starts,
-                group_modes,
-                group_scales,
                 work,
-                together,
                 fits[pairs],
             )
             if most[p] > room:
@@ -233,17 +214,14 @@ def sound_scores(
 
 
 @compiled
-def _asked_for(
-    modes: int, groups: IntArray, group_starts: IntArray, group_modes: IntArray
-) -> tuple[IntArray, IntArray]:
+def _asked_for(groups: IntArray, group_starts: IntArray) -> tuple[IntArray, IntArray]:
     """``(R,)`` and ``(R,)``: runs of modes that any pair asks for, from the first to behind the last."""
-    wanted = np.zeros(modes + 2, np.bool_)
+    wanted = np.zeros(len(group_starts) + 1, np.bool_)
     for group in groups:
-        for column in range(group_starts[group], group_starts[group + 1]):
-            wanted[group_modes[column] + 1] = True
-    # Between modes where what is wanted begins or ends.
+        wanted[group + 1] = True
+    # Between groups where what is wanted begins or ends.
     edges = np.nonzero(wanted[1:] != wanted[:-1])[0]
-    return edges[0::2], edges[1::2]
+    return group_starts[edges[0::2]], group_starts[edges[1::2]]
 
 
 @compiled

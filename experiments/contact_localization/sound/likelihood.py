@@ -13,12 +13,13 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp
 
-from experiments.contact_localization.sound.density import sound_scores
+from experiments.contact_localization.sound.density import MOST_RANK, sound_scores
 from experiments.contact_localization.sound.gains import GainTable
 from experiments.contact_localization.sound.matching import (
     Pairs,
     Scales,
     SoundNoise,
+    group_starts,
     likely_scales,
     pairs_of,
 )
@@ -100,15 +101,20 @@ class SoundTerm:
             modes: of the object.
             material: for the damping that the modes should have.
             noise: of the term.
+
+        Raises:
+            WrongUse: a group may be larger than the kernel takes.
         """
         noise = noise or SoundNoise()
+        if not 1 <= noise.most <= MOST_RANK:
+            raise WrongUse(f"groups of {noise.most} modes were asked for; 1 to {MOST_RANK} can be weighed")
         self.evidence = evidence
         self._table, self._modes, self._material, self._noise = table, modes, material, noise
-        self._groups = table.groups
+        self._starts = group_starts(modes.frequencies, noise)
         self._peaks = evidence.peaks if len(modes.frequencies) else ()
         frequencies = np.array([peak.frequency for peak in self._peaks])
         self.scales: Scales = likely_scales(frequencies, modes.frequencies, noise)
-        self._pairs = pairs_of(frequencies, self._groups.frequencies, self.scales.factors, noise)
+        self._pairs = pairs_of(frequencies, self._group_frequencies(), self.scales.factors, noise)
         self._gain_scales = self._unit_gains()
 
     @property
@@ -209,6 +215,7 @@ class SoundTerm:
             struck.samples,
             struck.blend,
             struck.directions,
+            self._gain_scales,
             heard.rows,
             heard.real,
             heard.imaginary,
@@ -216,24 +223,26 @@ class SoundTerm:
             heard.offsets,
             pairs.starts,
             pairs.groups,
-            self._groups.starts,
-            self._groups.modes,
-            self._gain_scales,
+            self._starts,
             pairs.shares,
             pairs.clutter,
             weight,
             log_shares,
         )
 
+    def _group_frequencies(self) -> FloatArray:
+        logs = np.log(self._modes.frequencies)
+        return np.array(
+            [np.exp(logs[a:b].mean()) for a, b in zip(self._starts[:-1], self._starts[1:], strict=True)]
+        )
+
     def _unit_gains(self) -> FloatArray:
-        """``(M,)``: a column's weight over its group's rms gain, one figure a group: any basis will do."""
-        groups = self._groups
-        if not len(groups.modes):
-            return np.zeros(0)
-        squares = groups.weights**2
-        gains = np.add.reduceat(squares * self._table.mean_squares[groups.modes], groups.starts[:-1])
-        rms = np.sqrt(gains / np.add.reduceat(squares, groups.starts[:-1]))
-        return np.asarray(groups.weights / np.repeat(rms, np.diff(groups.starts)))
+        """``(C, m)``: one over the noise of a mode's gain; one figure a group, so that any basis will do."""
+        squares = self._table.mean_squares
+        result = np.empty(len(squares))
+        for a, b in zip(self._starts[:-1], self._starts[1:], strict=True):
+            result[a:b] = 1.0 / np.sqrt(squares[a:b].mean())
+        return np.asarray(result / np.array(self._noise.spreads)[:, None])
 
     def _row(self, index: int, struck: _Struck, scale_shares: FloatArray) -> ModeRow:
         peak, pairs = self._peaks[index], self._pairs
@@ -247,9 +256,8 @@ class SoundTerm:
         chances = odds * np.exp(fits) / total
         best = int(np.argmax(chances))
         group = int(pairs.groups[span[best - 1]]) if best else -1
-        own = self._groups.own_starts
-        modes = tuple(range(int(own[group]), int(own[group + 1]))) if best else ()
-        at = self._groups.frequencies[[group]] if best else np.zeros(0)
+        modes = tuple(range(int(self._starts[group]), int(self._starts[group + 1]))) if best else ()
+        at = np.array([self._group_frequencies()[group]]) if best else np.zeros(0)
         return ModeRow(
             peak.frequency,
             peak.damping,
@@ -282,7 +290,7 @@ def _whitened(peaks: tuple[Peak, ...], spreads: tuple[float, ...]) -> _Heard:
             unit = np.sqrt(np.mean(np.abs(peak.y[peak.heard]) ** 2))
             row = peak.heard / np.hypot(1.0, peak.sigma / (spread * unit))
             length = float(np.linalg.norm(row * peak.y))
-            rows.append(row / spread)
+            rows.append(row)
             ys.append(row * peak.y / length)
             logs = 2.0 * np.log(row[peak.heard])
             offsets.append(float(np.sum(logs - 2.0 * np.log(length / np.linalg.norm(peak.y)))))

@@ -35,6 +35,8 @@ class SoundNoise:
         aside: metres, one sigma along each axis of the object, beside images: by so much places that sound
             tells are off together, as its modes, the hammer's mount and the object's attitude are.
         alone: ``weight`` by sound alone, where nothing names the errors that contacts share.
+        group: modes whose frequencies differ by less than this share mix freely.
+        most: modes in one group at most; at most ``sound_kernels.MOST_RANK``.
     """
 
     spreads: tuple[float, ...] = (0.1, 0.4)
@@ -47,6 +49,8 @@ class SoundNoise:
     weight: float = 0.5
     aside: float = 1.0e-3
     alone: float = 0.2
+    group: float = 0.01
+    most: int = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +86,24 @@ class Pairs:
         """The same, were one scale the only one."""
         one = slice(scale, scale + 1)
         return Pairs(self.starts, self.groups, self.shares[one], self.clutter[one])
+
+
+def group_starts(frequencies: FloatArray, noise: SoundNoise) -> IntArray:
+    """``(G + 1,)`` first mode of every group of near-equal frequencies.
+
+    Within a group the eigenvectors are any rotation of each other, and a small asymmetry of the real
+    object picks another one; a group is therefore taken whole.
+
+    Args:
+        frequencies: ``(m,)`` Hz, ascending.
+        noise: gives the group's width.
+    """
+    starts = [0]
+    for mode in range(1, len(frequencies)):
+        close = frequencies[mode] < (1.0 + noise.group) * frequencies[mode - 1]
+        if not close or mode - starts[-1] >= noise.most:
+            starts.append(mode)
+    return np.array([*starts, len(frequencies)] if len(frequencies) else [0], dtype=np.int64)
 
 
 def likely_scales(peaks: FloatArray, modes: FloatArray, noise: SoundNoise) -> Scales:

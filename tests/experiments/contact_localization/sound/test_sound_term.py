@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from experiments.contact_localization.sound.density import MOST_RANK, add_densities, sound_scores
 from experiments.contact_localization.sound.gains import gain_table
 from experiments.contact_localization.sound.likelihood import SoundTerm
-from experiments.contact_localization.sound.matching import SoundNoise, likely_scales
-from experiments.contact_localization.sound.mixing import ModeMixing, group_starts, mixed_groups
+from experiments.contact_localization.sound.matching import SoundNoise, group_starts, likely_scales
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import MATERIALS
@@ -97,9 +96,7 @@ def test_a_pair_of_equal_modes_may_come_in_any_basis(angle: float, seed: int) ->
     found = []
     for modes in (twins, turned):
         # In double: rotating would round the table's single precision anew.
-        exact = modes.at(SURFACE.points)
-        groups = mixed_groups(exact, SURFACE.points, frequencies, ModeMixing())
-        table = replace(TABLE, shapes=exact, groups=groups)
+        table = replace(TABLE, shapes=modes.at(SURFACE.points))
         found.append(SoundTerm(evidence, table, modes, GLASS).log_likelihood(places, plate.down(K)))
     assert found[1] == pytest.approx(found[0], abs=1e-9)
 
@@ -178,8 +175,7 @@ def test_scores_are_the_sums_that_they_say(seed: int, peaks: int, strikes: int) 
     rng = np.random.default_rng(seed)
     hypotheses, scales = 35, 3
     shapes = rng.normal(size=(50, 7, 3)).astype(np.float32)
-    starts, group_modes = np.array([0, 1, 3, 6, 8]), np.array([0, 1, 2, 3, 4, 5, 6, 2])
-    gain_scales = rng.uniform(0.3, 1.0, len(group_modes))
+    starts = np.array([0, 1, 3, 6, 7])
     samples = rng.integers(0, 50, (hypotheses, strikes, 1))
     down = np.tile([0.0, 0.0, -1.0], (1, strikes, 1))
     groups = rng.integers(0, 4, (peaks, 2))
@@ -195,7 +191,8 @@ def test_scores_are_the_sums_that_they_say(seed: int, peaks: int, strikes: int) 
         samples,
         np.ones(samples.shape),
         down,
-        spreads[:, None, None] * rows,
+        np.repeat(spreads[:, None], 7, axis=1),
+        rows,
         ys.real.copy(),
         ys.imag.copy(),
         np.full(peaks, strikes),
@@ -203,8 +200,6 @@ def test_scores_are_the_sums_that_they_say(seed: int, peaks: int, strikes: int) 
         np.arange(0, 2 * peaks + 1, 2),
         groups.ravel(),
         starts,
-        group_modes,
-        gain_scales,
         shares,
         clutter,
         0.2,
@@ -215,8 +210,7 @@ def test_scores_are_the_sums_that_they_say(seed: int, peaks: int, strikes: int) 
     for p in range(peaks):
         terms = np.log(np.tile(clutter[:, p], (hypotheses, 1)))
         for q in range(2):
-            columns = slice(starts[groups[p, q]], starts[groups[p, q] + 1])
-            block = struck[:, :, group_modes[columns]] * gain_scales[columns]
+            block = struck[:, :, starts[groups[p, q]] : starts[groups[p, q] + 1]]
             nats = [offsets[c, p] + _log_density(spreads[c] * block, rows[c, p], ys[c, p]) for c in range(2)]
             both = np.logaddexp(*nats)[:, None] + np.log(shares[:, 2 * p + q])
             terms = np.logaddexp(terms, both)
@@ -280,7 +274,7 @@ def test_a_wrong_number_of_places_is_refused() -> None:
     with pytest.raises(WrongUse, match="directions"):
         term.log_likelihood(places, plate.down(3))
     with pytest.raises(WrongUse, match="groups of 9"):
-        gain_table(MODES, SURFACE, ModeMixing(most=9))
+        _term(_evidence(MODES, places[0], 9), noise=SoundNoise(most=9))
 
 
 @settings(max_examples=25, deadline=None)
@@ -363,9 +357,9 @@ def test_the_mode_table_names_the_modes() -> None:
 
 def test_groups_are_as_wide_as_asked_and_no_larger() -> None:
     frequencies = np.array([100.0, 100.1, 100.2, 100.3, 200.0, 300.0, 300.5])
-    assert group_starts(frequencies, ModeMixing()).tolist() == [0, 3, 4, 5, 7]
-    assert group_starts(frequencies, ModeMixing(free=1e-9)).tolist() == list(range(8))
-    assert group_starts(np.zeros(0), ModeMixing()).tolist() == [0]
+    assert group_starts(frequencies, SoundNoise()).tolist() == [0, 3, 4, 5, 7]
+    assert group_starts(frequencies, SoundNoise(group=1e-9)).tolist() == list(range(8))
+    assert group_starts(np.zeros(0), SoundNoise()).tolist() == [0]
 
 
 @settings(max_examples=30, deadline=None)
