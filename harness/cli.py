@@ -230,9 +230,8 @@ def _ended(arguments: list[str], as_json: bool) -> int:
         said = error.format_message().replace("Value error, ", "")
         return _report(said, WrongUse.kind(), error.exit_code, as_json)
     except Exception as error:  # noqa: BLE001 - the last place where a program can still get an answer
-        if (
-            isinstance(error, NotImplementedError) and error.args
-        ):  # ours name what is not there; a library's do not
+        # Ours name what is not there; a library's do not.
+        if isinstance(error, NotImplementedError) and error.args:
             return _report(str(error), WrongUse.kind(), WrongUse.exit_code, as_json)
         traceback.print_exc()
         return _report(_unforeseen(error), UNFORESEEN, 1, as_json)
