@@ -106,6 +106,18 @@ def test_contacts_on_another_object_are_refused_or_leave_the_size_open(known: st
     assert width(found.belief) > 0.5 * width(Belief.ignorant(RANGE))
 
 
+def test_contacts_that_fit_worse_than_the_right_object_s_leave_the_size_open(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stand, size = stand_of("mug")
+    sure = by_touch(stand, contacts("mug", 1.0, 10), size, RANGE)
+    monkeypatch.setattr("experiments.scale_estimation.touch.touch.DOUBTED", 0.5 * sure.cost)
+    doubted = by_touch(stand, contacts("mug", 1.0, 10), size, RANGE)
+    ignorant = width(Belief.ignorant(RANGE))
+    assert width(sure.belief) < 0.1 * ignorant
+    assert width(doubted.belief) > 0.5 * ignorant
+
+
 # What is seen, or where the camera is.
 
 

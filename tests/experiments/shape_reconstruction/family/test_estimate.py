@@ -7,7 +7,7 @@ import pytest
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.contacts_fit import ContactFit
-from experiments.shape_reconstruction.family.estimate import _believed, family_estimate
+from experiments.shape_reconstruction.family.estimate import LOOSE, _believed, family_estimate
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.metric import shape_error
@@ -119,8 +119,13 @@ def test_nothing_read_is_refused(readings: ShapeEvidence) -> None:
         family_estimate(replace(readings, touches=(), look=None), COARSE)
 
 
-def test_a_body_of_no_class_is_said_to_be_outside() -> None:
+def test_a_body_of_no_class_is_said_to_be_outside(monkeypatch: pytest.MonkeyPatch) -> None:
     import trimesh
+
+    monkeypatch.setattr(
+        "experiments.shape_reconstruction.family.estimate.not_bounded",
+        lambda _evidence, _mesh, outside: ("y",) if outside else (),
+    )
 
     arms = [trimesh.creation.box((0.12, 0.02, 0.1)), trimesh.creation.box((0.02, 0.12, 0.1))]
     cross = trimesh.boolean.union(arms, engine="manifold").subdivide_to_size(4e-3)
@@ -128,6 +133,8 @@ def test_a_body_of_no_class_is_said_to_be_outside() -> None:
     found = family_estimate(shape_readings(touches_on(mesh, 14, seed=0), look_at(mesh)), COARSE)
     require_sound(found)
     assert any("outside the family" in flag for flag in found.flags)
+    assert found.details["contact_cost"] > LOOSE
+    assert found.not_bounded == ("y",), "no class limits what no reading does"
 
 
 def test_a_thin_board_that_stands_keeps_its_two_sides_apart() -> None:
