@@ -133,7 +133,9 @@ def test_a_body_of_no_class_is_said_to_be_outside(monkeypatch: pytest.MonkeyPatc
     found = family_estimate(shape_readings(touches_on(mesh, 14, seed=0), look_at(mesh)), COARSE)
     require_sound(found)
     assert any("outside the family" in flag for flag in found.flags)
-    assert found.details["contact_cost"] > LOOSE
+    typical = found.details["contact_cost"]
+    assert isinstance(typical, float)
+    assert typical > LOOSE
     assert found.not_bounded == ("y",), "no class limits what no reading does"
 
 
