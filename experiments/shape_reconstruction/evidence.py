@@ -40,6 +40,13 @@ class GuardedTouch:
         """Whether it touched anything."""
         return len(self.points) > 0
 
+    @property
+    def mean_normal(self) -> FloatArray:
+        """``(3,)`` unit, the mean of its normals; where they cancel each other, against the gel."""
+        total = self.normals.sum(axis=0)
+        length = float(np.linalg.norm(total))
+        return np.asarray(total / length if length > 0.0 else -self.stand_from_gel[:3, 2])
+
 
 @dataclass(frozen=True, eq=False)
 class SeenMask:
@@ -104,3 +111,8 @@ class ShapeEvidence:
     def contacts(self) -> tuple[GuardedTouch, ...]:
         """Those touches that met the object."""
         return tuple(touch for touch in self.touches if touch.met)
+
+    @property
+    def sighted(self) -> bool:
+        """Whether a camera saw something of the object."""
+        return self.look is not None and bool(self.look.mask.any())

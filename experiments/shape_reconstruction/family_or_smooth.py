@@ -47,7 +47,6 @@ def _why_smooth(found: ShapeEstimate, evidence: ShapeEvidence) -> str | None:
     assert isinstance(beyond, float)
     if found.details["foreign"] and count >= ENOUGH:
         return f"no household shape fits {count} contacts"
-    sighted = evidence.look is not None and bool(evidence.look.mask.any())
-    if not sighted and beyond > BEYOND and count >= MANY:
+    if not evidence.sighted and beyond > BEYOND and count >= MANY:
         return f"the household shape lies {beyond * 1e3:.0f} mm beyond {count} contacts in the mean"
     return None

@@ -66,8 +66,7 @@ def _is_face(touch: GuardedTouch) -> bool:
     """Whether it met a smooth piece of surface, wide both ways: an edge has no one normal."""
     middle = touch.points.mean(axis=0)
     widths = np.linalg.svd(touch.points - middle, compute_uv=False) / np.sqrt(len(touch.points))
-    mean = touch.normals.mean(axis=0)
-    spread = np.arccos(np.clip(touch.normals @ mean / max(float(np.linalg.norm(mean)), 1e-9), -1.0, 1.0))
+    spread = np.arccos(np.clip(touch.normals @ touch.mean_normal, -1.0, 1.0))
     return bool(len(widths) > 1 and widths[1] > WIDE and spread.mean() < SMOOTH)
 
 
@@ -92,9 +91,7 @@ class _Patch:
     def of(cls, touch: GuardedTouch, gel: FloatArray) -> "_Patch":
         rows = farthest_points(touch.points, POINTS)
         turn, place = touch.stand_from_gel[:3, :3], touch.points[rows].mean(axis=0)
-        total = touch.normals.sum(axis=0) @ turn
-        normal = total / max(float(np.linalg.norm(total)), 1e-9)
-        return cls((touch.points[rows] - place) @ turn, normal, turn, place + turn @ gel)
+        return cls((touch.points[rows] - place) @ turn, touch.mean_normal @ turn, turn, place + turn @ gel)
 
     def residuals(self, shape: FamilyShape, moved: FloatArray) -> FloatArray:
         """``(5 + n + 3,)``: of the move itself, of each point, and of the normal."""

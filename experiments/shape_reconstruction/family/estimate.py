@@ -68,15 +68,14 @@ def family_estimate(
     """
     began = time.perf_counter()
     settings = settings or FamilySettings()
-    sighted = evidence.look is not None and bool(evidence.look.mask.any())
-    if not sighted and not evidence.contacts:
+    if not evidence.sighted and not evidence.contacts:
         raise OutOfDomain(
             f"{len(evidence.touches)} touches met nothing and no silhouette was seen; a shape needs one "
             "contact or one silhouette: press at the object, or take its picture"
         )
     search = FamilySearch(evidence, settings)
     seeds = [seed for estimate in previous for seed in _seeds_of(search, estimate)]
-    mixture = mixture_of(search.found(seeds), sighted, bool(evidence.contacts), settings.seed)
+    mixture = mixture_of(search.found(seeds), evidence.sighted, bool(evidence.contacts), settings.seed)
     turned = turned_contacts(mixture.best.shape, evidence)
     fit = contact_fit(mixture.best.shape, search.full)
     fit = replace(fit, doubtful=fit.doubtful | (turned > 0.0))

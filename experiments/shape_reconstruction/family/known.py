@@ -69,7 +69,7 @@ def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str
     """
     if evidence.look is not None and _limits(evidence.look):
         return _open_without_class(evidence, mesh) if outside else ()
-    normals = np.array([_mean(touch.normals) for touch in evidence.contacts]).reshape(-1, 3)
+    normals = np.array([touch.mean_normal for touch in evidence.contacts]).reshape(-1, 3)
     supposed = beyond_contacts(mesh.vertices, evidence).max(axis=0)
     free = []
     for axis, name in enumerate("xyz"):
@@ -97,11 +97,6 @@ def beyond_contacts(vertices: FloatArray, evidence: ShapeEvidence) -> FloatArray
     low, high = met.min(axis=0), met.max(axis=0)
     low[2] = min(low[2], 0.0)
     return np.asarray(np.maximum(np.maximum(low - vertices, vertices - high), 0.0))
-
-
-def _mean(normals: FloatArray) -> FloatArray:
-    total = normals.sum(axis=0)
-    return np.asarray(total / max(float(np.linalg.norm(total)), 1e-9))
 
 
 def _limits(look: SeenMask) -> bool:

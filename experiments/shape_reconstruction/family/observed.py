@@ -74,7 +74,7 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
         sigma=sigma,
         worth=np.array([min(WORTH, len(rows)) / len(rows) for rows in points]),
         middles=_stacked([touch.points.mean(axis=0)[None] for touch in contacts], 3),
-        normals=_stacked([_mean_normal(touch)[None] for touch in contacts], 3),
+        normals=_stacked([touch.mean_normal[None] for touch in contacts], 3),
         normal_sigma=np.array([np.hypot(touch.normal_sigma, np.radians(6.0)) for touch in contacts]),
         gel=np.array([touch.stand_from_gel[:3, :3] for touch in contacts]).reshape(-1, 3, 3),
         free=_free_places(evidence, coarse),
@@ -87,12 +87,6 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
 
 def _stacked(parts: list[FloatArray], columns: int) -> FloatArray:
     return read_only(np.concatenate([np.empty((0, columns)), *parts]))
-
-
-def _mean_normal(touch: GuardedTouch) -> FloatArray:
-    total = touch.normals.sum(axis=0)
-    length = float(np.linalg.norm(total))
-    return np.asarray(total / length if length > 0.0 else -touch.stand_from_gel[:3, 2])
 
 
 def _free_places(evidence: ShapeEvidence, coarse: bool) -> FloatArray:
