@@ -37,8 +37,9 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
     those before are read.
 
     Raises:
-        WrongUse: nothing is to be read; there is no such folder of known shapes; or the scene says where the
-            mesh file's origin is, which says nothing of where an unknown object touches its support.
+        WrongUse: nothing is to be read; there is no such folder of known shapes; the scene names networks
+            that only a table uses; or it says where the mesh file's origin is, which says nothing of where an
+            unknown object touches its support.
     """
     if steps_of(scene) == 0:
         raise WrongUse("nothing is to be read: ask for vision, for presses, or for both")
@@ -48,6 +49,11 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
             "position to where its middle should be on the support"
         )
     _require_library(scene.section(ShapeRun).library)
+    if scene.section(ShapeRun).pcn is not None:
+        raise WrongUse(
+            "[shape] pcn adds rows to a table and is not used by a run; leave it out of the scene, or "
+            "measure with: touchstone tables shape-reconstruction --set pcn=FOLDER"
+        )
     settings, looks = scene.section(ShapeRun), scene.sensors.camera
     if settings.choose != "planned" or _presses(scene) == 0:
         place = np.array(scene.object.pose.position)

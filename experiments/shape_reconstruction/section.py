@@ -38,6 +38,8 @@ class ShapeRun(Section):
             are left; None to make them all.
         library: folder of meshes or ObjectFiles that ``shape.method = "retrieval"`` chooses among; None for
             household shapes that come with the program.
+        pcn: folder of the paper's own networks (``pcn.train --profile paper``), whose rows a table shows
+            beside ours; a run does not use it.
         seed: of where and how deep the presses are; a run may say another.
     """
 
@@ -56,3 +58,4 @@ class ShapeRun(Section):
     contact_tilt_error: Annotated[Angle, Positive] = math.radians(2.5)
     until: Annotated[Length, Positive] | None = None
     library: str | None = None
+    pcn: str | None = None

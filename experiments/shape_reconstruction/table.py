@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.shape_reconstruction.dials import OWN
+from experiments.shape_reconstruction.pcn.paper.network import paper_completions
 from experiments.shape_reconstruction.readings import evidence_of
 from experiments.shape_reconstruction.result import true_surface
 from experiments.shape_reconstruction.section import ShapeRun
@@ -94,8 +95,9 @@ def scene_of(scene: SceneFile, cell: ShapeCell) -> SceneFile:
     """
     tree = scene.model_dump(mode="json", by_alias=True)
     tree["sensors"].update(camera=True, sound=False, touch=True)
-    # Known shapes answer a run and change nothing of it: recordings do not depend on them.
-    tree.setdefault(ShapeRun.table, {"presses": PRESSES[-1]}).update(choose=cell.choose, library=None)
+    # What only answers changes nothing of a run: recordings do not depend on it.
+    own = {"choose": cell.choose, "library": None, "pcn": None}
+    tree.setdefault(ShapeRun.table, {"presses": PRESSES[-1]}).update(own)
     return scene_from_json(tree, cell.name)
 
 
@@ -105,10 +107,11 @@ def run_cell(
     """Perform and answer one run; the result as JSON values.
 
     Raises:
-        DataRefused: nothing says what is true of the run.
+        DataRefused: nothing says what is true of the run, or ``[shape] pcn`` has no network that may be run.
     """
     experiment: Experiment = named(NAME)
-    here, library = scene_of(scene, cell), scene.section(ShapeRun).library
+    here, asked = scene_of(scene, cell), scene.section(ShapeRun)
+    networks = {} if asked.pcn is None else paper_completions(Path(asked.pcn))
     with closing(perform_in_process(experiment, cell, here, station, recordings)) as case:
         run = RunFiles(case.run.recording)
         truth = true_surface(run)
@@ -117,8 +120,8 @@ def run_cell(
                 f"no true surface is beside {run.recording.folder.name}: no instrument read anything in this "
                 "run, or its .truth.npz was taken away; take the run away too, and it is performed again"
             )
-        evidence = replace(evidence_of(run, run.recording.steps()), library=library)
-        rows = scored_rows(evidence, truth, here.section(ShapeRun).presses)
+        evidence = replace(evidence_of(run, run.recording.steps()), library=asked.library)
+        rows = scored_rows(evidence, truth, here.section(ShapeRun).presses, networks.values())
         met = [touch.met for touch in evidence.touches]
         return {"schema": 1, "cell": vars(cell), "steps": run.recording.committed, "met": met, "rows": rows}
 

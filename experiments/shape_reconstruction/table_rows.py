@@ -1,7 +1,8 @@
 """The rows of the table of shapes: what each is answered from, by which method, and how it is scored."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from experiments.shape_reconstruction.estimators.average import by_average
@@ -16,6 +17,7 @@ from experiments.shape_reconstruction.metric import (
     published_from_points,
     surfaces_apart,
 )
+from experiments.shape_reconstruction.pcn.paper.network import SENSES, PaperCompletion
 from experiments.shape_reconstruction.section import MOST_PRESSES
 from experiments.shape_reconstruction.stated_band import band_held
 from experiments.shape_reconstruction.surface import ShapeEstimate
@@ -47,6 +49,11 @@ TABLED: Mapping[str, Mapping[str, tuple[int, ...]]] = {
     "family": {"T": PRESSES, "V": _NONE, "TV": (*FEW, *PRESSES)},
 }
 """By method, from touch alone, the picture alone, or both: after how many presses."""
+
+PUBLISHED = "pcn as published"
+"""Method of the rows by the paper's own networks, which a table is given the folder of."""
+
+_PUBLISHED: Mapping[str, tuple[int, ...]] = {"T": PRESSES, "V": _NONE, "TV": (*FEW, *PRESSES)}
 
 SAMPLES = 6000
 """On each surface: means are then known to 0.04 mm, in a quarter of the time."""
@@ -80,10 +87,16 @@ class ShapeRow:
         return replace(evidence, touches=evidence.touches[: self.presses], look=look)
 
 
-def rows_after(presses: int) -> list[ShapeRow]:
-    """Of a run of so many presses: after the counts that are tabled, and after all of them."""
+def rows_after(presses: int, published: Container[str] = ()) -> list[ShapeRow]:
+    """Of a run of so many presses: after the counts that are tabled, and after all of them.
+
+    Args:
+        presses: of the run.
+        published: senses of which the paper's own network is there.
+    """
+    own = {senses: counts for senses, counts in _PUBLISHED.items() if senses in published}
     found = []
-    for method, by_senses in TABLED.items():
+    for method, by_senses in {**TABLED, PUBLISHED: own}.items():
         for senses, counts in by_senses.items():
             made = [count for count in counts if count < presses] + [presses]
             used = made if "T" in senses else _NONE
@@ -96,7 +109,7 @@ ROW_NAMES = (
     AVERAGE,
     *(
         ShapeRow(method, senses, count).name
-        for method, by_senses in TABLED.items()
+        for method, by_senses in {**TABLED, PUBLISHED: _PUBLISHED}.items()
         for senses in by_senses
         for count in (range(1, MOST_PRESSES + 1) if "T" in senses else _NONE)
     ),
@@ -104,17 +117,22 @@ ROW_NAMES = (
 """Of all rows that a run of any number of presses may have, in the order of a table."""
 
 
-def scored_rows(evidence: ShapeEvidence, truth: Mesh, presses: int) -> dict[str, dict[str, Any]]:
+def scored_rows(
+    evidence: ShapeEvidence, truth: Mesh, presses: int, networks: Iterable[PaperCompletion] = ()
+) -> dict[str, dict[str, Any]]:
     """Every row of a run, as JSON values by its name.
 
     Args:
         evidence: of the whole run.
         truth: m in ``stand``.
         presses: that the run was to make; it may have ended sooner.
+        networks: the paper's own, for rows beside ours.
     """
+    published = {SENSES[network.sense]: network for network in networks}
     rows = {FLOOR: _floor(truth), AVERAGE: _surface_row(by_average(evidence), truth)}
-    for row in rows_after(presses):
-        rows[row.name] = _answered(row, evidence, truth)
+    for row in rows_after(presses, published):
+        answer = published[row.senses].answered if row.method == PUBLISHED else partial(_by, row.method)
+        rows[row.name] = _answered(answer, row.part(evidence), truth)
     return rows
 
 
@@ -123,12 +141,18 @@ def _floor(truth: Mesh) -> dict[str, Any]:
     return {**_errors(error), "chamfer_points_m": published_floor(truth), "seconds": 0.0}
 
 
-def _answered(row: ShapeRow, evidence: ShapeEvidence, truth: Mesh) -> dict[str, Any]:
+_Found = PointEstimate | ShapeEstimate
+
+
+def _by(method: str, part: ShapeEvidence) -> _Found:
+    return pointed(method, part) if method in POINTS else estimated(method, part)
+
+
+def _answered(answer: Callable[[ShapeEvidence], _Found], part: ShapeEvidence, truth: Mesh) -> dict[str, Any]:
     """An answer's errors; what is refused counts as far off as the object is large, and says why."""
-    part, began = row.part(evidence), now()
-    found: PointEstimate | ShapeEstimate
+    began = now()
     try:
-        found = pointed(row.method, part) if row.method in POINTS else estimated(row.method, part)
+        found = answer(part)
     except FitRefused as refusal:
         size = truth.diagonal
         return {"error_m": size, "seconds": now() - began, "gross": True, "refused": str(refusal)}

@@ -19,8 +19,8 @@ from experiments.scale_estimation.unseen.training.paper.paper_fit import (  # no
     fitted_paper,
     paper_graph,
 )
-from experiments.scale_estimation.unseen.training.paper.resnet import ResNet18  # noqa: E402
 from experiments.scale_estimation.unseen.training.samples import SizeSamples  # noqa: E402
+from harness.authoring.resnet import ResNet18  # noqa: E402
 
 PUBLISHED = 11_689_512
 """Parameters of ResNet-18 with a thousand classes."""
@@ -41,7 +41,7 @@ def drawn(sense: str, count: int) -> list[Any]:
 
 
 def test_resnet_18_has_the_published_layers() -> None:
-    module = ResNet18(3, USUAL)
+    module = ResNet18(3, 1)
     count = sum(value.numel() for value in module.parameters())
     assert count == PUBLISHED - 1000 * 513 + 513
     with torch.no_grad():

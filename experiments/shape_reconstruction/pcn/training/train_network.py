@@ -45,13 +45,14 @@ def train_network(amounts: CompletionAmounts, seed: int) -> tuple[bytes, dict[st
             "batch": BATCH,
             "seed": seed,
         },
-        "fitted": _reached(errors(module, learnt.of(np.arange(0, len(learnt.shapes), 8)))),
-        "held_out": _reached(errors(module, held)),
+        "fitted": reached(errors(module, learnt.of(np.arange(0, len(learnt.shapes), 8)))),
+        "held_out": reached(errors(module, held)),
     }
     return graph(module), card
 
 
-def _reached(found: FloatArray) -> dict[str, float]:
+def reached(found: FloatArray) -> dict[str, float]:
+    """Errors of sets in m, as a card says them."""
     return {
         "sets": len(found),
         "mean_chamfer_points_m": round(float(found.mean()), 6),

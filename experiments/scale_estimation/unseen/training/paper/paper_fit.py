@@ -10,8 +10,8 @@ from torch import Tensor, nn
 
 from experiments.scale_estimation.unseen.paper.inputs import INPUTS
 from experiments.scale_estimation.unseen.training.paper.recurrent import ImprintGru
-from experiments.scale_estimation.unseen.training.paper.resnet import ResNet18
 from experiments.scale_estimation.unseen.training.samples import SIZES, SizeSamples
+from harness.authoring.resnet import ResNet18
 from harness.basics.arrays import FloatArray
 from harness.objectfile.graph import Nodes, float_value
 
@@ -23,12 +23,19 @@ USUAL = float(np.log(SIZES).mean())
 """Logarithm of the size that a network begins at: the middle of the range."""
 
 MODULES: dict[str, Callable[[], ResNet18 | ImprintGru]] = {
-    "picture": lambda: ResNet18(3, USUAL),
-    "spectrogram": lambda: ResNet18(1, USUAL),
+    "picture": lambda: _residual(3),
+    "spectrogram": lambda: _residual(1),
     "imprints": lambda: ImprintGru(USUAL),
 }
 
 _AT_ONCE = 256
+
+
+def _residual(channels: int) -> ResNet18:
+    """One number out, the logarithm of a size in m, which begins at the usual one."""
+    module = ResNet18(channels, 1)
+    nn.init.constant_(module.last.bias, USUAL)
+    return module
 
 
 def fitted_paper(sense: str, samples: SizeSamples, epochs: int, seed: int) -> ResNet18 | ImprintGru:

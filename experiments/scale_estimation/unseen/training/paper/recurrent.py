@@ -5,7 +5,7 @@ import torch
 from torch import Tensor, nn
 
 from experiments.scale_estimation.unseen import contact_set
-from experiments.scale_estimation.unseen.training.paper.resnet import written_linear
+from harness.authoring.resnet import written_linear
 from harness.objectfile.graph import Nodes
 
 _EACH = 64

@@ -1,4 +1,4 @@
-"""ResNet-18 (He et al., Deep residual learning for image recognition, CVPR 2016, table 1), one number out."""
+"""ResNet-18 in torch and as a graph (He et al., Deep residual learning, CVPR 2016, table 1)."""
 
 from itertools import pairwise
 
@@ -38,14 +38,14 @@ class ResidualBlock(nn.Module):
 
 
 class ResNet18(nn.Module):
-    """The published layers; the last gives the logarithm of a size in m.
+    """The published layers.
 
     Args:
         channels: of the picture.
-        usual: logarithm of the size that it begins at.
+        outputs: numbers that the last layer gives.
     """
 
-    def __init__(self, channels: int, usual: float) -> None:
+    def __init__(self, channels: int, outputs: int) -> None:
         super().__init__()
         self.first = _convolution(channels, STAGES[0], _FIRST, 2)
         self.pool = nn.MaxPool2d(3, 2, 1)
@@ -55,11 +55,10 @@ class ResNet18(nn.Module):
                 stride = 2 if stage > 0 and number == 0 else 1
                 blocks.append(ResidualBlock(before if number == 0 else width, width, stride))
         self.blocks = nn.ModuleList(blocks)
-        self.last = nn.Linear(STAGES[-1], 1)
-        nn.init.constant_(self.last.bias, usual)
+        self.last = nn.Linear(STAGES[-1], outputs)
 
     def forward(self, picture: Tensor) -> Tensor:
-        """``(n, 1)`` of ``(n, channels, rows, columns)``."""
+        """``(n, outputs)`` of ``(n, channels, rows, columns)``."""
         found = self.pool(torch.relu(self.first(picture)))
         for block in self.blocks:
             found = block(found)

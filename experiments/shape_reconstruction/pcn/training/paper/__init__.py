@@ -1,0 +1,1 @@
+"""What is needed to train the network of the paper as published, and not to run it."""
