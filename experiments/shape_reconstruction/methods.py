@@ -12,6 +12,8 @@ from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family_or_smooth import by_family
 from experiments.shape_reconstruction.pcn.completed_surface import by_completed_surface
+from experiments.shape_reconstruction.pcn.glance import by_glance
+from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
 from experiments.shape_reconstruction.pcn.network import by_completion
 from experiments.shape_reconstruction.retrieval.known_shapes import by_known_shapes
 from experiments.shape_reconstruction.surface import ShapeEstimate
@@ -22,6 +24,7 @@ METHODS: Mapping[str, Callable[[ShapeEvidence], ShapeEstimate]] = {
     "ellipsoid": by_ellipsoid,
     "hull": by_hull,
     "visual-hull": by_visual_hull,
+    "glance": by_glanced_surface,
     "rbf": by_hermite,
     "pcn": by_completed_surface,
     "family-coarse": partial(by_family, settings=LEVELS["coarse"]),
@@ -33,9 +36,10 @@ METHODS: Mapping[str, Callable[[ShapeEvidence], ShapeEstimate]] = {
 
 POINTS: Mapping[str, Callable[[ShapeEvidence], PointEstimate]] = {
     "raw points": by_raw_points,
+    "glance": by_glance,
     "pcn": by_completion,
 }
-"""Those that answer in points, as a table scores them; of these, ``pcn`` has a surface too."""
+"""Those that answer in points, as a table scores them; of these, the networks have a surface too."""
 
 QUICK, INFORMATIVE, BEST = "rbf", "family-coarse", "family"
 """While the arm waits for the next press; where that goes by which shapes are likely; by default."""

@@ -43,6 +43,7 @@ TABLED: Mapping[str, Mapping[str, tuple[int, ...]]] = {
     "ellipsoid": {"T": PRESSES},
     "hull": {"T": PRESSES},
     "visual-hull": {"V": _NONE, "TV": PRESSES},
+    "glance": {"V": _NONE},
     "pcn": {"T": PRESSES},
     "retrieval": {"T": (8, 32), "TV": (8, 32)},
     "rbf": {"T": PRESSES, "TV": PRESSES},

@@ -20,10 +20,10 @@ class ResidualBlock(nn.Module):
 
     def __init__(self, before: int, channels: int, stride: int) -> None:
         super().__init__()
-        self.first = _convolution(before, channels, 3, stride)
-        self.second = _convolution(channels, channels, 3, 1)
+        self.first = convolution(before, channels, 3, stride)
+        self.second = convolution(channels, channels, 3, 1)
         changes = stride != 1 or before != channels
-        self.shortcut = _convolution(before, channels, 1, stride) if changes else None
+        self.shortcut = convolution(before, channels, 1, stride) if changes else None
 
     def forward(self, given: Tensor) -> Tensor:
         """``(n, channels, rows / stride, columns / stride)``."""
@@ -32,9 +32,9 @@ class ResidualBlock(nn.Module):
 
     def write(self, nodes: Nodes, given: str) -> str:
         """The same in a graph."""
-        along = given if self.shortcut is None else _written(nodes, given, self.shortcut)
-        inner = nodes.add("Relu", _written(nodes, given, self.first))
-        return nodes.add("Relu", nodes.add("Add", _written(nodes, inner, self.second), along))
+        along = given if self.shortcut is None else written_convolution(nodes, given, self.shortcut)
+        inner = nodes.add("Relu", written_convolution(nodes, given, self.first))
+        return nodes.add("Relu", nodes.add("Add", written_convolution(nodes, inner, self.second), along))
 
 
 class ResNet18(nn.Module):
@@ -47,7 +47,7 @@ class ResNet18(nn.Module):
 
     def __init__(self, channels: int, outputs: int) -> None:
         super().__init__()
-        self.first = _convolution(channels, STAGES[0], _FIRST, 2)
+        self.first = convolution(channels, STAGES[0], _FIRST, 2)
         self.pool = nn.MaxPool2d(3, 2, 1)
         blocks = []
         for stage, (before, width) in enumerate(pairwise((STAGES[0], *STAGES))):
@@ -66,7 +66,7 @@ class ResNet18(nn.Module):
 
     def write(self, nodes: Nodes, picture: str) -> str:
         """The same in a graph."""
-        found = nodes.add("Relu", _written(nodes, picture, self.first))
+        found = nodes.add("Relu", written_convolution(nodes, picture, self.first))
         found = nodes.add("MaxPool", found, kernel_shape=[3, 3], strides=[2, 2], pads=[1, 1, 1, 1])
         for block in self.blocks:
             found = block.write(nodes, found)
@@ -80,24 +80,24 @@ def written_linear(nodes: Nodes, value: str, layer: nn.Linear) -> str:
     return nodes.add("Gemm", value, weight, nodes.weight(layer.bias.detach().numpy(), "a bias"))
 
 
-def _convolution(before: int, channels: int, side: int, stride: int) -> nn.Sequential:
+def convolution(before: int, channels: int, side: int, stride: int) -> nn.Sequential:
     """A convolution and its batch's normalisation, begun as He et al. 2015 (Delving deep) begin them."""
-    convolution = nn.Conv2d(before, channels, side, stride, side // 2, bias=False)
-    nn.init.kaiming_normal_(convolution.weight, mode="fan_out", nonlinearity="relu")
-    return nn.Sequential(convolution, nn.BatchNorm2d(channels))
+    kernel = nn.Conv2d(before, channels, side, stride, side // 2, bias=False)
+    nn.init.kaiming_normal_(kernel.weight, mode="fan_out", nonlinearity="relu")
+    return nn.Sequential(kernel, nn.BatchNorm2d(channels))
 
 
-def _written(nodes: Nodes, value: str, layer: nn.Sequential) -> str:
-    """Both as one convolution: at inference a normalisation is a factor and a shift of each channel."""
-    convolution, normalisation = layer[0], layer[1]
-    assert isinstance(convolution, nn.Conv2d)
+def written_convolution(nodes: Nodes, value: str, layer: nn.Sequential) -> str:
+    """Both as one in a graph: at inference a normalisation is a factor and a shift of each channel."""
+    kernel, normalisation = layer[0], layer[1]
+    assert isinstance(kernel, nn.Conv2d)
     assert isinstance(normalisation, nn.BatchNorm2d)
     mean, variance = normalisation.running_mean, normalisation.running_var
     assert mean is not None
     assert variance is not None
     factor = (normalisation.weight / torch.sqrt(variance + normalisation.eps)).detach().numpy()
-    weight = nodes.weight(convolution.weight.detach().numpy() * factor[:, None, None, None], "a convolution")
+    weight = nodes.weight(kernel.weight.detach().numpy() * factor[:, None, None, None], "a convolution")
     shift = normalisation.bias.detach().numpy() - factor * mean.numpy()
     bias = nodes.weight(np.asarray(shift), "a convolution")
-    half, stride = convolution.kernel_size[0] // 2, convolution.stride[0]
+    half, stride = kernel.kernel_size[0] // 2, kernel.stride[0]
     return nodes.add("Conv", value, weight, bias, strides=[stride] * 2, pads=[half] * 4)

@@ -26,7 +26,7 @@ GAP = 4.0
 """Median distances between neighbouring points: a ball of this radius does not pass between points of one
 wall, and does enter a vessel."""
 
-_SPREAD = float(np.sqrt(0.5 * np.pi))
+SPREAD = float(np.sqrt(0.5 * np.pi))
 """Standard deviations of a normal density over the mean of its absolute values."""
 
 
@@ -47,7 +47,7 @@ def by_completed_surface(evidence: ShapeEvidence) -> ShapeEstimate:
     beyond = beyond_deviation(mesh, known, sides, evidence.largest)
     return ShapeEstimate(
         mesh=mesh,
-        deviation=np.hypot(_SPREAD * shipped().held_out, beyond),
+        deviation=np.hypot(SPREAD * shipped().held_out, beyond),
         known_by=known,
         not_bounded=not_bounded(sides),
         doubtful={},

@@ -12,10 +12,10 @@ import numpy as np
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.pcn.card import held_out_error
 from experiments.shape_reconstruction.pcn.interpolated import interpolated
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN, TAKEN, PointFrame, taken
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import DataRefused
 from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.runtime import Network
 
@@ -42,13 +42,7 @@ class TouchCompletion:
         Raises:
             DataRefused: the card does not say it.
         """
-        held = self.card.get("held_out")
-        error = held.get("mean_chamfer_points_m") if isinstance(held, Mapping) else None
-        if not isinstance(error, float):
-            raise DataRefused(
-                'the network\'s card has no "held_out" with "mean_chamfer_points_m" in metres; train it again'
-            )
-        return error
+        return held_out_error(self.card)
 
     def completed(self, points: FloatArray) -> FloatArray:
         """``(GIVEN, 3)`` m all over the object of which ``(n, 3)`` m in ``stand`` were touched.

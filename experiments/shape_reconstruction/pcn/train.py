@@ -1,12 +1,13 @@
-r"""Train a point completion network on drawn household shapes; it never sees what it is tested on.
+r"""Train point completion networks on drawn household shapes; they never see what they are tested on.
 
 \b
     python -m experiments.shape_reconstruction.pcn.train --profile standard
 
-writes what ships: half an hour of one core at most. ``--profile paper --out FOLDER`` trains the networks of
-ObjectFolder 2.0 in their published size, by touch, by a picture and by both, for rows of a table beside ours
-(``tables shape-reconstruction --set pcn=FOLDER``). It wants a graphics processor: there ten minutes, without
-one days. None of those ships.
+writes what ships, by touch and by a glance: half an hour of one core.
+
+``--profile paper --out FOLDER`` trains the networks of ObjectFolder 2.0 in their published size, by touch, by
+a picture and by both, for rows of a table beside ours (``tables shape-reconstruction --set pcn=FOLDER``). It
+wants a graphics processor: there seven minutes, without one days. None of those ships.
 """
 
 import argparse
@@ -31,19 +32,28 @@ class CompletionProfile:
         sets: of touches of each.
         steps: of the fit.
         batch: sets a step.
+        compared: points at a step, of those given and of those all over a shape.
     """
 
     shapes: int
     sets: int
     steps: int
     batch: int = 12
+    compared: int = 1024
 
 
 PROFILES = MappingProxyType(
-    {"smoke": CompletionProfile(26, 2, 4), "standard": CompletionProfile(520, 6, 1600)}
+    {
+        "smoke": {"completion": CompletionProfile(26, 2, 4), "glance": CompletionProfile(26, 2, 4)},
+        "standard": {
+            "completion": CompletionProfile(520, 6, 1600),
+            "glance": CompletionProfile(2000, 6, 3000, 24, 512),
+        },
+    }
 )
+"""Of the networks that ship: by touch, and by a glance."""
 PAPER_PROFILES = MappingProxyType(
-    {"paper-smoke": CompletionProfile(26, 1, 2, 4), "paper": CompletionProfile(2600, 8, 6000, 32)}
+    {"paper-smoke": CompletionProfile(26, 1, 2, 4), "paper": CompletionProfile(2600, 8, 6000, 32, 4096)}
 )
 """Of the paper's own networks; the first shows in a minute that all of it runs."""
 
@@ -52,6 +62,10 @@ def main(arguments: list[str] | None = None) -> int:
     """Draw, fit, say what is reached on shapes that were held out, write."""
     options = _parser().parse_args(arguments)
     paper = options.profile in PAPER_PROFILES
+    names = tuple(INPUTS) if paper else tuple(PROFILES[options.profile])
+    asked = options.only or names
+    if unknown := [name for name in asked if name not in names]:
+        return _refused(f"--profile {options.profile} has no {unknown[0]}; it has {', '.join(names)}")
     folder: Path | None = options.out
     if paper and folder is None:
         return _refused(f"nothing of --profile {options.profile} ships: add --out FOLDER")
@@ -64,30 +78,30 @@ def main(arguments: list[str] | None = None) -> int:
         return _refused("torch finds no CUDA device here; leave --device out, or say --device cpu")
     folder = folder or Path(__file__).parent / "data"
     folder.mkdir(parents=True, exist_ok=True)
-    if not paper:
-        _train_ours(options, folder)
-    for sense in options.only or INPUTS if paper else ():
-        _train_paper(sense, options, device, folder)
+    for name in asked:
+        _train(name, options, device, folder)
     return 0
 
 
-def _train_ours(options: argparse.Namespace, folder: Path) -> None:
-    from experiments.shape_reconstruction.pcn.training.train_network import train_network  # needs torch
-
-    began = time.process_time()
-    data, card = train_network(PROFILES[options.profile], options.seed)
-    card["cpu_seconds"] = round(time.process_time() - began, 1)
-    _write(folder, "completion", data, card, options)
-
-
-def _train_paper(sense: str, options: argparse.Namespace, device: str, folder: Path) -> None:
-    # Needs torch.
+def _train(name: str, options: argparse.Namespace, device: str, folder: Path) -> None:
+    """One network with its card, written."""
+    # All need torch.
     from experiments.shape_reconstruction.pcn.training.paper.train_paper import train_paper_completion
+    from experiments.shape_reconstruction.pcn.training.train_glance import train_glance
+    from experiments.shape_reconstruction.pcn.training.train_network import train_network
 
-    began, amounts = time.perf_counter(), PAPER_PROFILES[options.profile]
-    data, card = train_paper_completion(sense, amounts, options.seed, options.processes, device)
-    card["seconds"] = round(time.perf_counter() - began, 1)
-    _write(folder, sense, data, card, options)
+    began, seconds = time.process_time(), time.perf_counter()
+    if options.profile in PAPER_PROFILES:
+        amounts = PAPER_PROFILES[options.profile]
+        data, card = train_paper_completion(name, amounts, options.seed, options.processes, device)
+    elif name == "glance":
+        amounts = PROFILES[options.profile][name]
+        data, card = train_glance(amounts, options.seed, options.processes, device)
+    else:
+        data, card = train_network(PROFILES[options.profile][name], options.seed)
+    card["cpu_seconds"] = round(time.process_time() - began, 1)
+    card["seconds"] = round(time.perf_counter() - seconds, 1)
+    _write(folder, name, data, card, options)
 
 
 def _write(
@@ -104,10 +118,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--profile", choices=[*PROFILES, *PAPER_PROFILES], default="standard")
     parser.add_argument(
-        "--only", choices=list(INPUTS), action="append", help="of the paper's; again for more"
+        "--only", choices=[*PROFILES["standard"], *INPUTS], action="append", help="again for more than one"
     )
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--processes", type=int, default=own_cores(), help="that draw the paper's samples")
+    parser.add_argument("--processes", type=int, default=own_cores(), help="that draw samples")
     parser.add_argument(
         "--device",
         choices=("auto", "cpu", "cuda"),

@@ -168,7 +168,7 @@ def test_a_smoke_training_ends_in_a_graph_that_answers_as_torch_does(tmp_path: P
     torch = pytest.importorskip("torch", reason="the extra 'author' is not installed")
     from experiments.shape_reconstruction.pcn.training.networks import CompletionNetwork, graph
 
-    assert main(["--profile", "smoke", "--out", str(tmp_path)]) == 0
+    assert main(["--profile", "smoke", "--only", "completion", "--out", str(tmp_path)]) == 0
     card = (tmp_path / "completion.json").read_text()
     assert json.loads(card)["profile"] == "smoke"
     assert np.isfinite(opened((tmp_path / "completion.onnx").read_bytes(), card).completed(POINTS)).all()

@@ -12,18 +12,12 @@ from experiments.shape_reconstruction import table_rows
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.explore import plan
-from experiments.shape_reconstruction.pcn.paper.inputs import (
-    INPUTS,
-    SIDE,
-    UNTOUCHED,
-    Turned,
-    window_of,
-    window_points,
-)
+from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
 from experiments.shape_reconstruction.pcn.paper.network import DENSE, SENSES, paper_completions
 from experiments.shape_reconstruction.pcn.point_frame import TAKEN, PointFrame, taken
 from experiments.shape_reconstruction.pcn.train import main
 from experiments.shape_reconstruction.pcn.training.paper.samples import sense_samples
+from experiments.shape_reconstruction.pcn.window import SIDE, UNTOUCHED, Turned, window_of, window_points
 from experiments.shape_reconstruction.table_rows import ROW_NAMES, rows_after, scored_rows
 from harness.basics.arrays import BoolArray, FloatArray
 from harness.basics.errors import DataRefused, FitRefused, WrongUse

@@ -10,8 +10,9 @@ import numpy as np
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS, UNTOUCHED, Turned, window_of
+from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
 from experiments.shape_reconstruction.pcn.point_frame import PointFrame, taken
+from experiments.shape_reconstruction.pcn.window import UNTOUCHED, Turned, window_of
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import DataRefused, FitRefused, OutOfDomain

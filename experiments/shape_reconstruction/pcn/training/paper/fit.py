@@ -2,45 +2,57 @@
 
 import sys
 import time
+from collections.abc import Callable
+from typing import Protocol, TypeVar
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from experiments.shape_reconstruction.pcn.training.fit import chamfer
-from experiments.shape_reconstruction.pcn.training.paper.networks import PaperNetwork
 from experiments.shape_reconstruction.pcn.training.paper.samples import SenseSamples
 from harness.basics.arrays import FloatArray
 
 RATE = 5.0e-4
 DECAY = 1.0e-2
 
-COMPARED = 4096
-"""Points of the dense cloud at a step, of as many all over the shape."""
-
 _COARSELY = 1024
 """Points all over the shape that the coarse clouds are compared with."""
 
 _SAID_EVERY = 20.0
 
+Module = TypeVar("Module", bound=nn.Module)
+
+
+class FitAmounts(Protocol):
+    """How long is learnt."""
+
+    @property
+    def steps(self) -> int: ...  # noqa: D102
+    @property
+    def batch(self) -> int: ...  # noqa: D102
+    @property
+    def compared(self) -> int:
+        """Points of the dense cloud at a step, of as many all over the shape."""
+
 
 def fitted_completion(
-    sense: str, samples: SenseSamples, steps: int, batch: int, seed: int, device: str
-) -> PaperNetwork:
+    name: str, make: Callable[[], Module], samples: SenseSamples, amounts: FitAmounts, seed: int, device: str
+) -> Module:
     """A network, its rate rising for a hundredth of the steps and then falling as half a cosine.
 
     Args:
-        sense: of ``INPUTS``.
+        name: of the network, for progress.
+        make: it, with its first weights.
         samples: to learn from.
-        steps: of the fit.
-        batch: samples a step.
+        amounts: of the fit.
         seed: of the first weights and of the order of samples.
         device: ``"cpu"`` or ``"cuda"``; sums on the latter are in no fixed order.
     """
     torch.manual_seed(seed)
     torch.set_float32_matmul_precision("high")
     draw = torch.Generator().manual_seed(seed)
-    module = PaperNetwork(sense).to(device)
+    module, steps = make().to(device), amounts.steps
     adam = torch.optim.AdamW(module.parameters(), lr=RATE, weight_decay=DECAY)
     falling = torch.optim.lr_scheduler.OneCycleLR(adam, RATE, total_steps=steps + 1, pct_start=0.01)
     inputs = [torch.from_numpy(value).to(device) for value in samples.inputs.values()]
@@ -48,8 +60,9 @@ def fitted_completion(
     module.train()
     began = said = time.perf_counter()
     for step in range(steps):
-        rows = torch.randint(len(whole), (batch,), generator=draw).to(device)
-        loss = _loss(module, *_mirrored([value[rows] for value in inputs], whole[rows], draw), draw)
+        rows = torch.randint(len(whole), (amounts.batch,), generator=draw).to(device)
+        given, wanted = _mirrored([value[rows] for value in inputs], whole[rows], draw)
+        loss = _loss(module, given, wanted, amounts.compared, draw)
         adam.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(module.parameters(), 1.0)
@@ -59,18 +72,22 @@ def fitted_completion(
             said = now
             left = (now - began) / (step + 1) * (steps - step - 1)
             sys.stderr.write(
-                f"{sense}: step {step + 1} of {steps}: {float(loss.detach()):.4f}, {left:.0f} s left\n"
+                f"{name}: step {step + 1} of {steps}: {float(loss.detach()):.4f}, {left:.0f} s left\n"
             )
     return module.eval()
 
 
-def _loss(module: PaperNetwork, given: list[Tensor], whole: Tensor, draw: torch.Generator) -> Tensor:
+def _loss(
+    module: nn.Module, given: list[Tensor], whole: Tensor, compared: int, draw: torch.Generator
+) -> Tensor:
     """Of every cloud alike: what is folded can be no better than what it is folded from."""
     coarse, dense = module(*given)
-    some = torch.randperm(dense.shape[1], generator=draw)[:COMPARED].to(dense.device)
-    few = torch.randperm(whole.shape[1], generator=draw)[:_COARSELY].to(dense.device)
-    found = chamfer(dense[:, some], whole).mean()
-    return torch.stack([found, *(chamfer(cloud, whole[:, few]).mean() for cloud in coarse)]).sum()
+
+    def some(points: Tensor, count: int) -> Tensor:
+        return points[:, torch.randperm(points.shape[1], generator=draw)[:count].to(points.device)]
+
+    found, few = chamfer(some(dense, compared), some(whole, compared)).mean(), some(whole, _COARSELY)
+    return torch.stack([found, *(chamfer(cloud, few).mean() for cloud in coarse)]).sum()
 
 
 def _mirrored(given: list[Tensor], whole: Tensor, draw: torch.Generator) -> tuple[list[Tensor], Tensor]:
@@ -90,7 +107,7 @@ def _mirrored(given: list[Tensor], whole: Tensor, draw: torch.Generator) -> tupl
     return [one(value) for value in given], points(whole)
 
 
-def completion_errors(module: PaperNetwork, samples: SenseSamples, batch: int, device: str) -> FloatArray:
+def completion_errors(module: nn.Module, samples: SenseSamples, batch: int, device: str) -> FloatArray:
     """``(n,)`` m: Chamfer-L1 from the dense cloud to the points all over each shape and back."""
     found = []
     with torch.no_grad():

@@ -11,10 +11,11 @@ from functools import partial
 import numpy as np
 from scipy.ndimage import binary_fill_holes
 
-from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS, SIDE, UNTOUCHED, window_points
+from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
 from experiments.shape_reconstruction.pcn.point_frame import PointFrame, taken
 from experiments.shape_reconstruction.pcn.training.samples import FEWEST, PRESSES, shape_of
 from experiments.shape_reconstruction.pcn.training.touched_shape import TouchedShape
+from experiments.shape_reconstruction.pcn.window import SIDE, UNTOUCHED, window_points
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import rotation_about

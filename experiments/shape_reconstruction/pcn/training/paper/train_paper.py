@@ -1,18 +1,20 @@
 """One network of the paper's completion: samples, fit, card."""
 
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 import torch
 
-from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS, SIDE
+from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
 from experiments.shape_reconstruction.pcn.paper.network import DENSE
 from experiments.shape_reconstruction.pcn.point_frame import TAKEN
 from experiments.shape_reconstruction.pcn.training.paper.fit import completion_errors, fitted_completion
-from experiments.shape_reconstruction.pcn.training.paper.networks import COARSE
+from experiments.shape_reconstruction.pcn.training.paper.networks import COARSE, PaperNetwork
 from experiments.shape_reconstruction.pcn.training.paper.samples import sense_samples
 from experiments.shape_reconstruction.pcn.training.samples import PRESSES, SIZES
 from experiments.shape_reconstruction.pcn.training.train_network import HELD_OUT, reached
+from experiments.shape_reconstruction.pcn.window import SIDE
 from harness.sim.solid.household.families import FAMILIES
 
 _TAKES = {
@@ -32,6 +34,8 @@ class PaperAmounts(Protocol):
     def steps(self) -> int: ...  # noqa: D102
     @property
     def batch(self) -> int: ...  # noqa: D102
+    @property
+    def compared(self) -> int: ...  # noqa: D102
 
 
 def train_paper_completion(
@@ -41,7 +45,7 @@ def train_paper_completion(
     samples = sense_samples(sense, amounts.shapes, amounts.sets, seed, processes)
     last = amounts.shapes - round(HELD_OUT * amounts.shapes)
     learnt, held = samples.of(samples.shapes < last), samples.of(samples.shapes >= last)
-    module = fitted_completion(sense, learnt, amounts.steps, amounts.batch, seed, device)
+    module = fitted_completion(sense, partial(PaperNetwork, sense), learnt, amounts, seed, device)
     fitted = learnt.of(np.arange(0, len(learnt.shapes), 8))
     takes = " and ".join(_TAKES[name] for name, _ in INPUTS[sense])
     card = {

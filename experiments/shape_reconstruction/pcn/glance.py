@@ -1,0 +1,106 @@
+"""A glance: points all over an object from its silhouette alone, by a network that came with the program."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
+from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
+from experiments.shape_reconstruction.pcn.card import held_out_error
+from experiments.shape_reconstruction.pcn.interpolated import interpolated
+from experiments.shape_reconstruction.pcn.point_frame import GIVEN
+from experiments.shape_reconstruction.pcn.window import SIDE, UNTOUCHED, Turned, window_of
+from harness.basics.arrays import FloatArray
+from harness.basics.clock import now
+from harness.basics.errors import FitRefused
+from harness.objectfile.entries import Domain, Input, Tensor
+from harness.objectfile.runtime import Network
+
+
+@dataclass(frozen=True, eq=False)
+class Glance:
+    """A trained network.
+
+    Attributes:
+        network: that runs it.
+        card: where it comes from and what it reaches on shapes held out.
+    """
+
+    network: Network
+    card: Mapping[str, object]
+
+    @property
+    def held_out(self) -> float:
+        """M, mean Chamfer-L1 from points to points on shapes that the network was not fitted to.
+
+        Raises:
+            DataRefused: the card does not say it.
+        """
+        return held_out_error(self.card)
+
+    def points(self, look: SeenMask) -> FloatArray:
+        """``(GIVEN, 3)`` m in ``stand``: places all over the object, those behind it supposed."""
+        turned = Turned.towards(look)
+        window = window_of(look, UNTOUCHED, turned)[None].astype(np.float32)
+        found = np.asarray(self.network({"window": window})["completed"][0], np.float64)
+        return turned.outward(UNTOUCHED.outward(found))
+
+
+def by_glance(evidence: ShapeEvidence) -> PointEstimate:
+    """Points all over the object, and between them; it heeds no touch.
+
+    Raises:
+        FitRefused: nothing was seen.
+    """
+    began = now()
+    return PointEstimate(interpolated(glanced(evidence)), now() - began, {"estimator": "glance"})
+
+
+def glanced(evidence: ShapeEvidence) -> FloatArray:
+    """``(GIVEN, 3)`` m in ``stand``: places all over the object that the picture shows.
+
+    Raises:
+        FitRefused: nothing was seen.
+    """
+    look = evidence.look
+    if look is None or not evidence.sighted:
+        raise FitRefused(
+            "the camera saw nothing of the object, and a glance needs its silhouette; let it look again"
+        )
+    return shipped().points(look)
+
+
+@cache
+def shipped() -> Glance:
+    """The network in the program's own folder."""
+    folder = files(__package__) / "data"
+    return opened((folder / "glance.onnx").read_bytes(), (folder / "glance.json").read_text())
+
+
+def opened(data: bytes, card: str) -> Glance:
+    """A network from its file's bytes and its card.
+
+    Raises:
+        DataRefused: the graph must not be run, or is another one.
+    """
+    window = Input(
+        name="window",
+        dtype="float32",
+        shape=("n", 1, SIDE, SIDE),
+        unit="1",
+        meaning="the silhouette",
+        domain=Domain(low=(0.0,), high=(1.0,)),
+        normaliser="in the graph",
+    )
+    completed = Tensor(
+        name="completed",
+        dtype="float32",
+        shape=("n", GIVEN, 3),
+        unit="1",
+        meaning="places all over the object in the window's frame",
+    )
+    return Glance(Network(data, "glance.onnx", [window], [completed]), json.loads(card))

@@ -1,0 +1,90 @@
+"""A glance: it turns with the bench, needs a silhouette, and is near what it has never seen."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from experiments.shape_reconstruction.methods import estimated
+from experiments.shape_reconstruction.metric import points_error, surfaces_apart
+from experiments.shape_reconstruction.pcn.glance import by_glance, opened, shipped
+from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
+from experiments.shape_reconstruction.pcn.point_frame import GIVEN
+from experiments.shape_reconstruction.pcn.train import main
+from experiments.shape_reconstruction.pcn.window import SIDE
+from harness.basics.errors import DataRefused, FitRefused
+from harness.basics.geometry import rotation_about, transform
+from harness.objects.builtin import build
+from tests.experiments.shape_reconstruction.touched import evidence_of, look_at
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("name", ["mug", "plate", "wrench"])
+def test_one_look_is_nearer_than_a_centimetre_to_what_was_never_drawn(name: str) -> None:
+    mesh = build(name, 6e-3)
+    seen = evidence_of((), look_at(mesh))
+    assert points_error(by_glance(seen).points, mesh, 3000).chamfer < 10e-3
+    found = by_glanced_surface(seen)
+    assert surfaces_apart(found.mesh, mesh, 3000).error.chamfer < 10e-3
+    assert trimesh.Trimesh(found.mesh.vertices, found.mesh.faces).is_watertight
+    assert np.isfinite(found.deviation).all()
+    assert (found.deviation > shipped().held_out).all()
+    assert found.not_bounded  # one picture never limits its line of sight
+
+
+def test_a_glance_turns_with_the_bench() -> None:
+    look = look_at(build("pitcher", 6e-3))
+    turn = transform(rotation_about(UP, 1.1), np.zeros(3))
+    turned = replace(look, stand_from_camera=turn @ look.stand_from_camera)
+    here = shipped().points(look) @ turn[:3, :3].T
+    assert shipped().points(turned) == pytest.approx(here, abs=1e-3)  # a pixel may fall on the other side
+
+
+def test_without_a_silhouette_there_is_no_glance() -> None:
+    look = look_at(build("mug", 6e-3))
+    for nothing in (None, replace(look, mask=np.zeros_like(look.mask))):
+        with pytest.raises(FitRefused, match="let it look again"):
+            by_glance(evidence_of((), nothing))
+    with pytest.raises(FitRefused):
+        estimated("glance", evidence_of((), None))
+
+
+def test_the_card_says_what_was_held_out() -> None:
+    held = shipped().card["held_out"]
+    assert isinstance(held, dict)
+    assert held["sets"] > 200
+    assert shipped().held_out < 0.01
+    assert shipped().card["profile"] == "standard"
+    with pytest.raises(DataRefused, match="train it again"):
+        replace(shipped(), card={}).held_out  # noqa: B018 - it is computed
+
+
+def test_a_profile_that_has_no_such_network_says_which_it_has(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--profile", "paper", "--only", "glance"]) == 2
+    assert "touch, picture, both" in capsys.readouterr().err
+
+
+def test_a_smoke_training_ends_in_a_graph_that_answers_as_torch_does(tmp_path: Path) -> None:
+    torch = pytest.importorskip("torch", reason="the extra 'author' is not installed")
+    from experiments.shape_reconstruction.pcn.training.glance import GlanceNetwork
+
+    asked = ["--profile", "smoke", "--only", "glance", "--processes", "1", "--device", "cpu"]
+    assert main([*asked, "--out", str(tmp_path)]) == 0
+    card = (tmp_path / "glance.json").read_text()
+    assert json.loads(card)["profile"] == "smoke"
+    assert np.isfinite(
+        opened((tmp_path / "glance.onnx").read_bytes(), card).points(look_at(build("mug", 9e-3)))
+    ).all()
+    torch.manual_seed(1)
+    module = GlanceNetwork()
+    windows = (torch.rand((3, 1, SIDE, SIDE)) < 0.4).to(torch.float32)
+    with torch.no_grad():
+        module.train()(windows)  # so that the normalisation is of something
+        wanted = module.eval()(windows)[1].numpy()
+    answered = opened(module.graph(), card).network({"window": windows.numpy()})["completed"]
+    assert answered.shape == (3, GIVEN, 3)
+    assert answered == pytest.approx(wanted, abs=1e-2 * float(np.abs(wanted).max()))  # half precision
