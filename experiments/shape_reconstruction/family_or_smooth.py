@@ -49,7 +49,7 @@ def by_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -
         return found
     smooth = by_hermite(evidence, symmetric=False)  # every class of round bodies was tried
     if found.details["foreign"] and evidence.sighted and deviations_apart(found, smooth) <= BESIDE:
-        return replace(found, seconds=found.seconds + smooth.seconds)
+        return _kept(found, smooth)
     open_ = {*found.not_bounded, *smooth.not_bounded}
     return replace(
         smooth,
@@ -68,6 +68,14 @@ def _why_smooth(found: ShapeEstimate, evidence: ShapeEvidence) -> str | None:
     if not evidence.sighted and beyond > BEYOND and count >= MANY:
         return f"the household shape lies {beyond * 1e3:.0f} mm beyond {count} contacts in the mean"
     return None
+
+
+def _kept(found: ShapeEstimate, smooth: ShapeEstimate) -> ShapeEstimate:
+    """A household shape beside the smooth surface: nowhere less sure than that surface is."""
+    stated = _nearest_deviations(smooth, found.mesh.vertices)
+    return replace(
+        found, deviation=np.minimum(found.deviation, stated), seconds=found.seconds + smooth.seconds
+    )
 
 
 def deviations_apart(found: ShapeEstimate, smooth: ShapeEstimate) -> float:

@@ -94,6 +94,18 @@ def test_a_household_shape_that_the_smooth_surface_leaves_open_is_kept_though_it
     np.testing.assert_array_equal(found.mesh.vertices, expected.mesh.vertices)
 
 
+def test_a_household_shape_that_is_kept_is_nowhere_less_sure_than_the_smooth_surface(
+    readings: ShapeEvidence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    by_rbf = by_hermite(readings, symmetric=False)
+    random = np.random.default_rng(0)
+    unsure = random.uniform(0.5, 2.0, len(by_rbf.mesh.vertices)) * by_rbf.deviation
+    fitted = replace(by_rbf, deviation=unsure, details={"foreign": True, "beyond_m": 0.0})
+    monkeypatch.setattr(family_or_smooth, "family_estimate", lambda *_: fitted)
+    found = by_family(readings)
+    np.testing.assert_array_equal(found.deviation, np.minimum(unsure, by_rbf.deviation))
+
+
 def test_two_surfaces_are_apart_by_their_distance_over_the_stated_deviation(
     readings: ShapeEvidence,
 ) -> None:
