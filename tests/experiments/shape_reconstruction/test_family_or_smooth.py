@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from experiments.shape_reconstruction import family_or_smooth
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import family_estimate
 from experiments.shape_reconstruction.family.settings import LEVELS
-from experiments.shape_reconstruction.family_or_smooth import MANY, by_family
+from experiments.shape_reconstruction.family_or_smooth import BESIDE, MANY, by_family, deviations_apart
 from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
 from tests.support.shape_readings import look_at, shape_readings, touches_on
 
@@ -47,6 +49,7 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
     by_rbf = by_hermite(part, symmetric=False)
     fitted: ShapeEstimate = replace(
         by_rbf,
+        mesh=_away(by_rbf.mesh, 0.1),
         details={"foreign": foreign, "beyond_m": beyond},
         not_bounded=("y",),
         doubtful={1: 0.004},
@@ -63,6 +66,60 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
         np.testing.assert_array_equal(found.mesh.vertices, by_rbf.mesh.vertices)
     else:
         assert found is fitted
+
+
+@pytest.mark.parametrize(
+    ("away", "sighted", "smooth"),
+    [
+        (0.5, True, False),
+        (2.0, True, True),
+        (0.5, False, True),  # nothing says how far the household shape may go on
+    ],
+)
+def test_a_household_shape_that_the_smooth_surface_leaves_open_is_kept_though_it_fits_badly(
+    readings: ShapeEvidence, monkeypatch: pytest.MonkeyPatch, away: float, sighted: bool, smooth: bool
+) -> None:
+    part = replace(readings, look=readings.look if sighted else None)
+    by_rbf = by_hermite(part, symmetric=False)
+    # Along z by so many limits: some of the surface is only slid along itself, so that no shift is exact.
+    height = by_rbf.mesh.vertices[:, 2].max()
+    held = replace(by_rbf, deviation=np.full(len(by_rbf.mesh.vertices), height / BESIDE))
+    fitted = replace(
+        held, mesh=_away(held.mesh, away * height), details={"foreign": True, "beyond_m": 0.0}, flags=()
+    )
+    monkeypatch.setattr(family_or_smooth, "family_estimate", lambda *_: fitted)
+    monkeypatch.setattr(family_or_smooth, "by_hermite", lambda *_, **__: held)
+    found = by_family(part)
+    expected = held if smooth else fitted
+    np.testing.assert_array_equal(found.mesh.vertices, expected.mesh.vertices)
+
+
+def test_a_household_shape_that_is_kept_is_nowhere_less_sure_than_the_smooth_surface(
+    readings: ShapeEvidence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    by_rbf = by_hermite(readings, symmetric=False)
+    random = np.random.default_rng(0)
+    unsure = random.uniform(0.5, 2.0, len(by_rbf.mesh.vertices)) * by_rbf.deviation
+    fitted = replace(by_rbf, deviation=unsure, details={"foreign": True, "beyond_m": 0.0})
+    monkeypatch.setattr(family_or_smooth, "family_estimate", lambda *_: fitted)
+    found = by_family(readings)
+    np.testing.assert_array_equal(found.deviation, np.minimum(unsure, by_rbf.deviation))
+
+
+def test_two_surfaces_are_apart_by_their_distance_over_the_stated_deviation(
+    readings: ShapeEvidence,
+) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
+    inner = Mesh(np.asarray(ball.vertices), np.asarray(ball.faces, dtype=np.int64))
+    outer = Mesh(1.2 * inner.vertices, inner.faces)
+    stated = replace(by_hermite(readings), mesh=inner, deviation=np.full(len(inner.vertices), 5.0e-3))
+    # 10 mm apart; an icosphere of radius 50 mm has faces up to 0.1 mm within it.
+    assert deviations_apart(replace(stated, mesh=outer), stated) == pytest.approx(2.0, abs=0.03)
+
+
+def _away(mesh: Mesh, by: float) -> Mesh:
+    """The same, farther along z by some m."""
+    return Mesh(mesh.vertices + np.array([0.0, 0.0, by]), mesh.faces)
 
 
 def test_contacts_of_no_object_at_all_are_foreign_to_the_family(readings: ShapeEvidence) -> None:
