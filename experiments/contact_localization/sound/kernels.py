@@ -11,7 +11,8 @@ _FACING = 0.5
 _RIDGE, _REACH = 0.2, 1.0
 """Of the Gaussian's width: against samples in a row, and how far a place may lie from the samples' mean."""
 
-_LITTLE = 1.0e-3
+_LITTLE, _FAR = 1.0e-3, 8.0
+"""Shares below which a sample adds nothing, and nats behind the nearest sample's at which it has none."""
 
 
 @compiled
@@ -116,7 +117,8 @@ def _gaussian(gaps: FloatArray, width: float, shares: FloatArray) -> None:
         shares[j] = gaps[0, j] ** 2 + gaps[1, j] ** 2
         closest = min(closest, shares[j])
     for j in range(len(shares)):
-        shares[j] = np.exp(-0.5 * (shares[j] - closest) / width**2)
+        nats = 0.5 * (shares[j] - closest) / width**2
+        shares[j] = np.exp(-nats) if nats < _FAR else 0.0
         total += shares[j]
     for j in range(len(shares)):
         shares[j] /= total
