@@ -33,11 +33,17 @@ class GainTable:
             found[far] = self.surface.tree.query(points[far])[1]
         return found
 
-    def about(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """``(n, 7)`` samples about ``(n, 3)`` points in metres and their shares, smooth in the point."""
+    def about(self, points: FloatArray, directions: FloatArray) -> tuple[IntArray, FloatArray]:
+        """``(n, 12)`` samples about ``(n, 3)`` places in metres that a hammer strikes, and their shares.
+
+        Args:
+            points: ``(n, 3)`` metres; how far they are off the surface along the hammer does not matter.
+            directions: ``(n, 3)`` unit, of the hammer.
+        """
         surface = self.surface
         return blend_of_samples(
             np.ascontiguousarray(points),
+            np.ascontiguousarray(directions),
             self.nearest(points),
             surface.points,
             surface.normals,
@@ -47,7 +53,7 @@ class GainTable:
         )
 
 
-_ABOUT = 7
+_ABOUT = 12
 _WIDTH = 0.5
 """Of the Gaussian between samples, in units of their spacing."""
 

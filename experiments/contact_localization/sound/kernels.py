@@ -6,9 +6,13 @@ from harness.basics.arrays import AnyArray, FloatArray, IntArray
 from harness.basics.compiled import compiled
 
 _FACING = 0.5
-"""Cosine between normals below which a sample is on another face."""
+"""Cosine between a sample's normal and the way back of a hammer below which it strikes another face."""
 
-_LITTLE = 1.0e-3
+_RIDGE, _REACH = 0.2, 1.0
+"""Of the Gaussian's width: against samples in a row, and how far a place may lie from the samples' mean."""
+
+_LITTLE, _FAR = 1.0e-3, 8.0
+"""Shares below which a sample adds nothing, and nats behind the nearest sample's at which it has none."""
 
 
 @compiled
@@ -27,6 +31,7 @@ def nearest_in_table(points: FloatArray, nearest: AnyArray, origin: FloatArray, 
 @compiled
 def blend_of_samples(
     points: FloatArray,
+    directions: FloatArray,
     nearest: IntArray,
     places: FloatArray,
     normals: FloatArray,
@@ -34,15 +39,21 @@ def blend_of_samples(
     count: int,
     width: float,
 ) -> tuple[IntArray, FloatArray]:
-    """Samples about each place and their shares: a Gaussian of the distance, facing the same way.
+    """Samples about the places that a hammer strikes, and their shares: exact for what is linear across it.
+
+    The samples face the hammer: beside a rim or a hole the nearest one often faces elsewhere. Where none
+    does, the nearest has it all. Their mean under a Gaussian is a place of its own, up to half a spacing
+    off, at random from one place to the next; the shares are therefore those of a plane fitted across the
+    hammer (local linear regression), which may be negative. Beyond an edge the plane ends with the samples.
 
     Args:
         points: ``(n, 3)`` metres.
+        directions: ``(n, 3)`` unit, of the hammer.
         nearest: ``(n,)`` the sample nearest to each.
         places: ``(s, 3)`` metres, of the samples.
         normals: ``(s, 3)`` unit, of the samples.
-        neighbours: ``(s, >= count - 1)`` of the samples, nearest first.
-        count: samples that share a place.
+        neighbours: ``(s, >= count)`` of the samples, nearest first.
+        count: samples that share a place at most.
         width: metres, one sigma of the Gaussian.
 
     Returns:
@@ -50,22 +61,91 @@ def blend_of_samples(
     """
     samples = np.empty((len(points), count), np.int64)
     shares = np.zeros((len(points), count))
-    gaps = np.empty(count)
+    gaps, sides = np.empty((2, count)), np.empty((2, 3))
     for i in range(len(points)):
-        first = nearest[i]
-        for j in range(count):
-            sample = first if j == 0 else neighbours[first, j - 1]
-            samples[i, j] = sample
-            facing, gap = 0.0, 0.0
-            for d in range(3):
-                facing += normals[first, d] * normals[sample, d]
-                gap += (points[i, d] - places[sample, d]) ** 2
-            gaps[j] = gap if facing > _FACING else np.inf
-        closest = gaps.min()
-        for j in range(count):
-            shares[i, j] = np.exp(-0.5 * (gaps[j] - closest) / width**2)
-        shares[i] /= shares[i].sum()
+        samples[i] = nearest[i]
+        found = _facing(directions[i], nearest[i], normals, neighbours, samples[i])
+        if found == 0:
+            shares[i, 0] = 1.0
+            continue
+        _across(directions[i], sides)
+        for j in range(found):
+            for side in range(2):
+                gaps[side, j] = 0.0
+                for d in range(3):
+                    gaps[side, j] += sides[side, d] * (places[samples[i, j], d] - points[i, d])
+        _gaussian(gaps[:, :found], width, shares[i, :found])
+        _levelled(gaps[:, :found], width, shares[i, :found])
     return samples, shares
+
+
+@compiled
+def _facing(
+    direction: FloatArray, first: int, normals: FloatArray, neighbours: AnyArray, samples: IntArray
+) -> int:
+    """Write the first sample and its neighbours that face a hammer, as many as there is room for."""
+    found = 0
+    for j in range(neighbours.shape[1] + 1):
+        sample = first if j == 0 else neighbours[first, j - 1]
+        facing = 0.0
+        for d in range(3):
+            facing -= normals[sample, d] * direction[d]
+        if facing > _FACING:
+            samples[found] = sample
+            found += 1
+            if found == len(samples):
+                break
+    return found
+
+
+@compiled
+def _across(direction: FloatArray, sides: FloatArray) -> None:
+    """Write ``(2, 3)``: two unit vectors across a unit direction and each other (Duff, JCGT 6(1), 2017)."""
+    x, y, z = direction[0], direction[1], direction[2]
+    sign = 1.0 if z >= 0.0 else -1.0
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    sides[0, 0], sides[0, 1], sides[0, 2] = 1.0 + sign * x * x * a, sign * b, -sign * x
+    sides[1, 0], sides[1, 1], sides[1, 2] = b, sign + y * y * a, -y
+
+
+@compiled
+def _gaussian(gaps: FloatArray, width: float, shares: FloatArray) -> None:
+    """Write the ``(count,)`` shares of samples at ``(2, count)`` gaps in metres, summing to 1."""
+    closest, total = np.inf, 0.0
+    for j in range(len(shares)):
+        shares[j] = gaps[0, j] ** 2 + gaps[1, j] ** 2
+        closest = min(closest, shares[j])
+    for j in range(len(shares)):
+        nats = 0.5 * (shares[j] - closest) / width**2
+        shares[j] = np.exp(-nats) if nats < _FAR else 0.0
+        total += shares[j]
+    for j in range(len(shares)):
+        shares[j] /= total
+
+
+@compiled
+def _levelled(gaps: FloatArray, width: float, shares: FloatArray) -> None:
+    """Change shares so that the samples' mean is the place itself: times ``1 - (gap - mean) C^-1 mean``.
+
+    ``C`` is the covariance of the gaps, with a ridge against samples in a row.
+    """
+    mean0, mean1 = 0.0, 0.0
+    for j in range(len(shares)):
+        mean0 += shares[j] * gaps[0, j]
+        mean1 += shares[j] * gaps[1, j]
+    c00, c01, c11 = (_RIDGE * width) ** 2, 0.0, (_RIDGE * width) ** 2
+    for j in range(len(shares)):
+        x, y = gaps[0, j] - mean0, gaps[1, j] - mean1
+        c00 += shares[j] * x * x
+        c01 += shares[j] * x * y
+        c11 += shares[j] * y * y
+    within = min(1.0, _REACH * width / max(np.hypot(mean0, mean1), 1.0e-9))
+    factor = within / (c00 * c11 - c01 * c01)
+    slope0 = factor * (c11 * mean0 - c01 * mean1)
+    slope1 = factor * (c00 * mean1 - c01 * mean0)
+    for j in range(len(shares)):
+        shares[j] *= 1.0 - (gaps[0, j] - mean0) * slope0 - (gaps[1, j] - mean1) * slope1
 
 
 @compiled
@@ -97,7 +177,7 @@ def put_gains(
             blended[3 * first[r] : 3 * last[r]] = 0.0
         for j in range(about):
             share = blend[k, j]
-            if share > _LITTLE:
+            if abs(share) > _LITTLE:
                 row = shapes[samples[k, j]]
                 for r in range(len(first)):
                     for i in range(3 * first[r], 3 * last[r]):
