@@ -8,6 +8,7 @@ from scipy.special import ndtr
 from experiments.scale_estimation.sound.model import RingingModel
 from harness.basics.arrays import FloatArray
 from harness.basics.compiled import compiled
+from harness.basics.materials import Material
 from harness.sim.modal.modes import dampings
 
 NARROW, WIDE = 0.008, 0.035
@@ -33,6 +34,8 @@ CLUTTER_FALL = 5.0
 above it on average, peaks of modes 16."""
 
 _REACH = 4.0
+_PARTS = 16
+"""Of the band above the solved modes, in each of which the rate of their peaks is taken as even."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +73,78 @@ def log_likelihood(peaks: Peaks, model: RingingModel, log_sizes: FloatArray) -> 
     low, high = np.log(peaks.band)
     logs = np.log(model.frequencies)
     heard = logs - log_sizes[:, None]
-    loud = FOUND * ndtr((levels - threshold) / LEVEL_SIGMA) / _overlapping(model, heard, peaks.window_decay)
+    alike = _overlapping(model, heard, peaks.window_decay)
+    levels = levels + 10.0 * np.log10(alike)  # energies of modes that are heard as one add
+    loud = FOUND * ndtr((levels - threshold) / LEVEL_SIGMA) / alike
     in_band = ndtr((heard - low) / NARROW) - ndtr((heard - high) / NARROW)
     expected = (loud * in_band).sum(axis=1)
     above = (peaks.levels - peaks.levels.min()) / CLUTTER_FALL
     clutter = CLUTTER / (high - low) * np.exp(-above) / CLUTTER_FALL
+    beyond = UnsolvedModes.of(model)
+    expected += beyond.expected(log_sizes, peaks, threshold)
     matches = _matched(
         np.log(peaks.frequencies), peaks.levels, logs, levels, loud, log_sizes, clutter,
+        beyond.intensity(log_sizes, peaks, threshold),
     )  # fmt: skip
     return np.asarray(matches - expected)
+
+
+@dataclass(frozen=True)
+class UnsolvedModes:
+    """Modes above the highest that was solved: how many there are is known, not where each is.
+
+    They go on at the spacing of those below, as a thin wall's do (Cremer, Heckl and Petersson,
+    Structure-borne sound, 2005). Without them a peak up there would be chance at a large size and a mode's at
+    a small one: things of a soft material, which have too many modes to solve all, would be called small.
+
+    Attributes:
+        top: Hz, of the nominal object, from where on modes were not solved.
+        per_hz: modes a hertz of it.
+        amplitude: Pa s / N, of a middling one.
+        material: whose damping they have.
+    """
+
+    top: float
+    per_hz: float
+    amplitude: float
+    material: Material
+
+    @classmethod
+    def of(cls, model: RingingModel) -> "UnsolvedModes":
+        """As the upper half of the modes that were solved goes on."""
+        upper = model.frequencies[len(model.frequencies) // 2 :]
+        amplitude = float(np.exp(np.log(model.amplitudes[-len(upper) :] + 1e-30).mean()))
+        per_hz = (len(upper) - 1) / max(float(np.ptp(upper)), 1.0)
+        return cls(float(upper[-1]), per_hz, amplitude, model.material)
+
+    def expected(self, log_sizes: FloatArray, peaks: Peaks, threshold: float) -> FloatArray:
+        """``(k,)`` how many of their peaks are in the band and likely louder than ``threshold`` dB."""
+        low, high = np.log(peaks.band)
+        begin = np.clip(np.log(self.top) - log_sizes, low, high)
+        share = (np.arange(_PARTS) + 0.5) / _PARTS
+        logs = begin[:, None] + (high - begin)[:, None] * share
+        rate, _ = self._rate(np.exp(logs), log_sizes[:, None], peaks.window_decay, threshold)
+        return np.asarray(rate.mean(axis=1) * (high - begin))
+
+    def intensity(self, log_sizes: FloatArray, peaks: Peaks, threshold: float) -> FloatArray:
+        """``(p, k)`` of them at every peak, per unit of log frequency and per dB; 0 below ``top``."""
+        heard = peaks.frequencies[:, None]
+        rate, levels = self._rate(heard, log_sizes, peaks.window_decay, threshold)
+        off = (peaks.levels[:, None] - levels) / LEVEL_SIGMA
+        loudness = np.exp(-0.5 * off**2) / (LEVEL_SIGMA * np.sqrt(2.0 * np.pi))
+        return np.where(np.log(heard) + log_sizes > np.log(self.top), rate * loudness, 0.0)
+
+    def _rate(
+        self, heard: FloatArray, log_sizes: FloatArray, window_decay: float, threshold: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Peaks a unit of the logarithm at frequencies in Hz, and their levels in dB re 1 Pa/N."""
+        decays = dampings(heard, self.material) + window_decay
+        levels = 20.0 * np.log10(self.amplitude * np.exp(-2.0 * log_sizes) / (2.0 * decays))
+        per_hz = self.per_hz * np.exp(log_sizes)
+        apart = 1.0 + 2.0 * per_hz * WIDTHS * decays / (2.0 * np.pi)  # modes that share one peak
+        levels = levels + 10.0 * np.log10(apart)
+        found = FOUND * ndtr((levels - threshold) / LEVEL_SIGMA) / apart
+        return np.asarray(per_hz * heard * found), np.asarray(levels)
 
 
 def _overlapping(model: RingingModel, heard: FloatArray, window_decay: float) -> FloatArray:
@@ -102,6 +168,7 @@ def _matched(
     found: FloatArray,
     log_sizes: FloatArray,
     clutter: FloatArray,
+    beyond: FloatArray,
 ) -> FloatArray:
     """``(k,)`` sum over peaks of the logarithm of their intensity over clutter's, at every size."""
     first, step, count = log_sizes[0], log_sizes[1] - log_sizes[0], len(log_sizes)
@@ -109,7 +176,7 @@ def _matched(
     intensity = np.empty(count)
     norm = 1.0 / np.sqrt(2.0 * np.pi)
     for peak in range(len(heard)):
-        intensity[:] = 0.0
+        intensity[:] = beyond[peak]
         for mode in range(len(modes)):
             middle = modes[mode] - heard[peak]  # the size at which this mode is heard there
             low = max(0, int(np.ceil((middle - _REACH * WIDE - first) / step)))

@@ -9,7 +9,7 @@ from experiments.scale_estimation.readings import peaks_of
 from experiments.scale_estimation.size import ENDS, STEP, Belief, SizeRange
 from experiments.scale_estimation.sound.hearing import SHAPE_SIGMA, Hearing, MaterialGuess, by_sound
 from experiments.scale_estimation.sound.model import RingingModel
-from experiments.scale_estimation.sound.peaks import Peaks
+from experiments.scale_estimation.sound.peaks import CLUTTER_FALL, Peaks, UnsolvedModes, log_likelihood
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import KNOWN, MATERIALS
@@ -169,3 +169,45 @@ def test_a_silent_strike_is_no_reading() -> None:
     silent = Strike(50e3, nothing, nothing, 0, 0.0, overload=False, double_hit=False, silent=True)
     assert peaks_of([]) is None
     assert peaks_of([silent]) is None
+
+
+def test_a_loud_peak_speaks_less_against_a_size_whose_modes_there_were_not_solved() -> None:
+    """Else the smaller of two sizes wins, whose solved modes reach higher: soft things were called small."""
+    solved = RingingModel(np.linspace(1000.0, 3000.0, 11), np.full(11, 0.05), MATERIALS["polycarbonate"])
+    loud = float(solved.levels(np.zeros(1), DECAY)[0].max())
+
+    def likely(hertz: float) -> float:
+        peaks = of(np.array([1400.0, hertz]), np.array([loud - 20.0, loud]), "polycarbonate")
+        return float(log_likelihood(peaks, solved, np.array([-1e-3, 0.0, 1e-3]))[1])
+
+    amid, above = likely(700.0), likely(6000.0)
+    assert above > amid + 1.0
+    assert above < likely(2000.0)  # where a mode was solved, it is its peak
+
+
+@pytest.mark.parametrize("shift", [0.0, -0.4])
+def test_a_peak_above_the_solved_modes_counts_alike_wherever_it_lies(shift: float) -> None:
+    low, high = (
+        UnsolvedModes.of(model()).intensity(np.array([shift]), of(at, np.zeros(1)), -20.0)
+        for at in (np.array([5.0e4]), np.array([5.2e4]))
+    )
+    assert low.item() > 0.0
+    assert low.item() == pytest.approx(high.item(), rel=0.2)
+    solved = of(np.array([model().frequencies[-2] * np.exp(-shift)]), np.zeros(1))
+    assert UnsolvedModes.of(model()).intensity(np.array([shift]), solved, -20.0).item() == 0.0
+
+
+def test_modes_that_are_heard_as_one_are_louder_than_each() -> None:
+    """Four modes within each other's width: a peak of four times the energy is likelier than one of one."""
+    at = 3000.0 + np.arange(4)
+    four = RingingModel(np.asarray(at, dtype=np.float64), np.full(4, 0.05), MATERIALS["polycarbonate"])
+    alone = float(four.levels(np.zeros(1), DECAY)[0].max())
+
+    def likely(louder: float) -> float:
+        peaks = of(np.array([2000.0, 3001.5]), np.array([alone - 30.0, alone + louder]), "polycarbonate")
+        return float(log_likelihood(peaks, four, np.array([-1e-3, 0.0, 1e-3]))[1])
+
+    chance = 1.0 / CLUTTER_FALL  # nats a dB by which louder chance peaks are rarer
+    by_level = [likely(louder) - chance * louder for louder in (0.0, 6.0, 12.0)]
+    assert by_level[1] > by_level[0]
+    assert by_level[1] > by_level[2]
