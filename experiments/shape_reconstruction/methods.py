@@ -11,6 +11,7 @@ from experiments.shape_reconstruction.estimators.point_answer import PointEstima
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family_or_smooth import by_family
+from experiments.shape_reconstruction.glance_or_family import by_glance_or_family
 from experiments.shape_reconstruction.pcn.completed_surface import by_completed_surface
 from experiments.shape_reconstruction.pcn.glance import by_glance
 from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
@@ -29,8 +30,8 @@ METHODS: Mapping[str, Callable[[ShapeEvidence], ShapeEstimate]] = {
     "pcn": by_completed_surface,
     "family-coarse": partial(by_family, settings=LEVELS["coarse"]),
     "retrieval": by_known_shapes,
-    "family": by_family,
-    "family-fine": partial(by_family, settings=LEVELS["fine"]),
+    "family": by_glance_or_family,
+    "family-fine": partial(by_glance_or_family, settings=LEVELS["fine"]),
 }
 """From cheap to dear: a box takes 10 ms, the family some seconds."""
 

@@ -8,17 +8,21 @@ from importlib.resources import files
 
 import numpy as np
 
+from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.pcn.card import held_out_error
 from experiments.shape_reconstruction.pcn.interpolated import interpolated
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN
-from experiments.shape_reconstruction.pcn.window import SIDE, UNTOUCHED, Turned, window_of
+from experiments.shape_reconstruction.pcn.window import SIDE, SPAN, UNTOUCHED, Turned, window_of
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import FitRefused
 from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.runtime import Network
+
+_RIM = np.ones((SIDE, SIDE), bool)
+_RIM[1:-1, 1:-1] = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +47,21 @@ class Glance:
         return held_out_error(self.card)
 
     def points(self, look: SeenMask) -> FloatArray:
-        """``(GIVEN, 3)`` m in ``stand``: places all over the object, those behind it supposed."""
+        """``(GIVEN, 3)`` m in ``stand``: places all over the object, those behind it supposed.
+
+        Raises:
+            FitRefused: the object reaches out of the window.
+        """
         turned = Turned.towards(look)
-        window = window_of(look, UNTOUCHED, turned)[None].astype(np.float32)
-        found = np.asarray(self.network({"window": window})["completed"][0], np.float64)
+        window = window_of(look, UNTOUCHED, turned)
+        if window[0, _RIM].any():
+            raise FitRefused(
+                f"the silhouette reaches farther than {SPAN * UNTOUCHED.reach * 1e3:.0f} mm from where the "
+                "object should stand, and the network looks no farther; check where it stands, or touch it"
+            )
+        found = np.asarray(
+            self.network({"window": window[None].astype(np.float32)})["completed"][0], np.float64
+        )
         return turned.outward(UNTOUCHED.outward(found))
 
 
@@ -54,7 +69,7 @@ def by_glance(evidence: ShapeEvidence) -> PointEstimate:
     """Points all over the object, and between them; it heeds no touch.
 
     Raises:
-        FitRefused: nothing was seen.
+        FitRefused: as ``glanced``.
     """
     began = now()
     return PointEstimate(interpolated(glanced(evidence)), now() - began, {"estimator": "glance"})
@@ -64,12 +79,13 @@ def glanced(evidence: ShapeEvidence) -> FloatArray:
     """``(GIVEN, 3)`` m in ``stand``: places all over the object that the picture shows.
 
     Raises:
-        FitRefused: nothing was seen.
+        FitRefused: nothing was seen, the object fills the picture, or it is too large for the network.
     """
     look = evidence.look
-    if look is None or not evidence.sighted:
+    if look is None or silhouette_of(evidence, np.zeros((0, 3))) is None:
         raise FitRefused(
-            "the camera saw nothing of the object, and a glance needs its silhouette; let it look again"
+            "the camera saw nothing of the object, or nothing else, and a glance needs its silhouette; let "
+            "it look again"
         )
     return shipped().points(look)
 

@@ -4,33 +4,49 @@ import time
 
 import numpy as np
 
+from experiments.shape_reconstruction.estimators.free_space import Silhouette
 from experiments.shape_reconstruction.estimators.knowledge import known_by, limited_sides, not_bounded
 from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.pcn.completed_surface import SPREAD, closed_around
 from experiments.shape_reconstruction.pcn.glance import glanced, shipped
 from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.arrays import FloatArray
 
 
 def by_glanced_surface(evidence: ShapeEvidence) -> ShapeEstimate:
     """What household shapes look like that: closed by a ball as wide as the gaps between the points.
 
-    It heeds no touch. Its deviation is what the network was off on shapes that were held out; nothing but
-    what it has learnt limits how deep the object is along the line of sight, and ``not_bounded`` says so.
+    It heeds no touch. Its deviation is what the network was off on shapes that were held out, and twice what
+    its points lie outside of their own silhouette: so much it has not understood. Nothing but what it has
+    learnt limits how deep the object is along the line of sight, and ``not_bounded`` says so.
 
     Raises:
-        FitRefused: nothing was seen.
+        FitRefused: nothing was seen, the object fills the picture, or it is too large for the network.
     """
     start = time.perf_counter()
     points = glanced(evidence)
     mesh, seen = closed_around(points), silhouette_of(evidence, np.zeros((0, 3)))
+    deviation = np.hypot(SPREAD * shipped().held_out, 2.0 * _outside(evidence, seen, points))
     return ShapeEstimate(
         mesh=mesh,
-        deviation=np.full(len(mesh.vertices), SPREAD * shipped().held_out),
+        deviation=np.full(len(mesh.vertices), deviation),
         known_by=known_by(mesh, None, seen),
         not_bounded=not_bounded(limited_sides(mesh, None, seen)),
         doubtful={},
-        flags=("by the picture alone: what is behind is supposed, as household shapes are",),
+        flags=(
+            "by the picture alone: its class is not told, and what is behind is supposed, as household "
+            "shapes are",
+        ),
         seconds=time.perf_counter() - start,
         details={"estimator": "glance", "points": len(points)},
     )
+
+
+def _outside(evidence: ShapeEvidence, seen: Silhouette | None, points: FloatArray) -> float:
+    """M, root mean square of how far points lie outside of the silhouette."""
+    look = evidence.look
+    if look is None or seen is None:
+        return 0.0
+    pixel = float(np.linalg.norm(look.stand_from_camera[:3, 3])) / look.focal_length
+    return pixel * float(np.sqrt(np.mean(np.maximum(seen.outside_pixels(points), 0.0) ** 2)))

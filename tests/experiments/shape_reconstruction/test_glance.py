@@ -17,8 +17,9 @@ from experiments.shape_reconstruction.pcn.train import main
 from experiments.shape_reconstruction.pcn.window import SIDE
 from harness.basics.errors import DataRefused, FitRefused
 from harness.basics.geometry import rotation_about, transform
+from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
-from tests.experiments.shape_reconstruction.touched import evidence_of, look_at
+from tests.experiments.shape_reconstruction.touched import evidence_of, look_at, presses
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -34,6 +35,34 @@ def test_one_look_is_nearer_than_a_centimetre_to_what_was_never_drawn(name: str)
     assert np.isfinite(found.deviation).all()
     assert (found.deviation > shipped().held_out).all()
     assert found.not_bounded  # one picture never limits its line of sight
+
+
+def test_without_a_contact_the_answer_is_by_a_glance_and_with_one_it_is_not() -> None:
+    mesh = build("mug", 6e-3)
+    seen = evidence_of((), look_at(mesh))
+    found = estimated("family", seen)
+    assert found.details["estimator"] == "glance"
+    assert any("picture alone" in flag for flag in found.flags)
+    touched = estimated("family", evidence_of(presses(mesh, 1, seed=3), look_at(mesh)))
+    assert touched.details["kind"] == "family"
+
+
+def test_what_is_too_large_for_the_network_is_not_glanced_at() -> None:
+    large = build("plate", 6e-3)
+    large = Mesh(2.5 * large.vertices, large.faces)
+    seen = evidence_of((), look_at(large), largest=0.8)
+    with pytest.raises(FitRefused, match="looks no farther"):
+        by_glance(seen)
+    assert estimated("family", seen).details.get("estimator") != "glance"
+
+
+def test_a_silhouette_that_it_does_not_understand_makes_it_less_sure() -> None:
+    look = look_at(build("mug", 6e-3))
+    known = by_glanced_surface(evidence_of((), look))
+    odd = look.mask.copy()
+    odd[30:90:6] = False  # no household shape is in slices
+    strange = by_glanced_surface(evidence_of((), replace(look, mask=odd)))
+    assert strange.deviation.min() > known.deviation.max()
 
 
 def test_a_glance_turns_with_the_bench() -> None:
