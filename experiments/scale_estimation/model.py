@@ -9,8 +9,7 @@ from experiments.scale_estimation.section import Scale
 from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.sound.hearing import MaterialGuess
 from experiments.scale_estimation.sound.model import RingingModel
-from experiments.scale_estimation.touch.fit import Stand
-from experiments.scale_estimation.touch.stand_errors import StandErrors
+from experiments.scale_estimation.touch.fit import Stand, StandErrors
 from experiments.scale_estimation.vision.fit import View
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
@@ -104,7 +103,7 @@ class ObjectModel:
         """For contacts."""
         surface = sample_surface(self.mesh, self.nominal / _SAMPLES)
         asked = self.scene.section(Scale)
-        errors = StandErrors.at(self.station.errors, asked.place_error, asked.support_error)
+        errors = StandErrors(asked.place_error, asked.support_error, self.station.errors.tilt)
         return Stand.of(surface, self.upright, self.anchor, self.place, errors)
 
     @property

@@ -1,15 +1,13 @@
 """Contacts against the surface of a model at any size, place and turn: least squares of many hypotheses."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from experiments.scale_estimation.touch.contact_scale import ContactScale
 from experiments.scale_estimation.touch.patch import Patch
-from experiments.scale_estimation.touch.stand_errors import StandErrors
 from harness.basics.arrays import FloatArray
 from harness.sim.solid.surface_samples import Surface
 
@@ -18,8 +16,7 @@ FACING = 12.0e-3
 sample: on a thin wall it is then the face that looks the contact's way."""
 
 DISTANCE_SIGMA = 1.1e-3
-"""M, of where a contact is along its normal while hypotheses are searched for: more than it is, so that what
-is nearly right is found, and tells a wrong object; how sure the size is follows ``ContactScale``."""
+"""M, of where a contact is along its normal: the arm's, the gel's and the shape's errors together."""
 
 NORMAL_SIGMA = float(np.radians(10.0))
 """Rad; a contact on a rim has a plane's normal 20 to 40 degrees off, so it counts softly."""
@@ -39,6 +36,23 @@ UNKNOWNS = 8
 _SIZE, _X, _Y, _YAW, _Z, _TILT_X, _TILT_Y, _DEPTH = range(UNKNOWNS)
 
 
+@dataclass(frozen=True)
+class StandErrors:
+    """How well it is known where the object stands: standard deviations.
+
+    Attributes:
+        place: m, per axis of the plane.
+        support: m, of the height.
+        tilt: rad, per axis, of the object's own stand.
+        depth: m, along its axis, of where the gel is on the arm and how deep it reads: of all contacts alike.
+    """
+
+    place: float = 0.1
+    support: float = 1.0e-3
+    tilt: float = float(np.radians(0.5))
+    depth: float = 0.8e-3
+
+
 @dataclass(frozen=True, eq=False)
 class Stand:
     """The nominal object as it stands, upright in base, its bottom's middle at the origin.
@@ -55,7 +69,7 @@ class Stand:
     normals: FloatArray
     spacing: float
     place: FloatArray
-    errors: StandErrors = field(default_factory=StandErrors)
+    errors: StandErrors = StandErrors()
 
     @classmethod
     def of(
@@ -130,21 +144,11 @@ class TouchProblem:
         patches: of the contacts.
         points: of each patch that are used; the first are spread the widest.
         slack: by which share a sample that is taken for the nearest may be farther than it.
-        weighed: whether contacts count by their own scale; else by ``DISTANCE_SIGMA``, as in a search.
     """
 
-    def __init__(
-        self,
-        stand: Stand,
-        patches: Sequence[Patch],
-        points: int,
-        slack: float = 0.0,
-        weighed: bool = False,
-    ) -> None:
+    def __init__(self, stand: Stand, patches: Sequence[Patch], points: int, slack: float = 0.0) -> None:
         self.stand = stand
         self._slack = slack
-        off = stand.errors.contact / DISTANCE_SIGMA
-        self._scale = ContactScale.of(off, len(patches)) if weighed else None
         places = [patch.points[:points] - stand.place for patch in patches]
         self._points = np.array(places).reshape(len(patches), points, 3)
         self._normals = np.array([patch.normal for patch in patches]).reshape(-1, 3)
@@ -170,10 +174,6 @@ class TouchProblem:
             if last < rounds:
                 here = here + self._step(residuals, slopes, here, fixed_size)
         return best, least
-
-    def cost(self, unknowns: FloatArray) -> FloatArray:
-        """``(k,)`` half sums of squares with the prior, or what stands for them, of ``(k, UNKNOWNS)``."""
-        return self._linear(unknowns)[2]
 
     def sigma(self, unknowns: FloatArray) -> float:
         """Of the size's logarithm at ``(UNKNOWNS,)`` unknowns, all else free, to first order."""
@@ -224,8 +224,9 @@ class TouchProblem:
         along = apart - np.einsum("kcmi,kcmi->kcm", apart, faced)[..., None] * faced
         lateral = np.linalg.norm(along, axis=-1).mean(axis=2)
         beyond = np.maximum(lateral - scale[:, None] * 3.0e-3, 0.0) / DISTANCE_SIGMA
-        apart, turned_away = 0.5 * (distance**2 + beyond**2), 0.5 * np.minimum(angle, 3.0) ** 2 / 3.0
-        weight, cost = self._counted(apart, turned_away)
+        cost = 0.5 * (distance**2 + np.minimum(angle, 3.0) ** 2 / 3.0 + beyond**2)
+        capped = CAP * (1.0 - np.exp(-cost / CAP))
+        weight = np.exp(-0.5 * cost / CAP)
         slopes = np.empty((k, c, UNKNOWNS))
         # Slopes of the distance along the sample's normal, in the standing frame.
         slopes[..., _SIZE] = -scale[:, None] * np.einsum("kcmi,kcmi->kcm", points, faced).mean(axis=2)
@@ -244,16 +245,7 @@ class TouchProblem:
         slopes[..., _DEPTH] = 1.0
         prior = 0.5 * ((self._prior * unknowns) ** 2).sum(axis=1)
         weighed = weight[..., None] * slopes / DISTANCE_SIGMA
-        return weight * distance, weighed, cost + prior
-
-    def _counted(self, apart: FloatArray, turned: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """``(k, c)`` weights of the distances, and ``(k,)`` costs of all contacts."""
-        if self._scale is None:
-            both = apart + turned
-            return np.exp(-0.5 * both / CAP), (CAP * (1.0 - np.exp(-both / CAP))).sum(axis=1)
-        total = (CAP * (1.0 - np.exp(-apart / CAP))).sum(axis=1)
-        precision, cost = self._scale.precision(total), self._scale.cost(total)
-        return np.sqrt(precision)[:, None] * np.exp(-0.5 * apart / CAP), cost + turned.sum(axis=1)
+        return weight * distance, weighed, capped.sum(axis=1) + prior
 
 
 def _turns(unknowns: FloatArray) -> FloatArray:

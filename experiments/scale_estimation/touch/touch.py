@@ -103,33 +103,25 @@ def by_touch(
         _starts(stand, patches, logs, refined > CHEAP), 5, fixed_size=False
     )
     likely = found[np.argsort(costs)[: max(refined, _LIKELY)]]
-    fine = TouchProblem(stand, patches, _FINE_POINTS, weighed=True)
+    fine = TouchProblem(stand, patches, _FINE_POINTS)
     minima, misfits = fine.refined(likely[:refined], 8, fixed_size=False)
     least = misfits + passed.cost(minima)
     best = int(least.argmin())
-    cost = float(TouchProblem(stand, patches, _FINE_POINTS).cost(minima[best][None])[0] / len(patches))
-    _require_same(cost)
+    if misfits[best] / len(patches) > MISFIT:
+        raise FitRefused(
+            "the contacts are off this object's surface at any size and turn: "
+            f"{misfits[best] / len(patches):.1f} a contact (limit {MISFIT:g}); check that it is this object, "
+            "and that it stands upright where the scene says"
+        )
     apart = _apart(minima, least)
-    rough = TouchProblem(stand, patches, _FINE_POINTS, _SLACK, weighed=True)
+    rough = TouchProblem(stand, patches, _FINE_POINTS, _SLACK)
     scan = [_profile(rough, passed, found, costs, minima[apart[:_FOLLOWED]], logs)]
     for k in apart:
         scan.append(_scanned(fine, minima[k], float(least[k] - misfits[k])))
     belief = Belief.of(sizes, -_least_of(np.vstack(scan), logs))
+    cost = float(misfits[best] / len(patches))
     belief = belief.doubted(max(CHANCE ** (len(patches) - 1), STRANGER if cost > DOUBTED else 0.0))
     return Touch(belief, minima[best], cost, time.perf_counter() - began)
-
-
-def _require_same(cost: float) -> None:
-    """Refuse contacts that are not of this object.
-
-    Raises:
-        FitRefused: they cost more each, at the best size and place, than the object's own do.
-    """
-    if cost > MISFIT:
-        raise FitRefused(
-            f"the contacts are off this object's surface at any size and turn: {cost:.1f} a contact (limit "
-            f"{MISFIT:g}); check that it is this object, and that it stands upright where the scene says"
-        )
 
 
 def _starts(stand: Stand, patches: Sequence[Patch], logs: FloatArray, everywhere: bool) -> FloatArray:

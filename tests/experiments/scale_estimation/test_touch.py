@@ -1,22 +1,17 @@
 """Size by touch: contacts on a model itself are read back; what they leave open stays open."""
 
-from dataclasses import replace
-from functools import cache
 from itertools import product
 
 import numpy as np
 import pytest
 
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.touch.contact_scale import ContactScale
 from experiments.scale_estimation.touch.fit import THROUGH, UNKNOWNS, FreeSpace, Stand
 from experiments.scale_estimation.touch.patch import POINTS, Patch, patch_of
-from experiments.scale_estimation.touch.stand_errors import StandErrors
 from experiments.scale_estimation.touch.touch import by_touch
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import rotation_about, transform
-from harness.bench.bench_errors import USUAL
 from harness.objects.household import build
 from harness.sim.solid.surface_samples import sample_surface
 
@@ -25,7 +20,6 @@ PLACE = np.array([-0.42, 0.0, 0.25])
 UP = np.array([0.0, 0.0, 1.0])
 
 
-@cache
 def stand_of(name: str) -> tuple[Stand, float]:
     mesh = build(name)
     nominal = float(np.ptp(mesh.bounds, axis=0).max())
@@ -66,39 +60,6 @@ def test_contacts_all_over_give_the_size(name: str, scale: float) -> None:
     assert found.belief.size == pytest.approx(scale * nominal, rel=0.03)
     low, high = found.belief.interval
     assert 0.98 * low < scale * nominal < 1.02 * high
-
-
-def test_contacts_that_fit_well_leave_less_open_than_those_that_do_not() -> None:
-    """The same places, and the same errors ten times as large: how well they fit is the only difference."""
-    stand, nominal = stand_of("bowl")
-    near, far = (
-        by_touch(stand, contacts("bowl", 1.0, 10, sigma=sigma), nominal, RANGE) for sigma in (0.15e-3, 1.5e-3)
-    )
-    widths = [np.log(found.belief.interval[1] / found.belief.interval[0]) for found in (near, far)]
-    assert far.cost > 2.0 * near.cost
-    assert widths[1] > 1.3 * widths[0]
-
-
-def test_a_contact_s_scale_counts_as_its_cost_falls() -> None:
-    scale, misfits = ContactScale.of(0.4, 10), np.linspace(0.0, 6.0, 601)
-    falling = np.gradient(scale.cost(misfits), misfits)
-    assert falling[1:-1] == pytest.approx(scale.precision(misfits)[1:-1], rel=1e-3)
-    assert scale.precision(misfits[:1]).item() > 1.0 / 0.4**2 > scale.precision(misfits[-1:]).item()
-
-
-def test_few_contacts_say_nothing_of_their_own_scale() -> None:
-    assert ContactScale.of(0.4, 4).precision(np.zeros(1)).item() == pytest.approx(1.0 / 0.4**2)
-
-
-def test_on_a_bench_that_errs_more_touch_is_less_sure() -> None:
-    stand, nominal = stand_of("bowl")
-    patches = contacts("bowl", 1.0, 10)
-    widths = []
-    for factor in (1.0, 3.0):
-        there = replace(stand, errors=StandErrors.at(USUAL.times(factor), 0.02, 1e-3))
-        low, high = by_touch(there, patches, nominal, RANGE).belief.interval
-        widths.append(np.log(high / low))
-    assert widths[1] > 1.5 * widths[0]
 
 
 def test_one_contact_says_hardly_anything() -> None:
