@@ -57,18 +57,24 @@ def by_completed_surface(evidence: ShapeEvidence) -> ShapeEstimate:
     )
 
 
-def closed_around(points: FloatArray) -> Mesh:
+def closed_around(points: FloatArray, gap: float = GAP, blur: float = 0.0) -> Mesh:
     """The morphological closing of ``(n, 3)`` m of points, a pitch outside of them and above the support.
+
+    Args:
+        points: all over a body.
+        gap: median distances between neighbouring points that the closing ball does not pass.
+        blur: pitches over which the surface is smoothed.
 
     Raises:
         OutOfDomain: as ``isosurface``.
     """
     apart = float(np.median(cKDTree(points).query(points, k=[2])[0]))
-    radius = max(GAP * apart, 2.0 * PITCH)
+    radius = max(gap * apart, 2.0 * PITCH)
     margin = radius + 3.0 * PITCH
     grid = Grid.over(points.min(axis=0) - margin, points.max(axis=0) + margin, PITCH)
     near = (np.asarray(cKDTree(points).query(grid.points)[0]) <= radius).reshape(grid.shape)
     around = ndimage.binary_fill_holes(near)
     depth = grid.pitch * np.asarray(ndimage.distance_transform_edt(around))
-    mesh = grid.surface((radius - grid.pitch - depth).ravel())
+    outside = ndimage.gaussian_filter(radius - grid.pitch - depth, blur)
+    mesh = grid.surface(outside.ravel())
     return Mesh(np.maximum(mesh.vertices, [-np.inf, -np.inf, 0.0]), mesh.faces)

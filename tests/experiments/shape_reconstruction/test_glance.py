@@ -31,7 +31,9 @@ def test_one_look_is_nearer_than_a_centimetre_to_what_was_never_drawn(name: str)
     assert points_error(by_glance(seen).points, mesh, 3000).chamfer < 10e-3
     found = by_glanced_surface(seen)
     assert surfaces_apart(found.mesh, mesh, 3000).error.chamfer < 10e-3
-    assert trimesh.Trimesh(found.mesh.vertices, found.mesh.faces).is_watertight
+    body = trimesh.Trimesh(found.mesh.vertices, found.mesh.faces)
+    assert body.is_watertight
+    assert body.body_count == 1
     assert np.isfinite(found.deviation).all()
     assert (found.deviation > shipped().held_out).all()
     assert found.not_bounded  # one picture never limits its line of sight
