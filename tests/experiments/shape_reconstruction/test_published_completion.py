@@ -183,11 +183,11 @@ def test_what_cannot_be_trained_says_why(tmp_path: Path, capsys: pytest.CaptureF
 @pytest.mark.parametrize("sense", list(INPUTS))
 def test_a_graph_answers_as_torch_does(sense: str, tmp_path: Path) -> None:
     torch = pytest.importorskip("torch", reason="the extra 'author' is not installed")
-    from experiments.shape_reconstruction.pcn.training.paper.networks import PaperNetwork
+    from experiments.shape_reconstruction.pcn.training.paper.networks import PaperCompletionNetwork
 
     torch.set_num_threads(1)
     torch.manual_seed(2)
-    module = PaperNetwork(sense)
+    module = PaperCompletionNetwork(sense)
     given = [torch.randn((2, *shape)) for _, shape in INPUTS[sense]]
     with torch.no_grad():
         module.train()(*given)  # so that the normalisation is of something

@@ -26,7 +26,7 @@ REACH = 0.05
 """Half the width of a patch before it is folded, of the frame's reach, as published."""
 
 
-class Stream(nn.Module):
+class SenseStream(nn.Module):
     """One sense: a code, and the coarse cloud from it.
 
     Args:
@@ -97,7 +97,7 @@ class Folding(nn.Module):
         )
 
 
-class PaperNetwork(nn.Module):
+class PaperCompletionNetwork(nn.Module):
     """The network of one sense or of both.
 
     Args:
@@ -107,7 +107,7 @@ class PaperNetwork(nn.Module):
     def __init__(self, sense: str) -> None:
         super().__init__()
         self.sense, self.coarse = sense, COARSE[sense]
-        self.streams = nn.ModuleList([Stream(_encoder(name), self.coarse) for name, _ in INPUTS[sense]])
+        self.streams = nn.ModuleList([SenseStream(_encoder(name), self.coarse) for name, _ in INPUTS[sense]])
         count = len(self.streams)
         self.merge = nn.Linear(3 * self.coarse * count, 3 * self.coarse) if count > 1 else None
         self.fold = Folding(CODE * count, self.coarse)

@@ -10,7 +10,7 @@ from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
 from experiments.shape_reconstruction.pcn.paper.network import DENSE
 from experiments.shape_reconstruction.pcn.point_frame import TAKEN
 from experiments.shape_reconstruction.pcn.training.paper.fit import completion_errors, fitted_completion
-from experiments.shape_reconstruction.pcn.training.paper.networks import COARSE, PaperNetwork
+from experiments.shape_reconstruction.pcn.training.paper.networks import COARSE, PaperCompletionNetwork
 from experiments.shape_reconstruction.pcn.training.paper.samples import sense_samples
 from experiments.shape_reconstruction.pcn.training.samples import PRESSES, SIZES
 from experiments.shape_reconstruction.pcn.training.train_network import HELD_OUT, reached
@@ -23,7 +23,7 @@ _TAKES = {
 }
 
 
-class PaperAmounts(Protocol):
+class PaperCompletionAmounts(Protocol):
     """What of a profile is used here."""
 
     @property
@@ -39,13 +39,13 @@ class PaperAmounts(Protocol):
 
 
 def train_paper_completion(
-    sense: str, amounts: PaperAmounts, seed: int, processes: int, device: str
+    sense: str, amounts: PaperCompletionAmounts, seed: int, processes: int, device: str
 ) -> tuple[bytes, dict[str, Any]]:
     """The graph's bytes and its card."""
     samples = sense_samples(sense, amounts.shapes, amounts.sets, seed, processes)
     last = amounts.shapes - round(HELD_OUT * amounts.shapes)
     learnt, held = samples.of(samples.shapes < last), samples.of(samples.shapes >= last)
-    module = fitted_completion(sense, partial(PaperNetwork, sense), learnt, amounts, seed, device)
+    module = fitted_completion(sense, partial(PaperCompletionNetwork, sense), learnt, amounts, seed, device)
     fitted = learnt.of(np.arange(0, len(learnt.shapes), 8))
     takes = " and ".join(_TAKES[name] for name, _ in INPUTS[sense])
     card = {
