@@ -19,6 +19,7 @@ from experiments.scale_estimation.unseen.answer import (
     load_networks,
     outline_alone,
     strikes_alone,
+    together_without_shape,
     ways_alone,
 )
 from experiments.scale_estimation.unseen.contact_set import GelWay
@@ -188,10 +189,15 @@ class ScaleAnswering:
                 seconds[sense] = self._read[sense] + time.perf_counter() - began
         if not found:
             raise WrongUse("the scene asks for no sense; set sensors.camera, sensors.sound or sensors.touch")
-        beliefs = [one.belief for one in found.values() if not isinstance(one, FitRefused)]
-        together = fused(beliefs) if beliefs else Belief.ignorant(self.model.sizes)
+        beliefs = {sense: one.belief for sense, one in found.items() if not isinstance(one, FitRefused)}
+        together = self._together(beliefs, shape_known)
         usable = sum(not strike.fault for strike in self.strikes)
         return SizeAnswer(found, together, seconds, len(self.patches), usable)
+
+    def _together(self, beliefs: Mapping[str, Belief], shape_known: bool) -> Belief:
+        if not beliefs:
+            return Belief.ignorant(self.model.sizes)
+        return fused(list(beliefs.values())) if shape_known else together_without_shape(beliefs)
 
     def peaks(self) -> Peaks | None:
         """The resonances of all strikes so far; None where none was made, or none may be used."""

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from experiments.scale_estimation.dials import TURNS
-from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.unseen.answer import NOVEL_SIGMA, strikes_alone, ways_alone
+from experiments.scale_estimation.size import Belief, SizeRange
+from experiments.scale_estimation.unseen.answer import (
+    NOVEL_SIGMA,
+    WIDER,
+    strikes_alone,
+    together_without_shape,
+    ways_alone,
+)
 from experiments.scale_estimation.unseen.contact_set import MOST, GelWay
 from experiments.scale_estimation.unseen.contact_set import features as features_of_ways
 from experiments.scale_estimation.unseen.network import by_strikes, by_ways, shipped
@@ -23,6 +29,29 @@ BAND = 150.0, 12e3
 CERAMIC = MATERIALS["ceramic"]
 OCTAVE = np.log(2.0) / (np.log(14.0 / 0.025) / BANDS)
 """Bands."""
+
+
+def normal(size: float, sigma: float) -> Belief:
+    return Belief.of(RANGE, -0.5 * ((RANGE.logs - np.log(size)) / sigma) ** 2)
+
+
+def test_senses_of_an_unknown_shape_weigh_by_how_far_their_errors_are_of_the_shape() -> None:
+    sigma, sizes = 0.08, {"vision": 0.20, "audio": 0.26, "touch": 0.22}
+    beliefs = {sense: normal(size, sigma) for sense, size in sizes.items()}
+    found = together_without_shape(beliefs)
+    weights = {sense: 1.0 / (WIDER[sense] * sigma) ** 2 for sense in sizes}
+    total = sum(weights.values())
+    wanted = np.exp(sum(weights[sense] * np.log(size) for sense, size in sizes.items()) / total)
+    assert found.size == pytest.approx(wanted, rel=5e-3)
+    assert found.spread == pytest.approx(total**-0.5, rel=0.05)
+    turned = dict(reversed(beliefs.items()))
+    assert together_without_shape(turned).size == pytest.approx(found.size)
+
+
+@pytest.mark.parametrize("sense", list(WIDER))
+def test_one_sense_alone_is_believed_as_it_is(sense: str) -> None:
+    belief = normal(0.2, 0.1)
+    assert together_without_shape({sense: belief}) is belief
 
 
 def rung(size: float, material: str = "ceramic") -> FloatArray:
