@@ -169,6 +169,7 @@ def report(
     )
 
 
+@pytest.mark.slow  # a press and a strike over the wires are compared in tests/wire
 def test_a_run_over_every_wire_reads_what_the_bench_in_process_reads(tmp_path: Path) -> None:
     compare("mug", touch_scene(contacts=2, spacing="close"), tmp_path)
 

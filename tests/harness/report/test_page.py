@@ -137,6 +137,7 @@ def test_bars_are_to_scale_and_show_which_side_a_peak_is_on(written: Path) -> No
     ]
 
 
+@pytest.mark.slow  # a whole page; what it says is in the result too
 def test_sound_that_says_nothing_is_said_to(report_data: ReportData, tmp_path: Path) -> None:
     full = report_data.sound
     assert not isinstance(full, Missing)

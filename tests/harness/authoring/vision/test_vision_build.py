@@ -83,6 +83,7 @@ def test_a_block_becomes_an_object_file_that_can_be_looked_at(
     assert (of.folder / "object.json").read_bytes() == first
 
 
+@pytest.mark.slow  # a second training; its parts stay
 def test_networks_are_finished_on_pictures_where_that_is_asked_for(
     block: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

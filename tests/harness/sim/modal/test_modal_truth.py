@@ -30,6 +30,7 @@ def shear_speed(material: Material) -> float:
     return float(np.sqrt(material.young / (2.0 * (1.0 + material.poisson) * material.density)))
 
 
+@pytest.mark.slow  # a published table, which does not change
 def test_the_ritz_method_gives_the_published_cube() -> None:
     """Demarest, J. Acoust. Soc. Am. 49(3), 1971."""
     cube = ritz_frequencies((1.0, 1.0, 1.0), Material("", 1.0, 1.0, 0.3, 0.0, 0.0), 14)
