@@ -8,17 +8,18 @@ from importlib.resources import files
 
 import numpy as np
 
+from experiments.shape_reconstruction.estimators.free_space import Silhouette
 from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
 from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.pcn.card import held_out_error
+from experiments.shape_reconstruction.pcn.graph_values import completed_places, touched_or_seen
 from experiments.shape_reconstruction.pcn.interpolated import interpolated
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN
 from experiments.shape_reconstruction.pcn.window import SIDE, SPAN, UNTOUCHED, Turned, window_of
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import FitRefused
-from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.runtime import Network
 
 _RIM = np.ones((SIDE, SIDE), bool)
@@ -69,25 +70,26 @@ def by_glance(evidence: ShapeEvidence) -> PointEstimate:
     """Points all over the object, and between them; it heeds no touch.
 
     Raises:
-        FitRefused: as ``glanced``.
-    """
-    began = now()
-    return PointEstimate(interpolated(glanced(evidence)), now() - began, {"estimator": "glance"})
-
-
-def glanced(evidence: ShapeEvidence) -> FloatArray:
-    """``(GIVEN, 3)`` m in ``stand``: places all over the object that the picture shows.
-
-    Raises:
         FitRefused: nothing was seen, the object fills the picture, or it is too large for the network.
     """
-    look = evidence.look
-    if look is None or silhouette_of(evidence, np.zeros((0, 3))) is None:
+    began = now()
+    points = shipped().points(silhouette_to_glance_at(evidence).look)
+    return PointEstimate(interpolated(points), now() - began, {"estimator": "glance"})
+
+
+def silhouette_to_glance_at(evidence: ShapeEvidence) -> Silhouette:
+    """The silhouette of the picture.
+
+    Raises:
+        FitRefused: nothing was seen, or the object fills the picture.
+    """
+    seen = silhouette_of(evidence, np.zeros((0, 3)))
+    if seen is None:
         raise FitRefused(
             "the camera saw nothing of the object, or nothing else, and a glance needs its silhouette; let "
             "it look again"
         )
-    return shipped().points(look)
+    return seen
 
 
 @cache
@@ -103,20 +105,5 @@ def opened(data: bytes, card: str) -> Glance:
     Raises:
         DataRefused: the graph must not be run, or is another one.
     """
-    window = Input(
-        name="window",
-        dtype="float32",
-        shape=("n", 1, SIDE, SIDE),
-        unit="1",
-        meaning="the silhouette",
-        domain=Domain(low=(0.0,), high=(1.0,)),
-        normaliser="in the graph",
-    )
-    completed = Tensor(
-        name="completed",
-        dtype="float32",
-        shape=("n", GIVEN, 3),
-        unit="1",
-        meaning="places all over the object in the window's frame",
-    )
-    return Glance(Network(data, "glance.onnx", [window], [completed]), json.loads(card))
+    inputs = [touched_or_seen("window", (1, SIDE, SIDE))]
+    return Glance(Network(data, "glance.onnx", inputs, [completed_places(GIVEN)]), json.loads(card))

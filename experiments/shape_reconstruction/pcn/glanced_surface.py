@@ -6,10 +6,9 @@ import numpy as np
 
 from experiments.shape_reconstruction.estimators.free_space import Silhouette
 from experiments.shape_reconstruction.estimators.knowledge import known_by, limited_sides, not_bounded
-from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.pcn.completed_surface import SPREAD, closed_around
-from experiments.shape_reconstruction.pcn.glance import glanced, shipped
+from experiments.shape_reconstruction.pcn.glance import shipped, silhouette_to_glance_at
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 
@@ -29,9 +28,10 @@ def by_glanced_surface(evidence: ShapeEvidence) -> ShapeEstimate:
         FitRefused: nothing was seen, the object fills the picture, or it is too large for the network.
     """
     start = time.perf_counter()
-    points = glanced(evidence)
-    mesh, seen = closed_around(points, GAP, BLUR), silhouette_of(evidence, np.zeros((0, 3)))
-    deviation = np.hypot(SPREAD * shipped().held_out, 2.0 * _outside(evidence, seen, points))
+    seen = silhouette_to_glance_at(evidence)
+    points = shipped().points(seen.look)
+    mesh = closed_around(points, GAP, BLUR)
+    deviation = np.hypot(SPREAD * shipped().held_out, 2.0 * _outside(seen, points))
     return ShapeEstimate(
         mesh=mesh,
         deviation=np.full(len(mesh.vertices), deviation),
@@ -47,10 +47,7 @@ def by_glanced_surface(evidence: ShapeEvidence) -> ShapeEstimate:
     )
 
 
-def _outside(evidence: ShapeEvidence, seen: Silhouette | None, points: FloatArray) -> float:
+def _outside(seen: Silhouette, points: FloatArray) -> float:
     """M, root mean square of how far points lie outside of the silhouette."""
-    look = evidence.look
-    if look is None or seen is None:
-        return 0.0
-    pixel = float(np.linalg.norm(look.stand_from_camera[:3, 3])) / look.focal_length
+    pixel = float(np.linalg.norm(seen.look.stand_from_camera[:3, 3])) / seen.look.focal_length
     return pixel * float(np.sqrt(np.mean(np.maximum(seen.outside_pixels(points), 0.0) ** 2)))

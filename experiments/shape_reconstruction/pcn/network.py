@@ -13,14 +13,11 @@ from experiments.shape_reconstruction.estimators.contact_samples import all_samp
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.pcn.card import held_out_error
+from experiments.shape_reconstruction.pcn.graph_values import completed_places, touched_or_seen
 from experiments.shape_reconstruction.pcn.interpolated import interpolated
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN, TAKEN, PointFrame, taken
 from harness.basics.arrays import FloatArray
-from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.runtime import Network
-
-_GREATEST = 30.0
-"""Of any number that the network takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,20 +78,7 @@ def opened(data: bytes, card: str) -> TouchCompletion:
     Raises:
         DataRefused: the graph must not be run, or is another one.
     """
-    touched = Input(
-        name="touched",
-        dtype="float32",
-        shape=("n", TAKEN, 3),
-        unit="1",
-        meaning="touched places over how far they reach",
-        domain=Domain(low=(-_GREATEST,), high=(_GREATEST,)),
-        normaliser="in the graph",
+    inputs = [touched_or_seen("touched", (TAKEN, 3))]
+    return TouchCompletion(
+        Network(data, "completion.onnx", inputs, [completed_places(GIVEN)]), json.loads(card)
     )
-    completed = Tensor(
-        name="completed",
-        dtype="float32",
-        shape=("n", GIVEN, 3),
-        unit="1",
-        meaning="places all over the object in the same frame",
-    )
-    return TouchCompletion(Network(data, "completion.onnx", [touched], [completed]), json.loads(card))

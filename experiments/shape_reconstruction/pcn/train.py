@@ -14,48 +14,12 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from types import MappingProxyType
 
 from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
+from experiments.shape_reconstruction.pcn.training.profiles import PAPER_PROFILES, PROFILES
 from harness.basics.cores import own_cores
-
-
-@dataclass(frozen=True)
-class CompletionProfile:
-    """How much is drawn and for how long it is learnt.
-
-    Attributes:
-        shapes: drawn; a tenth of them is held out.
-        sets: of touches of each.
-        steps: of the fit.
-        batch: sets a step.
-        compared: points at a step, of those given and of those all over a shape.
-    """
-
-    shapes: int
-    sets: int
-    steps: int
-    batch: int = 12
-    compared: int = 1024
-
-
-PROFILES = MappingProxyType(
-    {
-        "smoke": {"completion": CompletionProfile(26, 2, 4), "glance": CompletionProfile(26, 2, 4)},
-        "standard": {
-            "completion": CompletionProfile(520, 6, 1600),
-            "glance": CompletionProfile(2000, 6, 3000, 24, 512),
-        },
-    }
-)
-"""Of the networks that ship: by touch, and by a glance."""
-PAPER_PROFILES = MappingProxyType(
-    {"paper-smoke": CompletionProfile(26, 1, 2, 4), "paper": CompletionProfile(2600, 8, 6000, 32, 4096)}
-)
-"""Of the paper's own networks; the first shows in a minute that all of it runs."""
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -10,13 +10,13 @@ import numpy as np
 from experiments.shape_reconstruction.estimators.contact_samples import all_samples
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.pcn.graph_values import completed_places, touched_or_seen
 from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
 from experiments.shape_reconstruction.pcn.point_frame import PointFrame, taken
 from experiments.shape_reconstruction.pcn.window import UNTOUCHED, Turned, window_of
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import DataRefused, FitRefused, OutOfDomain
-from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.runtime import Network
 
 DENSE = 16_384
@@ -24,9 +24,6 @@ DENSE = 16_384
 
 SENSES: Mapping[str, str] = {"touch": "T", "picture": "V", "both": "TV"}
 """Of each network, what it is answered from as a table's rows say it."""
-
-_GREATEST = 30.0
-"""Of any number that a network takes."""
 
 _TRAIN = "python -m experiments.shape_reconstruction.pcn.train --profile paper --out FOLDER"
 
@@ -95,24 +92,7 @@ def _opened(folder: Path, sense: str) -> PaperCompletion:
         card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise DataRefused(f"{path} has no card beside it; train it again: {_TRAIN}") from error
-    inputs = [_input(name, shape) for name, shape in INPUTS[sense]]
-    completed = Tensor(
-        name="completed",
-        dtype="float32",
-        shape=("n", DENSE, 3),
-        unit="1",
-        meaning="places all over the object in the same frame",
-    )
-    return PaperCompletion(sense, Network(path.read_bytes(), path.name, inputs, [completed]), card)
-
-
-def _input(name: str, shape: tuple[int, ...]) -> Input:
-    return Input(
-        name=name,
-        dtype="float32",
-        shape=("n", *shape),
-        unit="1",
-        meaning={"touched": "touched places over how far they reach", "window": "the silhouette"}[name],
-        domain=Domain(low=(-_GREATEST,), high=(_GREATEST,)),
-        normaliser="in the graph",
+    inputs = [touched_or_seen(name, shape) for name, shape in INPUTS[sense]]
+    return PaperCompletion(
+        sense, Network(path.read_bytes(), path.name, inputs, [completed_places(DENSE)]), card
     )

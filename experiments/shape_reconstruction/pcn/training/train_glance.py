@@ -1,6 +1,6 @@
 """The network of a glance: samples, fit, card."""
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -9,29 +9,15 @@ from experiments.shape_reconstruction.pcn.point_frame import GIVEN
 from experiments.shape_reconstruction.pcn.training.glance import GlanceNetwork
 from experiments.shape_reconstruction.pcn.training.paper.fit import completion_errors, fitted_completion
 from experiments.shape_reconstruction.pcn.training.paper.samples import sense_samples
+from experiments.shape_reconstruction.pcn.training.profiles import CompletionProfile
 from experiments.shape_reconstruction.pcn.training.samples import SIZES
 from experiments.shape_reconstruction.pcn.training.train_network import HELD_OUT, reached
 from experiments.shape_reconstruction.pcn.window import SIDE
 from harness.sim.solid.household.families import FAMILIES
 
 
-class GlanceAmounts(Protocol):
-    """What of a profile is used here."""
-
-    @property
-    def shapes(self) -> int: ...  # noqa: D102
-    @property
-    def sets(self) -> int: ...  # noqa: D102
-    @property
-    def steps(self) -> int: ...  # noqa: D102
-    @property
-    def batch(self) -> int: ...  # noqa: D102
-    @property
-    def compared(self) -> int: ...  # noqa: D102
-
-
 def train_glance(
-    amounts: GlanceAmounts, seed: int, processes: int, device: str
+    amounts: CompletionProfile, seed: int, processes: int, device: str
 ) -> tuple[bytes, dict[str, Any]]:
     """The graph's bytes and its card."""
     torch.set_num_threads(1)  # the same bits whatever the machine has

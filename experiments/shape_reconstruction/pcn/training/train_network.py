@@ -1,6 +1,6 @@
 """The network's file and its card: what it learnt from and what it reaches on shapes held out."""
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -8,6 +8,7 @@ import torch
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN, TAKEN
 from experiments.shape_reconstruction.pcn.training.fit import BATCH, errors, fitted
 from experiments.shape_reconstruction.pcn.training.networks import graph
+from experiments.shape_reconstruction.pcn.training.profiles import CompletionProfile
 from experiments.shape_reconstruction.pcn.training.samples import PRESSES, SIZES, touch_sets
 from harness.basics.arrays import FloatArray
 from harness.sim.solid.household.families import FAMILIES
@@ -15,18 +16,7 @@ from harness.sim.solid.household.families import FAMILIES
 HELD_OUT = 0.1
 
 
-class CompletionAmounts(Protocol):
-    """What of a profile is used here."""
-
-    @property
-    def shapes(self) -> int: ...  # noqa: D102
-    @property
-    def sets(self) -> int: ...  # noqa: D102
-    @property
-    def steps(self) -> int: ...  # noqa: D102
-
-
-def train_network(amounts: CompletionAmounts, seed: int) -> tuple[bytes, dict[str, Any]]:
+def train_network(amounts: CompletionProfile, seed: int) -> tuple[bytes, dict[str, Any]]:
     """The graph's bytes and its card."""
     torch.set_num_threads(1)  # the same bits whatever the machine has
     sets = touch_sets(amounts.shapes, amounts.sets, seed)

@@ -3,7 +3,7 @@
 import sys
 import time
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from experiments.shape_reconstruction.pcn.training.fit import chamfer
 from experiments.shape_reconstruction.pcn.training.paper.samples import SenseSamples
+from experiments.shape_reconstruction.pcn.training.profiles import CompletionProfile
 from harness.basics.arrays import FloatArray
 
 RATE = 5.0e-4
@@ -24,20 +25,13 @@ _SAID_EVERY = 20.0
 Module = TypeVar("Module", bound=nn.Module)
 
 
-class FitAmounts(Protocol):
-    """How long is learnt."""
-
-    @property
-    def steps(self) -> int: ...  # noqa: D102
-    @property
-    def batch(self) -> int: ...  # noqa: D102
-    @property
-    def compared(self) -> int:
-        """Points of the dense cloud at a step, of as many all over the shape."""
-
-
 def fitted_completion(
-    name: str, make: Callable[[], Module], samples: SenseSamples, amounts: FitAmounts, seed: int, device: str
+    name: str,
+    make: Callable[[], Module],
+    samples: SenseSamples,
+    amounts: CompletionProfile,
+    seed: int,
+    device: str,
 ) -> Module:
     """A network, its rate rising for a hundredth of the steps and then falling as half a cosine.
 

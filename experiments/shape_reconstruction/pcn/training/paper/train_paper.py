@@ -1,7 +1,7 @@
 """One network of the paper's completion: samples, fit, card."""
 
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -12,6 +12,7 @@ from experiments.shape_reconstruction.pcn.point_frame import TAKEN
 from experiments.shape_reconstruction.pcn.training.paper.fit import completion_errors, fitted_completion
 from experiments.shape_reconstruction.pcn.training.paper.networks import COARSE, PaperCompletionNetwork
 from experiments.shape_reconstruction.pcn.training.paper.samples import sense_samples
+from experiments.shape_reconstruction.pcn.training.profiles import CompletionProfile
 from experiments.shape_reconstruction.pcn.training.samples import PRESSES, SIZES
 from experiments.shape_reconstruction.pcn.training.train_network import HELD_OUT, reached
 from experiments.shape_reconstruction.pcn.window import SIDE
@@ -23,23 +24,8 @@ _TAKES = {
 }
 
 
-class PaperCompletionAmounts(Protocol):
-    """What of a profile is used here."""
-
-    @property
-    def shapes(self) -> int: ...  # noqa: D102
-    @property
-    def sets(self) -> int: ...  # noqa: D102
-    @property
-    def steps(self) -> int: ...  # noqa: D102
-    @property
-    def batch(self) -> int: ...  # noqa: D102
-    @property
-    def compared(self) -> int: ...  # noqa: D102
-
-
 def train_paper_completion(
-    sense: str, amounts: PaperCompletionAmounts, seed: int, processes: int, device: str
+    sense: str, amounts: CompletionProfile, seed: int, processes: int, device: str
 ) -> tuple[bytes, dict[str, Any]]:
     """The graph's bytes and its card."""
     samples = sense_samples(sense, amounts.shapes, amounts.sets, seed, processes)
