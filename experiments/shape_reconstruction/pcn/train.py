@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> int:
         return _refused(f"nothing of --profile {options.profile} ships: add --out FOLDER")
     if find_spec("torch") is None:
         return _refused("the network needs torch to be trained: pip install '.[author]'")
-    from experiments.shape_reconstruction.pcn.training.paper.device import device_of  # needs torch
+    from experiments.shape_reconstruction.pcn.training.device import device_of  # needs torch
 
     device = device_of(options.device)
     if device is None:

@@ -16,7 +16,7 @@ from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
 from experiments.shape_reconstruction.pcn.paper.network import DENSE, SENSES, paper_completions
 from experiments.shape_reconstruction.pcn.point_frame import TAKEN, PointFrame, taken
 from experiments.shape_reconstruction.pcn.train import main
-from experiments.shape_reconstruction.pcn.training.paper.samples import sense_samples
+from experiments.shape_reconstruction.pcn.training.sense_samples import sense_samples
 from experiments.shape_reconstruction.pcn.window import SIDE, UNTOUCHED, Turned, window_of, window_points
 from experiments.shape_reconstruction.table_rows import ROW_NAMES, rows_after, scored_rows
 from harness.basics.arrays import BoolArray, FloatArray

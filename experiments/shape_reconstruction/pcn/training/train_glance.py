@@ -7,10 +7,10 @@ import torch
 
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN
 from experiments.shape_reconstruction.pcn.training.glance import GlanceNetwork
-from experiments.shape_reconstruction.pcn.training.paper.fit import completion_errors, fitted_completion
-from experiments.shape_reconstruction.pcn.training.paper.samples import sense_samples
 from experiments.shape_reconstruction.pcn.training.profiles import CompletionProfile
 from experiments.shape_reconstruction.pcn.training.samples import SIZES
+from experiments.shape_reconstruction.pcn.training.sense_fit import completion_errors, fitted_completion
+from experiments.shape_reconstruction.pcn.training.sense_samples import sense_samples
 from experiments.shape_reconstruction.pcn.training.train_network import HELD_OUT, reached
 from experiments.shape_reconstruction.pcn.window import SIDE
 from harness.sim.solid.household.families import FAMILIES

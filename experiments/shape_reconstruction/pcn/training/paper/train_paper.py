@@ -9,11 +9,11 @@ import torch
 from experiments.shape_reconstruction.pcn.paper.inputs import INPUTS
 from experiments.shape_reconstruction.pcn.paper.network import DENSE
 from experiments.shape_reconstruction.pcn.point_frame import TAKEN
-from experiments.shape_reconstruction.pcn.training.paper.fit import completion_errors, fitted_completion
 from experiments.shape_reconstruction.pcn.training.paper.networks import COARSE, PaperCompletionNetwork
-from experiments.shape_reconstruction.pcn.training.paper.samples import sense_samples
 from experiments.shape_reconstruction.pcn.training.profiles import CompletionProfile
 from experiments.shape_reconstruction.pcn.training.samples import PRESSES, SIZES
+from experiments.shape_reconstruction.pcn.training.sense_fit import completion_errors, fitted_completion
+from experiments.shape_reconstruction.pcn.training.sense_samples import sense_samples
 from experiments.shape_reconstruction.pcn.training.train_network import HELD_OUT, reached
 from experiments.shape_reconstruction.pcn.window import SIDE
 from harness.sim.solid.household.families import FAMILIES

@@ -1,4 +1,4 @@
-"""Fit the paper's completion, on a graphics processor where there is one."""
+"""Fit a network of one sense or both, on a graphics processor where there is one."""
 
 import sys
 import time
@@ -10,8 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from experiments.shape_reconstruction.pcn.training.fit import chamfer
-from experiments.shape_reconstruction.pcn.training.paper.samples import SenseSamples
 from experiments.shape_reconstruction.pcn.training.profiles import CompletionProfile
+from experiments.shape_reconstruction.pcn.training.sense_samples import SenseSamples
 from harness.basics.arrays import FloatArray
 
 RATE = 5.0e-4

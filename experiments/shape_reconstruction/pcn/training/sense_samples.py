@@ -1,4 +1,4 @@
-"""What the paper's completion learns from: touches, silhouettes, and the whole of drawn shapes.
+"""What networks of one sense or both learn from: touches, silhouettes, and the whole of drawn shapes.
 
 The touches are those that ours learns from; the silhouette is what a camera like the bench's sees.
 """
