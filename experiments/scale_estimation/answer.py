@@ -140,7 +140,7 @@ class ScaleAnswering:
             return
         if outline is not None:
             self.outline = outline
-            self._read["vision"] += time.perf_counter() - began
+            self._count("vision", began)
         if "gel.image" in record.readings:
             self._read_contact(record)
 
@@ -150,6 +150,7 @@ class ScaleAnswering:
         seen = observe_step(record, run.station.flange_from_gel, run.acquisition, aspect)
         if seen.strike is not None:
             self.strikes.append(seen.strike)
+            began = self._count("audio", began)
         try:
             patch = patch_of_contact(seen, run.calibration, run.station.gel.sensor.pitch)
         except PictureRefused as refusal:  # whether the gel met anything is not known either
@@ -161,7 +162,13 @@ class ScaleAnswering:
         self.met.append(patch is not None)
         self.ways.append(GelWay.made(seen.base_from_gel, self.model.place, patch))
         self.free.append(free_line(seen.base_from_gel, length, patch is not None))
-        self._read["touch"] += time.perf_counter() - began
+        self._count("touch", began)
+
+    def _count(self, sense: str, began: float) -> float:
+        """The time; what has passed since ``began`` was for that sense."""
+        ended = time.perf_counter()
+        self._read[sense] += ended - began
+        return ended
 
     def answer(self) -> SizeAnswer:
         """By each sense that the scene asks for, and by all that answer.

@@ -103,7 +103,7 @@ class ObjectModel:
         """For contacts."""
         surface = sample_surface(self.mesh, self.nominal / _SAMPLES)
         asked = self.scene.section(Scale)
-        errors = StandErrors(asked.place_error, asked.support_error, self.station.errors.tilt)
+        errors = StandErrors.at(self.station.errors, asked.place_error, asked.support_error)
         return Stand.of(surface, self.upright, self.anchor, self.place, errors)
 
     @property

@@ -89,6 +89,20 @@ def log_likelihood(peaks: Peaks, model: RingingModel, log_sizes: FloatArray) -> 
     return np.asarray(matches - expected)
 
 
+def modes_a_peak(peaks: Peaks, model: RingingModel, log_size: float) -> float:
+    """How many modes share a peak of the band, on average; 1 where none is in it.
+
+    Args:
+        peaks: heard.
+        model: of the object at its nominal size.
+        log_size: logarithm of the size over the nominal one.
+    """
+    heard = np.log(model.frequencies) - np.array([[log_size]])
+    low, high = np.log(peaks.band)
+    in_band = (heard >= low) & (heard <= high)
+    return float(_overlapping(model, heard, peaks.window_decay)[in_band].mean()) if in_band.any() else 1.0
+
+
 @dataclass(frozen=True)
 class UnsolvedModes:
     """Modes above the highest that was solved: how many there are is known, not where each is.

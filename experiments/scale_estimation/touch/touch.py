@@ -43,7 +43,8 @@ _FOLLOWED = 2
 """Stands of the first search that each size is followed from."""
 
 CHEAP = 4
-"""Refined starts up to which the first search begins at two places of the object alone."""
+"""Refined starts up to which the first search begins at two places of the object alone, and each size is
+followed from one stand of it."""
 
 _LIKELY = 12
 _FINE_POINTS = 6
@@ -115,7 +116,8 @@ def by_touch(
         )
     apart = _apart(minima, least)
     rough = TouchProblem(stand, patches, _FINE_POINTS, _SLACK)
-    scan = [_profile(rough, passed, found, costs, minima[apart[:_FOLLOWED]], logs)]
+    followed = _FOLLOWED if refined > CHEAP else 1
+    scan = [_profile(rough, passed, found, costs, minima[apart[:followed]], logs, followed)]
     for k in apart:
         scan.append(_scanned(fine, minima[k], float(least[k] - misfits[k])))
     belief = Belief.of(sizes, -_least_of(np.vstack(scan), logs))
@@ -148,17 +150,18 @@ def _profile(
     costs: FloatArray,
     minima: FloatArray,
     logs: FloatArray,
+    followed: int,
 ) -> FloatArray:
     """``(n, 2)`` logarithms of sizes all over, and the least cost that was found at each.
 
-    Every size is followed alike, from what the first search found nearest to it and from the best minima: one
-    that was not would look worse than it is beside one that was.
+    Every size is followed alike, from as many stands that the first search found nearest to it and from as
+    many of the best minima: one that was not would look worse than it is beside one that was.
     """
     sizes = np.linspace(logs[0], logs[-1], int(np.ceil((logs[-1] - logs[0]) / _PROFILED)) + 1)
     away = costs + 0.5 * ((sizes[:, None] - found[:, 0]) / _COARSE) ** 2
-    near = found[np.argpartition(away, _FOLLOWED, axis=1)[:, :_FOLLOWED]]
-    followed = np.broadcast_to(minima, (len(sizes), *minima.shape))
-    starts = np.concatenate([near, followed], axis=1)
+    near = found[np.argpartition(away, followed, axis=1)[:, :followed]]
+    best = np.broadcast_to(minima, (len(sizes), *minima.shape))
+    starts = np.concatenate([near, best], axis=1)
     starts[..., 0] = sizes[:, None]
     there, least = problem.refined(starts.reshape(-1, UNKNOWNS), 5, fixed_size=True)
     least = (least + passed.cost(there)).reshape(len(sizes), -1)

@@ -9,7 +9,13 @@ from experiments.scale_estimation.readings import peaks_of
 from experiments.scale_estimation.size import ENDS, STEP, Belief, SizeRange
 from experiments.scale_estimation.sound.hearing import SHAPE_SIGMA, Hearing, MaterialGuess, by_sound
 from experiments.scale_estimation.sound.model import RingingModel
-from experiments.scale_estimation.sound.peaks import CLUTTER_FALL, Peaks, UnsolvedModes, log_likelihood
+from experiments.scale_estimation.sound.peaks import (
+    CLUTTER_FALL,
+    Peaks,
+    UnsolvedModes,
+    log_likelihood,
+    modes_a_peak,
+)
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.materials import KNOWN, MATERIALS
@@ -211,3 +217,24 @@ def test_modes_that_are_heard_as_one_are_louder_than_each() -> None:
     by_level = [likely(louder) - chance * louder for louder in (0.0, 6.0, 12.0)]
     assert by_level[1] > by_level[0]
     assert by_level[1] > by_level[2]
+
+
+def test_modes_too_dense_to_be_told_apart_are_no_answer() -> None:
+    """Each peak is five modes': a list of such peaks fits many sizes, however well it fits one."""
+    middles = np.random.default_rng(5).uniform(900.0, 8000.0, 12)
+    dense = np.sort((middles[:, None] * (1.0 + 1e-4 * np.arange(5))).ravel())
+    for each, refused in ((5, True), (1, False)):
+        at = dense[:: 5 // each]
+        ringing = RingingModel(at, np.full(len(at), 0.05), MATERIALS["ceramic"])
+        peaks = of(dense[::5], ringing.levels(np.zeros(1), DECAY)[0][::each])
+        assert (modes_a_peak(peaks, ringing, 0.0) > 4.0) is refused
+        if refused:
+            with pytest.raises(FitRefused, match="modes share a peak"):
+                by_sound(peaks, [MaterialGuess(ringing, 0.03)], NOMINAL, RANGE)
+        else:
+            assert by_sound(peaks, [MaterialGuess(ringing, 0.03)], NOMINAL, RANGE).belief.size > 0.0
+
+
+def test_no_mode_in_the_band_is_no_crowd() -> None:
+    peaks = of(np.array([1000.0, 2000.0]), np.zeros(2))
+    assert modes_a_peak(peaks, model(), np.log(1e-3)) == 1.0

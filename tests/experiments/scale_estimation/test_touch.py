@@ -1,17 +1,19 @@
 """Size by touch: contacts on a model itself are read back; what they leave open stays open."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.touch.fit import THROUGH, UNKNOWNS, FreeSpace, Stand
+from experiments.scale_estimation.touch.fit import THROUGH, UNKNOWNS, FreeSpace, Stand, StandErrors
 from experiments.scale_estimation.touch.patch import POINTS, Patch, patch_of
 from experiments.scale_estimation.touch.touch import by_touch
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import rotation_about, transform
+from harness.bench.bench_errors import USUAL
 from harness.objects.household import build
 from harness.sim.solid.surface_samples import sample_surface
 
@@ -60,6 +62,16 @@ def test_contacts_all_over_give_the_size(name: str, scale: float) -> None:
     assert found.belief.size == pytest.approx(scale * nominal, rel=0.03)
     low, high = found.belief.interval
     assert 0.98 * low < scale * nominal < 1.02 * high
+
+
+def test_a_station_that_knows_less_where_its_gel_is_leaves_more_of_the_size_open() -> None:
+    stand, nominal = stand_of("bowl")
+    made, widths = contacts("bowl", 1.0, 10), []
+    for errors in (USUAL, USUAL.times(4.0)):
+        there = replace(stand, errors=StandErrors.at(errors, 0.1, 1e-3))
+        low, high = by_touch(there, made, nominal, RANGE).belief.interval
+        widths.append(high / low - 1.0)
+    assert widths[1] > 1.1 * widths[0]
 
 
 def test_one_contact_says_hardly_anything() -> None:
