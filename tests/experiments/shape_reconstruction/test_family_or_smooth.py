@@ -10,7 +10,7 @@ from experiments.shape_reconstruction import family_or_smooth
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import family_estimate
-from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
 from experiments.shape_reconstruction.family_or_smooth import BESIDE, MANY, by_family, deviations_apart
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.mesh import Mesh
@@ -50,7 +50,7 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
     fitted: ShapeEstimate = replace(
         by_rbf,
         mesh=_away(by_rbf.mesh, 0.1),
-        details={"foreign": foreign, "beyond_m": beyond},
+        details={"foreign": foreign, "beyond_m": beyond, "cost": 1.0},
         not_bounded=("y",),
         doubtful={1: 0.004},
         flags=("off",),
@@ -66,6 +66,38 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
         np.testing.assert_array_equal(found.mesh.vertices, by_rbf.mesh.vertices)
     else:
         assert found is fitted
+
+
+@pytest.mark.parametrize(
+    ("contacts", "costs", "tries", "kept"),
+    [
+        (8, (400.0, 300.0), 2, 1),
+        (8, (300.0, 400.0), 2, 0),
+        (3, (400.0, 300.0), 1, 0),  # too few contacts to tell that none fits
+    ],
+)
+def test_where_no_class_fits_other_draws_are_tried_and_the_better_is_kept(
+    readings: ShapeEvidence,
+    monkeypatch: pytest.MonkeyPatch,
+    contacts: int,
+    costs: tuple[float, float],
+    tries: int,
+    kept: int,
+) -> None:
+    part = replace(readings, touches=readings.touches[:contacts])
+    by_rbf, seeds = by_hermite(part), list[int]()
+
+    def searched(_: ShapeEvidence, settings: FamilySettings) -> ShapeEstimate:
+        seeds.append(settings.seed)
+        turn = len(seeds) - 1
+        details = {"foreign": turn == 0, "beyond_m": 0.0, "cost": costs[turn]}
+        return replace(by_rbf, details=details, flags=(f"search {turn}",), seconds=1.0)
+
+    monkeypatch.setattr(family_or_smooth, "family_estimate", searched)
+    found = by_family(part)
+    assert len(set(seeds)) == tries
+    assert found.flags[0] == f"search {kept}"
+    assert found.seconds >= tries  # the time of both is stated
 
 
 @pytest.mark.parametrize(
@@ -85,7 +117,10 @@ def test_a_household_shape_that_the_smooth_surface_leaves_open_is_kept_though_it
     height = by_rbf.mesh.vertices[:, 2].max()
     held = replace(by_rbf, deviation=np.full(len(by_rbf.mesh.vertices), height / BESIDE))
     fitted = replace(
-        held, mesh=_away(held.mesh, away * height), details={"foreign": True, "beyond_m": 0.0}, flags=()
+        held,
+        mesh=_away(held.mesh, away * height),
+        details={"foreign": True, "beyond_m": 0.0, "cost": 1.0},
+        flags=(),
     )
     monkeypatch.setattr(family_or_smooth, "family_estimate", lambda *_: fitted)
     monkeypatch.setattr(family_or_smooth, "by_hermite", lambda *_, **__: held)
@@ -100,7 +135,7 @@ def test_a_household_shape_that_is_kept_is_nowhere_less_sure_than_the_smooth_sur
     by_rbf = by_hermite(readings, symmetric=False)
     random = np.random.default_rng(0)
     unsure = random.uniform(0.5, 2.0, len(by_rbf.mesh.vertices)) * by_rbf.deviation
-    fitted = replace(by_rbf, deviation=unsure, details={"foreign": True, "beyond_m": 0.0})
+    fitted = replace(by_rbf, deviation=unsure, details={"foreign": True, "beyond_m": 0.0, "cost": 1.0})
     monkeypatch.setattr(family_or_smooth, "family_estimate", lambda *_: fitted)
     found = by_family(readings)
     np.testing.assert_array_equal(found.deviation, np.minimum(unsure, by_rbf.deviation))
