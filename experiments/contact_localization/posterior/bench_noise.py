@@ -58,6 +58,7 @@ def _touch(noise: TouchNoise, errors: BenchErrors, place: float, turn: float) ->
         noise,
         rms=noise.rms * _ratio(errors, "gel_depth"),
         tilt=noise.tilt * turn,
+        spin=noise.spin * _ratio(errors, "gel_yaw"),
         shift=noise.shift * place,
         depth=noise.depth * place,
     )

@@ -14,6 +14,7 @@ from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise, best_of
 from experiments.contact_localization.posterior.likelihood import arrange, geometry_scores, possible_anchors
 from experiments.contact_localization.posterior.shared_errors import log_prior, moves
+from experiments.contact_localization.touch.attitude import turns_between
 from experiments.contact_localization.touch.contact_scales import cap_of, contact_scales, place_noise
 from experiments.contact_localization.touch.touch import TouchMap, best_fit, touch_terms
 from harness.basics.arrays import FloatArray, IntArray
@@ -160,7 +161,8 @@ class Search:
         touch, noise = self.touch(contact, coarse), place_noise(self.noise, at.shared is not None)
         noise = replace(noise.with_model(self.model.seen_rms, touch), cap=cap)
         for chosen, view, places in self.placed(contact, at, coarse):
-            term[chosen] = touch_terms(view, touch, noise, places, step, rings, sigma, temperature)
+            turns = self._turns(contact, at.yaws[chosen], coarse)
+            term[chosen] = touch_terms(view, touch, noise, places, step, rings, sigma, temperature, turns)
         return term
 
     def _scales(self, members: IntArray, named: bool = False) -> Iterator[tuple[int, float, float]]:
@@ -178,7 +180,8 @@ class Search:
             ((_, view, places),) = self.placed(k, one)
             noise = self.noise.touch.with_model(self.model.seen_rms, self.touch(k))
             wide = sigma if one.shared is not None else self._with_spacing(sigma)
-            values[column] = best_fit(view, self.touch(k), noise, places[0], wide)
+            (turn,) = self._turns(k, one.yaws)
+            values[column] = best_fit(view, self.touch(k), noise, places[0], wide, turn)
         return values
 
     def placed(
@@ -191,6 +194,12 @@ class Search:
             chosen = np.nonzero(pictures == picture)[0].astype(np.int64)
             view = self.view(contact, int(picture), coarse)
             yield chosen, view, places_in_object[chosen] @ view.object_from_view
+
+    def _turns(self, contact: int, yaws: FloatArray, coarse: bool = False) -> FloatArray:
+        """``(n, 3)`` by which the gel is turned against the picture that serves each yaw."""
+        past = yaws - np.radians(_YAW_STEP) * self.pictures(yaws, coarse)
+        past = (past + np.pi) % (2.0 * np.pi) - np.pi
+        return turns_between(self.contacts[contact].base_from_gel[:3, :3], past)
 
     def gel_centres(self, contact: int, at: Hypotheses) -> FloatArray:
         """``(n, 3)`` metres, in the object's frame, at one contact."""

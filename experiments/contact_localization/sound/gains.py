@@ -3,26 +3,36 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from experiments.contact_localization.sound.kernels import blend_of_samples, nearest_in_table
+from experiments.contact_localization.sound.kernels import faces_about, nearest_in_table
 from harness.basics.arrays import AnyArray, FloatArray, IntArray, read_only
 from harness.sim.modal.modes import Modes
 from harness.sim.solid.surface_samples import Surface
 
+_CANDIDATES = 16
+"""Faces about a sample among which the one nearest to a place is looked for."""
+
 
 @dataclass(frozen=True, eq=False)
 class GainTable:
-    """The modes at a surface's samples, made once an object.
+    """The modes at a surface's samples and at the nodes of their own mesh, made once an object.
 
     Attributes:
         surface: whose samples; gives the sample nearest to any place.
-        shapes: ``(samples, m, 3)`` 1/sqrt(kg), float32.
+        shapes: ``(samples + nodes, m, 3)`` 1/sqrt(kg), float32.
         mean_squares: ``(m,)`` 1/kg: of each mode's gain along the normal, over the samples.
+        nodes: ``(nodes, 3)`` metres.
+        faces: ``(f, 3)`` nodes of the mesh's surface.
+        near_faces: ``(samples, k)`` faces about each sample.
     """
 
     surface: Surface
     shapes: AnyArray
     mean_squares: FloatArray
+    nodes: FloatArray
+    faces: IntArray
+    near_faces: AnyArray
 
     def nearest(self, points: FloatArray) -> IntArray:
         """``(n,)`` sample nearest to each of ``(n, 3)`` points in metres, however far."""
@@ -33,34 +43,26 @@ class GainTable:
             found[far] = self.surface.tree.query(points[far])[1]
         return found
 
-    def about(self, points: FloatArray, directions: FloatArray) -> tuple[IntArray, FloatArray]:
-        """``(n, 12)`` samples about ``(n, 3)`` places in metres that a hammer strikes, and their shares.
+    def about(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        """``(n, 3)`` rows of ``shapes`` about ``(n, 3)`` places in metres, and shares: linear on a face.
 
-        Args:
-            points: ``(n, 3)`` metres; how far they are off the surface along the hammer does not matter.
-            directions: ``(n, 3)`` unit, of the hammer.
+        Samples about a place would give it the shapes of one beside it, another one for every place, and
+        near a rim those of a face that the hammer never meets; so it is nodes that are blended.
         """
-        surface = self.surface
-        return blend_of_samples(
-            np.ascontiguousarray(points),
-            np.ascontiguousarray(directions),
-            self.nearest(points),
-            surface.points,
-            surface.normals,
-            surface.neighbours,
-            _ABOUT,
-            _WIDTH * surface.spacing,
-        )
-
-
-_ABOUT = 12
-_WIDTH = 0.5
-"""Of the Gaussian between samples, in units of their spacing."""
+        points = np.ascontiguousarray(points)
+        nodes, shares = faces_about(points, self.nearest(points), self.near_faces, self.nodes, self.faces)
+        return nodes + len(self.surface.points), shares
 
 
 def gain_table(modes: Modes, surface: Surface) -> GainTable:
-    """Tabulate the modes at a surface's samples."""
-    shapes = modes.at(surface.points).astype(np.float32)
-    along = np.einsum("smi,si->sm", shapes, surface.normals.astype(np.float32))
+    """Tabulate the modes at a surface's samples and at their own nodes."""
+    at_samples = modes.at(surface.points).astype(np.float32)
+    along = np.einsum("smi,si->sm", at_samples, surface.normals.astype(np.float32))
     squares = np.asarray(np.mean(along**2, axis=0, dtype=np.float64))
-    return GainTable(surface, read_only(shapes), read_only(squares))
+    shapes = np.concatenate([at_samples, modes.shapes.astype(np.float32)])
+    count = min(_CANDIDATES, len(modes.faces))
+    middles = cKDTree(modes.points[modes.faces].mean(axis=1))
+    near = np.asarray(middles.query(surface.points, k=count)[1], dtype=np.int32).reshape(-1, count)
+    return GainTable(
+        surface, read_only(shapes), read_only(squares), modes.points, modes.faces, read_only(near)
+    )

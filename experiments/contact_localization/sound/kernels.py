@@ -1,18 +1,13 @@
-"""The loops that find a place's gains: samples about it, and how strongly a strike there moves each mode."""
+"""The loops that find a place's gains: the face it lies on, and how far a strike there moves each mode."""
 
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray, IntArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, copy_line
+from harness.basics.faces.nearest_kernels import nearest_on_triangle
 
-_FACING = 0.5
-"""Cosine between a sample's normal and the way back of a hammer below which it strikes another face."""
-
-_RIDGE, _REACH = 0.2, 1.0
-"""Of the Gaussian's width: against samples in a row, and how far a place may lie from the samples' mean."""
-
-_LITTLE, _FAR = 1.0e-3, 8.0
-"""Shares below which a sample adds nothing, and nats behind the nearest sample's at which it has none."""
+_LITTLE = 1.0e-3
+"""Share below which a place of the table adds nothing."""
 
 
 @compiled
@@ -29,123 +24,59 @@ def nearest_in_table(points: FloatArray, nearest: AnyArray, origin: FloatArray, 
 
 
 @compiled
-def blend_of_samples(
-    points: FloatArray,
-    directions: FloatArray,
-    nearest: IntArray,
-    places: FloatArray,
-    normals: FloatArray,
-    neighbours: AnyArray,
-    count: int,
-    width: float,
+def faces_about(
+    points: FloatArray, nearest: IntArray, near_faces: AnyArray, corners: FloatArray, faces: AnyArray
 ) -> tuple[IntArray, FloatArray]:
-    """Samples about the places that a hammer strikes, and their shares: exact for what is linear across it.
-
-    The samples face the hammer: beside a rim or a hole the nearest one often faces elsewhere. Where none
-    does, the nearest has it all. Their mean under a Gaussian is a place of its own, up to half a spacing
-    off, at random from one place to the next; the shares are therefore those of a plane fitted across the
-    hammer (local linear regression), which may be negative. Beyond an edge the plane ends with the samples.
+    """The corners of the face that each place is nearest to, and their shares in the nearest place of it.
 
     Args:
         points: ``(n, 3)`` metres.
-        directions: ``(n, 3)`` unit, of the hammer.
         nearest: ``(n,)`` the sample nearest to each.
-        places: ``(s, 3)`` metres, of the samples.
-        normals: ``(s, 3)`` unit, of the samples.
-        neighbours: ``(s, >= count)`` of the samples, nearest first.
-        count: samples that share a place at most.
-        width: metres, one sigma of the Gaussian.
+        near_faces: ``(samples, k)`` faces about each sample.
+        corners: ``(nodes, 3)`` metres.
+        faces: ``(f, 3)`` nodes.
 
     Returns:
-        ``(n, count)`` samples and ``(n, count)`` shares that sum to 1.
+        ``(n, 3)`` nodes and ``(n, 3)`` shares from 0 to 1 that sum to 1.
     """
-    samples = np.empty((len(points), count), np.int64)
-    shares = np.zeros((len(points), count))
-    gaps, sides = np.empty((2, count)), np.empty((2, 3))
+    nodes, shares = np.empty((len(points), 3), np.int64), np.empty((len(points), 3))
+    triangle, here, foot = np.empty((3, 3)), np.empty(3), np.empty(3)
     for i in range(len(points)):
-        samples[i] = nearest[i]
-        found = _facing(directions[i], nearest[i], normals, neighbours, samples[i])
-        if found == 0:
-            shares[i, 0] = 1.0
-            continue
-        _across(directions[i], sides)
-        for j in range(found):
-            for side in range(2):
-                gaps[side, j] = 0.0
-                for d in range(3):
-                    gaps[side, j] += sides[side, d] * (places[samples[i, j], d] - points[i, d])
-        _gaussian(gaps[:, :found], width, shares[i, :found])
-        _levelled(gaps[:, :found], width, shares[i, :found])
-    return samples, shares
+        best, face = np.inf, 0
+        for j in range(near_faces.shape[1]):
+            other = near_faces[nearest[i], j]
+            for corner in range(3):
+                copy_line(triangle[corner], corners[faces[other, corner]])
+            gap = nearest_on_triangle(points[i], triangle, here)
+            if gap < best:
+                best, face = gap, other
+                copy_line(foot, here)
+        for corner in range(3):
+            nodes[i, corner] = faces[face, corner]
+            copy_line(triangle[corner], corners[faces[face, corner]])
+        _put_shares(foot, triangle, shares[i])
+    return nodes, shares
 
 
 @compiled
-def _facing(
-    direction: FloatArray, first: int, normals: FloatArray, neighbours: AnyArray, samples: IntArray
-) -> int:
-    """Write the first sample and its neighbours that face a hammer, as many as there is room for."""
-    found = 0
-    for j in range(neighbours.shape[1] + 1):
-        sample = first if j == 0 else neighbours[first, j - 1]
-        facing = 0.0
-        for d in range(3):
-            facing -= normals[sample, d] * direction[d]
-        if facing > _FACING:
-            samples[found] = sample
-            found += 1
-            if found == len(samples):
-                break
-    return found
-
-
-@compiled
-def _across(direction: FloatArray, sides: FloatArray) -> None:
-    """Write ``(2, 3)``: two unit vectors across a unit direction and each other (Duff, JCGT 6(1), 2017)."""
-    x, y, z = direction[0], direction[1], direction[2]
-    sign = 1.0 if z >= 0.0 else -1.0
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    sides[0, 0], sides[0, 1], sides[0, 2] = 1.0 + sign * x * x * a, sign * b, -sign * x
-    sides[1, 0], sides[1, 1], sides[1, 2] = b, sign + y * y * a, -y
-
-
-@compiled
-def _gaussian(gaps: FloatArray, width: float, shares: FloatArray) -> None:
-    """Write the ``(count,)`` shares of samples at ``(2, count)`` gaps in metres, summing to 1."""
-    closest, total = np.inf, 0.0
-    for j in range(len(shares)):
-        shares[j] = gaps[0, j] ** 2 + gaps[1, j] ** 2
-        closest = min(closest, shares[j])
-    for j in range(len(shares)):
-        nats = 0.5 * (shares[j] - closest) / width**2
-        shares[j] = np.exp(-nats) if nats < _FAR else 0.0
-        total += shares[j]
-    for j in range(len(shares)):
-        shares[j] /= total
-
-
-@compiled
-def _levelled(gaps: FloatArray, width: float, shares: FloatArray) -> None:
-    """Change shares so that the samples' mean is the place itself: times ``1 - (gap - mean) C^-1 mean``.
-
-    ``C`` is the covariance of the gaps, with a ridge against samples in a row.
-    """
-    mean0, mean1 = 0.0, 0.0
-    for j in range(len(shares)):
-        mean0 += shares[j] * gaps[0, j]
-        mean1 += shares[j] * gaps[1, j]
-    c00, c01, c11 = (_RIDGE * width) ** 2, 0.0, (_RIDGE * width) ** 2
-    for j in range(len(shares)):
-        x, y = gaps[0, j] - mean0, gaps[1, j] - mean1
-        c00 += shares[j] * x * x
-        c01 += shares[j] * x * y
-        c11 += shares[j] * y * y
-    within = min(1.0, _REACH * width / max(np.hypot(mean0, mean1), 1.0e-9))
-    factor = within / (c00 * c11 - c01 * c01)
-    slope0 = factor * (c11 * mean0 - c01 * mean1)
-    slope1 = factor * (c00 * mean1 - c01 * mean0)
-    for j in range(len(shares)):
-        shares[j] *= 1.0 - (gaps[0, j] - mean0) * slope0 - (gaps[1, j] - mean1) * slope1
+def _put_shares(foot: FloatArray, triangle: FloatArray, shares: FloatArray) -> None:
+    """Write the shares of a triangle's corners in a place of it; of one without area its first corner's."""
+    aa, ab, bb, pa, pb = 0.0, 0.0, 0.0, 0.0, 0.0
+    for d in range(3):
+        a, b = triangle[1, d] - triangle[0, d], triangle[2, d] - triangle[0, d]
+        p = foot[d] - triangle[0, d]
+        aa += a * a
+        ab += a * b
+        bb += b * b
+        pa += p * a
+        pb += p * b
+    det = aa * bb - ab * ab
+    if det > 0.0:
+        shares[1] = min(max((bb * pa - ab * pb) / det, 0.0), 1.0)
+        shares[2] = min(max((aa * pb - ab * pa) / det, 0.0), 1.0 - shares[1])
+    else:
+        shares[1] = shares[2] = 0.0
+    shares[0] = 1.0 - shares[1] - shares[2]
 
 
 @compiled
@@ -163,10 +94,10 @@ def put_gains(
 
     Args:
         gains: written where a mode is asked for.
-        shapes: ``(n, 3 m)`` modes at the surface's samples: a mode's three axes side by side.
+        shapes: ``(n, 3 m)`` modes at the table's places: a mode's three axes side by side.
         first: ``(R,)`` first mode of each run of modes that are asked for.
         last: ``(R,)`` mode behind the run's last.
-        samples: ``(K, J)`` samples about the place that each strike hit.
+        samples: ``(K, J)`` places of the table about the one that each strike hit.
         blend: ``(K, J)`` their shares in it.
         directions: ``(K, 3)`` unit, of the strikes.
         blended: ``(3 m,)``, written.

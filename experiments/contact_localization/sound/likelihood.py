@@ -188,7 +188,7 @@ class SoundTerm:
         strikes = len(self.evidence.used)
         flat = points.reshape(-1, 3)
         if between:
-            samples, blend = self._table.about(flat, np.broadcast_to(directions, points.shape).reshape(-1, 3))
+            samples, blend = self._table.about(flat)
         else:
             samples, blend = self._table.nearest(flat)[:, None], np.ones((len(flat), 1))
         shape = (len(points), strikes, samples.shape[1])

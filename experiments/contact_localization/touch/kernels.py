@@ -1,18 +1,16 @@
 """The touch term's loops: crop, press, hang, compare.
 
 Shapes: ``reading`` is the tuple ``(heights, pitch, touched, flat, skirt, edge)`` of a ``TouchMap``;
-``sigmas`` is ``(rms, tilt)`` of a ``TouchNoise``; ``scratch`` is ``(2, rows, columns)``, overwritten.
+``sigmas`` is ``(rms, tilt, spin)`` of a ``TouchNoise``; ``scratch`` is ``(2, rows, columns)``, overwritten.
+``lean`` is ``(LEAN,)`` numbers of a fit, overwritten: see ``attitude.leaning``.
 """
 
 import numpy as np
 
-from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from experiments.contact_localization.touch.attitude import Reading, Sigmas, leaning, put_lean, slid
+from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.compiled import compiled, copy_line
 from harness.sim.gel.view import POOL
-
-Reading = tuple[FloatArray, float, IntArray, BoolArray, FloatArray, FloatArray]
-Sigmas = tuple[float, float]
-
 
 _CORE = 0.2
 """Share of the deepest place above which the object shapes the gel (Taxim, section III-A)."""
@@ -107,6 +105,7 @@ def score_at(
     crop: FloatArray,
     pressed: FloatArray,
     scratch: FloatArray,
+    lean: FloatArray,
 ) -> tuple[float, float]:
     """The term at one pixel of a view, and the depth along it of the gel's centre.
 
@@ -143,6 +142,8 @@ def score_at(
             _press(crop, plane, pitch, pressed)
             _hang(pressed, skirt, edge, scratch)
             cost = _misfit(pressed, reading, plane, sigmas)
+    put_lean(a, plane, sigmas, lean)
+    cost -= slid(pressed, reading, sigmas, lean)
     return -0.5 * cost, reference - plane[0]
 
 
@@ -220,17 +221,20 @@ def fill_scores(
     depth: FloatArray,
     score: FloatArray,
     gel_depth: FloatArray,
+    lean: FloatArray,
     reading: Reading,
     sigmas: Sigmas,
     pixels: AnyArray,
 ) -> None:
-    """Fill in ``score`` and ``gel_depth`` at ``(n, 2)`` pixels."""
+    """Fill in ``score``, ``gel_depth`` and ``lean`` at ``(n, 2)`` pixels."""
     shape = reading[0].shape
     crop, pressed, scratch = np.empty(shape), np.empty(shape), np.empty((2, shape[0], shape[1]))
     for n in range(len(pixels)):
         r, c = pixels[n, 0], pixels[n, 1]
         if np.isnan(score[r, c]):
-            score[r, c], gel_depth[r, c] = score_at(depth, r, c, reading, sigmas, crop, pressed, scratch)
+            score[r, c], gel_depth[r, c] = score_at(
+                depth, r, c, reading, sigmas, crop, pressed, scratch, lean[r, c]
+            )
 
 
 @compiled
@@ -252,9 +256,11 @@ def terms_at(
     farthest: FloatArray,
     score: FloatArray,
     gel_depth: FloatArray,
+    lean: FloatArray,
     reading: Reading,
     sigmas: Sigmas,
     places: FloatArray,
+    turns: FloatArray,
     step: int,
     rings: int,
     shift: float,
@@ -282,13 +288,14 @@ def terms_at(
                     continue
                 if np.isnan(score[r, c]):
                     score[r, c], gel_depth[r, c] = score_at(
-                        depth, r, c, reading, sigmas, crop, pressed, scratch
+                        depth, r, c, reading, sigmas, crop, pressed, scratch, lean[r, c]
                     )
                 if score[r, c] == -np.inf:
                     continue
                 dx, dy = (c - column) * view_pitch, (r - row) * view_pitch
                 dz = (places[n, 2] - gel_depth[r, c]) / depth_sigma
-                value = temperature * score[r, c] - 0.5 * ((dx * dx + dy * dy) / (shift * shift) + dz * dz)
+                told = score[r, c] + leaning(lean[r, c], turns[n, 0], turns[n, 1], turns[n, 2])
+                value = temperature * told - 0.5 * ((dx * dx + dy * dy) / (shift * shift) + dz * dz)
                 around[count] = value
                 count += 1
                 best = max(best, value)

@@ -9,16 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.contact_localization.touch.kernels import (
-    Reading,
-    Sigmas,
-    fill_scores,
-    similarities_at,
-    terms_at,
-)
+from experiments.contact_localization.touch.attitude import Reading, Sigmas, leanings_at
+from experiments.contact_localization.touch.kernels import fill_scores, similarities_at, terms_at
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, read_only
 from harness.bench.bench_errors import USUAL
 from harness.sim.gel.view import ToolView
+
+UPRIGHT: FloatArray = read_only(np.zeros(3))
+"""Of a gel that stands as its view does."""
 
 LEVEL_SLOPE = 0.06
 """Mean slope of a pixel below which it may be the gel at rest."""
@@ -31,6 +29,7 @@ class TouchNoise:
     Attributes:
         rms: metres, root mean square over the touched area at the true place, one sigma.
         tilt: rad, one sigma about each axis of the image: sensor frame and object's attitude.
+        spin: rad, one sigma of the image's turn in its own plane.
         skirt: metres, sigma of the blur that stands for the gel hanging from the contact.
         edge: metres, sigma of the blur over the contact's own edges: what the sensor cannot resolve.
         shift: metres, one sigma in the plane of the gel of where the arm says a contact was
@@ -41,6 +40,7 @@ class TouchNoise:
 
     rms: float = USUAL.gel_depth
     tilt: float = np.radians(1.75)
+    spin: float = USUAL.gel_yaw
     skirt: float = 1.0e-3
     edge: float = 0.6e-3
     shift: float = 0.6e-3
@@ -50,7 +50,7 @@ class TouchNoise:
     @property
     def sigmas(self) -> Sigmas:
         """As the loops take them."""
-        return float(self.rms), float(self.tilt)
+        return float(self.rms), float(self.tilt), float(self.spin)
 
     def with_model(self, rms: float, touch: "TouchMap") -> "TouchNoise":
         """With what the predicted maps are themselves off by.
@@ -143,6 +143,7 @@ def view_scores(view: ToolView, touch: TouchMap, noise: TouchNoise, pixels: IntA
         view.depth,
         view.score,
         view.gel_depth,
+        view.lean,
         touch.reading,
         noise.sigmas,
         pixels,
@@ -158,6 +159,7 @@ def touch_terms(
     rings: int,
     shift: float,
     temperature: float,
+    turns: FloatArray = UPRIGHT,
 ) -> FloatArray:
     """Log-likelihood of one contact's image and place under each hypothesis.
 
@@ -173,6 +175,8 @@ def touch_terms(
         rings: cells looked at on each side.
         shift: metres, one sigma of the place in the plane of the gel.
         temperature: factor on the image's share.
+        turns: ``(n, 3)`` or ``(3,)`` by which the gel is turned against the view under each hypothesis, as
+            ``turns_between`` has them.
 
     Returns:
         ``(n,)`` nats, not below ``-noise.cap``.
@@ -185,9 +189,11 @@ def touch_terms(
         view.farthest,
         view.score,
         view.gel_depth,
+        view.lean,
         touch.reading,
         noise.sigmas,
         places,
+        np.broadcast_to(turns, (len(places), 3)),
         step,
         rings,
         shift,
@@ -197,7 +203,14 @@ def touch_terms(
     )
 
 
-def best_fit(view: ToolView, touch: TouchMap, noise: TouchNoise, place: FloatArray, shift: float) -> float:
+def best_fit(
+    view: ToolView,
+    touch: TouchMap,
+    noise: TouchNoise,
+    place: FloatArray,
+    shift: float,
+    turn: FloatArray = UPRIGHT,
+) -> float:
     """How well a contact fits near one place: nats of its best cell, untempered and uncapped.
 
     Args:
@@ -206,6 +219,7 @@ def best_fit(view: ToolView, touch: TouchMap, noise: TouchNoise, place: FloatArr
         noise: of the term.
         place: ``(3,)`` metres in view coordinates: the gel's centre.
         shift: metres, one sigma of the place in the plane of the gel.
+        turn: ``(3,)`` by which the gel is turned against the view.
     """
     rings = int(np.ceil(3.0 * shift / view.pitch))
     column, row = np.round((place[:2] - view.origin) / view.pitch).astype(np.int64)
@@ -219,7 +233,11 @@ def best_fit(view: ToolView, touch: TouchMap, noise: TouchNoise, place: FloatArr
     dy = view.origin[1] + r * view.pitch - place[1]
     dz = place[2] - view.gel_depth[r, c]
     cost = (dx**2 + dy**2) / shift**2 + (dz / noise.depth) ** 2
-    fits = view.score[r, c] - 0.5 * np.where(np.isfinite(cost), cost, np.inf)
+    fits = (
+        view.score[r, c]
+        + leanings_at(view.lean[r, c], *turn)
+        - 0.5 * np.where(np.isfinite(cost), cost, np.inf)
+    )
     return float(fits.max(initial=-np.inf))
 
 

@@ -21,6 +21,9 @@ _MARGIN = 4.0e-3
 FirstSurface = Callable[[FloatArray, float, int, int], FloatArray]
 """As ``height_map.first_surface`` of one object: from a view, a pitch in m, rows and columns to depths."""
 
+LEAN = 7
+"""Numbers of a fit that say what an attitude which is expected of the gel changes of its score."""
+
 POOL = 4
 """Pixels of a view, each way, that share the limits on where the gel can be."""
 
@@ -40,6 +43,7 @@ class ToolView:
             reach through the gel.
         score: ``(rows, columns)`` nats, NaN where not asked for yet.
         gel_depth: ``(rows, columns)`` metres along z of the gel's centre, from the fit.
+        lean: ``(rows, columns, LEAN)`` of the fit: what an attitude expected of the gel changes of the score.
     """
 
     object_from_view: FloatArray
@@ -50,6 +54,7 @@ class ToolView:
     farthest: FloatArray
     score: FloatArray
     gel_depth: FloatArray
+    lean: FloatArray
 
 
 def view_along(
@@ -99,6 +104,7 @@ def _view_of(
         farthest,
         missing,
         missing.copy(),
+        np.empty((*depth.shape, LEAN)),
     )
 
 

@@ -23,7 +23,7 @@ from harness.sim.gel.view import POOL, ToolView, view_along
 from tests.samples.synthetic_press import BLOCK, Press, felt, stepped_block
 
 NOISE = TouchNoise()
-CORE, SUNKEN = 0.2, -6e-3
+CORE, SUNKEN, WITHIN = 0.2, -6e-3, 0.35
 EDGE = Press((0.008, -0.005, 0.025), (0.02, 0.0, -np.sqrt(1.0 - 0.02**2)), yaw=0.3)
 VIEWED = EDGE.object_from_gel[:3, :3] @ rotation_about(np.array([0.0, 1.0, 0.0]), np.radians(1.0))
 """As the estimator believes the tool stood: a degree off."""
@@ -99,6 +99,25 @@ def cost_of(predicted: FloatArray, plane: FloatArray, touch: TouchMap) -> float:
     return float((gap**2).sum() / (len(touch.touched) * NOISE.rms**2) + tilt)
 
 
+def slid(predicted: FloatArray, touch: TouchMap) -> float:
+    """By how much a shift within a pixel and a turn in the picture's plane lower the cost, by a ridge fit."""
+    rows, columns = touch.heights.shape
+    down, across = np.zeros((2, rows, columns))
+    down[1:-1] = 0.5 * (predicted[2:] - predicted[:-2])
+    across[:, 1:-1] = 0.5 * (predicted[:, 2:] - predicted[:, :-2])
+    y, x = np.meshgrid(*(np.arange(side) + 0.5 - 0.5 * side for side in (rows, columns)), indexing="ij")
+    inner = ~touch.flat
+    inner[[0, -1]], inner[:, [0, -1]] = False, False
+    design = np.column_stack([across[inner], down[inner], (x * down - y * across)[inner]])
+    unit = len(touch.touched) * NOISE.rms**2
+    gap = (touch.heights - predicted)[inner]
+    prior = np.diag([WITHIN**-2, WITHIN**-2, NOISE.spin**-2])
+    right = design.T @ gap / unit
+    step = np.linalg.solve(design.T @ design / unit + prior, right)
+    share = min(1.0, 1.0 / max(*np.abs(step[:2]), 1e-9))
+    return float(share * (2.0 - share) * right @ step)
+
+
 def reference(view: ToolView, row: int, column: int, touch: TouchMap) -> tuple[float, float]:
     """The term at one pixel and the depth of the gel's centre."""
     crop, first = cropped(view, row, column, touch.heights.shape)
@@ -112,6 +131,7 @@ def reference(view: ToolView, row: int, column: int, touch: TouchMap) -> tuple[f
         plane = plane_of(predicted - touch.heights, shape > 0.0, touch, plane)
         predicted = hung(pressed_by(crop, plane, touch), touch)
         cost = cost_of(predicted, plane, touch)
+    cost -= slid(predicted, touch)
     return -0.5 * cost, first - float(plane[0])
 
 
@@ -168,6 +188,7 @@ def test_single_precision_gives_the_same_term_to_its_own_digits(view: ToolView, 
         view.farthest,
         np.full(depth.shape, np.nan),
         np.full(depth.shape, np.nan),
+        np.empty_like(view.lean),
     )
     view_scores(again, rough, NOISE, pixels)
     here, there = view.score[tuple(pixels.T)], again.score[tuple(pixels.T)]
