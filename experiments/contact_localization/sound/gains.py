@@ -34,6 +34,11 @@ class GainTable:
     faces: IntArray
     near_faces: AnyArray
 
+    @property
+    def at_samples(self) -> AnyArray:
+        """``(samples, m, 3)`` of ``shapes``."""
+        return self.shapes[: len(self.surface.points)]
+
     def nearest(self, points: FloatArray) -> IntArray:
         """``(n,)`` sample nearest to each of ``(n, 3)`` points in metres, however far."""
         table = self.surface.table

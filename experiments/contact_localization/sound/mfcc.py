@@ -126,7 +126,7 @@ class MfccTable:
         rows = []
         for first in range(0, len(normals), _CHUNK):
             chosen = slice(first, first + _CHUNK)
-            gains = np.einsum("nmd,nd->nm", table.shapes[chosen], normals[chosen])
+            gains = np.einsum("nmd,nd->nm", table.at_samples[chosen], normals[chosen])
             # Modes are many lines apart, so that powers add; their interference is left out.
             summed = (gains**2) @ powers.reshape(len(powers), -1)
             features = cepstra(summed.reshape(-1, frames, bands), self._settings).reshape(len(gains), -1)

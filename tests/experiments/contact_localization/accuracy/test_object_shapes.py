@@ -73,7 +73,7 @@ def test_the_model_hears_with_the_objectfiles_modes(of: ObjectFile, level: str) 
     assert model.modes is not None
     assert len(model.modes.frequencies) == MODES
     gains = model.gains(4e-3)
-    assert gains.shapes.shape == (len(model.surface(4e-3).points), MODES, 3)
+    assert gains.at_samples.shape == (len(model.surface(4e-3).points), MODES, 3)
     assert np.isfinite(gains.shapes).all()
 
 
