@@ -35,6 +35,7 @@ def by_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -
 
     With a picture a household shape that does not fit its contacts is still the answer, moved to them, where
     the smooth surface leaves it open: both say the same of what was touched, and the smooth one no more.
+    Where it is not, other draws are searched once more.
 
     Args:
         evidence: one contact or a silhouette at least.
@@ -43,40 +44,37 @@ def by_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -
     Raises:
         OutOfDomain: nothing was touched or seen.
     """
-    found = _searched(evidence, settings or FamilySettings())
+    settings = settings or FamilySettings()
+    found = family_estimate(evidence, settings)
     why = _why_smooth(found, evidence)
     if why is None:
         return found
     smooth = by_hermite(evidence, symmetric=False)  # every class of round bodies was tried
-    if found.details["foreign"] and evidence.sighted and deviations_apart(found, smooth) <= BESIDE:
-        return _kept(found, smooth)
+    seconds = found.seconds + smooth.seconds
+    if not _is_beside(found, smooth, evidence) and found.details["foreign"]:
+        # A search may miss a shape that fits, and one by other draws seldom misses the same.
+        again = family_estimate(evidence, replace(settings, seed=settings.seed + 1))
+        seconds += again.seconds
+        if _why_smooth(again, evidence) is None:
+            return replace(again, seconds=seconds)
+        if _is_beside(again, smooth, evidence):
+            found = again
+    if _is_beside(found, smooth, evidence):
+        return replace(_kept(found, smooth), seconds=seconds)
     open_ = {*found.not_bounded, *smooth.not_bounded}
     return replace(
         smooth,
         not_bounded=tuple(axis for axis in "xyz" if axis in open_),
         flags=(*found.flags, f"{why}: the surface is by rbf"),
         doubtful=found.doubtful,
-        seconds=found.seconds + smooth.seconds,
+        seconds=seconds,
     )
 
 
-def _searched(evidence: ShapeEvidence, settings: FamilySettings) -> ShapeEstimate:
-    """The family's estimate; where it fits no class, the better of it and that of other draws.
-
-    A search may miss a shape that fits, and another one seldom misses the same. It does not begin at what the
-    first has found: that would crowd out what it finds itself.
-    """
-    first = family_estimate(evidence, settings)
-    if not first.details["foreign"] or len(evidence.contacts) < ENOUGH:
-        return first
-    again = family_estimate(evidence, replace(settings, seed=settings.seed + 1))
-    return replace(min(first, again, key=_cost), seconds=first.seconds + again.seconds)
-
-
-def _cost(found: ShapeEstimate) -> float:
-    cost = found.details["cost"]
-    assert isinstance(cost, float)
-    return cost
+def _is_beside(found: ShapeEstimate, smooth: ShapeEstimate, evidence: ShapeEvidence) -> bool:
+    """Whether a household shape that does not fit its contacts is no farther from them than it may be."""
+    seen = bool(found.details["foreign"]) and evidence.sighted
+    return seen and deviations_apart(found, smooth) <= BESIDE
 
 
 def _why_smooth(found: ShapeEstimate, evidence: ShapeEvidence) -> str | None:
@@ -92,9 +90,7 @@ def _why_smooth(found: ShapeEstimate, evidence: ShapeEvidence) -> str | None:
 def _kept(found: ShapeEstimate, smooth: ShapeEstimate) -> ShapeEstimate:
     """A household shape beside the smooth surface: nowhere less sure than that surface is."""
     stated = _nearest_deviations(smooth, found.mesh.vertices)
-    return replace(
-        found, deviation=np.minimum(found.deviation, stated), seconds=found.seconds + smooth.seconds
-    )
+    return replace(found, deviation=np.minimum(found.deviation, stated))
 
 
 def deviations_apart(found: ShapeEstimate, smooth: ShapeEstimate) -> float:

@@ -50,7 +50,7 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
     fitted: ShapeEstimate = replace(
         by_rbf,
         mesh=_away(by_rbf.mesh, 0.1),
-        details={"foreign": foreign, "beyond_m": beyond, "cost": 1.0},
+        details={"foreign": foreign, "beyond_m": beyond},
         not_bounded=("y",),
         doubtful={1: 0.004},
         flags=("off",),
@@ -69,35 +69,40 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
 
 
 @pytest.mark.parametrize(
-    ("contacts", "costs", "tries", "kept"),
+    ("contacts", "first", "second", "answer"),
     [
-        (8, (400.0, 300.0), 2, 1),
-        (8, (300.0, 400.0), 2, 0),
-        (3, (400.0, 300.0), 1, 0),  # too few contacts to tell that none fits
+        (8, "away", "fits", "search 1"),
+        (8, "away", "away", "by rbf"),
+        (8, "away", "beside", "search 1"),
+        (8, "beside", "fits", "search 0"),  # what stands beside the smooth surface has the right form
+        (8, "fits", "fits", "search 0"),
+        (3, "away", "fits", "search 0"),  # too few contacts to tell that none fits
     ],
 )
-def test_where_no_class_fits_other_draws_are_tried_and_the_better_is_kept(
+def test_where_no_class_fits_other_draws_are_searched_once_more(
     readings: ShapeEvidence,
     monkeypatch: pytest.MonkeyPatch,
     contacts: int,
-    costs: tuple[float, float],
-    tries: int,
-    kept: int,
+    first: str,
+    second: str,
+    answer: str,
 ) -> None:
     part = replace(readings, touches=readings.touches[:contacts])
-    by_rbf, seeds = by_hermite(part), list[int]()
+    by_rbf, seeds = by_hermite(part, symmetric=False), list[int]()
 
     def searched(_: ShapeEvidence, settings: FamilySettings) -> ShapeEstimate:
+        kind, turn = (first, second)[len(seeds)], len(seeds)
         seeds.append(settings.seed)
-        turn = len(seeds) - 1
-        details = {"foreign": turn == 0, "beyond_m": 0.0, "cost": costs[turn]}
-        return replace(by_rbf, details=details, flags=(f"search {turn}",), seconds=1.0)
+        details = {"foreign": kind != "fits", "beyond_m": 0.0}
+        mesh = _away(by_rbf.mesh, 0.1) if kind == "away" else by_rbf.mesh
+        return replace(by_rbf, mesh=mesh, details=details, flags=(f"search {turn}",), seconds=1.0)
 
     monkeypatch.setattr(family_or_smooth, "family_estimate", searched)
     found = by_family(part)
-    assert len(set(seeds)) == tries
-    assert found.flags[0] == f"search {kept}"
-    assert found.seconds >= tries  # the time of both is stated
+    assert answer in " ".join(found.flags)
+    assert ("by rbf" in found.flags[-1]) is (answer == "by rbf")
+    assert len(set(seeds)) == len(seeds)  # by draws of its own
+    assert found.seconds >= len(seeds)  # the time of all is stated
 
 
 @pytest.mark.parametrize(
@@ -119,7 +124,7 @@ def test_a_household_shape_that_the_smooth_surface_leaves_open_is_kept_though_it
     fitted = replace(
         held,
         mesh=_away(held.mesh, away * height),
-        details={"foreign": True, "beyond_m": 0.0, "cost": 1.0},
+        details={"foreign": True, "beyond_m": 0.0},
         flags=(),
     )
     monkeypatch.setattr(family_or_smooth, "family_estimate", lambda *_: fitted)
@@ -135,7 +140,7 @@ def test_a_household_shape_that_is_kept_is_nowhere_less_sure_than_the_smooth_sur
     by_rbf = by_hermite(readings, symmetric=False)
     random = np.random.default_rng(0)
     unsure = random.uniform(0.5, 2.0, len(by_rbf.mesh.vertices)) * by_rbf.deviation
-    fitted = replace(by_rbf, deviation=unsure, details={"foreign": True, "beyond_m": 0.0, "cost": 1.0})
+    fitted = replace(by_rbf, deviation=unsure, details={"foreign": True, "beyond_m": 0.0})
     monkeypatch.setattr(family_or_smooth, "family_estimate", lambda *_: fitted)
     found = by_family(readings)
     np.testing.assert_array_equal(found.deviation, np.minimum(unsure, by_rbf.deviation))
