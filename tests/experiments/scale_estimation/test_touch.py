@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.size import SizeRange
 from experiments.scale_estimation.touch.fit import THROUGH, UNKNOWNS, FreeSpace, Stand, StandErrors
 from experiments.scale_estimation.touch.patch import POINTS, Patch, patch_of
@@ -14,8 +15,10 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import rotation_about, transform
 from harness.bench.bench_errors import USUAL
+from harness.bench.station_file import Station
 from harness.objects.household import build
 from harness.sim.solid.surface_samples import sample_surface
+from tests.experiments.scale_estimation.runs import scene_of
 
 RANGE = SizeRange(0.05, 0.45)
 PLACE = np.array([-0.42, 0.0, 0.25])
@@ -72,6 +75,16 @@ def test_a_station_that_knows_less_where_its_gel_is_leaves_more_of_the_size_open
         low, high = by_touch(there, made, nominal, RANGE).belief.interval
         widths.append(high / low - 1.0)
     assert widths[1] > 1.1 * widths[0]
+
+
+def test_how_well_the_gel_s_place_is_known_is_the_station_s_word(station: Station) -> None:
+    rough = station.model_copy(update={"errors": station.errors.times(3.0)})
+    usual, worse = (
+        ObjectModel(build("bowl"), scene_of(3, camera=False, mesh="builtin:bowl"), one).stand.errors
+        for one in (station, rough)
+    )
+    assert worse.depth > 2.0 * usual.depth
+    assert worse.tilt == pytest.approx(3.0 * usual.tilt)
 
 
 def test_one_contact_says_hardly_anything() -> None:

@@ -57,3 +57,10 @@ def test_turning_it_costs_what_the_prior_of_the_yaw_says(search: Search) -> None
     weighed = search.weigh(at, np.arange(len(PRESSES)), 2, 2)
     images = weighed.log_weights - search.log_yaw_prior(at.yaws)
     assert np.ptp(images) < 0.5
+
+
+def test_a_turned_object_is_refused_no_sooner(search: Search) -> None:
+    """What says whether a contact is of the object at all expects the turn too."""
+    members = np.arange(len(PRESSES))
+    straight, turned = (search.gates(_turned(search, TURNS[[k]]), members) for k in (2, 4))
+    assert turned == pytest.approx(straight, abs=0.15)
