@@ -51,15 +51,16 @@ def by_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -
         return found
     smooth = by_hermite(evidence, symmetric=False)  # every class of round bodies was tried
     seconds = found.seconds + smooth.seconds
-    if not _is_beside(found, smooth, evidence) and found.details["foreign"]:
+    beside = _is_beside(found, smooth, evidence)
+    if found.details["foreign"] and not beside:
         # A search may miss a shape that fits, and one by other draws seldom misses the same.
         again = family_estimate(evidence, replace(settings, seed=settings.seed + 1))
         seconds += again.seconds
         if _why_smooth(again, evidence) is None:
             return replace(again, seconds=seconds)
-        if _is_beside(again, smooth, evidence):
-            found = again
-    if _is_beside(found, smooth, evidence):
+        beside = _is_beside(again, smooth, evidence)
+        found = again if beside else found
+    if beside:
         return replace(_kept(found, smooth), seconds=seconds)
     open_ = {*found.not_bounded, *smooth.not_bounded}
     return replace(
