@@ -104,7 +104,7 @@ def _view_of(
         farthest,
         missing,
         missing.copy(),
-        np.empty((*depth.shape, LEAN)),
+        np.zeros((*depth.shape, LEAN)),
     )
 
 

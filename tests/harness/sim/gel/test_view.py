@@ -106,6 +106,7 @@ def test_nothing_is_known_of_a_new_picture() -> None:
     assert np.isnan(view.score).all()
     assert np.isnan(view.gel_depth).all()
     assert view.score is not view.gel_depth
+    assert not view.lean.any()  # where nothing can be felt no turn changes that
 
 
 @pytest.mark.parametrize("size", [(0.034, 0.030), (0.010, 0.021)])
