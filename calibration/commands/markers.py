@@ -58,6 +58,7 @@ def markers(
     from calibration.markers.result import answer_of, file_of
     from calibration.taxim.pictures import set_digest
     from harness.basics.files.json_file import write_model
+    from harness.basics.files.named_file import refusals_name
     from harness.basics.quantities import LENGTH
 
     pictures = _pictures(source)
@@ -67,7 +68,8 @@ def markers(
         options.positive("--pitch", pitch, LENGTH),
         options.positive("--spacing", spacing, LENGTH),
     )
-    made = markers_at_rest(pictures, printed)
+    with refusals_name(source):
+        made = markers_at_rest(pictures, printed)
     file = file_of(
         made, printed, f"sha256 {set_digest(pictures[0], _rest(pictures))}, {len(pictures)} pictures"
     )

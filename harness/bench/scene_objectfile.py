@@ -67,12 +67,12 @@ def with_objectfile(tree: Any, folder: Path, where: str) -> Any:
     named = tree.get("object") if isinstance(tree, Mapping) else None
     if not isinstance(named, Mapping) or "mesh" in named or not isinstance(named.get("objectfile"), str):
         return tree
+    path = objectfile_folder(named["objectfile"], folder)
     for key in _OF_A_MESH:
         if key in named:
             raise WrongUse(
-                f"{where}: 'object.{key}' is of a mesh, and an ObjectFile says its own; leave it out"
+                f"{where}: 'object.{key}' is of a mesh, and the ObjectFile {path} says its own; leave it out"
             )
-    path = objectfile_folder(named["objectfile"], folder)
     require_objectfile(path, where)
     name, material = _described(path / DESCRIPTION)
     return {**tree, "object": {**named, "mesh": OBJECTFILE + name, "material": material}}

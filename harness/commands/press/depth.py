@@ -85,6 +85,7 @@ def depth(
 
     Try: touchstone depth press.png --background rest.png --calibration r15.npz --out d.npz --picture d.png
     """
+    from harness.basics.files.named_file import refusals_name
     from harness.bench.station_file import load_station, station_path
     from harness.picture.image_file import read_image
     from harness.sim.optics.depth_reading import read_press
@@ -96,7 +97,9 @@ def depth(
     wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, bench)
     known = _calibration(calibration, bench)
     rest = None if background is None else read_image(background)
-    found = read_press(_frames(images), known, _detection(rest), rest, _thickness(known, bench))
+    frames, thickness_known = _frames(images), _thickness(known, bench)
+    with refusals_name(*images, *([] if background is None else [background])):
+        found = read_press(frames, known, _detection(rest), rest, thickness_known)
     frame_from_gel = None if bench is None else bench.flange_from_gel
     points = found.points(frame_from_gel)
     pressed = depth_force.answer_force(wanted, found)
