@@ -26,7 +26,7 @@ TEMPER = 0.7
 ALIKE = 0.15
 """Of the logarithm of the size: sizes no further apart are one answer, not two."""
 
-SURE = 0.9
+SURE = 0.7
 """Probability of the likeliest size and those alike, below which another one stands beside it: with modes
 an octave off, a handful of peaks is matched by chance, and no interval about either size would be honest."""
 
