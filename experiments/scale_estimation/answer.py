@@ -118,6 +118,9 @@ class ScaleAnswering:
             return
         if sensors.touch:
             _ = self.model.stand.tree, self.model.stand.places
+        if sensors.camera:
+            with suppress(WrongUse):  # a station without a camera: said by the answer
+                _ = self.model.view.corners
         if sensors.sound:
             with suppress(MeshRefused):  # said by the answer: sight and touch need no elements
                 self.model.ringing(self.accuracy)

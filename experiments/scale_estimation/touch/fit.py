@@ -109,6 +109,11 @@ class Stand:
         return cKDTree(self.points)
 
     @cached_property
+    def deepest(self) -> float:
+        """M: no place in the object is farther from a sample: half its least extent, and the spacing."""
+        return float(0.5 * np.ptp(self.points, axis=0).min() + self.spacing)
+
+    @cached_property
     def tree(self) -> cKDTree:
         """Over places and, weighed, the way that the surface faces there."""
         return cKDTree(np.hstack([self.points, FACING * self.normals]))
@@ -134,14 +139,17 @@ class FreeSpace:
             return np.zeros(len(unknowns))
         standing, _ = _in_stand(unknowns, self._places[None])
         scale = np.exp(unknowns[:, _SIZE])[:, None, None]
-        near = np.asarray(self._stand.places.query((standing[:, 0] / scale).reshape(-1, 3))[1])
+        tree, most = self._stand.places, self._stand.deepest
+        near = tree.query((standing[:, 0] / scale).reshape(-1, 3), distance_upper_bound=most)[1]
         shape = standing[:, 0].shape
+        outside = (near == tree.n).reshape(shape[:-1])  # what has no sample so near is not in the object
+        near = np.minimum(near, tree.n - 1)
         points, faced = self._stand.points[near].reshape(shape), self._stand.normals[near].reshape(shape)
         apart = standing[:, 0] - scale * points
         deep = -np.einsum("kni,kni->kn", apart, faced)
         # Straight under a sample, not beside an edge of which it is the nearest.
         aside = np.linalg.norm(apart + deep[..., None] * faced, axis=-1)
-        inside = (deep > PASSED) & (aside < self._stand.spacing * scale[..., 0])
+        inside = (deep > PASSED) & (aside < self._stand.spacing * scale[..., 0]) & ~outside
         return THROUGH * np.asarray(
             np.logical_or.reduceat(inside, self._ends, axis=1).sum(axis=1), np.float64
         )

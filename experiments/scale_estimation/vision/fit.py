@@ -6,7 +6,6 @@ from functools import cache, cached_property
 import numpy as np
 
 from harness.basics.arrays import FloatArray, read_only
-from harness.basics.mesh_hull import hull_of
 from harness.picture.camera_errors import CameraErrors
 from harness.picture.outline import SeenOutline, directions
 
@@ -48,7 +47,8 @@ class View:
         base_from_camera: ``(4, 4)``; x right, y down, z forward.
         focal_px: pixels.
         centre_px: (x, y) of the optical axis, pixels from the picture's corner.
-        standing: ``(n, 3)`` m, corners of the nominal object upright in base, its anchor at the origin.
+        standing: ``(n, 3)`` m, corners of the nominal object's convex hull upright in base, its anchor at the
+            origin.
         place: ``(3,)`` m in base: where that middle nominally stands.
         errors: of all this.
     """
@@ -63,8 +63,7 @@ class View:
     @cached_property
     def corners(self) -> FloatArray:
         """``(m, 3)`` those corners that can be on an outline: the farthest in directions all around."""
-        spanning = hull_of(self.standing)
-        return np.asarray(spanning[np.unique((spanning @ _all_around().T).argmax(axis=0))])
+        return np.asarray(self.standing[np.unique((_all_around() @ self.standing.T).argmax(axis=1))])
 
     @cached_property
     def sigmas(self) -> FloatArray:
