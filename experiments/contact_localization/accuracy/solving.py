@@ -16,7 +16,7 @@ from experiments.contact_localization.accuracy.dials import (
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.observation import contact_of, height_map
 from experiments.contact_localization.posterior.bench_noise import noise_at
-from experiments.contact_localization.posterior.dials import BLOCK, METHOD, SPACING
+from experiments.contact_localization.posterior.dials import BLOCK, METHOD, ROUNDS, SAMPLES, SPACING
 from experiments.contact_localization.posterior.estimate import Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Noise
 from experiments.contact_localization.posterior.strain import times_stated
@@ -31,6 +31,8 @@ from harness.recording.observation import Observation
 T = TypeVar("T")
 
 PROGRAM = "contact-localization"
+_LOOKED_BY = (SPACING, ROUNDS, SAMPLES, BLOCK)
+
 ESTIMATOR = "experiments.contact_localization.posterior.estimate"
 """The module whose sources, with all they import, decide whether a curve still holds."""
 
@@ -173,7 +175,8 @@ def located(
     """The estimates after each contact from the ``first`` on; after the last alone where None.
 
     Where the last one's residuals are larger than the bench's stated errors allow, it is estimated again
-    under errors so much larger, and says so.
+    under errors so much larger, and says so. What fits no place at other levels than the default's is
+    estimated again at these: a refusal may not hang on how finely one looked.
 
     Args:
         readings: of the run.
@@ -185,14 +188,29 @@ def located(
         FitRefused: no place on this object explains the readings, no image shows a contact, or no picture
             of them may be used.
     """
-    errors = readings.model.errors
-    found = _located_at(errors, readings, accuracy, first, judged)
+    errors, began = readings.model.errors, time.perf_counter()
+    try:
+        found = _located_at(errors, readings, accuracy, first, judged)
+    except FitRefused:
+        usual = accuracy.with_({knob.name: knob.default for knob in _LOOKED_BY})
+        if usual.levels == accuracy.levels:
+            raise
+        lost = time.perf_counter() - began
+        return _looked_again(located(readings, usual, first, judged), lost)
     factor = times_stated(found[-1].strain) if judged and accuracy.of(METHOD) == "grid" else 1.0
     if factor == 1.0:
         return found
     less_sure = replace(readings, prior=readings.prior.times(factor))
     wider = _located_at(errors.times(factor), less_sure, accuracy)[-1]
     return (*found[:-1], _widened(found[-1], wider, factor))
+
+
+def _looked_again(found: tuple[Estimate, ...], lost: float) -> tuple[Estimate, ...]:
+    """Estimates at the default levels, the s that the others took counted with the last one's judging."""
+    last = found[-1]
+    seconds = {**last.seconds, "judge": last.seconds.get("judge", 0.0) + lost}
+    doubt = "at the levels asked for no place explained the readings; at the default levels this one does"
+    return (*found[:-1], replace(last, seconds=seconds, doubts=(*last.doubts, doubt)))
 
 
 def _located_at(

@@ -22,6 +22,9 @@ REFUSE_FEW_BELOW = -20.0
 SLIPPED_BELOW = -10.0
 """Nats of one contact where the others fit."""
 
+_WALL = 6.0e-3
+"""M: a wall no thicker is thin beside what the place is known to."""
+
 _ENOUGH = 4
 _FAR_BELOW = -1000.0
 
@@ -132,8 +135,9 @@ def refuse_inside_out(search: Search, one: Hypotheses, members: IntArray) -> Non
         FitRefused: naming the contact that faces away most.
     """
     facing = np.array([_facing(search, int(k), one) for k in members])
-    # Beside a thin wall the nearest sample may be of its other face: half of the contacts are no majority.
-    if np.mean(facing > 0.0) > 0.5:
+    # Beside a thin wall the nearest sample may be of its other face: half of the contacts are no majority,
+    # and a contact alone is believed where a wall's other face is near.
+    if np.mean(facing > 0.0) > 0.5 and not (len(members) == 1 and _walled(search, int(members[0]), one)):
         worst = int(members[np.argmax(facing)])
         raise FitRefused(
             f"the object is inside out: its normals point away from the gel at most contacts, the worst is "
@@ -149,6 +153,14 @@ def _facing(search: Search, contact: int, one: Hypotheses) -> float:
     normal = search.surface.normals[search.surface.tree.query(point)[1]]
     axis = search.prior.object_from_base(one.yaws)[0] @ search.contacts[contact].axis
     return float(normal @ axis)
+
+
+def _walled(search: Search, contact: int, one: Hypotheses) -> bool:
+    """Whether a face that looks at the tool is no farther than a thin wall's thickness."""
+    point = search.surface_points(contact, one)[0]
+    near = search.surface.normals[search.surface.tree.query_ball_point(point, _WALL)]
+    axis = search.prior.object_from_base(one.yaws)[0] @ search.contacts[contact].axis
+    return bool((near @ axis < -0.5).any())
 
 
 def _repeated(search: Search, contact: int) -> int | None:

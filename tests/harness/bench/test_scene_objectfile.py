@@ -66,7 +66,7 @@ def test_a_scene_survives_a_recording(egg: ObjectFile) -> None:
 @pytest.mark.parametrize("line", ['material = "steel"', 'units = "mm"', 'wall = "2 mm"'])
 def test_what_only_a_mesh_has_is_refused_beside_it(egg: ObjectFile, tmp_path: Path, line: str) -> None:
     shutil.copytree(egg.folder, tmp_path / "egg")
-    with pytest.raises(WrongUse, match="ObjectFile .* says its own; leave it out"):
+    with pytest.raises(WrongUse, match=r"ObjectFile .* says its own; leave it out"):
         load_scene(written(tmp_path, f'objectfile = "egg"\n{line}'))
 
 

@@ -19,7 +19,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import frame_facing, transform
 from harness.basics.mesh import Mesh
-from tests.samples.synthetic_press import PRESSES
+from tests.samples.synthetic_press import PRESSES, box
 
 GOOD, BAD = -2.0, -60.0
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -176,3 +176,20 @@ def test_a_contact_of_two_that_seems_to_be_from_inside_is_no_object_inside_out(
     refuse_inside_out(search, truth, np.array([1, 2]))
     with pytest.raises(FitRefused, match="inside out"):
         refuse_inside_out(search, truth, np.array([1]))
+
+
+def test_a_lone_contact_beside_a_thin_wall_does_not_say_that_the_object_is_inside_out(
+    block: Model, prior: Prior
+) -> None:
+    """Which of a wall's two faces the nearest sample is of, one contact cannot tell."""
+    one = np.array([0])
+    for thickness, walled in ((2e-3, True), (2e-2, False)):
+        plate = box(0.05, 0.05, thickness)
+        turned = Model(Mesh(plate.vertices, plate.faces[:, ::-1]), block.sensor, block.calibration)
+        search = searched(turned, prior, np.zeros((1, 3)))
+        top = Hypotheses(np.array([[0.0, 0.0, 0.5 * thickness]]), np.zeros(1), np.zeros(1))
+        if walled:
+            refuse_inside_out(search, top, one)
+        else:
+            with pytest.raises(FitRefused, match="inside out"):
+                refuse_inside_out(search, top, one)

@@ -19,7 +19,9 @@ from experiments.contact_localization.posterior.strain import (
     strain_of,
     times_stated,
 )
+from harness.basics.errors import FitRefused
 from harness.bench.bench_errors import USUAL
+from harness.effects.accuracy import Accuracy
 from tests.support.localization import dials
 
 QUICK = dials(spacing=3e-3, rounds=1, samples=600)
@@ -75,3 +77,39 @@ def test_a_strained_answer_is_made_again_under_errors_so_much_larger(
     expected = [(1.0, 1.0)] if times == 1.0 else [(1.0, 1.0), (times, times)]
     assert np.allclose(asked, expected)
     assert any("[errors]" in doubt for doubt in found.doubts) == (times > 1.0)
+
+
+def test_what_fits_no_place_at_other_levels_is_looked_at_again_at_the_default_ones(
+    plain: Estimate, block: Model, prior: Prior, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A grid's own error, or a finer one's luck, is no reason to call a right object another."""
+    usual = dials()
+
+    def at(_errors: Any, _readings: Readings, accuracy: Accuracy, *_: object) -> tuple[Estimate, ...]:
+        if accuracy.levels != usual.levels:
+            raise FitRefused("no place on this object explains the contacts")
+        return (plain,)
+
+    monkeypatch.setattr(solving, "_located_at", at)
+    readings = Readings((), (), block, prior, 0, (0.0, 0.0))
+    again, once = located(readings, QUICK)[-1], located(readings, usual)[-1]
+    assert np.array_equal(again.position_in_object, once.position_in_object)
+    assert any("default levels" in doubt for doubt in again.doubts)
+    assert not once.doubts
+    assert again.seconds["judge"] > once.seconds.get("judge", 0.0)
+
+
+def test_what_fits_no_place_at_the_default_levels_is_refused_at_all(
+    block: Model, prior: Prior, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Accuracy] = []
+
+    def at(_errors: Any, _readings: Readings, accuracy: Accuracy, *_: object) -> tuple[Estimate, ...]:
+        asked.append(accuracy)
+        raise FitRefused("no place on this object explains the contacts")
+
+    monkeypatch.setattr(solving, "_located_at", at)
+    for accuracy in (QUICK, dials()):
+        with pytest.raises(FitRefused):
+            located(Readings((), (), block, prior, 0, (0.0, 0.0)), accuracy)
+    assert len(asked) == 3
