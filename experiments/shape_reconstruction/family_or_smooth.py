@@ -48,7 +48,7 @@ def by_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -
     found = family_estimate(evidence, settings)
     why = _why_smooth(found, evidence)
     if why is None:
-        return found
+        return _untested(found, len(evidence.contacts))
     smooth = by_hermite(evidence, symmetric=False)  # every class of round bodies was tried
     seconds = found.seconds + smooth.seconds
     beside = _is_beside(found, smooth, evidence)
@@ -70,6 +70,14 @@ def by_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -
         doubtful=found.doubtful,
         seconds=seconds,
     )
+
+
+def _untested(found: ShapeEstimate, contacts: int) -> ShapeEstimate:
+    """A household shape, which says where its contacts are too few to find it out as none."""
+    if not 0 < contacts < ENOUGH:
+        return found
+    said = f"that it is a household shape is supposed: {contacts} contacts could not tell ({ENOUGH} can)"
+    return replace(found, flags=(*found.flags, said))
 
 
 def _is_beside(found: ShapeEstimate, smooth: ShapeEstimate, evidence: ShapeEvidence) -> bool:

@@ -11,7 +11,13 @@ from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import family_estimate
 from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
-from experiments.shape_reconstruction.family_or_smooth import BESIDE, MANY, by_family, deviations_apart
+from experiments.shape_reconstruction.family_or_smooth import (
+    BESIDE,
+    ENOUGH,
+    MANY,
+    by_family,
+    deviations_apart,
+)
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
@@ -65,7 +71,20 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
         assert set(by_rbf.not_bounded) <= set(found.not_bounded)
         np.testing.assert_array_equal(found.mesh.vertices, by_rbf.mesh.vertices)
     else:
-        assert found is fitted
+        assert found.mesh is fitted.mesh
+        # Contacts that could not have told say so.
+        assert ("supposed" in " ".join(found.flags)) is (contacts < ENOUGH)
+
+
+def test_without_a_contact_nothing_is_said_of_contacts(
+    readings: ShapeEvidence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = replace(readings, touches=readings.touches[:0])
+    fitted = replace(
+        by_hermite(readings, symmetric=False), details={"foreign": False, "beyond_m": 0.0}, flags=("off",)
+    )
+    monkeypatch.setattr(family_or_smooth, "family_estimate", lambda *_: fitted)
+    assert by_family(part).flags == ("off",)
 
 
 @pytest.mark.parametrize(
