@@ -42,14 +42,14 @@ class TurnedRoom:
 
 
 def turned_room(axis: Revolution, samples: ContactSamples, evidence: ShapeEvidence) -> TurnedRoom | None:
-    """The union of what all downward touches cleared, turned; None where none went down into the body.
+    """The union of what all downward touches cleared, those that met nothing too; None where none went down.
 
     A touch whose room, turned, would hold a place that was met says that the body is not round there, and
     is left out: it came down beside a handle, or on one.
     """
     top = float(samples.points[:, 2].max())
     found = None
-    for touch in evidence.contacts:
+    for touch in evidence.touches:
         if _is_downward(touch) and touch.stand_from_gel[2, 3] < top - BELOW:
             room = _room_of(touch, axis, samples, evidence)
             if room.at(samples.points).max() <= SLACK:

@@ -76,11 +76,13 @@ def test_without_a_touch_down_into_it_a_round_body_has_no_room() -> None:
     assert turned_room(axis_of(samples), samples, part) is None
 
 
-@pytest.mark.parametrize("hollow", [True, False])
-def test_the_smooth_surface_of_a_vessel_is_open_where_its_floor_was_touched(hollow: bool) -> None:
-    evidence = vessel()
-    part = evidence if hollow else replace(evidence, touches=evidence.touches[:-1])
-    found = by_hermite(part)
+@pytest.mark.parametrize("last", ["met", "missed", "not made"])
+def test_the_smooth_surface_of_a_vessel_is_open_where_a_touch_went_down_into_it(last: str) -> None:
+    evidence, hollow = vessel(), last != "not made"
+    *others, down = evidence.touches
+    nothing = replace(down, points=np.zeros((0, 3)), normals=np.zeros((0, 3)))
+    ends = {"met": [down], "missed": [nothing], "not made": []}[last]
+    found = by_hermite(replace(evidence, touches=(*others, *ends)))
     assert found.details["axis_m"] == pytest.approx(CENTRE[:2], abs=1e-3)
     inside = is_inside(circle(0.03, 0.06)[:-1], found.mesh.corners)
     assert not inside.any() if hollow else inside.all()
