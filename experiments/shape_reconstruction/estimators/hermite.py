@@ -35,8 +35,8 @@ MARGIN = 10.0e-3
 """M beyond the contacts that the object may reach."""
 
 SLOPE, ROUND_SLOPE = 0.3, 0.15
-"""M beyond the hull of the contacts for every m from the nearest of them: the object reaches no farther. Less of
-a round body, whose hull is of contacts turned about its axis. Found on sixteen development runs."""
+"""M beyond the hull of the contacts for every m from the nearest of them: the object reaches no farther. Less
+of a round body, whose hull is of contacts turned about its axis. Found on sixteen development runs."""
 
 FOOT = 0.6
 """Of the contacts' width that of the object at its support is, within the hull."""
