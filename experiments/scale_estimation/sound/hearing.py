@@ -28,7 +28,8 @@ ALIKE = 0.15
 
 SURE = 0.7
 """Probability of the likeliest size and those alike, below which another one stands beside it: with modes
-an octave off, a handful of peaks is matched by chance, and no interval about either size would be honest."""
+an octave off, a handful of peaks is matched by chance. From there to nine tenths the interval reaches over
+both. Of twenty hard objects of development runs the likeliest was right, at 0.64 and more."""
 
 SHARED = 3.2
 """Modes that share a peak, on average, beyond which no peak is a mode's: a list of peaks then fits many

@@ -7,6 +7,7 @@ import pytest
 
 from experiments.scale_estimation.readings import peaks_of
 from experiments.scale_estimation.size import ENDS, STEP, Belief, SizeRange
+from experiments.scale_estimation.sound import hearing
 from experiments.scale_estimation.sound.hearing import SHAPE_SIGMA, Hearing, MaterialGuess, by_sound
 from experiments.scale_estimation.sound.model import RingingModel
 from experiments.scale_estimation.sound.peaks import (
@@ -102,6 +103,26 @@ def test_a_drawing_twice_as_large_of_the_same_object_gives_the_same_size() -> No
     larger = RingingModel(drawn.frequencies / 2.0, drawn.amplitudes / 4.0, drawn.material)
     found = by_sound(peaks, [MaterialGuess(larger, 0.03)], 2.0 * NOMINAL, RANGE)
     assert found.belief.size == pytest.approx(heard_size(peaks).belief.size, rel=1e-3)
+
+
+@pytest.mark.parametrize(("share", "answered"), [(0.6, False), (0.75, True), (0.85, True)])
+def test_beside_another_likely_size_the_interval_reaches_over_both_or_there_is_no_answer(
+    monkeypatch: pytest.MonkeyPatch, share: float, answered: bool
+) -> None:
+    other = 1.6
+
+    def two(_peaks: Peaks, _model: RingingModel, log_sizes: FloatArray) -> FloatArray:
+        away = np.stack([log_sizes, log_sizes - np.log(other)]) / 0.01
+        both = np.logaddexp(*(np.log([[share], [1.0 - share]]) - 0.5 * away**2))
+        return np.asarray(50.0 + both / hearing.TEMPER)
+
+    monkeypatch.setattr(hearing, "log_likelihood", two)
+    if not answered:
+        with pytest.raises(FitRefused, match="several sizes"):
+            heard_size(peaks_at(1.0))
+        return
+    low, high = heard_size(peaks_at(1.0)).belief.interval
+    assert low < NOMINAL < other * NOMINAL < high
 
 
 def test_modes_an_octave_apart_are_no_answer() -> None:
