@@ -31,10 +31,11 @@ from harness.recording.observation import Observation
 T = TypeVar("T")
 
 PROGRAM = "contact-localization"
-_LOOKED_BY = (SPACING, ROUNDS, SAMPLES, BLOCK)
-
 ESTIMATOR = "experiments.contact_localization.posterior.estimate"
 """The module whose sources, with all they import, decide whether a curve still holds."""
+
+_LOOKED_BY = (SPACING, ROUNDS, SAMPLES, BLOCK)
+"""How finely readings are looked at; which senses are asked, and how they are simulated, is another thing."""
 
 
 @dataclass(frozen=True, eq=False)

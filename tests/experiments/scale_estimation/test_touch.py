@@ -134,6 +134,24 @@ def test_a_way_through_the_object_counts_against_its_being_there() -> None:
     assert FreeSpace(stand, []).cost(both).tolist() == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("name", ["bowl", "pitcher", "wrench"])
+def test_free_space_is_looked_up_no_farther_than_the_object_is_deep_and_costs_the_same(name: str) -> None:
+    stand, _ = stand_of(name)
+    random = np.random.default_rng(0)
+    ways = [
+        PLACE + random.uniform(-0.15, 0.15, (1, 3)) + np.linspace(0.0, 0.1, 12)[:, None] * UP
+        for _ in range(60)
+    ]
+    some = np.zeros((6, UNKNOWNS))
+    some[:, 0] = np.linspace(-0.5, 0.7, 6)
+    everywhere = replace(stand)
+    everywhere.__dict__["deepest"] = np.inf
+    costs = FreeSpace(stand, ways).cost(some)
+    assert costs.tolist() == FreeSpace(everywhere, ways).cost(some).tolist()
+    assert costs.max() > 0.0
+    assert stand.deepest < 0.5 * np.ptp(stand.points, axis=0).max()
+
+
 @pytest.mark.parametrize("scale", [pytest.param(0.35, marks=pytest.mark.slow), 2.6])
 def test_a_size_beyond_the_range_is_named(scale: float) -> None:
     stand, nominal = stand_of("mug")
