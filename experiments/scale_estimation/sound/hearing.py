@@ -29,8 +29,8 @@ ALIKE = 0.15
 SURE = 0.8
 """Probability of the likeliest size and those alike, below which another one stands beside it: with modes
 an octave off, a handful of peaks is matched by chance. From there to nine tenths the interval reaches into
-both. Of twenty hard objects of development runs the likeliest was right; of 24 objects of other modes half are
-less sure than this (tests/hard_cases)."""
+both. Of twenty hard objects of development runs the likeliest was right; of 24 objects of other modes half
+are less sure than this (tests/hard_cases)."""
 
 SHARED = 3.2
 """Modes that share a peak, on average, beyond which no peak is a mode's: a list of peaks then fits many
