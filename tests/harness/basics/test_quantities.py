@@ -35,6 +35,35 @@ def test_a_quantity_is_the_nearest_float_to_its_si_value(
     assert dimension.parse(text) == value
 
 
+SI_OF_ONE = {
+    "a length": {"m": 1.0, "mm": 0.001, "cm": 0.01, "um": 0.000001, "µm": 0.000001, "in": 0.0254},
+    "an angle": {"rad": 1.0, "deg": math.pi / 180.0, "mrad": 0.001},
+    "a speed": {"m/s": 1.0, "mm/s": 0.001, "cm/s": 0.01},
+    "an acceleration": {"m/s^2": 1.0, "mm/s^2": 0.001},
+    "an angular speed": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
+    "an angular acceleration": {"rad/s^2": 1.0, "deg/s^2": math.pi / 180.0},
+    "a force": {"N": 1.0, "mN": 0.001, "kN": 1000.0},
+    "a mass": {"kg": 1.0, "g": 0.001},
+    "a density": {"kg/m^3": 1.0, "g/cm^3": 1000.0},
+    "a pressure": {"Pa": 1.0, "kPa": 1000.0, "MPa": 1000000.0, "GPa": 1000000000.0},
+    "a time": {"s": 1.0, "ms": 0.001, "us": 0.000001, "µs": 0.000001, "min": 60.0},
+    "a frequency": {"Hz": 1.0, "kHz": 1000.0, "MHz": 1000000.0},
+    "a rate of decay": {"1/s": 1.0},
+    "a share": {"1": 1.0, "%": 0.01},
+    "a level": {"dB": 1.0},
+    "a distance in the image": {"px": 1.0},
+}
+"""Written out, by the units' own definitions: a factor that is wrong in the table of units fails here."""
+
+
+@pytest.mark.parametrize("dimension", DIMENSIONS, ids=lambda d: d.name)
+def test_one_of_every_unit_is_what_the_unit_is_defined_as(dimension: Dimension) -> None:
+    defined = SI_OF_ONE[dimension.name]
+    assert set(dimension.factors) == set(defined)
+    for unit, value in defined.items():
+        assert dimension.parse(f"1 {unit}") == value, unit
+
+
 @pytest.mark.parametrize("dimension", DIMENSIONS, ids=lambda d: d.name)
 def test_the_example_of_a_dimension_reads(dimension: Dimension) -> None:
     assert math.isfinite(dimension.parse(dimension.example))
