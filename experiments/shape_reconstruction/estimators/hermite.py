@@ -34,9 +34,9 @@ PITCH = 4.0e-3
 MARGIN = 10.0e-3
 """M beyond the contacts that the object may reach."""
 
-SLOPE, ROUND_SLOPE = 0.3, 0.15
+SLOPE, ENTERED_SLOPE = 0.3, 0.15
 """M beyond the hull of the contacts for every m from the nearest of them: the object reaches no farther. Less
-of a round body, whose hull is of contacts turned about its axis. Found on sixteen development runs."""
+of a round body that the sensor went down into, whose contacts are turned about its axis. Found on sixteen development runs."""
 
 FOOT = 0.6
 """Of the contacts' width that of the object at its support is, within the hull."""
@@ -69,7 +69,7 @@ class _Bounds:
         """``(n,)`` m that points are outside; below 0 within."""
         outside = np.maximum(sensor_depth(self.evidence, points) - CLEARANCE, -points[:, 2])
         near = cKDTree(self.places).query(points)[0]
-        slope = SLOPE if self.room is None else ROUND_SLOPE
+        slope = SLOPE if self.room is None else ENTERED_SLOPE
         outside = np.maximum(outside, _outside_hull(self._hull_points, points) - _HULL - slope * near)
         if self.room is not None:
             outside = np.maximum(outside, self.room.at(points) - SLACK)
