@@ -36,7 +36,8 @@ MARGIN = 10.0e-3
 
 SLOPE, ENTERED_SLOPE = 0.3, 0.15
 """M beyond the hull of the contacts for every m from the nearest of them: the object reaches no farther. Less
-of a round body that the sensor went down into, whose contacts are turned about its axis. Found on sixteen development runs."""
+of a round body that the sensor went down into, whose contacts are turned about its axis. Found on sixteen
+development runs."""
 
 FOOT = 0.6
 """Of the contacts' width that of the object at its support is, within the hull."""
