@@ -76,7 +76,7 @@ def _untested(found: ShapeEstimate, contacts: int) -> ShapeEstimate:
     """A household shape, which says where its contacts are too few to find it out as none."""
     if not 0 < contacts < ENOUGH:
         return found
-    said = f"that it is a household shape is supposed: {contacts} contacts could not tell ({ENOUGH} can)"
+    said = f"a household shape is supposed: {contacts} contacts cannot tell whether it is one ({ENOUGH} can)"
     return replace(found, flags=(*found.flags, said))
 
 
