@@ -1,6 +1,6 @@
 """How probable a list of peaks is at every size: a Poisson process over the logarithm of frequency."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -26,7 +26,7 @@ FOUND = 0.9
 WIDTHS = 3.0
 """Half widths of a resonance within which two are heard as one peak."""
 
-CLUTTER = 2.0
+CLUTTER = 1.5
 """Peaks a band that are no mode's: echoes of the room, and what noise leaves of the weakest."""
 
 CLUTTER_FALL = 5.0
@@ -55,6 +55,23 @@ class Peaks:
     band: tuple[float, float]
     window_decay: float
     decays: FloatArray
+
+    def apart(self) -> "Peaks":
+        """Without those that stand within half a resonance's width of a louder one, which they are again.
+
+        An analysis gives a resonance that several strikes rang, or whose decay is not even, more than once.
+        Each would be evidence for a size that its neighbour is evidence for already.
+        """
+        half_widths = (np.maximum(self.decays, 0.0) + self.window_decay) / (2.0 * np.pi)
+        kept: list[int] = []
+        for peak in np.argsort(-self.levels, kind="stable"):
+            away = np.abs(self.frequencies[peak] - self.frequencies[kept])
+            if np.all(away > half_widths[kept]):
+                kept.append(int(peak))
+        own = np.sort(kept)
+        return replace(
+            self, frequencies=self.frequencies[own], levels=self.levels[own], decays=self.decays[own]
+        )
 
 
 def log_likelihood(peaks: Peaks, model: RingingModel, log_sizes: FloatArray) -> FloatArray:

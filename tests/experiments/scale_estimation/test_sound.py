@@ -97,6 +97,34 @@ def test_the_order_of_the_peaks_is_nothing() -> None:
     assert other.log_density == pytest.approx(one.log_density, abs=1e-9)
 
 
+def twice(peaks: Peaks, hertz: float) -> Peaks:
+    """Each peak again, fainter and so far above itself."""
+    return Peaks(
+        np.concatenate([peaks.frequencies, peaks.frequencies + hertz]),
+        np.concatenate([peaks.levels, peaks.levels - 3.0]),
+        peaks.band,
+        peaks.window_decay,
+        np.tile(peaks.decays, 2),
+    )
+
+
+def test_a_resonance_that_is_listed_twice_says_no_more_than_once() -> None:
+    peaks = peaks_at(1.3, noise=0.005)
+    once, again = heard_size(peaks), heard_size(twice(peaks, 1.0))
+    np.testing.assert_array_equal(again.belief.log_density, once.belief.log_density)
+    assert again.matched == once.matched
+    few = replace(peaks, frequencies=peaks.frequencies[:2], levels=peaks.levels[:2], decays=peaks.decays[:2])
+    with pytest.raises(FitRefused, match="2 peaks were heard"):
+        heard_size(twice(few, 1.0))
+
+
+def test_two_resonances_farther_apart_than_half_a_width_are_two() -> None:
+    peaks = peaks_at(1.3, noise=0.005)
+    half = (peaks.decays.max() + DECAY) / (2.0 * np.pi)
+    assert len(twice(peaks, 1.1 * half).apart().frequencies) == 2 * len(peaks.frequencies)
+    assert len(peaks.apart().frequencies) == len(peaks.frequencies)
+
+
 def test_a_drawing_twice_as_large_of_the_same_object_gives_the_same_size() -> None:
     """Half the frequencies and a quarter of the amplitudes at twice the size are one and the same body."""
     peaks, drawn = peaks_at(1.3, noise=0.005), model()
