@@ -21,6 +21,7 @@ from experiments.shape_reconstruction.family.layout import (
     BENT,
     CORED,
     DISC,
+    FLAT_SIDED,
     KNOTS,
     LOOP,
     PLAIN,
@@ -234,7 +235,7 @@ def _bottle(random: _Random, code: IntArray, theta: FloatArray) -> None:
 
 def _flat_bottle(random: _Random, code: IntArray, theta: FloatArray) -> None:
     _bottle(random, code, theta)
-    code[layout.PLAN], code[layout.HOLLOW] = SUPER, 0
+    code[layout.PLAN], code[layout.HOLLOW] = int(random.choice((SUPER, FLAT_SIDED))), 0
     theta[layout.ACROSS] = np.log(random.uniform(0.45, 0.95))
     theta[layout.POWER] = np.log(random.uniform(2.0, 4.5))
 

@@ -9,6 +9,7 @@ from experiments.shape_reconstruction.family.layout import (
     BAR,
     BENT,
     CORED,
+    FLAT_SIDED,
     LOOP,
     NO_LIMB,
     PLAIN,
@@ -75,7 +76,7 @@ def deviations(code: IntArray) -> dict[int, float]:
             del free[layout.WALL], free[layout.FLOOR]
         if code[layout.PLAN] == CORED:
             free |= {layout.CORE_X: 0.35, layout.CORE_Y: 0.35}
-        if code[layout.PLAN] == SUPER:
+        if code[layout.PLAN] in (SUPER, FLAT_SIDED):
             free |= {layout.ACROSS: 0.25, layout.POWER: 0.3}
         if code[layout.LIMB] != NO_LIMB:
             free |= _LIMB

@@ -30,7 +30,8 @@ WALL, FLOOR = 22, 23
 CORE_X, CORE_Y = 24, 25
 """Half sides of the rectangle that the section is swept round; zero size is an axis."""
 ACROSS, POWER = 26, 27
-"""Logarithms of y over x of a superelliptic plan, and of its power."""
+"""Logarithms of y over x of a superelliptic plan, at the widest place where sides are flat, and of its
+power."""
 LIMB_AT, LIMB_HALF, LIMB_REACH, LIMB_SLANT, LIMB_CORNER, LIMB_THICK, LIMB_WIDE = 28, 29, 30, 31, 32, 33, 34
 """A handle: height of its middle over the object's, half its height, how far it stands out of the wall, slope
 of its outer bar (a number), its corner's share (logit), half its thickness in its plane and across it."""
@@ -74,8 +75,9 @@ SIZE = 47
 KIND, HOLLOW, PLAN, LIMB, SPOUT, END_A, END_B = 0, 1, 2, 3, 4, 5, 6
 CODE_SIZE = 7
 TURNED, TOOL, BENT = 0, 1, 2
-ROUND, CORED, SUPER = 0, 1, 2
-"""Plans: an axis, a rectangle swept round, a superellipse."""
+ROUND, CORED, SUPER, FLAT_SIDED = 0, 1, 2, 3
+"""Plans: an axis, a rectangle swept round, a superellipse of one shape at all heights, and one that flat
+sides hold to their depth, while what is narrower than that, as a bottle's neck and cap are, is round."""
 NO_LIMB, LOOP, BAR = 0, 1, 2
 PLAIN, DISC, RING, SLOT = 0, 1, 2, 3
 """Ends of a tool."""

@@ -6,7 +6,16 @@ from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.freedom import has_yaw, sizes_of
 from experiments.shape_reconstruction.family.guides import Guides, long_way
-from experiments.shape_reconstruction.family.layout import BENT, CORED, KNOTS, LOOP, SUPER, TOOL, TURNED
+from experiments.shape_reconstruction.family.layout import (
+    BENT,
+    CORED,
+    FLAT_SIDED,
+    KNOTS,
+    LOOP,
+    SUPER,
+    TOOL,
+    TURNED,
+)
 from harness.basics.arrays import FloatArray, IntArray
 
 _Random = np.random.Generator
@@ -78,7 +87,7 @@ def _size(code: IntArray, theta: FloatArray) -> tuple[float, float]:
     half = float(np.exp(theta[layout.RADII : layout.RADII + KNOTS].max()))
     if code[layout.PLAN] == CORED:
         half += 0.7 * float(np.exp(theta[layout.CORE_X]) + np.exp(theta[layout.CORE_Y]))
-    if code[layout.PLAN] == SUPER:
+    if code[layout.PLAN] in (SUPER, FLAT_SIDED):
         half *= 0.5 * (1.0 + float(np.exp(theta[layout.ACROSS])))
     if code[layout.LIMB] == LOOP:
         half += 0.35 * float(np.exp(theta[layout.LIMB_REACH]))

@@ -12,6 +12,7 @@ from experiments.shape_reconstruction.family.layout import (
     CORE_X,
     CORE_Y,
     CORED,
+    FLAT_SIDED,
     FLOOR,
     HEIGHT,
     HOLLOW,
@@ -48,6 +49,9 @@ _H, _WALL, _FLOOR, _BX, _BY, _ACROSS, _POWER = 8, 9, 10, 11, 12, 13, 14
 _R, _Z = 15, 22
 _LIMB_Z, _LIMB_HALF, _LIMB_OUT, _LIMB_SLANT, _LIMB_CORNER, _LIMB_A, _LIMB_B = 29, 30, 31, 32, 33, 34, 35
 _SPOUT = 36
+_SLIGHT = 0.25
+"""Least slope that a distance is computed with: beside a kink of a flat side it would be none."""
+
 _SLOPE, _INVERSE = 42, 48
 """Of the side's pieces: radius over height, and one over the squared length."""
 
@@ -59,6 +63,8 @@ def prepare_turned(code: IntArray, theta: FloatArray, q: FloatArray) -> None:
     q[_H], q[_WALL], q[_FLOOR] = height, np.exp(theta[WALL]), np.exp(theta[FLOOR])
     q[_BX], q[_BY] = np.exp(theta[CORE_X]), np.exp(theta[CORE_Y])
     q[_ACROSS], q[_POWER] = np.exp(theta[ACROSS]), np.exp(theta[POWER])
+    if code[PLAN] == FLAT_SIDED:
+        q[_ACROSS] *= np.exp(np.max(theta[RADII : RADII + KNOTS]))
     power = np.exp(theta[WARP])
     for k in range(KNOTS):
         q[_R + k] = np.exp(theta[RADII + k])
@@ -116,6 +122,8 @@ def turned_box(code: IntArray, q: FloatArray, box: FloatArray) -> None:
     box[0], box[1], box[2], box[3], box[4], box[5] = -out, -out, 0.0, out, out, q[_H]
     if code[PLAN] == CORED:
         box[0], box[1], box[3], box[4] = -out - q[_BX], -out - q[_BY], out + q[_BX], out + q[_BY]
+    elif code[PLAN] == FLAT_SIDED:
+        box[1], box[4] = -min(out, q[_ACROSS]), min(out, q[_ACROSS])
     elif code[PLAN] != ROUND:
         box[1], box[4] = -out * q[_ACROSS], out * q[_ACROSS]
     if code[LIMB] != NO_LIMB:
@@ -156,14 +164,16 @@ def turned_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: fl
 @compiled_fast
 def _side(code: IntArray, q: FloatArray, x: float, y: float, z: float) -> float:
     """Distance from the section's outer side, which goes on straight below the foot and above the rim."""
-    stretch = 1.0
+    stretch, level = 1.0, 1.0
     if code[PLAN] == ROUND:
         rho = np.sqrt(x * x + y * y)
     elif code[PLAN] == CORED:
         u, v = abs(x) - q[_BX], abs(y) - q[_BY]
         rho = _corner(u, v)
     else:
-        p, across = q[_POWER], q[_ACROSS]
+        p, across, held = q[_POWER], q[_ACROSS], 0.0
+        if code[PLAN] == FLAT_SIDED:
+            across, held = _flattened(_radius_at(q, z), across)
         u, v = abs(x), abs(y) / across
         most = max(u, v)
         if most < 1e-9:
@@ -171,7 +181,31 @@ def _side(code: IntArray, q: FloatArray, x: float, y: float, z: float) -> float:
         else:
             rho = most * ((u / most) ** p + (v / most) ** p) ** (1.0 / p)
             stretch = np.hypot((u / rho) ** (p - 1.0), (v / rho) ** (p - 1.0) / across)
-    return float(_from_section(q, rho, z, stretch))
+            level = 1.0 - held * (v / rho) ** p
+    return float(_from_section(q, rho, z, stretch, level))
+
+
+@compiled_fast
+def _flattened(radius: float, half: float) -> tuple[float, float]:
+    """Depth over width where flat sides are ``half`` m from the middle, and how far they hold that depth.
+
+    The depth is about the lesser of the two, with a soft change from one to the other. It follows the width
+    where the second number is zero, and does not where that is one.
+    """
+    wide, deep = radius**2, half**2
+    wide, deep = wide * wide, deep * deep
+    wide, deep = wide * wide, deep * deep
+    return half / np.sqrt(np.sqrt(np.sqrt(wide + deep))), wide / (wide + deep)
+
+
+@compiled_fast
+def _radius_at(q: FloatArray, z: float) -> float:
+    if z <= q[_Z]:
+        return float(q[_R])
+    for k in range(KNOTS - 1):
+        if z < q[_Z + k + 1]:
+            return float(q[_R + k] + (z - q[_Z + k]) * q[_SLOPE + k])
+    return float(q[_R + KNOTS - 1])
 
 
 @compiled_fast
@@ -183,8 +217,11 @@ def _corner(u: float, v: float) -> float:
 
 
 @compiled_fast
-def _from_section(q: FloatArray, rho: float, z: float, stretch: float) -> float:
-    """Distance from the side; pieces next to the height first, others only as far as they can be nearer."""
+def _from_section(q: FloatArray, rho: float, z: float, stretch: float, level: float) -> float:
+    """Distance from the side; pieces next to the height first, others only as far as they can be nearer.
+
+    ``stretch`` is the slope of ``rho`` across; ``level`` is how much of the side's own slope a place has.
+    """
     last = KNOTS - 2
     k = 0
     while k < last and z > q[_Z + k + 1]:
@@ -213,8 +250,8 @@ def _from_section(q: FloatArray, rho: float, z: float, stretch: float) -> float:
         if gr * gr + gz * gz < best:
             best, dr, dz = gr * gr + gz * gz, gr, gz
     gap = np.sqrt(best)
-    if stretch != 1.0 and gap > 1e-12:
-        gap = best / np.sqrt((dr * stretch) ** 2 + dz * dz)
+    if (stretch != 1.0 or level != 1.0) and gap > 1e-12:
+        gap = best / max(np.sqrt((dr * stretch) ** 2 + (dz * level) ** 2), _SLIGHT * gap)
     return float(-gap if rho < edge else gap)
 
 

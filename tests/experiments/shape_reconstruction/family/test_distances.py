@@ -129,6 +129,45 @@ def test_a_grid_has_the_surface_s_distances_near_it_and_the_right_sign_elsewhere
     assert (np.sign(field) == np.sign(exact))[~near].all()
 
 
+def flat_sided(radius: float, half_depth: float) -> FamilyShape:
+    """A bottle of one radius all the way up, flattened to a half depth."""
+    shape = drawn("flat bottle")[0]
+    code, theta = shape.code.copy(), shape.theta.copy()
+    code[layout.PLAN] = layout.FLAT_SIDED
+    theta[layout.RADII : layout.RADII + layout.KNOTS] = np.log(radius)
+    theta[layout.RADII] = np.log(WIDEST)
+    theta[layout.ACROSS] = np.log(half_depth / WIDEST)
+    theta[layout.HEIGHT] = np.log(0.2)
+    return FamilyShape(shape.name, code, theta)
+
+
+WIDEST = 0.05
+"""M: radius of the foot."""
+
+
+@pytest.mark.parametrize("radius", [0.012, 0.02, 0.045])
+@pytest.mark.parametrize("half_depth", [0.025, 0.03])
+def test_flat_sides_hold_the_depth_of_what_is_wider_and_what_is_narrower_is_round(
+    radius: float, half_depth: float
+) -> None:
+    shape = flat_sided(radius, half_depth)
+    deep = min(radius, half_depth)
+    on_it = np.array([[radius, 0.0, 0.15], [0.0, deep, 0.15]])
+    np.testing.assert_allclose(distances(shape.code, shape.theta, on_it), 0.0, atol=0.03 * deep)
+
+
+def test_a_waist_leaves_flat_sides_upright() -> None:
+    """Where the outline goes in and out again the depth does not, and the distance follows the flat side."""
+    shape = flat_sided(0.045, 0.02)
+    theta = shape.theta.copy()
+    theta[layout.RADII : layout.RADII + layout.KNOTS] += 0.2 * np.cos(np.arange(layout.KNOTS) * np.pi)
+    theta[layout.ACROSS] = np.log(0.02) - theta[layout.RADII : layout.RADII + layout.KNOTS].max()
+    up = np.linspace(0.02, 0.18, 50)
+    for off in (-1e-3, 0.0, 1e-3):
+        beside = np.column_stack([np.zeros(50), np.full(50, 0.02 + off), up])
+        np.testing.assert_allclose(distances(shape.code, theta, beside), off, atol=2e-4)
+
+
 def test_a_can_has_the_volume_of_a_cylinder() -> None:
     shape = drawn("can")[0]
     theta = shape.theta.copy()
