@@ -158,9 +158,9 @@ def test_flat_sides_hold_the_depth_of_what_is_wider_and_what_is_narrower_is_roun
 
 def test_a_waist_leaves_flat_sides_upright() -> None:
     """Where the outline goes in and out again the depth does not, and the distance follows the flat side."""
-    shape = flat_sided(0.045, 0.02)
+    shape = flat_sided(0.07, 0.02)
     theta = shape.theta.copy()
-    theta[layout.RADII : layout.RADII + layout.KNOTS] += 0.2 * np.cos(np.arange(layout.KNOTS) * np.pi)
+    theta[layout.RADII : layout.RADII + layout.KNOTS] += 0.3 * np.cos(np.arange(layout.KNOTS) * np.pi)
     theta[layout.ACROSS] = np.log(0.02) - theta[layout.RADII : layout.RADII + layout.KNOTS].max()
     up = np.linspace(0.02, 0.18, 50)
     for off in (-1e-3, 0.0, 1e-3):
