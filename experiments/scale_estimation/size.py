@@ -27,6 +27,12 @@ drawing, so that one of the least size asked about may measure a little less."""
 FLOOR = 0.02
 """Share of the uniform density that every sense is mixed with before the product is taken."""
 
+SHARED = 3.0e-3
+"""Of the logarithm: what all senses err by alike. A thing is uneven by a quarter of a millimetre, so that its
+longest side is longer than its drawing's, which neither an outline nor contacts elsewhere tell. Of 207
+recordings sight and touch were each 0.4 % too small on average, and 91 % of fused intervals held with this, 88
+% without."""
+
 STRANGE = 0.05
 """How much less likely a size beyond the range is than one within, before anything is read."""
 
@@ -181,7 +187,7 @@ class Belief:
 
 
 def fused(beliefs: Sequence[Belief]) -> Belief:
-    """What several senses believe together, each on evidence of its own.
+    """What several senses believe together, each on evidence of its own but for what they err by alike.
 
     Raises:
         OutOfDomain: no belief was given, or of different ranges.
@@ -190,7 +196,8 @@ def fused(beliefs: Sequence[Belief]) -> Belief:
         raise OutOfDomain("beliefs about one range of sizes can be fused, one or more; give such")
     if len(beliefs) == 1:
         return beliefs[0]
-    return Belief.of(beliefs[0].range, np.sum([one.doubted(FLOOR).log_density for one in beliefs], axis=0))
+    product = np.sum([one.doubted(FLOOR).log_density for one in beliefs], axis=0)
+    return Belief.of(beliefs[0].range, product).widened(SHARED)
 
 
 def _quantile(logs: FloatArray, shares: FloatArray, share: float) -> float:

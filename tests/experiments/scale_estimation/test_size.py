@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.scale_estimation.size import ENDS, STEP, Belief, SizeRange, fused
+from experiments.scale_estimation.size import ENDS, SHARED, STEP, Belief, SizeRange, fused
 from harness.basics.errors import OutOfDomain
 
 RANGE = SizeRange(0.05, 0.4)
@@ -32,9 +32,14 @@ def test_knowing_nothing_is_the_whole_range() -> None:
 
 def test_independent_senses_narrow_each_other_as_normal_densities_do() -> None:
     together = fused([normal(0.150, 0.02), normal(0.153, 0.01)])
-    assert together.spread == pytest.approx(1.0 / np.hypot(50.0, 100.0), rel=0.05)
+    narrowed = 1.0 / np.hypot(50.0, 100.0)
+    assert together.spread == pytest.approx(np.hypot(narrowed, SHARED), rel=0.05)
     weighed = (np.log(0.150) / 0.02**2 + np.log(0.153) / 0.01**2) / (1 / 0.02**2 + 1 / 0.01**2)
     assert together.size == pytest.approx(float(np.exp(weighed)), rel=1e-3)
+
+
+def test_no_number_of_senses_is_surer_than_what_they_err_by_alike() -> None:
+    assert fused([normal(0.150, 0.004)] * 50).spread >= SHARED
 
 
 def test_one_wrong_sense_does_not_outvote_two_that_agree() -> None:
