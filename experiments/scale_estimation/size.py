@@ -30,8 +30,8 @@ FLOOR = 0.02
 SHARED = 3.0e-3
 """Of the logarithm: what all senses err by alike. A thing is uneven by a quarter of a millimetre, so that its
 longest side is longer than its drawing's, which neither an outline nor contacts elsewhere tell. Of 207
-recordings sight and touch were each 0.4 % too small on average, and 91 % of fused intervals held with this, 88
-% without."""
+recordings sight and touch were each 0.4 % too small on average, and with this 91 % of fused intervals held,
+without it 88 %."""
 
 STRANGE = 0.05
 """How much less likely a size beyond the range is than one within, before anything is read."""
