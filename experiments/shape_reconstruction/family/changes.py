@@ -62,10 +62,13 @@ def _of_vessel(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
     elif code[layout.LIMB] == LOOP:
         yield add_spout(shape, random)
     if code[layout.PLAN] == ROUND:
-        yield from _oval(shape)
+        yield _oval(shape, SUPER, 0.9)
+        if code[layout.HOLLOW] == 0:
+            yield _oval(shape, FLAT_SIDED, 0.7)
     elif code[layout.PLAN] in (SUPER, FLAT_SIDED):
         yield _coded(shape, layout.PLAN, ROUND)
-        yield _coded(shape, layout.PLAN, SUPER if code[layout.PLAN] == FLAT_SIDED else FLAT_SIDED)
+        if code[layout.HOLLOW] == 0:
+            yield _coded(shape, layout.PLAN, SUPER if code[layout.PLAN] == FLAT_SIDED else FLAT_SIDED)
     elif code[layout.PLAN] == CORED:
         yield _turned(shape, 0.5 * np.pi)
 
@@ -97,11 +100,10 @@ def _turned(shape: FamilyShape, by: float) -> FamilyShape:
     return FamilyShape(shape.name, shape.code, theta)
 
 
-def _oval(shape: FamilyShape) -> Iterator[FamilyShape]:
-    for plan, across in ((SUPER, 0.9), (FLAT_SIDED, 0.7)):
-        theta: FloatArray = shape.theta.copy()
-        theta[layout.ACROSS], theta[layout.POWER] = np.log(across), np.log(2.2)
-        yield _coded(FamilyShape(shape.name, shape.code, theta), layout.PLAN, plan)
+def _oval(shape: FamilyShape, plan: int, across: float) -> FamilyShape:
+    theta: FloatArray = shape.theta.copy()
+    theta[layout.ACROSS], theta[layout.POWER] = np.log(across), np.log(2.2)
+    return _coded(FamilyShape(shape.name, shape.code, theta), layout.PLAN, plan)
 
 
 def _coded(shape: FamilyShape, slot: int, value: int) -> FamilyShape:

@@ -35,6 +35,9 @@ from harness.basics.arrays import FloatArray, IntArray
 
 _MM = 1e-3
 _Random = np.random.Generator
+_FLAT = 0.7
+"""Depth over width of a bottle below which its sides are flat."""
+
 _EVEN = np.linspace(0.0, 1.0, KNOTS)
 
 
@@ -234,9 +237,11 @@ def _bottle(random: _Random, code: IntArray, theta: FloatArray) -> None:
 
 
 def _flat_bottle(random: _Random, code: IntArray, theta: FloatArray) -> None:
+    """The flatter half with flat sides below a round neck, the other oval all the way up."""
     _bottle(random, code, theta)
-    code[layout.PLAN], code[layout.HOLLOW] = int(random.choice((SUPER, FLAT_SIDED))), 0
-    theta[layout.ACROSS] = np.log(random.uniform(0.45, 0.95))
+    across = random.uniform(0.45, 0.95)
+    code[layout.PLAN], code[layout.HOLLOW] = (FLAT_SIDED if across < _FLAT else SUPER), 0
+    theta[layout.ACROSS] = np.log(across)
     theta[layout.POWER] = np.log(random.uniform(2.0, 4.5))
 
 

@@ -137,9 +137,13 @@ class FamilySearch:
 
     def laid(self) -> list[Hypothesis]:
         """Draws in their best place, turn and size; of every class those that fit best."""
-        random = np.random.default_rng(self.settings.seed)
         each = -(-self.settings.draws // sum(len(codes_of(name)) for name in CLASSES))
-        return [one for name in CLASSES for one in self._laid_of(name, each * len(codes_of(name)), random)]
+        found = []
+        for k, name in enumerate(CLASSES):
+            # A class draws as it would without the others: what is added to one changes none of them.
+            random = np.random.default_rng((self.settings.seed, k))
+            found += self._laid_of(name, each * len(codes_of(name)), random)
+        return found
 
     def _laid_of(self, name: str, count: int, random: _Random) -> list[Hypothesis]:
         """The best of a class's draws, of each combination of parts as many: none stands for another."""

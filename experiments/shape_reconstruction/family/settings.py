@@ -20,7 +20,7 @@ class FamilySettings:
         seed: of the draws.
     """
 
-    draws: int = 1800
+    draws: int = 1850
     yaws: int = 4
     starts: int = 84
     refined: int = 42
