@@ -7,12 +7,12 @@ import numpy as np
 
 from experiments.shape_reconstruction.choosing import CHOOSERS
 from experiments.shape_reconstruction.lines import aims_at_mask, lines_at_surface
-from experiments.shape_reconstruction.methods import estimated
 from experiments.shape_reconstruction.readings import ShapeReadings
+from experiments.shape_reconstruction.running import RunningShape
 from experiments.shape_reconstruction.section import ShapeRun
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import DataRefused, FitRefused
+from harness.basics.errors import DataRefused
 from harness.basics.geometry import translation
 from harness.basics.mesh import Mesh
 from harness.picture.camera_errors import CameraErrors
@@ -72,7 +72,7 @@ class ShapeExplorer:
     """
 
     def __init__(self, run: RunFiles, method: str) -> None:
-        self._run, self._method = run, method
+        self._run, self._shape = run, RunningShape(method)
         self._settings = run.scene.section(ShapeRun)
         self._readings = ShapeReadings(run)
         self._read, self._skipped = 0, 0
@@ -133,7 +133,7 @@ class ShapeExplorer:
         if until is None or index == 0:
             return False
         self._take_in(recording, index)
-        found = self._estimate()
+        found = self._shape.after(self._readings.evidence())
         return found is not None and not found.not_bounded and bool(found.deviation.mean() <= until)
 
     def skipped(self, recording: Recording, index: int) -> int:
@@ -153,10 +153,11 @@ class ShapeExplorer:
         """
         self._take_in(recording, index)
         random = np.random.default_rng((recording.header.seed, index))
+        evidence = self._readings.evidence()
         here = Surroundings(self._run.scene, self._run.station, self.travels, self._nothing, self._joints)
-        estimate = None if self._settings.choose == "random" else self._estimate()
+        estimate = None if self._settings.choose == "random" else self._shape.after(evidence)
         lines = np.concatenate([self._towards_surface(estimate, random), self._blind(here, random)])
-        scores = CHOOSERS[self._settings.choose](self._readings.evidence(), estimate, lines)
+        scores = CHOOSERS[self._settings.choose](evidence, estimate, lines)
         best = np.argsort(-scores, kind="stable")[:LINES]
         return contact_along(
             here, translation(self.place) @ lines[best], float(random.uniform(*self._settings.depth))
@@ -170,12 +171,6 @@ class ShapeExplorer:
             if record.step.kind == "press":
                 self._joints = end_of(record.step.parameters)
         self._read = index
-
-    def _estimate(self) -> ShapeEstimate | None:
-        try:
-            return estimated(self._method, self._readings.evidence())
-        except FitRefused:
-            return None
 
     def _towards_surface(self, estimate: ShapeEstimate | None, random: np.random.Generator) -> FloatArray:
         """``(n, 4, 4)`` in ``stand``."""

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.estimate import family_estimate
+from experiments.shape_reconstruction.family.estimate import LEFT, family_estimate
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
@@ -30,29 +30,32 @@ _SOME = 1000
 """Vertices of a surface, roughly, that are looked at."""
 
 
-def by_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -> ShapeEstimate:
+def by_family(
+    evidence: ShapeEvidence, settings: FamilySettings | None = None, previous: ShapeEstimate | None = None
+) -> ShapeEstimate:
     """The family's estimate; of an object outside of it, the smooth surface, which says so.
 
     With a picture a household shape that does not fit its contacts is still the answer, moved to them, where
     the smooth surface leaves it open: both say the same of what was touched, and the smooth one no more.
-    Where it is not, other draws are searched once more.
+    Where it is not, other draws are searched once more, unless the search goes on from another answer.
 
     Args:
         evidence: one contact or a silhouette at least.
         settings: how much is searched.
+        previous: by this function, of the same object and other readings; its hypotheses are begun at too.
 
     Raises:
         OutOfDomain: nothing was touched or seen.
     """
     settings = settings or FamilySettings()
-    found = family_estimate(evidence, settings)
+    found = family_estimate(evidence, settings, () if previous is None else (previous,))
     why = _why_smooth(found, evidence)
     if why is None:
         return _untested(found, len(evidence.contacts))
     smooth = by_hermite(evidence, symmetric=False)  # every class of round bodies was tried
     seconds = found.seconds + smooth.seconds
     beside = _is_beside(found, smooth, evidence)
-    if found.details["foreign"] and not beside:
+    if found.details["foreign"] and not beside and previous is None:
         # A search may miss a shape that fits, and one by other draws seldom misses the same.
         again = family_estimate(evidence, replace(settings, seed=settings.seed + 1))
         seconds += again.seconds
@@ -69,6 +72,7 @@ def by_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -
         flags=(*found.flags, f"{why}: the surface is by rbf"),
         doubtful=found.doubtful,
         seconds=seconds,
+        details={**smooth.details, LEFT: found.details["hypotheses"]},
     )
 
 

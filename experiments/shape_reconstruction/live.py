@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.methods import INFORMATIVE, QUICK, estimated
+from experiments.shape_reconstruction.methods import QUICK
+from experiments.shape_reconstruction.running import INFORMATIVE, RunningShape
 from experiments.shape_reconstruction.section import Choice
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from harness.basics.errors import FitRefused
 
 MOST = 4
 """Presses up to which each has an estimate of its own; of more, those at powers of two and the last."""
@@ -40,9 +40,10 @@ def live_estimates(evidence: ShapeEvidence, method: str) -> Iterator[LiveEstimat
         evidence: of the whole run.
         method: as ``live_method`` names it.
     """
+    running = RunningShape(method)
     for count in counts_shown(len(evidence.touches)):
         part = replace(evidence, touches=evidence.touches[:count])
-        yield LiveEstimate(count, part, _estimate(method, part))
+        yield LiveEstimate(count, part, running.after(part))
 
 
 def counts_shown(presses: int) -> list[int]:
@@ -51,10 +52,3 @@ def counts_shown(presses: int) -> list[int]:
         return list(range(1, presses + 1))
     powers = [2**k for k in range(presses.bit_length()) if 2**k < presses]
     return [*powers, presses]
-
-
-def _estimate(method: str, evidence: ShapeEvidence) -> ShapeEstimate | None:
-    try:
-        return estimated(method, evidence)
-    except FitRefused:
-        return None

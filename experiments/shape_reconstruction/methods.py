@@ -42,8 +42,8 @@ POINTS: Mapping[str, Callable[[ShapeEvidence], PointEstimate]] = {
 }
 """Those that answer in points, as a table scores them; of these, the networks have a surface too."""
 
-QUICK, INFORMATIVE, BEST = "rbf", "family-coarse", "family"
-"""While the arm waits for the next press; where that goes by which shapes are likely; by default."""
+QUICK, BEST = "rbf", "family"
+"""While the arm waits for the next press; by default."""
 
 
 def estimated(method: str, evidence: ShapeEvidence) -> ShapeEstimate:

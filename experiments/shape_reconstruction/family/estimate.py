@@ -48,6 +48,9 @@ many contacts it is twice that."""
 SLIPPING = 0.15
 """Share of contacts that may have slipped."""
 
+LEFT = "hypotheses_left"
+"""In the details of an answer that is not the family's: hypotheses of the family that fitted ill."""
+
 RIVAL = 0.2
 """Weight of a second class above which the class is unknown."""
 
@@ -121,8 +124,8 @@ def _by_picture_alone(found: ShapeEstimate, evidence: ShapeEvidence) -> ShapeEst
 
 
 def _seeds_of(search: FamilySearch, estimate: ShapeEstimate) -> Iterator[Hypothesis]:
-    """Hypotheses of an earlier estimate; none of one that is not the family's."""
-    listed = estimate.details.get("hypotheses", ())
+    """Hypotheses of an earlier estimate, or those that it left as they fitted ill; else none."""
+    listed = estimate.details.get("hypotheses", estimate.details.get(LEFT, ()))
     assert isinstance(listed, Sequence)
     for one in listed:
         code, numbers = np.array(one["code"], np.int64), np.array(one["numbers"], np.float64)

@@ -26,6 +26,9 @@ _RESOLVED = 1.2
 _FINER = (1.0, 0.5, 0.25)
 """Of the cell, tried in turn until a corner of the grid is inside of the body."""
 
+_SLIVER = 0.3
+"""Of a cell, half the thickness of what is thinner than that."""
+
 _WEIGHT = 0.03
 """Below it a hypothesis does not move the median."""
 
@@ -51,6 +54,9 @@ def median_surface(mixture: Mixture, pitch: float) -> Mesh:
         inside = median if median.min() < 0.0 else fields[0]
         if inside.min() < 0.0:
             break
+    else:
+        # A plate thinner than any cell: drawn as thick as it shows.
+        inside = inside - (inside.min() + _SLIVER * finer * cell)
     return isosurface(inside, low, finer * cell)
 
 

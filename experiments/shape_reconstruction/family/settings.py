@@ -50,3 +50,7 @@ LEVELS = {
     ),
 }
 """By name, the cheapest first."""
+
+CONTINUED = replace(LEVELS["coarse"], draws=200, starts=14, refined=6, changed=1, finals=4, finishing=6)
+"""Beside the hypotheses of an estimate from one press less: a third of a coarse search, by other draws each
+time, so that what one misses another finds."""

@@ -2,10 +2,17 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from experiments.shape_reconstruction import running
+from experiments.shape_reconstruction.estimators.plain_bodies import by_box
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.live import MOST, counts_shown, live_estimates, live_method
-from experiments.shape_reconstruction.methods import INFORMATIVE, QUICK
+from experiments.shape_reconstruction.methods import QUICK
+from experiments.shape_reconstruction.running import INFORMATIVE, RunningShape
+from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, presses
 
@@ -39,3 +46,30 @@ def test_each_estimate_is_from_the_presses_until_then_and_none_where_nothing_was
 def test_a_press_that_needs_likely_shapes_waits_for_them() -> None:
     assert live_method("active") == INFORMATIVE
     assert live_method("random") == live_method("planned") == QUICK
+
+
+@pytest.mark.timeout(300, func_only=True)  # compiles the family where it is the first to
+def test_what_goes_on_from_press_to_press_is_the_same_where_a_run_is_taken_up_again() -> None:
+    """Which estimates were asked for on the way changes none of them."""
+    evidence = evidence_of(TOUCHES[:3])
+    each, last = RunningShape(INFORMATIVE), RunningShape(INFORMATIVE)
+    for count in (1, 2, 2, 3):
+        found = each.after(replace(evidence, touches=TOUCHES[:count]))
+    again = last.after(evidence)
+    assert found is not None
+    assert again is not None
+    np.testing.assert_array_equal(found.mesh.vertices, again.mesh.vertices)
+
+
+def test_each_estimate_is_given_that_of_a_press_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[object] = []
+
+    def by_family(
+        evidence: ShapeEvidence, _settings: FamilySettings, previous: ShapeEstimate | None
+    ) -> ShapeEstimate:
+        given.append(previous and previous.details["presses"])
+        return replace(by_box(evidence_of(TOUCHES)), details={"presses": len(evidence.touches)})
+
+    monkeypatch.setattr(running, "by_family", by_family)
+    RunningShape(INFORMATIVE).after(evidence_of(TOUCHES[:3]))
+    assert given == [None, 0, 1, 2]

@@ -74,5 +74,6 @@ def test_bodies_that_lie_apart_are_answered_by_the_likeliest() -> None:
 
 
 @pytest.mark.timeout(300)
-def test_a_body_thinner_than_the_grid_has_a_surface() -> None:
-    assert volume(surface_of(board_at(0.0, 1.5e-3), 4e-3)) > 0.0
+@pytest.mark.parametrize("thick", [0.05e-3, 0.4e-3, 1.5e-3])
+def test_a_body_thinner_than_the_grid_has_a_surface(thick: float) -> None:
+    assert volume(surface_of(board_at(0.0, thick), 4e-3)) > 0.0

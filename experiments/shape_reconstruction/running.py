@@ -1,0 +1,52 @@
+"""The shape while a run goes on: after each press, from what was likely before it."""
+
+from dataclasses import replace
+
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.family.settings import CONTINUED
+from experiments.shape_reconstruction.family_or_smooth import by_family
+from experiments.shape_reconstruction.methods import estimated
+from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.errors import FitRefused, OutOfDomain
+
+INFORMATIVE = "family, continued"
+"""While the arm waits for a press that goes by which shapes are likely."""
+
+
+class RunningShape:
+    """Estimates after one press more each time.
+
+    By ``INFORMATIVE`` each begins at the hypotheses of that before it and at a few draws of its own, from the
+    first press on, whichever are asked for: a run that is resumed, or replayed, goes where it went.
+
+    Args:
+        method: ``INFORMATIVE``, or a key of ``METHODS``, by which each estimate stands alone.
+    """
+
+    def __init__(self, method: str) -> None:
+        self._method = method
+        self._taken: int | None = None
+        self._found: ShapeEstimate | None = None
+
+    def after(self, evidence: ShapeEvidence) -> ShapeEstimate | None:
+        """From all presses of some evidence; None where they say too little.
+
+        Args:
+            evidence: that of the last call and as many presses or more.
+        """
+        presses = len(evidence.touches)
+        if presses != self._taken:
+            first = 0 if self._taken is None else self._taken + 1
+            for count in range(first if self._method == INFORMATIVE else presses, presses + 1):
+                self._found = self._next(replace(evidence, touches=evidence.touches[:count]))
+            self._taken = presses
+        return self._found
+
+    def _next(self, evidence: ShapeEvidence) -> ShapeEstimate | None:
+        try:
+            if self._method != INFORMATIVE:
+                return estimated(self._method, evidence)
+            settings = replace(CONTINUED, seed=len(evidence.touches))
+            return by_family(evidence, settings, self._found)
+        except (FitRefused, OutOfDomain):
+            return None
