@@ -48,8 +48,9 @@ DAMPING_SIGMA = 0.8
 PEAK_DAMPING_SIGMA = 0.5
 """Likewise, of one peak's."""
 
-SHAPE_SIGMA = 0.028
-"""Relative deviation of all frequencies together that is of wall and unevenness, not of the material."""
+SHAPE_SIGMA = 0.024
+"""Relative deviation of all frequencies together that is of wall and unevenness, not of the material: 2.35 %
+on 170 recordings of 31 seeds of the mocked bench, which knows the material's own share."""
 
 NINE_TENTHS = 1.645
 """Standard deviations within which nine tenths of a normal distribution lie, each way."""
