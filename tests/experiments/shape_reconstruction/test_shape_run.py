@@ -13,6 +13,7 @@ from experiments.shape_reconstruction.experiment import EXPERIMENT
 from experiments.shape_reconstruction.explorer import ShapeExplorer
 from experiments.shape_reconstruction.methods import QUICK, estimated
 from experiments.shape_reconstruction.readings import evidence_of
+from experiments.shape_reconstruction.running import RunningShape
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.basics.errors import FitRefused, WrongUse
 from harness.basics.mesh import Mesh
@@ -249,7 +250,7 @@ def test_a_run_ends_when_the_shape_is_known_as_well_as_was_asked_and_nothing_is_
     run = RunFiles(touched)
     found = estimated(QUICK, evidence_of(run, touched.steps()))
     found = replace(found, not_bounded=() if bounded else ("z",))
-    monkeypatch.setattr(ShapeExplorer, "_estimate", lambda _self: found)
+    monkeypatch.setattr(RunningShape, "after", lambda *_: found)
     asked = run.scene.section(ShapeRun).model_copy(update={"until": until})
     object.__setattr__(run, "scene", run.scene.with_section(asked))
     assert ShapeExplorer(run, QUICK).is_sure(touched, 2) is sure
