@@ -30,7 +30,7 @@ def model_of(name: str, station: Station) -> ObjectModel:
 def explored(model: ObjectModel, true: FloatArray, seed: int | None) -> int:
     """Of ``WAYS`` lines straight down, how many meet the object; no seed: lines to its supposed middle."""
     surface = placed(model, model.stand.points, true)
-    random, met = np.random.default_rng(seed), 0
+    random, met = np.random.default_rng(seed or 0), 0
     patches: list[Patch] = []
     free: list[FloatArray] = []
     for _ in range(WAYS):
