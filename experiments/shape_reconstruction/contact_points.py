@@ -16,6 +16,9 @@ SHARE = 0.5
 TOUCHED = 0.12e-3
 """M of indentation below which nothing was touched."""
 
+CLEAR = 24
+"""Places of a press, spread over what was not touched."""
+
 _SMOOTH = 2.0
 """Pixels, one standard deviation of the window that slopes are averaged over."""
 
@@ -31,11 +34,13 @@ class ContactPoints:
         points: ``(n, 3)`` m.
         normals: ``(n, 3)`` unit, out of the object.
         error: m, one standard deviation of the points' heights by the picture alone.
+        clear: ``(k, 3)`` m, on the gel's face where it touched nothing: no part of the object is there.
     """
 
     points: FloatArray
     normals: FloatArray
     error: float
+    clear: FloatArray
 
 
 def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> ContactPoints | None:
@@ -51,14 +56,20 @@ def contact_points(heights: FloatArray, errors: FloatArray, pitch: float) -> Con
         return None
     core = heights >= SHARE * deepest
     rows, columns = _spread(core, POINTS)
-    count = np.array(heights.shape)
-    across = (columns - 0.5 * (count[1] - 1)) * pitch
-    along = (rows - 0.5 * (count[0] - 1)) * pitch
-    points = np.column_stack([across, along, -heights[rows, columns]])
+    points = _on_face(heights.shape, rows, columns, pitch)
+    points[:, 2] = -heights[rows, columns]
     slopes = _slopes(heights, core, pitch)[rows, columns]
     normals = np.column_stack([-slopes, -np.ones(len(slopes))])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return ContactPoints(points, normals, float(np.median(errors[rows, columns])))
+    clear = _on_face(heights.shape, *_spread(heights < TOUCHED, CLEAR), pitch)
+    return ContactPoints(points, normals, float(np.median(errors[rows, columns])), clear)
+
+
+def _on_face(shape: tuple[int, ...], rows: IntArray, columns: IntArray, pitch: float) -> FloatArray:
+    """``(n, 3)`` m on the unpressed gel where some pixels of its picture are."""
+    across = (columns - 0.5 * (shape[1] - 1)) * pitch
+    along = (rows - 0.5 * (shape[0] - 1)) * pitch
+    return np.column_stack([across, along, np.zeros(len(rows))])
 
 
 def _slopes(heights: FloatArray, core: BoolArray, pitch: float) -> FloatArray:
@@ -73,8 +84,10 @@ def _slopes(heights: FloatArray, core: BoolArray, pitch: float) -> FloatArray:
 
 
 def _spread(core: BoolArray, count: int) -> tuple[IntArray, IntArray]:
-    """Rows and columns of pixels far from each other: each the farthest from those before."""
+    """Rows and columns of pixels far from each other, each the farthest from those before."""
     places = np.argwhere(core)
+    if not len(places):
+        return places[:, 0], places[:, 1]
     chosen = [int(np.linalg.norm(places - places.mean(axis=0), axis=1).argmin())]
     apart = np.linalg.norm(places - places[chosen[0]], axis=1)
     while len(chosen) < min(count, len(places)):

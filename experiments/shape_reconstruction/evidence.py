@@ -4,11 +4,11 @@ Frame ``stand``: base, shifted to where the scene nominally puts the object on i
 support, axes as base has them. Everything here and every estimate is in it, in metres.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from harness.basics.arrays import BoolArray, FloatArray
+from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.basics.errors import OutOfDomain
 
 
@@ -25,6 +25,7 @@ class GuardedTouch:
         sigma: m, one standard deviation of the points along the normals, of each on its own.
         normal_sigma: rad, one standard deviation of the normals.
         index: the step of the run that it is.
+        clear: ``(k, 3)`` m, places of the unpressed gel's face that touched nothing where others did.
     """
 
     stand_from_gel: FloatArray
@@ -34,6 +35,7 @@ class GuardedTouch:
     sigma: float
     normal_sigma: float
     index: int
+    clear: FloatArray = field(default_factory=lambda: read_only(np.zeros((0, 3))))
 
     @property
     def met(self) -> bool:

@@ -102,6 +102,7 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
         sigma=float(np.hypot(settings.contact_error, 0.0 if found is None else found.error)),
         normal_sigma=settings.contact_tilt_error,
         index=record.step.index,
+        clear=read_only(nothing if found is None else apply(stand_from_gel, found.clear)),
     )
 
 

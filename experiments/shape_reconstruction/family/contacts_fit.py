@@ -7,14 +7,10 @@ import numpy as np
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
+from experiments.shape_reconstruction.family.contact_rows import SLIPPED, contact_sums
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
-from experiments.shape_reconstruction.family.residuals import (
-    contact_sums,
-    evaluate,
-    prepared_room,
-    rows_for,
-)
+from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
 from harness.basics.arrays import BoolArray, FloatArray
 
 STRANGE = 16.0
@@ -37,7 +33,7 @@ class ContactFit:
         sums: ``(contacts,)`` sums of squares, in standard deviations.
         off: ``(contacts,)`` m rms between its points and the surface.
         doubtful: ``(contacts,)`` whether it does not fit while most do.
-        others: half the cost of free places and rays of sight.
+        others: cost of free places, of what the gel touched nothing of, and of rays of sight.
     """
 
     sums: FloatArray
@@ -63,7 +59,8 @@ def contact_fit(shape: FamilyShape, seen: FamilyEvidence) -> ContactFit:
         off = np.sqrt(np.bincount(seen.touch, squares, count) / np.bincount(seen.touch, minlength=count))
     strange = (sums > STRANGE) & (off > LEAST_OFF)
     doubtful = strange & (sums > ALONE * np.median(sums)) if count else strange
-    by_contacts = float(np.where(sums <= 12.0, 0.5 * sums, np.sqrt(12.0 * sums) - 6.0).sum())
+    linear = np.sqrt(SLIPPED * sums) - 0.5 * SLIPPED
+    by_contacts = float(np.where(sums <= SLIPPED, 0.5 * sums, linear).sum())
     return ContactFit(sums, off, doubtful, cost - by_contacts)
 
 

@@ -16,6 +16,9 @@ POINTS_A_TOUCH = 6
 WORTH = 3.0
 """Independent points that a contact counts as: its height and its two slopes."""
 
+CLEAR_A_TOUCH, CLEAR_WORTH = 12, 4.0
+"""Places of a contact's gel that touched nothing, and how many independent ones they count as at most."""
+
 MODEL = 0.7e-3
 """M by which the nearest shape of the family is off a real surface, one standard deviation."""
 
@@ -39,6 +42,9 @@ class FamilyEvidence(NamedTuple):
         normals: ``(contacts, 3)`` unit, outward.
         normal_sigma: ``(contacts,)``.
         gel: ``(contacts, 3, 3)`` rotations, stand from gel.
+        clear: ``(c, 3)`` m on the gel's face, beside what contacts touched: the object is not there.
+        clear_touch: ``(c,)`` which contact each is of.
+        clear_worth: ``(contacts,)`` weight of each such place's squared residual.
         free: ``(k, 3)`` m where the sensor was, so that the object is not.
         place: ``(2,)`` reciprocal of m: of x and y.
         support: m, one standard deviation of its height.
@@ -54,6 +60,9 @@ class FamilyEvidence(NamedTuple):
     normals: FloatArray
     normal_sigma: FloatArray
     gel: FloatArray
+    clear: FloatArray
+    clear_touch: IntArray
+    clear_worth: FloatArray
     free: FloatArray
     place: float
     support: float
@@ -67,16 +76,21 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
     per_touch = 3 if coarse else POINTS_A_TOUCH
     chosen = [farthest_points(touch.points, per_touch) for touch in contacts]
     points = [touch.points[rows] for touch, rows in zip(contacts, chosen, strict=True)]
+    # They lie far from each other, each from those before: the first are spread as all are.
+    clear = [touch.clear[: CLEAR_A_TOUCH // 2 if coarse else CLEAR_A_TOUCH] for touch in contacts]
     sigma = np.array([np.hypot(touch.sigma, MODEL) for touch in contacts])
     return FamilyEvidence(
         points=_stacked(points, 3),
-        touch=np.repeat(np.arange(len(contacts)), [len(rows) for rows in points]).astype(np.int64),
+        touch=_numbered(points),
         sigma=sigma,
         worth=np.array([min(WORTH, len(rows)) / len(rows) for rows in points]),
         middles=_stacked([touch.points.mean(axis=0)[None] for touch in contacts], 3),
         normals=_stacked([touch.mean_normal[None] for touch in contacts], 3),
         normal_sigma=np.array([np.hypot(touch.normal_sigma, np.radians(6.0)) for touch in contacts]),
         gel=np.array([touch.stand_from_gel[:3, :3] for touch in contacts]).reshape(-1, 3, 3),
+        clear=_stacked(clear, 3),
+        clear_touch=_numbered(clear),
+        clear_worth=np.array([min(1.0, CLEAR_WORTH / max(len(rows), 1)) for rows in clear]),
         free=_free_places(evidence, coarse),
         place=evidence.place_error,
         support=evidence.support_error,
@@ -87,6 +101,11 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
 
 def _stacked(parts: list[FloatArray], columns: int) -> FloatArray:
     return read_only(np.concatenate([np.empty((0, columns)), *parts]))
+
+
+def _numbered(parts: list[FloatArray]) -> IntArray:
+    """``(rows,)`` of which part each of their rows is."""
+    return np.repeat(np.arange(len(parts)), [len(rows) for rows in parts]).astype(np.int64)
 
 
 def _free_places(evidence: ShapeEvidence, coarse: bool) -> FloatArray:

@@ -1,19 +1,27 @@
 """How a shape of the family disagrees with the readings: weighted residuals, and the cost they add up to.
 
-One likelihood for touch, sight and both: what was not read has no rows. Rows: of each contact its points and
-its normal, every free place, every ray. A contact counts as a whole: one that slipped loses all its weight.
+One likelihood for touch, sight and both: what was not read has no rows. Rows: of each contact its points, its
+normal and the places where its gel touched nothing, every free place, every ray. A contact counts as a whole:
+one that slipped loses all its weight.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from experiments.shape_reconstruction.family.contact_rows import (
+    clear_row,
+    contact_row_count,
+    contacts_off,
+    normal_rows,
+    point_row,
+    weigh_contacts,
+)
 from experiments.shape_reconstruction.family.distance import PREPARED, ball, distance, inside_depth, prepare
 from experiments.shape_reconstruction.family.layout import (
     CAMERA_DOWN,
     CAMERA_RIGHT,
     CAMERA_SCALE,
-    GEL,
     OUTLINE,
 )
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
@@ -30,12 +38,6 @@ RAY_MODEL = 0.5e-3
 
 PIXELS = 0.5
 """Of an outline's deviation: one standard deviation of where a mask ends."""
-
-NORMAL_STEP = 1.2e-3
-"""M between the places of which a shape's normal is taken."""
-
-SLIPPED = 12.0
-"""A contact's sum of squares at which it has half its weight."""
 
 _BEND = 3.0
 """Standard deviations beyond which a ray or a free place costs in proportion, not its square."""
@@ -57,8 +59,8 @@ class Rows(NamedTuple):
 
 @compiled
 def row_count(seen: FamilyEvidence) -> int:
-    """Rows of all readings: points, three to a normal, free places, rays."""
-    return int(len(seen.points) + 3 * len(seen.middles) + len(seen.free) + len(seen.rays.kinds))
+    """Rows of all readings: of contacts, free places, rays."""
+    return int(contact_row_count(seen) + len(seen.free) + len(seen.rays.kinds))
 
 
 @compiled
@@ -72,11 +74,14 @@ def evaluate(
     prepare(code, theta, q)
     n, m, k = len(seen.points), len(seen.middles), len(seen.free)
     for i in range(n):
-        out.values[i] = _point(code, theta, seen, q, i)
+        out.values[i] = point_row(code, theta, seen, q, i)
     for j in range(m):
-        _normal(code, theta, seen, q, j, out.values[n + 3 * j : n + 3 * j + 3])
-    cost = _weigh_contacts(seen, robust, out)
-    first = n + 3 * m
+        normal_rows(code, theta, seen, q, j, out.values[n + 3 * j : n + 3 * j + 3])
+    off = contacts_off(seen, out.values)
+    for i in range(len(seen.clear)):
+        out.values[n + 3 * m + i] = clear_row(code, theta, seen, q, off, i)
+    cost = weigh_contacts(seen, robust, out.values, out.weights)
+    first = contact_row_count(seen)
     for i in range(k):
         out.values[first + i] = _free(code, seen, q, i)
         cost += _weigh(first + i, 1.0, out)
@@ -125,43 +130,6 @@ def _sighted(theta: FloatArray, seen: FamilyEvidence, i: int, d: float) -> float
 
 
 @compiled
-def _point(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
-    j = seen.touch[i]
-    x, y, z = _moved(theta, seen, j, seen.points[i])
-    return float(distance(code, q, False, x, y, z) / seen.sigma[j])
-
-
-@compiled
-def _moved(theta: FloatArray, seen: FamilyEvidence, j: int, point: FloatArray) -> tuple[float, float, float]:
-    """Where a place of contact ``j`` is, were the gel off by what the shape's vector says."""
-    r = seen.gel[j]
-    a, b, c = theta[GEL], theta[GEL + 1], theta[GEL + 2]
-    x = point[0] + r[0, 0] * a + r[0, 1] * b + r[0, 2] * c
-    y = point[1] + r[1, 0] * a + r[1, 1] * b + r[1, 2] * c
-    z = point[2] + r[2, 0] * a + r[2, 1] * b + r[2, 2] * c
-    return x, y, z
-
-
-@compiled
-def _normal(
-    code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, j: int, out: FloatArray
-) -> None:
-    """The gradient just outside a contact less its normal; four places give it."""
-    x, y, z = _moved(theta, seen, j, seen.middles[j])
-    h = NORMAL_STEP
-    n = seen.normals[j]
-    x, y, z = x + h * n[0], y + h * n[1], z + h * n[2]
-    a = distance(code, q, False, x + h, y - h, z - h)
-    b = distance(code, q, False, x - h, y - h, z + h)
-    c = distance(code, q, False, x - h, y + h, z - h)
-    d = distance(code, q, False, x + h, y + h, z + h)
-    scale = 0.25 / h
-    out[0] = ((a - b - c + d) * scale - n[0]) / seen.normal_sigma[j]
-    out[1] = ((-a - b + c + d) * scale - n[1]) / seen.normal_sigma[j]
-    out[2] = ((-a + b - c + d) * scale - n[2]) / seen.normal_sigma[j]
-
-
-@compiled
 def _free(code: IntArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
     p = seen.free[i]
     return float(inside_depth(code, q, p[0], p[1], p[2]) / FREE_SIGMA)
@@ -175,42 +143,6 @@ def _weigh(row: int, worth: float, out: Rows) -> float:
         return float(0.5 * worth * size * size)
     out.weights[row] = worth * _BEND / size
     return float(worth * _BEND * (size - 0.5 * _BEND))
-
-
-@compiled
-def _weigh_contacts(seen: FamilyEvidence, robust: bool, out: Rows) -> float:
-    sums = contact_sums(seen, out.values)
-    cost = 0.0
-    n = len(seen.points)
-    factor = np.empty(len(sums))
-    for j in range(len(sums)):
-        s = sums[j]
-        if robust:
-            cost += 0.5 * SLIPPED * np.log(1.0 + s / SLIPPED)
-            factor[j] = SLIPPED / (SLIPPED + s)
-        elif s <= SLIPPED:
-            cost += 0.5 * s
-            factor[j] = 1.0
-        else:
-            cost += np.sqrt(SLIPPED * s) - 0.5 * SLIPPED
-            factor[j] = np.sqrt(SLIPPED / s)
-        out.weights[n + 3 * j : n + 3 * j + 3] = factor[j]
-    for i in range(n):
-        out.weights[i] = factor[seen.touch[i]] * seen.worth[seen.touch[i]]
-    return cost
-
-
-@compiled
-def contact_sums(seen: FamilyEvidence, values: FloatArray) -> FloatArray:
-    """``(contacts,)`` sums of the squared residuals of each contact, as independent as they are."""
-    sums = np.zeros(len(seen.middles))
-    n = len(seen.points)
-    for i in range(n):
-        sums[seen.touch[i]] += seen.worth[seen.touch[i]] * values[i] ** 2
-    for j in range(len(sums)):
-        for a in range(3):
-            sums[j] += values[n + 3 * j + a] ** 2
-    return sums
 
 
 @compiled
@@ -228,19 +160,24 @@ def frozen(
     A ray's least distance changes as that at its nearest place does (the envelope theorem).
     """
     prepare(code, theta, q)
-    n, m, k = len(seen.points), len(seen.middles), len(seen.free)
-    first, rays = n + 3 * m, seen.rays
+    n, k = len(seen.points), len(seen.free)
+    clear, first, rays = n + 3 * len(seen.middles), contact_row_count(seen), seen.rays
     towards, triple, last = np.empty(3), np.empty(3), -1
+    off = np.empty(0)
     for row in range(len(active)):
         i = active[row]
         if i < n:
-            out[row] = _point(code, theta, seen, q, i)
-        elif i < first:
+            out[row] = point_row(code, theta, seen, q, i)
+        elif i < clear:
             j = (i - n) // 3
             if j != last:
-                _normal(code, theta, seen, q, j, triple)
+                normal_rows(code, theta, seen, q, j, triple)
                 last = j
             out[row] = triple[(i - n) % 3]
+        elif i < first:
+            if not len(off):
+                off = contacts_off(seen, out)  # all points are active: their rows are the first
+            out[row] = clear_row(code, theta, seen, q, off, i - clear)
         elif i < first + k:
             out[row] = _free(code, seen, q, i - first)
         else:
@@ -258,9 +195,9 @@ def frozen(
 
 @compiled
 def active_rows(seen: FamilyEvidence, values: FloatArray) -> IntArray:
-    """Rows that pull: all of contacts and grazing rays, and of the others those that are violated."""
+    """Rows that pull: all of points, normals and grazing rays, and of the others those that are violated."""
     first = len(seen.points) + 3 * len(seen.middles)
-    rays = first + len(seen.free)
+    rays = contact_row_count(seen) + len(seen.free)
     found = np.empty(len(values), np.int64)
     count = 0
     for i in range(len(values)):

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.contact_points import POINTS, TOUCHED, ContactPoints, contact_points
+from experiments.shape_reconstruction.contact_points import (
+    CLEAR,
+    POINTS,
+    TOUCHED,
+    ContactPoints,
+    contact_points,
+)
 from harness.basics.arrays import FloatArray
 
 PITCH = 0.1245e-3
@@ -71,3 +77,21 @@ def test_one_pixel_is_one_point_with_a_finite_normal() -> None:
     assert len(found.points) == 1
     assert np.isfinite(found.normals).all()
     assert np.linalg.norm(found.normals, axis=1) == pytest.approx(1.0)
+
+
+def test_clear_places_are_on_the_face_where_nothing_was_touched_and_spread_over_it() -> None:
+    x, _ = across_and_along()
+    heights = np.where(np.abs(x) < 2e-3, 1e-3, 0.0)
+    clear = read(heights).clear
+    assert len(clear) == CLEAR
+    assert np.all(np.abs(clear[:, 0]) >= 2e-3)
+    assert np.all(clear[:, 2] == 0.0)
+    assert np.ptp(clear[:, 0]) > 19e-3
+    assert np.ptp(clear[:, 1]) > 14e-3
+    # Deep enough to be of the object, or not: gel that hangs from it is neither.
+    hanging = np.where(np.abs(x) < 2e-3, 1e-3, np.where(np.abs(x) < 6e-3, 2.0 * TOUCHED, 0.0))
+    assert np.all(np.abs(read(hanging).clear[:, 0]) >= 6e-3)
+
+
+def test_a_press_that_is_met_all_over_leaves_no_place_clear() -> None:
+    assert read(np.full((ROWS, COLUMNS), 1e-3)).clear.shape == (0, 3)

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import SOLID, FamilyShape, draw_shape, rarity
+from experiments.shape_reconstruction.family.contact_rows import contact_row_count
 from experiments.shape_reconstruction.family.contacts_fit import contact_fit
+from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
 from experiments.shape_reconstruction.family.guides import guides_of
@@ -28,7 +30,7 @@ from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family.sight import PASS
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.isosurface import isosurface
-from harness.basics.geometry import apply, translation
+from harness.basics.geometry import apply, transform, translation
 from harness.basics.mesh import Mesh
 from tests.support.shape_readings import look_at, missed, shape_readings, touches_on
 
@@ -82,7 +84,9 @@ def test_a_shape_fits_its_own_readings_better_than_its_neighbours_do(name: str) 
 @pytest.mark.parametrize("name", SHAPES)
 def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: str) -> None:
     shape, evidence = made(name)
-    seen = observe(evidence)
+    # Places said to be clear that lie in the shape, some of them, pull too.
+    touches = tuple(replace(one, clear=one.points - 6e-3 * one.normals) for one in evidence.touches)
+    seen = observe(replace(evidence, touches=touches))
     theta = nudged(shape, 0.05)
     out, q = rows_for(seen), prepared_room()
     evaluate(shape.code, theta, seen, False, out, q)
@@ -95,12 +99,46 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     frozen(shape.code, theta + direction, seen, rows, out.along, q, moved)
     again = rows_for(seen)
     evaluate(shape.code, theta + direction, seen, False, again, q)
-    contacts = rows < len(seen.points) + 3 * len(seen.middles)
+    contacts = rows < contact_row_count(seen)
+    assert (rows[contacts] >= len(seen.points) + 3 * len(seen.middles)).any()
     assert np.array_equal(again.values[rows][contacts], moved[contacts])
     # Along a flat side a ray's nearest place jumps as the shape moves: held there, it is off by that.
     true, held = again.values[rows] - base, moved - base
     assert true @ held > 0.5 * np.linalg.norm(true) * np.linalg.norm(held)
     assert np.linalg.norm(held) == pytest.approx(np.linalg.norm(true), rel=0.2)
+
+
+def across_a_shaft(depth: float) -> tuple[FamilyShape, GuardedTouch]:
+    """A tool, and a press across its shaft from above: the gel hangs over both of its sides."""
+    shape = made("spanner")[0]
+    theta = shape.theta.copy()
+    theta[: layout.POSE_END] = 0.0
+    theta[[layout.SHAFT_A, layout.SHAFT_B, layout.SHAFT_THICK]] = np.log(5e-3)
+    shape = FamilyShape(shape.name, shape.code, theta)
+    above = np.column_stack([np.zeros((400, 2)), np.linspace(0.0, 0.1, 400)])
+    top = above[np.flatnonzero(distances(shape.code, theta, above) < 0.0)[-1], 2]
+    along, across = np.meshgrid(np.linspace(-7e-3, 7e-3, 9), np.linspace(-9e-3, 9e-3, 11))
+    in_gel = np.column_stack([along.ravel(), across.ravel(), np.zeros(along.size)])
+    pose = transform(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, top - depth]))
+    face = apply(pose, in_gel)
+    met = distances(shape.code, theta, face) < 0.0
+    points = face[met] + np.array([0.0, 0.0, depth])
+    normals = np.repeat([[0.0, 0.0, 1.0]], len(points), axis=0)
+    return shape, GuardedTouch(pose, 30e-3, points, normals, 0.6e-3, 0.05, 0, face[~met])
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-3, -1e-3])
+def test_what_the_gel_touched_nothing_of_is_not_of_the_object(off: float) -> None:
+    shape, touch = across_a_shaft(1e-3)
+    shift = np.array([0.0, 0.0, off])  # an error that all places of the contact share
+    touch = replace(touch, points=touch.points + shift, clear=touch.clear + shift)
+    wide = FamilyShape(shape.name, shape.code, shape.theta.copy())
+    wide.theta[[layout.SHAFT_A, layout.SHAFT_B]] += np.log(3.0)
+    told, untold = (
+        observe(shape_readings((one,), None)) for one in (touch, replace(touch, clear=np.empty((0, 3))))
+    )
+    assert cost_of(shape, told) == pytest.approx(cost_of(shape, untold))
+    assert cost_of(wide, told) > cost_of(wide, untold) + 2.0
 
 
 @pytest.mark.parametrize("name", SHAPES)
