@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.changes import changes
+from experiments.shape_reconstruction.family.changes import beside, changes
 from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, codes_of, draw_shape, rarity
 from experiments.shape_reconstruction.family.freedom import (
     OUTLINE_BIAS,
@@ -45,6 +45,9 @@ CHANGING = 5
 LIKELY = 2
 """Changes of one code that are refined, of each shape: those that fit best as they were put on."""
 
+HOPPED, HOPS = 2, 8
+"""Hypotheses beside which others are looked for, and how many beside each in a round."""
+
 ALIKE = 1.5e-3
 """M by which two shapes of one code differ at most to be one hypothesis."""
 
@@ -57,7 +60,7 @@ class Hypothesis:
         shape: in the frame ``stand``.
         prior: that its numbers are refined under.
         cost: half the sum of squares of readings and prior, and the price of parts that are rare.
-        curvature: ``(n, n)`` of the cost along its free numbers.
+        curvature: ``(n, n)`` of the cost along its free numbers; empty until it is refined for the last time.
         price: of its parts.
     """
 
@@ -111,14 +114,26 @@ class FamilySearch:
         changed = self._next_to(started, settings.changed, random)
         # What one change made better may need another: a wall that was taken for solid is hollow again.
         again = self._next_to(changed, -(-settings.changed // 2), random)
-        last = _distinct(_ranked([*started, *changed, *again]), settings.finals)
-        return _ranked(self.refined(one, settings.finishing, robust=True) for one in last)
+        found = hopped = _ranked([*started, *changed, *again])
+        for _ in range(settings.hops):
+            hopped = _ranked([*hopped, *self._beside(hopped, random)])
+        # What lies beside the best must not take the places of what is likely elsewhere.
+        last = _distinct([*_distinct(hopped, HOPPED), *found], settings.finals + HOPPED)
+        return _ranked(self.refined(one, settings.finishing, last=True) for one in last)
 
     def _next_to(self, hypotheses: list[Hypothesis], count: int, random: _Random) -> list[Hypothesis]:
         """All shapes that differ by a part or a turn from those that fit best, refined."""
         promising = _of_classes(sorted(hypotheses, key=lambda one: one.misfit), count)
         return [
             self.refined(changed, CHANGING) for one in promising for changed in self._changes_of(one, random)
+        ]
+
+    def _beside(self, ranked: list[Hypothesis], random: _Random) -> list[Hypothesis]:
+        """Fitted anew from beside the best of all: a fit ends in the valley that it begins in."""
+        return [
+            self.refined(replace(one, shape=beside(one.shape, random)), self.settings.hopping)
+            for one in _distinct(ranked, HOPPED)
+            for _ in range(HOPS)
         ]
 
     def _changes_of(self, one: Hypothesis, random: _Random) -> Iterator[Hypothesis]:
@@ -204,11 +219,19 @@ class FamilySearch:
         middle[: layout.POSE_END] = self._bench_middle[: layout.POSE_END]
         return middle
 
-    def refined(self, one: Hypothesis, rounds: int, robust: bool = False) -> Hypothesis:
-        """All its free numbers fitted to all readings."""
+    def refined(self, one: Hypothesis, rounds: int, last: bool = False) -> Hypothesis:
+        """All its free numbers fitted to all readings.
+
+        Args:
+            one: to begin at.
+            rounds: at most.
+            last: whether contacts that do not fit are let go, and the curvature there is wanted.
+        """
         code = one.shape.code
         basis = basis_of(code, self.guides.sighted, self.guides.touched)
-        theta, cost, curvature = refine(code, one.shape.theta, self.full, one.prior, basis, robust, rounds)
+        theta, cost, curvature = refine(
+            code, one.shape.theta, self.full, one.prior, basis, last, rounds, last
+        )
         shape = FamilyShape(one.shape.name, code, theta)
         price = TEMPERATURE * rarity(shape)
         return Hypothesis(shape, one.prior, cost + price, curvature, price)

@@ -14,6 +14,8 @@ class FamilySettings:
         refined: of those, how many go on.
         refining: rounds of each.
         changed: hypotheses of which parts are then put on, taken off or exchanged.
+        hops: rounds of looking beside the best of them for better.
+        hopping: rounds that each shape beside one is refined for.
         finals: hypotheses that are refined to the end.
         finishing: rounds of each of those.
         pitch: m, of the grid that the surface is taken from.
@@ -24,8 +26,10 @@ class FamilySettings:
     yaws: int = 4
     starts: int = 84
     refined: int = 42
-    refining: int = 7
+    refining: int = 14
     changed: int = 4
+    hops: int = 4
+    hopping: int = 7
     finals: int = 10
     finishing: int = 14
     pitch: float = 2.5e-3
@@ -34,7 +38,7 @@ class FamilySettings:
 
 LEVELS = {
     "coarse": FamilySettings(
-        draws=600, starts=40, refined=16, changed=2, finals=5, finishing=8, pitch=4.0e-3
+        draws=600, starts=40, refined=16, changed=2, hops=2, finals=5, finishing=8, pitch=4.0e-3
     ),
     "default": FamilySettings(),
     "fine": replace(
@@ -44,6 +48,7 @@ LEVELS = {
         starts=300,
         refined=100,
         changed=10,
+        hops=8,
         finals=20,
         finishing=20,
         pitch=2.0e-3,

@@ -223,9 +223,25 @@ def test_a_thin_board_far_outside_of_the_mask_is_wrong_by_more_than_it_is_thick(
 def test_a_hypothesis_found_twice_counts_once() -> None:
     shape, readings = made("mug")
     search = FamilySearch(readings, LEVELS["coarse"])
-    best = search.refined(search.seeded(shape, shape.theta), 8, robust=True)
-    beside = search.refined(search.seeded(replace(shape, theta=best.shape.theta + 1e-5), shape.theta), 1)
+    best = search.refined(search.seeded(shape, shape.theta), 8, last=True)
+    near = replace(shape, theta=best.shape.theta + 1e-5)
+    beside = search.refined(search.seeded(near, shape.theta), 1, last=True)
     assert len(mixture_of([best, beside], True, True, 0).hypotheses) == 1
+
+
+def test_looking_beside_the_best_finds_better_and_loses_nothing_that_was_likely() -> None:
+    gained = 0.0
+    for name in ("tray", "spanner"):
+        _, readings = made(name)
+        without, with_hops = (
+            FamilySearch(readings, replace(LEVELS["coarse"], hops=hops)).found() for hops in (0, 2)
+        )
+        assert with_hops[0].cost < without[0].cost + 1e-3
+        assert {one.shape.code.tobytes() for one in without} <= {
+            one.shape.code.tobytes() for one in with_hops
+        }
+        gained += without[0].cost - with_hops[0].cost
+    assert gained > 0.1
 
 
 def test_sides_are_proposed_that_span_the_contacts() -> None:
