@@ -16,8 +16,9 @@ from harness.basics.faces.nearest_surface import NearestSurface
 ENOUGH = 6
 """Contacts from which on a smooth surface says more than a household shape that does not fit them."""
 
-SEARCHES = 3
-"""Of a shape that no search fits well."""
+SEARCHES, BLIND_SEARCHES = 3, 2
+"""Of a shape that no search fits well; of one that was not seen, at least: what no outline holds together has
+many more valleys."""
 
 BESIDE = 3.0
 """Of the deviations that the smooth surface states, root mean square: a household shape that does not fit its
@@ -40,7 +41,8 @@ def by_family(
 
     With a picture a household shape that does not fit its contacts is still the answer, moved to them, where
     the smooth surface leaves it open: both say the same of what was touched, and the smooth one no more.
-    Where contacts fit ill, other draws are searched too, unless the search goes on from another answer.
+    Where contacts fit ill, or there is no picture, other draws are searched too, unless the search goes on
+    from another answer.
 
     Args:
         evidence: one contact or a silhouette at least.
@@ -74,15 +76,17 @@ def by_family(
 def _searched(
     evidence: ShapeEvidence, settings: FamilySettings, previous: ShapeEstimate | None
 ) -> ShapeEstimate:
-    """The family's estimate; of an ill fit, the best of some searches, each by draws of its own.
+    """The family's estimate; of an ill fit or blind, the best of some searches, each by draws of its own.
 
     What one search misses another finds: in six sets of three or four searches, of a teapot and a bottle, the
     one of least cost was within 0.5 mm of that nearest to the truth; others were farther off by up to 9 mm.
     """
     best = family_estimate(evidence, settings, () if previous is None else (previous,))
     seconds = best.seconds
+    contacts = len(evidence.contacts)
+    least = 1 if evidence.sighted or contacts < ENOUGH else BLIND_SEARCHES
     for more in range(1, SEARCHES if previous is None else 1):
-        if not _fits_ill(best, len(evidence.contacts)):
+        if more >= least and not _fits_ill(best, contacts):
             break
         found = family_estimate(evidence, replace(settings, seed=settings.seed + more))
         seconds += found.seconds
