@@ -7,7 +7,13 @@ import pytest
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.contacts_fit import ContactFit
-from experiments.shape_reconstruction.family.estimate import LOOSE, _believed, family_estimate
+from experiments.shape_reconstruction.family.estimate import (
+    BLIND,
+    LOOSE,
+    NOISE,
+    _believed,
+    family_estimate,
+)
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.metric import shape_error
@@ -104,6 +110,20 @@ def test_a_picture_alone_gives_a_closed_shape_and_a_wide_deviation(
     found = family_estimate(replace(readings, touches=()), COARSE)
     require_sound(found)
     assert np.median(found.deviation) > np.median(estimate.deviation)
+
+
+def test_what_the_object_stands_on_is_less_sure_than_its_side(estimate: ShapeEstimate) -> None:
+    mesh = estimate.mesh
+    under = (mesh.vertex_normals[:, 2] < -0.9) & (mesh.vertices[:, 2] < 4e-3)
+    side = np.abs(mesh.vertices[:, 2] - 0.045) < 0.02
+    assert under.any()
+    assert estimate.deviation[under].min() > 1.5e-3
+    assert np.median(estimate.deviation[side]) < 1.5e-3
+
+
+def test_without_a_picture_no_place_is_as_sure_as_with_one(readings: ShapeEvidence) -> None:
+    touched = family_estimate(replace(readings, look=None), COARSE)
+    assert touched.deviation.min() > BLIND * NOISE
 
 
 def test_a_blank_picture_is_no_reading(readings: ShapeEvidence) -> None:
