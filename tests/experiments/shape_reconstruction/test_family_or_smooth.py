@@ -131,6 +131,25 @@ def test_of_an_ill_fit_the_search_of_least_cost_is_taken(
     assert found.seconds == made  # the time of all is stated
 
 
+@pytest.mark.parametrize(("contacts", "searches"), [(ENOUGH, 2), (ENOUGH - 1, 1)])
+def test_without_a_picture_two_searches_are_made_though_the_first_fits(
+    readings: ShapeEvidence, monkeypatch: pytest.MonkeyPatch, contacts: int, searches: int
+) -> None:
+    blind = replace(readings, touches=readings.touches[:contacts], look=None)
+    by_rbf, seeds = by_hermite(blind, symmetric=False), list[int]()
+
+    def searched(_: ShapeEvidence, settings: FamilySettings, previous: object = ()) -> ShapeEstimate:
+        seeds.append(settings.seed)
+        details = details_of(False) | {"cost": 10.0 - len(seeds)}
+        return replace(by_rbf, details=details, flags=(f"search {len(seeds)}",))
+
+    monkeypatch.setattr(family_or_smooth, "family_estimate", searched)
+    assert by_family(blind).flags[0] == f"search {searches}"
+    assert len(set(seeds)) == searches
+    went_on = by_family(blind, previous=by_rbf)  # where the arm waits there is one
+    assert went_on.flags[0] == f"search {searches + 1}"
+
+
 @pytest.mark.parametrize(
     ("away", "sighted", "smooth"),
     [
