@@ -9,12 +9,16 @@ from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surf
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused
 
+SPREAD = 0.3
+"""Share of what household shapes state that is held against a glance: they state all that few contacts allow,
+and the likeliest is nearer. Found on 88 answers by one to five contacts, of 18 development runs."""
+
 
 def by_glance_or_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -> ShapeEstimate:
     """The shape by all that is known: many household shapes fit one outline, and few of them are likely.
 
     Which are is learnt; so without a contact the network answers, and the family where the network may not.
-    Beside a few contacts, which still fit shapes of many depths, the surer of the two does, as each states.
+    Beside a few contacts, which still fit shapes of many depths, the glance does where it is surer by far.
 
     Args:
         evidence: one contact or a silhouette at least.
@@ -27,7 +31,7 @@ def by_glance_or_family(evidence: ShapeEvidence, settings: FamilySettings | None
     if glanced is not None and not evidence.contacts:
         return glanced
     found = by_family(evidence, settings)
-    if glanced is None or found.deviation.mean() <= glanced.deviation.mean():
+    if glanced is None or SPREAD * found.deviation.mean() <= glanced.deviation.mean():
         return found
     said = f"household shapes by {len(evidence.contacts)} contacts are less sure: they do not count"
     return replace(

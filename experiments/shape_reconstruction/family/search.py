@@ -7,7 +7,6 @@ import numpy as np
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.changes import beside, changes
 from experiments.shape_reconstruction.family.classes import CLASSES, FamilyShape, codes_of, draw_shape, rarity
 from experiments.shape_reconstruction.family.freedom import (
     OUTLINE_BIAS,
@@ -17,9 +16,10 @@ from experiments.shape_reconstruction.family.freedom import (
     stand_basis,
     stand_rows,
 )
-from experiments.shape_reconstruction.family.guides import Guides, guides_of
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
-from experiments.shape_reconstruction.family.proposals import lay
+from experiments.shape_reconstruction.family.proposing.changes import beside, changes
+from experiments.shape_reconstruction.family.proposing.guides import Guides, guides_of
+from experiments.shape_reconstruction.family.proposing.proposals import lay
 from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
 from experiments.shape_reconstruction.family.settings import FamilySettings

@@ -1,4 +1,4 @@
-"""A glance beside a household shape: the surer of the two is the answer, and says so."""
+"""A glance beside a household shape: it is the answer where it is surer by far, and says so."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from experiments.shape_reconstruction import glance_or_family
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.family_or_smooth import ENOUGH
-from experiments.shape_reconstruction.glance_or_family import by_glance_or_family
+from experiments.shape_reconstruction.glance_or_family import SPREAD, by_glance_or_family
 from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.objects.builtin import build
@@ -27,13 +27,14 @@ def readings() -> ShapeEvidence:
     [
         (0, True, 0.5, True),
         (1, True, 0.5, False),
-        (1, True, 2.0, True),  # a household shape that is not sure of its depth
-        (ENOUGH - 1, True, 2.0, True),
-        (ENOUGH, True, 2.0, False),  # so many contacts are heeded whatever they leave open
-        (1, False, 2.0, False),  # there is no picture to glance at
+        (1, True, 0.9 / SPREAD, False),
+        (1, True, 1.1 / SPREAD, True),  # a household shape that is not sure of its depth
+        (ENOUGH - 1, True, 1.1 / SPREAD, True),
+        (ENOUGH, True, 1.1 / SPREAD, False),  # so many contacts are heeded whatever they leave open
+        (1, False, 1.1 / SPREAD, False),  # there is no picture to glance at
     ],
 )
-def test_the_surer_of_both_is_the_answer(
+def test_a_glance_that_is_surer_by_far_is_the_answer(
     readings: ShapeEvidence,
     monkeypatch: pytest.MonkeyPatch,
     contacts: int,

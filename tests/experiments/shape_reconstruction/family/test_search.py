@@ -13,10 +13,10 @@ from experiments.shape_reconstruction.family.contacts_fit import contact_fit
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
-from experiments.shape_reconstruction.family.guides import guides_of
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
 from experiments.shape_reconstruction.family.posterior import mixture_of
-from experiments.shape_reconstruction.family.proposals import lay
+from experiments.shape_reconstruction.family.proposing.guides import guides_of
+from experiments.shape_reconstruction.family.proposing.proposals import lay
 from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import (
     active_rows,

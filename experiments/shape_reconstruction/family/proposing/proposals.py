@@ -5,7 +5,6 @@ import numpy as np
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.freedom import has_yaw, sizes_of
-from experiments.shape_reconstruction.family.guides import Guides, long_way
 from experiments.shape_reconstruction.family.layout import (
     BENT,
     CORED,
@@ -16,6 +15,7 @@ from experiments.shape_reconstruction.family.layout import (
     TOOL,
     TURNED,
 )
+from experiments.shape_reconstruction.family.proposing.guides import Guides, long_way
 from harness.basics.arrays import FloatArray, IntArray
 
 _Random = np.random.Generator
