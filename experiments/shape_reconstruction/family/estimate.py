@@ -46,7 +46,7 @@ wrong elsewhere too."""
 OUTSIDE = 6.0
 """A contact's typical sum of squares, of some five numbers, above which the object is of no class."""
 
-LOOSE = 10.0
+LOOSE = 8.0
 """The same above which the class does not limit what no reading does."""
 
 FOREIGN, SURE = 20.0, 6.0
