@@ -16,7 +16,7 @@ SHARE = 0.5
 TOUCHED = 0.12e-3
 """M of indentation below which nothing was touched."""
 
-CLEAR = 24
+CLEAR = 12
 """Places of a press, spread over what was not touched."""
 
 _SMOOTH = 2.0

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from experiments.shape_reconstruction.contact_points import CLEAR
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.family.sight import SightRays, no_rays, sight_rays
 from experiments.shape_reconstruction.family.spread import farthest_points
@@ -16,14 +17,11 @@ POINTS_A_TOUCH = 6
 WORTH = 3.0
 """Independent points that a contact counts as: its height and its two slopes."""
 
-CLEAR_A_TOUCH, CLEAR_WORTH = 12, 4.0
-"""Places of a contact's gel that touched nothing, and how many independent ones they count as at most."""
+CLEAR_WORTH = 4.0
+"""Independent places that those of a contact's gel that touched nothing count as, at most."""
 
 MODEL = 0.7e-3
 """M by which the nearest shape of the family is off a real surface, one standard deviation."""
-
-NORMAL_STEP = 2.0e-3
-"""M over which a shape's normal is taken: the mean over a contact."""
 
 _LAYERS = (0.0, 8.0e-3, 20.0e-3, 40.0e-3, 70.0e-3, 110.0e-3)
 _ACROSS = 5
@@ -77,7 +75,7 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
     chosen = [farthest_points(touch.points, per_touch) for touch in contacts]
     points = [touch.points[rows] for touch, rows in zip(contacts, chosen, strict=True)]
     # They lie far from each other, each from those before: the first are spread as all are.
-    clear = [touch.clear[: CLEAR_A_TOUCH // 2 if coarse else CLEAR_A_TOUCH] for touch in contacts]
+    clear = [touch.clear[: CLEAR // 2 if coarse else CLEAR] for touch in contacts]
     sigma = np.array([np.hypot(touch.sigma, MODEL) for touch in contacts])
     return FamilyEvidence(
         points=_stacked(points, 3),
