@@ -9,6 +9,7 @@ from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import LEFT, LOOSE, family_estimate
 from experiments.shape_reconstruction.family.settings import FamilySettings
+from experiments.shape_reconstruction.family.strain import STRAINED
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest_surface import NearestSurface
@@ -97,7 +98,13 @@ def _searched(
 def _fits_ill(found: ShapeEstimate, contacts: int) -> bool:
     typical = found.details["contact_cost"]
     assert isinstance(typical, float)
-    return contacts >= ENOUGH and typical > LOOSE
+    return contacts >= ENOUGH and (typical > LOOSE or _is_strained(found))
+
+
+def _is_strained(found: ShapeEstimate) -> bool:
+    strain = found.details["strain"]
+    assert isinstance(strain, float)
+    return strain > STRAINED
 
 
 def _cost(found: ShapeEstimate) -> float:
@@ -116,7 +123,7 @@ def _untested(found: ShapeEstimate, contacts: int) -> ShapeEstimate:
 
 def _is_beside(found: ShapeEstimate, smooth: ShapeEstimate, evidence: ShapeEvidence) -> bool:
     """Whether a household shape that does not fit its contacts is no farther from them than it may be."""
-    seen = bool(found.details["foreign"]) and evidence.sighted
+    seen = bool(found.details["foreign"]) and evidence.sighted and not _is_strained(found)
     return seen and deviations_apart(found, smooth) <= BESIDE
 
 
@@ -125,6 +132,8 @@ def _why_smooth(found: ShapeEstimate, evidence: ShapeEvidence) -> str | None:
     assert isinstance(beyond, float)
     if found.details["foreign"] and count >= ENOUGH:
         return f"no household shape fits {count} contacts"
+    if _is_strained(found) and count >= ENOUGH:
+        return f"no household shape fits {count} contacts on a bench as this is calibrated"
     if not evidence.sighted and beyond > BEYOND and count >= MANY:
         return f"the household shape lies {beyond * 1e3:.0f} mm beyond {count} contacts in the mean"
     return None

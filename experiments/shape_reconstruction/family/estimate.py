@@ -19,6 +19,7 @@ from experiments.shape_reconstruction.family.known import beyond_contacts, known
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
 from experiments.shape_reconstruction.family.settings import FamilySettings
+from experiments.shape_reconstruction.family.strain import Strain
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import BoolArray, FloatArray
@@ -88,7 +89,7 @@ def family_estimate(
     seeds = [seed for estimate in previous for seed in _seeds_of(search, estimate)]
     mixture = mixture_of(search.found(seeds), evidence.sighted, bool(evidence.contacts), settings.seed)
     turned = turned_contacts(mixture.best.shape, evidence)
-    fit = contact_fit(mixture.best.shape, search.full)
+    fit, strain = contact_fit(mixture.best.shape, search.full), search.strain(mixture.best.shape)
     fit = replace(fit, doubtful=fit.doubtful | (turned > 0.0))
     plain = median_surface(mixture, settings.pitch)
     mesh = _warped(plain, mixture.best.shape, evidence, fit)
@@ -101,11 +102,16 @@ def family_estimate(
         mesh=mesh,
         deviation=_deviation(plain, mixture, mesh, fit, evidence.sighted),
         known_by=known_by(mesh.vertices, evidence),
-        not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE),
+        not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE or strain.beyond_belief),
         doubtful=doubtful,
-        flags=(*_flags(mixture, fit, doubtful), *_turned_flags(evidence, turned)),
+        flags=(*_flags(mixture, fit, strain, doubtful), *_turned_flags(evidence, turned)),
         seconds=time.perf_counter() - began,
-        details={**_details(mixture, fit), "foreign": _is_foreign(fit), "beyond_m": _beyond(mesh, evidence)},
+        details={
+            **_details(mixture, fit),
+            "foreign": _is_foreign(fit),
+            "strain": strain.cost,
+            "beyond_m": _beyond(mesh, evidence),
+        },
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
 
@@ -170,7 +176,7 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh, fit: ContactFit, sight
     return np.asarray(np.sqrt(known + UNDERSIDE**2 * under) * (1.0 if sighted else BLIND))
 
 
-def _flags(mixture: Mixture, fit: ContactFit, doubtful: dict[int, float]) -> tuple[str, ...]:
+def _flags(mixture: Mixture, fit: ContactFit, strain: Strain, doubtful: dict[int, float]) -> tuple[str, ...]:
     flags = []
     classes = mixture.by_class()
     rivals = [name for name, weight in classes.items() if weight >= RIVAL]
@@ -180,6 +186,8 @@ def _flags(mixture: Mixture, fit: ContactFit, doubtful: dict[int, float]) -> tup
         flags.append(
             f"outside the family: contacts are {np.median(fit.off) * 1e3:.1f} mm off the nearest such shape"
         )
+    if strain.beyond_belief:
+        flags.append(f"outside the family: such a shape fits with {strain.most}")
     if doubtful:
         flags.append(f"contacts that do not fit the rest: {', '.join(str(index) for index in doubtful)}")
     return tuple(flags)

@@ -23,6 +23,7 @@ from experiments.shape_reconstruction.family.proposing.proposals import lay
 from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
 from experiments.shape_reconstruction.family.settings import FamilySettings
+from experiments.shape_reconstruction.family.strain import Strain, strain_of
 from harness.basics.arrays import FloatArray
 
 _Random = np.random.Generator
@@ -209,6 +210,10 @@ class FamilySearch:
         """
         rows = np.concatenate([self._bench, shape_rows(shape.code)])
         return Hypothesis(shape, PriorRows(self._middle(middle), rows), np.inf, np.empty((0, 0)))
+
+    def strain(self, shape: FamilyShape) -> Strain:
+        """What a shape asks of the bench."""
+        return strain_of(shape.theta, self._bench, self._bench_middle)
 
     def _changed(self, one: Hypothesis, shape: FamilyShape) -> Hypothesis:
         """Another shape beside a hypothesis: what they share is believed as before, not as it was fitted."""

@@ -11,6 +11,7 @@ from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import LOOSE, family_estimate
 from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
+from experiments.shape_reconstruction.family.strain import STRAINED
 from experiments.shape_reconstruction.family_or_smooth import (
     BESIDE,
     ENOUGH,
@@ -30,11 +31,12 @@ def readings() -> ShapeEvidence:
     return shape_readings(touches_on(mesh, MANY, seed=0), look_at(mesh))
 
 
-def details_of(foreign: bool, beyond: float = 0.0) -> dict[str, object]:
+def details_of(foreign: bool, beyond: float = 0.0, strain: float = 0.0) -> dict[str, object]:
     """What the family's estimate tells beside its surface."""
     typical = 3.0 * LOOSE if foreign else 0.1 * LOOSE
     return {
-        "foreign": foreign, "beyond_m": beyond, "cost": 1.0, "contact_cost": typical, "hypotheses": []
+        "foreign": foreign, "beyond_m": beyond, "cost": 1.0, "contact_cost": typical, "strain": strain,
+        "hypotheses": [],
     }  # fmt: skip
 
 
@@ -82,6 +84,35 @@ def test_the_surface_is_smooth_where_no_class_fits_enough_contacts(
         assert found.mesh is fitted.mesh
         # Contacts that could not have told say so.
         assert ("supposed" in " ".join(found.flags)) is (contacts < ENOUGH)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "by", "foreign", "smooth"),
+    [
+        (8, 1.1, False, True),  # though its contacts fit
+        (8, 1.1, True, True),  # though it is no farther from the smooth surface than it may be
+        (8, 0.9, False, False),
+        (ENOUGH - 1, 1.1, False, False),
+    ],
+)
+def test_what_fits_only_on_a_bench_that_is_off_beyond_belief_is_no_household_shape(
+    readings: ShapeEvidence,
+    monkeypatch: pytest.MonkeyPatch,
+    contacts: int,
+    by: float,
+    foreign: bool,
+    smooth: bool,
+) -> None:
+    part = replace(readings, touches=readings.touches[:contacts])
+    by_rbf, made = by_hermite(part, symmetric=False), list[int]()
+
+    def searched(_: ShapeEvidence, settings: FamilySettings, previous: object = ()) -> ShapeEstimate:
+        made.append(settings.seed)
+        return replace(by_rbf, details=details_of(foreign, strain=by * STRAINED), flags=())
+
+    monkeypatch.setattr(family_or_smooth, "family_estimate", searched)
+    assert ("by rbf" in " ".join(by_family(part).flags)) is smooth
+    assert len(made) == (family_or_smooth.SEARCHES if smooth else 1)  # other draws may fit as it stands
 
 
 def test_without_a_contact_nothing_is_said_of_contacts(

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.contacts_fit import ContactFit
@@ -15,6 +16,7 @@ from experiments.shape_reconstruction.family.estimate import (
     family_estimate,
 )
 from experiments.shape_reconstruction.family.settings import LEVELS
+from experiments.shape_reconstruction.family.strain import STRAINED
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.metric import shape_error
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
@@ -31,8 +33,6 @@ COARSE = replace(LEVELS["coarse"], draws=210)
 @pytest.fixture(scope="module")
 def can() -> Mesh:
     """A cylinder of 66 mm by 90 mm, off its nominal place: in the family, and no class was made for it."""
-    import trimesh
-
     made = trimesh.creation.cylinder(0.033, 0.09, sections=96).subdivide_to_size(3e-3)
     return Mesh(np.asarray(made.vertices) + np.array([0.01, -0.004, 0.045]), made.faces)
 
@@ -71,6 +71,27 @@ def test_the_same_seed_gives_the_same_answer(estimate: ShapeEstimate, readings: 
     again = family_estimate(readings, COARSE)
     np.testing.assert_array_equal(again.mesh.vertices, estimate.mesh.vertices)
     np.testing.assert_array_equal(again.deviation, estimate.deviation)
+
+
+def test_a_can_that_leans_says_so(
+    estimate: ShapeEstimate, can: Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its contacts fit, on a support that would have to be tilted by ten of its standard deviations."""
+    turn = trimesh.transformations.rotation_matrix(np.radians(8.0), [0.0, 1.0, 0.0])[:3, :3]
+    leaning = can.vertices @ turn.T
+    leaning[:, 2] -= leaning[:, 2].min()
+    mesh = Mesh(leaning, can.faces)
+    monkeypatch.setattr(
+        "experiments.shape_reconstruction.family.estimate.not_bounded",
+        lambda _evidence, _mesh, outside: ("y",) if outside else (),
+    )
+    found = family_estimate(shape_readings(touches_on(mesh, 16, seed=2), look_at(mesh)), COARSE)
+    assert found.not_bounded == ("y",), "no class limits what no reading does"
+    assert found.details["strain"] > STRAINED > 2.0 * estimate.details["strain"]  # type: ignore[operator]
+    assert found.details["contact_cost"] < LOOSE  # type: ignore[operator]
+    (said,) = [flag for flag in found.flags if "standard deviations" in flag]
+    assert said.startswith("outside the family: such a shape fits with its upright off by")
+    assert not [flag for flag in estimate.flags if "standard deviations" in flag]
 
 
 def test_a_search_that_begins_at_an_earlier_answer_is_no_worse(
@@ -140,8 +161,6 @@ def test_nothing_read_is_refused(readings: ShapeEvidence) -> None:
 
 
 def test_a_body_of_no_class_is_said_to_be_outside(monkeypatch: pytest.MonkeyPatch) -> None:
-    import trimesh
-
     monkeypatch.setattr(
         "experiments.shape_reconstruction.family.estimate.not_bounded",
         lambda _evidence, _mesh, outside: ("y",) if outside else (),
@@ -160,8 +179,6 @@ def test_a_body_of_no_class_is_said_to_be_outside(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_thin_board_that_stands_keeps_its_two_sides_apart() -> None:
-    import trimesh
-
     made = trimesh.creation.box((0.12, 0.004, 0.1)).subdivide_to_size(4e-3)
     board = Mesh(np.asarray(made.vertices) + np.array([0.0, 0.0, 0.05]), made.faces)
     found = family_estimate(shape_readings(touches_on(board, 8, seed=0), look_at(board)), COARSE)
