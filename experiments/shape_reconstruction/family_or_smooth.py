@@ -95,10 +95,19 @@ def _searched(
     return replace(best, seconds=seconds)
 
 
-def _fits_ill(found: ShapeEstimate, contacts: int) -> bool:
-    typical = found.details["contact_cost"]
+def is_ill_fitted(found: ShapeEstimate) -> bool:
+    """Whether no household shape that was found fits its readings well, however many they are.
+
+    Args:
+        found: by ``by_family``.
+    """
+    typical = found.details.get("contact_cost", np.inf)  # a smooth surface has none
     assert isinstance(typical, float)
-    return contacts >= ENOUGH and (typical > LOOSE or _is_strained(found))
+    return typical > LOOSE or _is_strained(found)
+
+
+def _fits_ill(found: ShapeEstimate, contacts: int) -> bool:
+    return contacts >= ENOUGH and is_ill_fitted(found)
 
 
 def _is_strained(found: ShapeEstimate) -> bool:

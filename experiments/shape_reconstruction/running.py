@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.settings import CONTINUED
-from experiments.shape_reconstruction.family_or_smooth import by_family
+from experiments.shape_reconstruction.family.settings import CONTINUED, LEVELS
+from experiments.shape_reconstruction.family_or_smooth import by_family, is_ill_fitted
 from experiments.shape_reconstruction.methods import estimated
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, OutOfDomain
@@ -17,7 +17,8 @@ class RunningShape:
     """Estimates after one press more each time.
 
     By ``INFORMATIVE`` each begins at the hypotheses of that before it and at a few draws of its own, from the
-    first press on, whichever are asked for: a run that is resumed, or replayed, goes where it went.
+    first press on, whichever are asked for: a run that is resumed, or replayed, goes where it went. Where what
+    is found fits ill, hypotheses before it may all be of a wrong form: then it is begun anew beside them.
 
     Args:
         method: ``INFORMATIVE``, or a key of ``METHODS``, by which each estimate stands alone.
@@ -46,7 +47,10 @@ class RunningShape:
         try:
             if self._method != INFORMATIVE:
                 return estimated(self._method, evidence)
-            settings = replace(CONTINUED, seed=len(evidence.touches))
-            return by_family(evidence, settings, self._found)
+            seed = len(evidence.touches)
+            found = by_family(evidence, replace(CONTINUED, seed=seed), self._found)
+            if not is_ill_fitted(found):
+                return found
+            return by_family(evidence, replace(LEVELS["coarse"], seed=seed), found)
         except (FitRefused, OutOfDomain):
             return None
