@@ -84,10 +84,9 @@ def _searched(
     """
     best = family_estimate(evidence, settings, () if previous is None else (previous,))
     seconds = best.seconds
-    contacts = len(evidence.contacts)
-    least = 1 if evidence.sighted or contacts < ENOUGH else BLIND_SEARCHES
+    least = 1 if evidence.sighted or len(evidence.contacts) < ENOUGH else BLIND_SEARCHES
     for more in range(1, SEARCHES if previous is None else 1):
-        if more >= least and not _fits_ill(best, contacts):
+        if more >= least and not is_ill_fitted(best):
             break
         found = family_estimate(evidence, replace(settings, seed=settings.seed + more))
         seconds += found.seconds
@@ -104,10 +103,6 @@ def is_ill_fitted(found: ShapeEstimate) -> bool:
     typical = found.details.get("contact_cost", np.inf)  # a smooth surface has none
     assert isinstance(typical, float)
     return typical > LOOSE or _is_strained(found)
-
-
-def _fits_ill(found: ShapeEstimate, contacts: int) -> bool:
-    return contacts >= ENOUGH and is_ill_fitted(found)
 
 
 def _is_strained(found: ShapeEstimate) -> bool:

@@ -17,8 +17,8 @@ class RunningShape:
     """Estimates after one press more each time.
 
     By ``INFORMATIVE`` each begins at the hypotheses of that before it and at a few draws of its own, from the
-    first press on, whichever are asked for: a run that is resumed, or replayed, goes where it went. Where what
-    is found fits ill, hypotheses before it may all be of a wrong form: then it is begun anew beside them.
+    first press on, whichever are asked for: a run that is resumed, or replayed, goes where it went. Where
+    what is found fits ill, hypotheses before it may all be of a wrong form: it is begun anew beside them.
 
     Args:
         method: ``INFORMATIVE``, or a key of ``METHODS``, by which each estimate stands alone.
