@@ -33,7 +33,6 @@ _DEVIATIONS = {
     TURNED: {
         layout.HEIGHT: 0.3, layout.WARP: 0.15, layout.WALL: 0.35, layout.FLOOR: 0.4,
         **{layout.RADII + k: 0.35 for k in range(layout.KNOTS)},
-        **{layout.SHARES + k: 0.05 for k in range(1, layout.KNOTS - 1)},
     },
     TOOL: {
         layout.LENGTH: 0.35, layout.SHAFT_A: 0.3, layout.SHAFT_B: 0.3, layout.SHAFT_THICK: 0.35,
@@ -54,9 +53,6 @@ _SPOUT = {
 }  # fmt: skip
 _SMOOTH = 0.10
 """Second difference of a section's deviation from its draw."""
-
-_BETWEEN = tuple(range(layout.SHARES + 1, layout.SHARES + layout.KNOTS - 1))
-"""Where the shares of the height are at which a section's inner knots lie."""
 
 _SIZES = {
     TURNED: (
@@ -114,10 +110,9 @@ def has_yaw(code: IntArray) -> bool:
 
 
 @lru_cache(maxsize=256)
-def _basis_of(code: tuple[int, ...], sighted: bool, touched: bool, knots: bool) -> FloatArray:
+def _basis_of(code: tuple[int, ...], sighted: bool, touched: bool) -> FloatArray:
     coded = np.array(code)
-    own = [slot for slot in deviations(coded) if knots or slot not in _BETWEEN]
-    slots = [layout.X, layout.Y, layout.LIFT, layout.TILT_X, layout.TILT_Y, *own]
+    slots = [layout.X, layout.Y, layout.LIFT, layout.TILT_X, layout.TILT_Y, *deviations(coded)]
     if has_yaw(coded):
         slots.append(layout.YAW)
     if sighted:
@@ -127,16 +122,9 @@ def _basis_of(code: tuple[int, ...], sighted: bool, touched: bool, knots: bool) 
     return np.asarray(np.eye(layout.SIZE)[np.sort(slots)])
 
 
-def basis_of(code: IntArray, sighted: bool, touched: bool, knots: bool = True) -> FloatArray:
-    """``(n, SIZE)`` every number that is free, by itself.
-
-    Args:
-        code: of a shape.
-        sighted: whether there is a picture.
-        touched: whether there is a contact.
-        knots: whether the knots of a section move along its height too.
-    """
-    return _basis_of(_key(code), sighted, touched, knots)
+def basis_of(code: IntArray, sighted: bool, touched: bool) -> FloatArray:
+    """``(n, SIZE)`` every number that is free, by itself."""
+    return _basis_of(_key(code), sighted, touched)
 
 
 def stand_basis(code: IntArray, two_senses: bool) -> FloatArray:

@@ -38,7 +38,7 @@ of its outer bar (a number), its corner's share (logit), half its thickness in i
 SPOUT_AT, SPOUT_REACH, SPOUT_RISE, SPOUT_ROOT, SPOUT_TIP = 35, 36, 37, 38, 39
 """Height of its root over the object's, how far it stands out, its rise over that, its two radii."""
 SHARES = 40
-"""``KNOTS`` shares of the height at which the radii are; the first is 0, the last 1."""
+"""``KNOTS`` shares of the height at which the radii are; not fitted."""
 TURNED_END = 47
 
 # A flat tool: a tapered shaft between two ends, cut out of a plate.

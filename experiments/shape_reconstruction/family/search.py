@@ -132,7 +132,7 @@ class FamilySearch:
     def _beside(self, ranked: list[Hypothesis], random: _Random) -> list[Hypothesis]:
         """Fitted anew from beside the best of all: a fit ends in the valley that it begins in."""
         return [
-            self.refined(replace(one, shape=beside(one.shape, random)), self.settings.hopping, knots=True)
+            self.refined(replace(one, shape=beside(one.shape, random)), self.settings.hopping)
             for one in _distinct(ranked, HOPPED)
             for _ in range(HOPS)
         ]
@@ -224,18 +224,16 @@ class FamilySearch:
         middle[: layout.POSE_END] = self._bench_middle[: layout.POSE_END]
         return middle
 
-    def refined(self, one: Hypothesis, rounds: int, last: bool = False, knots: bool = False) -> Hypothesis:
+    def refined(self, one: Hypothesis, rounds: int, last: bool = False) -> Hypothesis:
         """All its free numbers fitted to all readings.
 
         Args:
             one: to begin at.
             rounds: at most.
             last: whether contacts that do not fit are let go, and the curvature there is wanted.
-            knots: whether the knots of a section move along its height too, as they do at last. Where they do
-                from the beginning, fits of the wrong parts end in more valleys.
         """
         code = one.shape.code
-        basis = basis_of(code, self.guides.sighted, self.guides.touched, knots or last)
+        basis = basis_of(code, self.guides.sighted, self.guides.touched)
         theta, cost, curvature = refine(
             code, one.shape.theta, self.full, one.prior, basis, last, rounds, last
         )

@@ -65,11 +65,10 @@ def prepare_turned(code: IntArray, theta: FloatArray, q: FloatArray) -> None:
     q[_ACROSS], q[_POWER] = np.exp(theta[ACROSS]), np.exp(theta[POWER])
     if code[PLAN] == FLAT_SIDED:
         q[_ACROSS] *= np.exp(np.max(theta[RADII : RADII + KNOTS]))
-    power, share = np.exp(theta[WARP]), 0.0
+    power = np.exp(theta[WARP])
     for k in range(KNOTS):
         q[_R + k] = np.exp(theta[RADII + k])
-        share = min(max(theta[SHARES + k], share), 1.0)  # no knot passes another
-        q[_Z + k] = height * share**power
+        q[_Z + k] = height * theta[SHARES + k] ** power
     for k in range(KNOTS - 1):
         out, up = q[_R + k + 1] - q[_R + k], max(q[_Z + k + 1] - q[_Z + k], 1e-9)
         q[_SLOPE + k], q[_INVERSE + k] = out / up, 1.0 / (out * out + up * up)

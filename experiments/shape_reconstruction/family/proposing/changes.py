@@ -28,9 +28,6 @@ _Random = np.random.Generator
 LOOPS, TURNS = 3, 8
 """Handles drawn where there is none, and turns that each is tried at."""
 
-SPOUTS = 4
-"""Pairs of spout and handle drawn where there is such a pair, as it is and the other way round."""
-
 HEADS, _HOLE = (1.4, 2.0, 2.8), 0.55
 """Half widths of a tool's head over that of its shaft there; of its hole over its own."""
 
@@ -77,9 +74,6 @@ def _of_vessel(shape: FamilyShape, random: _Random) -> Iterator[FamilyShape]:
             yield from _all_about(add_loop(shape, random), random)
     if code[layout.SPOUT] != 0:
         yield _coded(shape, layout.SPOUT, 0)
-        for _ in range(SPOUTS):
-            drawn = add_spout(add_loop(shape, random), random)
-            yield from (drawn, _turned(drawn, np.pi))
     elif code[layout.LIMB] == LOOP:
         yield add_spout(shape, random)
     if code[layout.PLAN] == ROUND:

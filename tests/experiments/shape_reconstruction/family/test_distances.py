@@ -87,21 +87,6 @@ def test_what_sticks_out_of_a_body_ends_at_its_support() -> None:
         assert (distances(shape.code, theta, below) >= -below[:, 2] - 1e-9).all()
 
 
-def test_no_knot_of_a_section_passes_another() -> None:
-    shape = draw_shape("bottle", np.random.default_rng(0))
-    random = np.random.default_rng(1)
-    for _ in range(20):
-        theta = shape.theta.copy()
-        theta[layout.SHARES + 1 : layout.SHARES + layout.KNOTS - 1] += random.normal(
-            0.0, 0.3, layout.KNOTS - 2
-        )
-        crossed = FamilyShape(shape.name, shape.code, theta)
-        gaps = distances(crossed.code, theta, around(crossed, 400))
-        assert np.isfinite(gaps).all()
-        height = np.exp(theta[layout.HEIGHT])
-        assert (gaps[around(crossed, 400)[:, 2] > height] > 0.0).all()
-
-
 @pytest.mark.parametrize("name", CLASSES)
 def test_a_body_moves_with_its_pose(name: str) -> None:
     shape = drawn(name)[0]
