@@ -29,6 +29,10 @@ _FINER = (1.0, 0.5, 0.25)
 _SLIVER = 0.3
 """Of a cell, half the thickness of what is thinner than that."""
 
+BELOW = 5.0e-3
+"""M below the support's nominal height from where on nothing is of an answer: a handle or a spout of a
+hypothesis may dip into it, where no reading is."""
+
 _WEIGHT = 0.03
 """Below it a hypothesis does not move the median."""
 
@@ -57,7 +61,13 @@ def median_surface(mixture: Mixture, pitch: float) -> Mesh:
     else:
         # A plate thinner than any cell: drawn as thick as it shows.
         inside = inside - (inside.min() + _SLIVER * finer * cell)
-    return isosurface(inside, low, finer * cell)
+    return isosurface(_above_support(inside, low[2], finer * cell), low, finer * cell)
+
+
+def _above_support(inside: FloatArray, low: float, cell: float) -> FloatArray:
+    """Distances on a grid whose least height is ``low``, of what is not far below the support."""
+    heights = low + cell * np.arange(inside.shape[2])
+    return np.asarray(np.maximum(inside, -BELOW - heights))
 
 
 def _fields(shapes: list[FamilyShape], low: FloatArray, high: FloatArray, cell: float) -> FloatArray:

@@ -130,11 +130,13 @@ def turned_box(code: IntArray, q: FloatArray, box: FloatArray) -> None:
         lean = abs(q[_LIMB_SLANT]) * (q[_LIMB_HALF] if code[LIMB] == LOOP else q[_LIMB_OUT])
         half = q[_LIMB_HALF] if code[LIMB] == LOOP else lean
         box[3] = max(box[3], q[_LIMB_OUT] + lean + q[_LIMB_A])
+        box[2] = min(box[2], q[_LIMB_Z] - half - q[_LIMB_A])
         box[5] = max(box[5], q[_LIMB_Z] + half + q[_LIMB_A])
         box[1], box[4] = min(box[1], -q[_LIMB_B]), max(box[4], q[_LIMB_B])
     if code[SPOUT] != 0:
         wide = max(q[_SPOUT + 4], q[_SPOUT + 5])
         box[0] = min(box[0], -q[_SPOUT + 2] - wide)
+        box[2] = min(box[2], min(q[_SPOUT + 1], q[_SPOUT + 3]) - wide)
         box[5] = max(box[5], max(q[_SPOUT + 1], q[_SPOUT + 3]) + wide)
         box[1], box[4] = min(box[1], -wide), max(box[4], wide)
 
@@ -147,14 +149,13 @@ def turned_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: fl
     through: how far a ray goes in is then not how thick the wall is.
     """
     side = _side(code, q, x, y, z)
-    body = max(side, z - q[_H])
+    body = max(side, max(-z, z - q[_H]))
     if code[LIMB] == LOOP and x > 0.0:
         body = min(body, _loop(q, filled, x, y, z))
     elif code[LIMB] == BAR and x > 0.0:
         body = min(body, _bar(q, x, y, z))
     if code[SPOUT] != 0 and x < 0.0:
         body = min(body, _spout(q, x, y, z))
-    body = max(body, -z)  # whatever sticks out of it ends at the support
     if code[HOLLOW] != 0 and not filled:
         body = max(body, -max(side + q[_WALL], q[_FLOOR] - z))
     return float(body)

@@ -76,17 +76,6 @@ def test_everything_inside_is_in_the_body_s_box(name: str) -> None:
         np.testing.assert_array_equal(by_box, np.minimum(distances(shape.code, shape.theta, points), 0.0))
 
 
-def test_what_sticks_out_of_a_body_ends_at_its_support() -> None:
-    shape = draw_shape("teapot", np.random.default_rng(0))
-    for at, rise, reach in ((0.1, -2.0, 0.06), (0.0, 0.0, 0.02)):
-        theta = shape.theta.copy()
-        theta[layout.SPOUT_AT], theta[layout.SPOUT_RISE], theta[layout.SPOUT_REACH] = at, rise, np.log(reach)
-        theta[layout.LIMB_AT], theta[layout.LIMB_HALF] = 0.3, np.log(0.1)
-        points = around(FamilyShape(shape.name, shape.code, theta), 4000)
-        below = points[points[:, 2] < 0.0] - np.array([0.0, 0.0, 0.05])
-        assert (distances(shape.code, theta, below) >= -below[:, 2] - 1e-9).all()
-
-
 @pytest.mark.parametrize("name", CLASSES)
 def test_a_body_moves_with_its_pose(name: str) -> None:
     shape = drawn(name)[0]

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
-from experiments.shape_reconstruction.family.field import corners_of, median_surface
+from experiments.shape_reconstruction.family.field import BELOW, corners_of, median_surface
 from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.family.search import Hypothesis
 from harness.basics.mesh import Mesh
@@ -77,3 +77,26 @@ def test_bodies_that_lie_apart_are_answered_by_the_likeliest() -> None:
 @pytest.mark.parametrize("thick", [0.05e-3, 0.4e-3, 1.5e-3])
 def test_a_body_thinner_than_the_grid_has_a_surface(thick: float) -> None:
     assert volume(surface_of(board_at(0.0, thick), 4e-3)) > 0.0
+
+
+@pytest.mark.timeout(300)
+def test_no_surface_goes_on_below_the_support() -> None:
+    pot = draw_shape("teapot", np.random.default_rng(0))
+    theta = pot.theta.copy()
+    theta[layout.SPOUT_AT], theta[layout.SPOUT_RISE], theta[layout.SPOUT_REACH] = 0.1, -2.0, np.log(0.06)
+    sunk = FamilyShape(pot.name, pot.code, theta)
+    assert corners_of(sunk)[:, 2].min() < -0.1
+    mesh = surface_of(sunk, 2.5e-3)
+    assert mesh.bounds[0, 2] == pytest.approx(-BELOW, abs=1e-6)
+    assert volume(mesh) > 0.0
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+
+
+@pytest.mark.timeout(300)
+def test_a_body_that_stands_on_the_support_is_as_it_is() -> None:
+    shape = cup_with(3.0e-3)
+    theta = shape.theta.copy()
+    theta[layout.LIFT] = -2.0e-3
+    low = FamilyShape(shape.name, shape.code, theta)
+    assert surface_of(low, 2.5e-3).bounds[0, 2] == pytest.approx(-2.0e-3, abs=0.2e-3)
