@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import LEFT, LOOSE, family_estimate
-from experiments.shape_reconstruction.family.settings import FamilySettings
+from experiments.shape_reconstruction.family.settings import ANEW, FamilySettings
 from experiments.shape_reconstruction.family.strain import STRAINED
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
@@ -42,8 +42,8 @@ def by_family(
 
     With a picture a household shape that does not fit its contacts is still the answer, moved to them, where
     the smooth surface leaves it open: both say the same of what was touched, and the smooth one no more.
-    Where contacts fit ill, or there is no picture, other draws are searched too, unless the search goes on
-    from another answer.
+    Where contacts fit ill, or there is no picture, other draws are searched too; where the search goes on
+    from another answer, only of an ill fit, and beside its hypotheses.
 
     Args:
         evidence: one contact or a silhouette at least.
@@ -54,7 +54,7 @@ def by_family(
         OutOfDomain: nothing was touched or seen.
     """
     settings = settings or FamilySettings()
-    found = _searched(evidence, settings, previous)
+    found = _searched(evidence, settings) if previous is None else _went_on(evidence, settings, previous)
     why = _why_smooth(found, evidence)
     if why is None:
         return _untested(found, len(evidence.contacts))
@@ -74,19 +74,17 @@ def by_family(
     )
 
 
-def _searched(
-    evidence: ShapeEvidence, settings: FamilySettings, previous: ShapeEstimate | None
-) -> ShapeEstimate:
+def _searched(evidence: ShapeEvidence, settings: FamilySettings) -> ShapeEstimate:
     """The family's estimate; of an ill fit or blind, the best of some searches, each by draws of its own.
 
     What one search misses another finds: in six sets of three or four searches, of a teapot and a bottle, the
     one of least cost was within 0.5 mm of that nearest to the truth; others were farther off by up to 9 mm.
     """
-    best = family_estimate(evidence, settings, () if previous is None else (previous,))
+    best = family_estimate(evidence, settings)
     seconds = best.seconds
     least = 1 if evidence.sighted or len(evidence.contacts) < ENOUGH else BLIND_SEARCHES
-    for more in range(1, SEARCHES if previous is None else 1):
-        if more >= least and not is_ill_fitted(best):
+    for more in range(1, SEARCHES):
+        if more >= least and not _is_ill_fitted(best):
             break
         found = family_estimate(evidence, replace(settings, seed=settings.seed + more))
         seconds += found.seconds
@@ -94,13 +92,18 @@ def _searched(
     return replace(best, seconds=seconds)
 
 
-def is_ill_fitted(found: ShapeEstimate) -> bool:
-    """Whether no household shape that was found fits its readings well, however many they are.
+def _went_on(evidence: ShapeEvidence, settings: FamilySettings, previous: ShapeEstimate) -> ShapeEstimate:
+    """The family's estimate from another's hypotheses; of an ill fit begun anew beside what was found."""
+    found = family_estimate(evidence, settings, (previous,))
+    if not _is_ill_fitted(found) and _why_smooth(found, evidence) is None:
+        return found
+    anew = family_estimate(evidence, replace(ANEW, seed=settings.seed), (found,))
+    return replace(anew, seconds=found.seconds + anew.seconds)
 
-    Args:
-        found: by ``by_family``.
-    """
-    typical = found.details.get("contact_cost", np.inf)  # a smooth surface has none
+
+def _is_ill_fitted(found: ShapeEstimate) -> bool:
+    """Whether no household shape that was found fits its readings well, however many they are."""
+    typical = found.details["contact_cost"]
     assert isinstance(typical, float)
     return typical > LOOSE or _is_strained(found)
 

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.settings import CONTINUED, LEVELS
-from experiments.shape_reconstruction.family_or_smooth import by_family, is_ill_fitted
+from experiments.shape_reconstruction.family.settings import CONTINUED
+from experiments.shape_reconstruction.family_or_smooth import by_family
 from experiments.shape_reconstruction.methods import estimated
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.errors import FitRefused, OutOfDomain
@@ -47,10 +47,7 @@ class RunningShape:
         try:
             if self._method != INFORMATIVE:
                 return estimated(self._method, evidence)
-            seed = len(evidence.touches)
-            found = by_family(evidence, replace(CONTINUED, seed=seed), self._found)
-            if not is_ill_fitted(found):
-                return found
-            return by_family(evidence, replace(LEVELS["coarse"], seed=seed), found)
+            settings = replace(CONTINUED, seed=len(evidence.touches))
+            return by_family(evidence, settings, self._found)
         except (FitRefused, OutOfDomain):
             return None

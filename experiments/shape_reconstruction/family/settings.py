@@ -59,3 +59,6 @@ LEVELS = {
 CONTINUED = replace(LEVELS["coarse"], draws=200, starts=14, refined=6, changed=1, finals=4, finishing=6)
 """Beside the hypotheses of an estimate from one press less: a third of a coarse search, by other draws each
 time, so that what one misses another finds."""
+
+ANEW = LEVELS["coarse"]
+"""Beside those hypotheses where they fit ill: all of them may be of a wrong form."""

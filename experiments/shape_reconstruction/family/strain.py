@@ -13,7 +13,7 @@ from harness.basics.arrays import FloatArray
 
 STRAINED = 20.0
 """Half the sum of squares of some twelve numbers, in standard deviations, above which a shape does not fit.
-Right answers by presses and a picture have up to 17, wrong ones of hammers, scissors and bananas 27 to 88."""
+Right answers by presses and a picture have up to 17, wrong ones of hammers, scissors and bananas 21 to 88."""
 
 _SAYS = {
     layout.X: ("its place", "mm", 1e3),
@@ -59,10 +59,9 @@ def strain_of(theta: FloatArray, rows: FloatArray, middle: FloatArray) -> Strain
         middle: ``(SIZE,)`` that they are expected to be.
     """
     off = rows @ (theta - middle)
-    slot = int(np.argmax(np.abs(rows[int(np.argmax(np.abs(off)))])))
+    most = int(np.argmax(np.abs(off)))
+    slot = int(np.flatnonzero(rows[most])[0])
     name, unit, factor = _SAYS[slot]
-    deviations = float(np.abs(off).max())
-    by = factor * abs(float(theta[slot] - middle[slot]))
-    return Strain(
-        0.5 * float(off @ off), f"{name} off by {by:.1f} {unit}, {deviations:.0f} standard deviations"
-    )
+    by = factor * abs(theta[slot] - middle[slot])
+    said = f"{name} off by {by:.1f} {unit}, {abs(off[most]):.0f} standard deviations"
+    return Strain(0.5 * float(off @ off), said)

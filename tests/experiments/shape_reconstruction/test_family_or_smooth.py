@@ -10,10 +10,11 @@ from experiments.shape_reconstruction import family_or_smooth
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import LOOSE, family_estimate
-from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
+from experiments.shape_reconstruction.family.settings import CONTINUED, LEVELS, FamilySettings
 from experiments.shape_reconstruction.family.strain import STRAINED
 from experiments.shape_reconstruction.family_or_smooth import (
     BESIDE,
+    BEYOND,
     ENOUGH,
     MANY,
     by_family,
@@ -179,6 +180,49 @@ def test_without_a_picture_two_searches_are_made_though_the_first_fits(
     assert len(set(seeds)) == searches
     went_on = by_family(blind, previous=by_rbf)  # where the arm waits there is one
     assert went_on.flags[0] == f"search {searches + 1}"
+
+
+@pytest.mark.parametrize(
+    ("typical", "strain", "beyond", "begun"),
+    [
+        (2.0, 0.0, 0.0, 2),
+        (0.5, 1.1, 0.0, 2),
+        (0.5, 0.0, 2.0, 2),  # the smooth surface would answer
+        (0.5, 0.9, 0.5, 1),
+    ],
+)
+def test_where_what_goes_on_fits_ill_it_is_begun_anew_beside_it(
+    readings: ShapeEvidence,
+    monkeypatch: pytest.MonkeyPatch,
+    typical: float,
+    strain: float,
+    beyond: float,
+    begun: int,
+) -> None:
+    """All that was likely before may be of a wrong form, however well it goes on from press to press."""
+    blind = replace(readings, look=None)
+    by_rbf, made = by_hermite(blind, symmetric=False), list[tuple[int, tuple[ShapeEstimate, ...]]]()
+
+    def searched(
+        _: ShapeEvidence, settings: FamilySettings, previous: tuple[ShapeEstimate, ...] = ()
+    ) -> ShapeEstimate:
+        made.append((settings.draws, previous))
+        first = len(made) == 1
+        details = details_of(False, beyond * BEYOND * first, strain * STRAINED * first)
+        details["contact_cost"] = typical * LOOSE if first else 0.0
+        return replace(by_rbf, details=details, flags=(str(len(made)),), seconds=1.0)
+
+    monkeypatch.setattr(family_or_smooth, "family_estimate", searched)
+    before = replace(by_rbf, flags=("0",))
+    found = by_family(blind, CONTINUED, before)
+    assert found.flags[0] == str(begun)
+    assert found.seconds == begun  # the time of both is stated
+    assert len(made) == begun
+    (few, (given,)), *anew = made
+    assert given.flags == ("0",)
+    for many, (beside,) in anew:
+        assert many > few
+        assert beside.flags == ("1",)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import pytest
 from experiments.shape_reconstruction import running
 from experiments.shape_reconstruction.estimators.plain_bodies import by_box
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.estimate import LOOSE
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.live import MOST, counts_shown, live_estimates, live_method
 from experiments.shape_reconstruction.methods import QUICK
@@ -62,10 +61,6 @@ def test_what_goes_on_from_press_to_press_is_the_same_where_a_run_is_taken_up_ag
     np.testing.assert_array_equal(found.mesh.vertices, again.mesh.vertices)
 
 
-def _fits(presses: int) -> dict[str, object]:
-    return {"presses": presses, "contact_cost": 0.0, "strain": 0.0}
-
-
 def test_each_estimate_is_given_that_of_a_press_less(monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[object] = []
 
@@ -73,35 +68,8 @@ def test_each_estimate_is_given_that_of_a_press_less(monkeypatch: pytest.MonkeyP
         evidence: ShapeEvidence, _settings: FamilySettings, previous: ShapeEstimate | None
     ) -> ShapeEstimate:
         given.append(previous and previous.details["presses"])
-        return replace(by_box(evidence_of(TOUCHES)), details=_fits(len(evidence.touches)))
+        return replace(by_box(evidence_of(TOUCHES)), details={"presses": len(evidence.touches)})
 
     monkeypatch.setattr(running, "by_family", by_family)
     RunningShape(INFORMATIVE).after(evidence_of(TOUCHES[:3]))
     assert given == [None, 0, 1, 2]
-
-
-@pytest.mark.parametrize(("typical", "begun"), [(2.0 * LOOSE, 2), (0.5 * LOOSE, 1), (None, 2)])
-def test_where_what_is_found_fits_ill_it_is_begun_anew_beside_it(
-    monkeypatch: pytest.MonkeyPatch, typical: float | None, begun: int
-) -> None:
-    """All that was likely before may be of a wrong form, however well it goes on from press to press."""
-    evidence, made = evidence_of(TOUCHES[:1]), list[tuple[int, ShapeEstimate | None]]()
-    box = by_box(evidence)
-
-    def estimated(
-        _: ShapeEvidence, settings: FamilySettings, previous: ShapeEstimate | None
-    ) -> ShapeEstimate:
-        made.append((settings.draws, previous))
-        details: dict[str, object] = {} if typical is None else {"contact_cost": typical, "strain": 0.0}
-        return replace(box, details=details, flags=(str(len(made)),))
-
-    monkeypatch.setattr(running, "by_family", estimated)
-    found = RunningShape(INFORMATIVE).after(replace(evidence, touches=TOUCHES[:0]))
-    assert found is not None
-    assert found.flags == (str(begun),)
-    assert len(made) == begun
-    if begun == 2:
-        (few, _), (many, beside) = made
-        assert many > few
-        assert beside is not None
-        assert beside.flags == ("1",)

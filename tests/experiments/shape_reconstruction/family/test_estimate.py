@@ -76,7 +76,7 @@ def test_the_same_seed_gives_the_same_answer(estimate: ShapeEstimate, readings: 
 def test_a_can_that_leans_says_so(
     estimate: ShapeEstimate, can: Mesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its contacts fit, on a support that would have to be tilted by ten of its standard deviations."""
+    """Its contacts fit, on a support that would have to be tilted by eight of its standard deviations."""
     turn = trimesh.transformations.rotation_matrix(np.radians(8.0), [0.0, 1.0, 0.0])[:3, :3]  # type: ignore[no-untyped-call]
     leaning = can.vertices @ turn.T
     leaning[:, 2] -= leaning[:, 2].min()
