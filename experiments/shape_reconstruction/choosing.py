@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
-from experiments.shape_reconstruction.disagreement import disagreement
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.expected_error import error_spared
 from experiments.shape_reconstruction.section import Choice
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
@@ -38,9 +38,9 @@ def farthest(evidence: ShapeEvidence, estimate: ShapeEstimate | None, lines: Flo
 def most_informative(
     evidence: ShapeEvidence, estimate: ShapeEstimate | None, lines: FloatArray
 ) -> FloatArray:
-    """M by which likely shapes differ along each line, where it is met; as ``farthest`` while they agree."""
-    apart = None if estimate is None else disagreement(evidence, estimate, lines)
-    return farthest(evidence, estimate, lines) if apart is None else apart
+    """M of expected error that a press along each line spares; as ``farthest`` while likely shapes agree."""
+    spared = None if estimate is None else error_spared(evidence, estimate, lines)
+    return farthest(evidence, estimate, lines) if spared is None else spared
 
 
 CHOOSERS: dict[Choice, Chooser] = {"random": blindly, "farthest": farthest, "active": most_informative}

@@ -88,6 +88,8 @@ class ShapeEvidence:
         support_error: m, one standard deviation of the support's height.
         largest: m, no side of the object is longer.
         library: folder of known shapes, of which it may be one; None for those that come with the program.
+        supposed: ``(n, 3)`` m where the surface is supposed to be, by what was learnt from other objects; no
+            reading, and none unless an estimator asks for them.
     """
 
     touches: tuple[GuardedTouch, ...]
@@ -99,6 +101,7 @@ class ShapeEvidence:
     support_error: float
     largest: float
     library: str | None = None
+    supposed: FloatArray = field(default_factory=lambda: read_only(np.zeros((0, 3))))
 
     def __post_init__(self) -> None:
         for touch in self.touches:

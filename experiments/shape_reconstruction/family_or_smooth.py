@@ -10,6 +10,7 @@ from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.estimate import LEFT, LOOSE, family_estimate
 from experiments.shape_reconstruction.family.settings import ANEW, FamilySettings
 from experiments.shape_reconstruction.family.strain import STRAINED
+from experiments.shape_reconstruction.pcn.glance import with_supposed
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest_surface import NearestSurface
@@ -43,7 +44,8 @@ def by_family(
     With a picture a household shape that does not fit its contacts is still the answer, moved to them, where
     the smooth surface leaves it open: both say the same of what was touched, and the smooth one no more.
     Where contacts fit ill, or there is no picture, other draws are searched too; where the search goes on
-    from another answer, only of an ill fit, and beside its hypotheses.
+    from another answer, only of an ill fit, and beside its hypotheses. Beside few contacts it is held against
+    what a glance supposes, too.
 
     Args:
         evidence: one contact or a silhouette at least.
@@ -54,6 +56,7 @@ def by_family(
         OutOfDomain: nothing was touched or seen.
     """
     settings = settings or FamilySettings()
+    evidence = evidence if len(evidence.contacts) >= ENOUGH else with_supposed(evidence)
     found = _searched(evidence, settings) if previous is None else _went_on(evidence, settings, previous)
     why = _why_smooth(found, evidence)
     if why is None:

@@ -19,6 +19,9 @@ BEYOND = 0.02
 TILT = float(np.radians(20.0))
 """Rad, the most between a line and the estimated surface's normal."""
 
+_LESS = (1.0, 0.3, 0.0)
+"""Shares of a drawn tilt that are tried in turn: over a flat object the sensor has room for little."""
+
 _STEEPEST = 0.25
 """The way of the gel leads up no more steeply: its z in base."""
 
@@ -79,10 +82,13 @@ def _line(
 ) -> FloatArray | None:
     """``(4, 4)`` in ``stand``; None where the gel would lead steeply up, or no room is behind the place."""
     aside = frame_facing(-normal, random.uniform(0.0, 2.0 * np.pi))[:, 0]
-    forward = rotation_about(aside, random.uniform(0.0, TILT)) @ -normal
-    turn = random.uniform(0.0, 2.0 * np.pi)
-    end = None if forward[2] > _STEEPEST else _end(point, forward, half)
-    return None if end is None else transform(frame_facing(forward, turn), end)
+    tilt, turn = random.uniform(0.0, TILT), random.uniform(0.0, 2.0 * np.pi)
+    for share in _LESS:
+        forward = rotation_about(aside, share * tilt) @ -normal
+        end = None if forward[2] > _STEEPEST else _end(point, forward, half)
+        if end is not None:
+            return transform(frame_facing(forward, turn), end)
+    return None
 
 
 def _end(point: FloatArray, forward: FloatArray, half: float) -> FloatArray | None:

@@ -11,8 +11,8 @@ from experiments.shape_reconstruction.estimators.knowledge import not_bounded as
 from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.classes import FamilyShape
-from experiments.shape_reconstruction.family.contact_tilts import turned_contacts
-from experiments.shape_reconstruction.family.contacts_fit import ContactFit, contact_fit, moved_points
+from experiments.shape_reconstruction.family.contacts.fit import ContactFit, contact_fit, moved_points
+from experiments.shape_reconstruction.family.contacts.tilts import turned_contacts
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import median_surface
 from experiments.shape_reconstruction.family.known import beyond_contacts, known_by, not_bounded
@@ -39,6 +39,9 @@ Found on 24 development runs, as UNDERSIDE is."""
 UNDERSIDE, AT_SUPPORT, DOWNWARD = 1.5e-3, 5.0e-3, -0.5
 """M of deviation more, below so many m above the support, of what faces down by so much: no gel and no camera
 gets there, and feet, foot rings and hollows of some mm are common."""
+
+SPREAD_OVER = 4
+"""Of the shapes drawn about each hypothesis, over which the spread at every vertex is taken."""
 
 MISFIT = 0.5
 """By how much of a contact's typical sum of squares the variance grows: a shape that is off its contacts is
@@ -166,7 +169,7 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh, fit: ContactFit, sight
     """``(vertices,)`` m: spread of the hypotheses and about them, the warp, noise, and the underside."""
     total = np.zeros(len(plain.vertices))
     for one, weight, about in zip(mixture.hypotheses, mixture.weights, mixture.about, strict=True):
-        shapes = (one.shape, *about)
+        shapes = (one.shape, *about[:SPREAD_OVER])
         for shape in shapes:
             gap = distances(shape.code, shape.theta, plain.vertices)
             total += weight / len(shapes) * gap**2

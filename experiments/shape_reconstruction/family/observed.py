@@ -20,8 +20,15 @@ WORTH = 3.0
 CLEAR_WORTH = 4.0
 """Independent places that those of a contact's gel that touched nothing count as, at most."""
 
+SUPPOSED, SUPPOSED_WORTH = 48, 8.0
+"""Places that are supposed which a shape is held against, and independent places that they count as together:
+those of one glance err together."""
+
 MODEL = 0.7e-3
 """M by which the nearest shape of the family is off a real surface, one standard deviation."""
+
+_LEVEL_SIGHT = 0.1
+"""A camera that looks less steeply down does not see places on the support apart."""
 
 _LAYERS = (0.0, 8.0e-3, 20.0e-3, 40.0e-3, 70.0e-3, 110.0e-3)
 _ACROSS = 5
@@ -48,6 +55,10 @@ class FamilyEvidence(NamedTuple):
         support: m, one standard deviation of its height.
         largest: m, no side is longer.
         rays: of the picture; none without one.
+        supposed: ``(s, 3)`` m where the surface is supposed to be.
+        supposed_worth: weight of each such place's squared residual.
+        supposed_right, supposed_down: ``(3,)`` m along the support that those are off by for each m that the
+            camera is off to the picture's right, and down.
     """
 
     points: FloatArray
@@ -66,6 +77,10 @@ class FamilyEvidence(NamedTuple):
     support: float
     largest: float
     rays: SightRays
+    supposed: FloatArray
+    supposed_worth: float
+    supposed_right: FloatArray
+    supposed_down: FloatArray
 
 
 def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
@@ -77,6 +92,8 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
     # They lie far from each other, each from those before: the first are spread as all are.
     clear = [touch.clear[: CLEAR // 2 if coarse else CLEAR] for touch in contacts]
     sigma = np.array([np.hypot(touch.sigma, MODEL) for touch in contacts])
+    supposed = _some(evidence.supposed, SUPPOSED // 3 if coarse else SUPPOSED)
+    rays = no_rays() if evidence.look is None else sight_rays(evidence.look, coarse)
     return FamilyEvidence(
         points=_stacked(points, 3),
         touch=_numbered(points),
@@ -93,8 +110,24 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
         place=evidence.place_error,
         support=evidence.support_error,
         largest=evidence.largest,
-        rays=no_rays() if evidence.look is None else sight_rays(evidence.look, coarse),
+        rays=rays,
+        supposed=np.ascontiguousarray(supposed),
+        supposed_worth=SUPPOSED_WORTH / max(len(supposed), 1),
+        supposed_right=_along_support(rays.right, rays.middle),
+        supposed_down=_along_support(rays.down, rays.middle),
     )
+
+
+def _along_support(shift: FloatArray, sight: FloatArray) -> FloatArray:
+    """``(3,)`` level: where a line of sight goes to on the support as the camera is shifted by a vector."""
+    if sight[2] > -_LEVEL_SIGHT:
+        return np.array([shift[0], shift[1], 0.0])
+    return np.asarray(shift - sight * (shift[2] / sight[2]))
+
+
+def _some(places: FloatArray, count: int) -> FloatArray:
+    """So many of them at most, spread over their order."""
+    return places[:: max(-(-len(places) // count), 1)]
 
 
 def _stacked(parts: list[FloatArray], columns: int) -> FloatArray:

@@ -13,8 +13,8 @@ from harness.basics.arrays import FloatArray
 LEAST = 0.01
 """Weight of a hypothesis, of the greatest, below which it is left out."""
 
-SAMPLES = 4
-"""Shapes drawn about each hypothesis."""
+SAMPLES = 16
+"""Shapes drawn about each hypothesis: fewer tell a press apart from others by chance."""
 
 _LONGEST = 2.5
 """Standard deviations of a prior that a drawn number is off its hypothesis at most."""

@@ -10,6 +10,7 @@ from experiments.shape_reconstruction.family.residuals import (
     active_rows,
     evaluate,
     frozen,
+    hold_rays,
     prepared_room,
     rows_for,
 )
@@ -136,11 +137,12 @@ def _normal_equations(
     """Gauss-Newton's curvature and slope along the directions."""
     rows = active_rows(seen, out.values)
     base, here = np.empty(len(rows)), np.empty(len(rows))
-    frozen(code, theta, seen, rows, out.along, q, base)
+    hold_rays(code, theta, seen, rows, out, q)
+    frozen(code, theta, seen, rows, out.held, q, base)
     slopes = np.empty((len(basis), len(rows)))
     root = np.sqrt(out.weights[rows])
     for i in range(len(basis)):
-        frozen(code, theta + _NUDGE * basis[i], seen, rows, out.along, q, here)
+        frozen(code, theta + _NUDGE * basis[i], seen, rows, out.held, q, here)
         slopes[i] = (here - base) / _NUDGE * root
     off = prior.rows @ (theta - prior.middle)
     curvature = slopes @ slopes.T + along.T @ along

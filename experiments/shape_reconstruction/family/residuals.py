@@ -1,15 +1,15 @@
 """How a shape of the family disagrees with the readings: weighted residuals, and the cost they add up to.
 
 One likelihood for touch, sight and both: what was not read has no rows. Rows: of each contact its points, its
-normal and the places where its gel touched nothing, every free place, every ray. A contact counts as a whole:
-one that slipped loses all its weight.
+normal and the places where its gel touched nothing, every free place, every ray, every place that is
+supposed. A contact counts as a whole: one that slipped loses all its weight.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from experiments.shape_reconstruction.family.contact_rows import (
+from experiments.shape_reconstruction.family.contacts.rows import (
     clear_row,
     contact_row_count,
     contacts_off,
@@ -18,29 +18,28 @@ from experiments.shape_reconstruction.family.contact_rows import (
     weigh_contacts,
 )
 from experiments.shape_reconstruction.family.distance import PREPARED, ball, distance, inside_depth, prepare
-from experiments.shape_reconstruction.family.layout import (
-    CAMERA_DOWN,
-    CAMERA_RIGHT,
-    CAMERA_SCALE,
-    OUTLINE,
-)
+from experiments.shape_reconstruction.family.layout import CAMERA_DOWN, CAMERA_RIGHT
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
 from experiments.shape_reconstruction.family.ray_depth import nearest_along
-from experiments.shape_reconstruction.family.sight import GRAZE, MEET, PASS
+from experiments.shape_reconstruction.family.ray_rows import (
+    held_distance,
+    hold_ray,
+    ray_origin,
+    sighted,
+    turned_ray,
+)
+from experiments.shape_reconstruction.family.sight import GRAZE, MEET
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
 
 FREE_SIGMA = 1.0e-3
 """M by which the sensor's housing may seem to be inside the object."""
 
-RAY_MODEL = 0.5e-3
-"""M by which the outline of the nearest shape is off a real one."""
-
-PIXELS = 0.5
-"""Of an outline's deviation: one standard deviation of where a mask ends."""
+SUPPOSED_SIGMA = 5.0e-3
+"""M by which a place that is supposed is off: a little more than a glance is on shapes held out."""
 
 _BEND = 3.0
-"""Standard deviations beyond which a ray or a free place costs in proportion, not its square."""
+"""Standard deviations beyond which a ray, a free or a supposed place costs in proportion, not its square."""
 
 
 class Rows(NamedTuple):
@@ -50,16 +49,23 @@ class Rows(NamedTuple):
         values: ``(rows,)``.
         weights: ``(rows,)`` by which a squared residual counts at this shape: worth times robustness.
         along: ``(rays,)`` m along each ray where the shape is nearest.
+        held: ``(rays, 3)`` where each is held as derivatives are taken: two places, m, the second's share.
     """
 
     values: FloatArray
     weights: FloatArray
     along: FloatArray
+    held: FloatArray
 
 
 @compiled
 def row_count(seen: FamilyEvidence) -> int:
-    """Rows of all readings: of contacts, free places, rays."""
+    """Rows of all readings: of contacts, free places, rays, and of what is supposed."""
+    return int(_first_supposed(seen) + len(seen.supposed))
+
+
+@compiled
+def _first_supposed(seen: FamilyEvidence) -> int:
     return int(contact_row_count(seen) + len(seen.free) + len(seen.rays.kinds))
 
 
@@ -85,7 +91,12 @@ def evaluate(
     for i in range(k):
         out.values[first + i] = _free(code, seen, q, i)
         cost += _weigh(first + i, 1.0, out)
-    return cost + _evaluate_rays(code, theta, seen, out, q, first + k)
+    cost += _evaluate_rays(code, theta, seen, out, q, first + k)
+    for i in range(len(seen.supposed)):
+        row = _first_supposed(seen) + i
+        out.values[row] = _supposed(code, theta, seen, q, i)
+        cost += _weigh(row, seen.supposed_worth, out)
+    return cost
 
 
 @compiled
@@ -95,44 +106,34 @@ def _evaluate_rays(
     rays, cost = seen.rays, 0.0
     origin, towards, to_middle = np.empty(3), np.empty(3), np.empty(3)
     radius = ball(q, to_middle)
-    for a in range(3):
-        origin[a] = rays.eye[a] + theta[CAMERA_RIGHT] * rays.right[a] + theta[CAMERA_DOWN] * rays.down[a]
-        to_middle[a] -= origin[a]
+    ray_origin(theta, rays, origin)
+    to_middle -= origin
     for i in range(len(rays.kinds)):
-        _turned_ray(theta, seen, i, towards)
+        turned_ray(theta, rays, i, towards)
         d, out.along[i] = nearest_along(
             code, q, origin, towards, radius, to_middle, rays.kinds[i] == MEET, rays.step
         )
-        out.values[first + i] = _sighted(theta, seen, i, d)
+        out.values[first + i] = sighted(theta, rays, i, d)
         cost += _weigh(first + i, rays.worth[i], out)
     return cost
-
-
-@compiled
-def _turned_ray(theta: FloatArray, seen: FamilyEvidence, i: int, towards: FloatArray) -> None:
-    """A ray's direction, were the picture's scale off by what the shape's vector says."""
-    rays = seen.rays
-    scale = theta[CAMERA_SCALE]
-    for a in range(3):
-        towards[a] = rays.directions[i, a] + scale * (rays.directions[i, a] - rays.middle[a])
-
-
-@compiled
-def _sighted(theta: FloatArray, seen: FamilyEvidence, i: int, d: float) -> float:
-    """A ray's residual where it passes the shape at ``d`` m."""
-    rays = seen.rays
-    sigma = np.hypot(PIXELS * rays.pixel, RAY_MODEL)
-    if rays.kinds[i] == GRAZE:
-        return float((d - theta[OUTLINE]) / sigma)
-    if rays.kinds[i] == PASS:
-        return float(min(d, 0.0) * rays.gain[i] / sigma)
-    return float(max(d, 0.0) / sigma)
 
 
 @compiled
 def _free(code: IntArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
     p = seen.free[i]
     return float(inside_depth(code, q, p[0], p[1], p[2]) / FREE_SIGMA)
+
+
+@compiled
+def _supposed(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
+    """A place on the support is supposed where the camera sees it, and is off by what the camera is."""
+    p = seen.supposed[i]
+    x, y, z = (
+        p[0] + theta[CAMERA_RIGHT] * seen.supposed_right[0] + theta[CAMERA_DOWN] * seen.supposed_down[0],
+        p[1] + theta[CAMERA_RIGHT] * seen.supposed_right[1] + theta[CAMERA_DOWN] * seen.supposed_down[1],
+        p[2] + theta[CAMERA_RIGHT] * seen.supposed_right[2] + theta[CAMERA_DOWN] * seen.supposed_down[2],
+    )
+    return float(distance(code, q, False, x, y, z) / SUPPOSED_SIGMA)
 
 
 @compiled
@@ -146,23 +147,37 @@ def _weigh(row: int, worth: float, out: Rows) -> float:
 
 
 @compiled
+def hold_rays(
+    code: IntArray, theta: FloatArray, seen: FamilyEvidence, active: IntArray, out: Rows, q: FloatArray
+) -> None:
+    """Fill in where rays are held, ``out.held``, of those that are active."""
+    prepare(code, theta, q)
+    first, rays = contact_row_count(seen) + len(seen.free), seen.rays
+    origin, towards = np.empty(3), np.empty(3)
+    ray_origin(theta, rays, origin)
+    for row in active:
+        i = row - first
+        if 0 <= i < len(rays.kinds):
+            turned_ray(theta, rays, i, towards)
+            hold_ray(code, q, origin, towards, out.along[i], rays.step, out.held[i])
+
+
+@compiled
 def frozen(
     code: IntArray,
     theta: FloatArray,
     seen: FamilyEvidence,
     active: IntArray,
-    along: FloatArray,
+    held: FloatArray,
     q: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill in the residuals of some rows with the rays' nearest places held: what derivatives are taken of.
-
-    A ray's least distance changes as that at its nearest place does (the envelope theorem).
-    """
+    """Fill in the residuals of some rows with rays held in place: what derivatives are taken of."""
     prepare(code, theta, q)
     n, k = len(seen.points), len(seen.free)
     clear, first, rays = n + 3 * len(seen.middles), contact_row_count(seen), seen.rays
-    towards, triple, last = np.empty(3), np.empty(3), -1
+    towards, origin, triple, last = np.empty(3), np.empty(3), np.empty(3), -1
+    ray_origin(theta, rays, origin)
     off = np.empty(0)
     for row in range(len(active)):
         i = active[row]
@@ -180,28 +195,24 @@ def frozen(
             out[row] = clear_row(code, theta, seen, q, off, i - clear)
         elif i < first + k:
             out[row] = _free(code, seen, q, i - first)
+        elif i >= _first_supposed(seen):
+            out[row] = _supposed(code, theta, seen, q, i - _first_supposed(seen))
         else:
             i -= first + k
-            _turned_ray(theta, seen, i, towards)
-            t = along[i]
-            x, y, z = (
-                rays.eye[0] + theta[CAMERA_RIGHT] * rays.right[0] + theta[CAMERA_DOWN] * rays.down[0],
-                rays.eye[1] + theta[CAMERA_RIGHT] * rays.right[1] + theta[CAMERA_DOWN] * rays.down[1],
-                rays.eye[2] + theta[CAMERA_RIGHT] * rays.right[2] + theta[CAMERA_DOWN] * rays.down[2],
-            )
-            d = distance(code, q, True, x + t * towards[0], y + t * towards[1], z + t * towards[2])
-            out[row] = _sighted(theta, seen, i, d)
+            turned_ray(theta, rays, i, towards)
+            d = held_distance(code, q, origin, towards, held[i])
+            out[row] = sighted(theta, rays, i, d)
 
 
 @compiled
 def active_rows(seen: FamilyEvidence, values: FloatArray) -> IntArray:
     """Rows that pull: all of points, normals and grazing rays, and of the others those that are violated."""
-    first = len(seen.points) + 3 * len(seen.middles)
+    first, end = len(seen.points) + 3 * len(seen.middles), _first_supposed(seen)
     rays = contact_row_count(seen) + len(seen.free)
     found = np.empty(len(values), np.int64)
     count = 0
     for i in range(len(values)):
-        if i < first or values[i] != 0.0 or (i >= rays and seen.rays.kinds[i - rays] == GRAZE):
+        if i < first or values[i] != 0.0 or (rays <= i < end and seen.rays.kinds[i - rays] == GRAZE):
             found[count] = i
             count += 1
     return found[:count]
@@ -211,7 +222,8 @@ def active_rows(seen: FamilyEvidence, values: FloatArray) -> IntArray:
 def rows_for(seen: FamilyEvidence) -> Rows:
     """Room for the rows of some readings."""
     count = row_count(seen)
-    return Rows(np.zeros(count), np.zeros(count), np.zeros(len(seen.rays.kinds)))
+    rays = len(seen.rays.kinds)
+    return Rows(np.zeros(count), np.zeros(count), np.zeros(rays), np.zeros((rays, 3)))
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 
@@ -17,7 +17,7 @@ from experiments.shape_reconstruction.pcn.graph_values import completed_places, 
 from experiments.shape_reconstruction.pcn.interpolated import interpolated
 from experiments.shape_reconstruction.pcn.point_frame import GIVEN
 from experiments.shape_reconstruction.pcn.window import SIDE, SPAN, UNTOUCHED, Turned, window_of
-from harness.basics.arrays import FloatArray
+from harness.basics.arrays import FloatArray, read_only
 from harness.basics.clock import now
 from harness.basics.errors import FitRefused
 from harness.objectfile.runtime import Network
@@ -75,6 +75,15 @@ def by_glance(evidence: ShapeEvidence) -> PointEstimate:
     began = now()
     points = shipped().points(silhouette_to_glance_at(evidence).look)
     return PointEstimate(interpolated(points), now() - began, {"estimator": "glance"})
+
+
+def with_supposed(evidence: ShapeEvidence) -> ShapeEvidence:
+    """The same, with the places that a glance supposes; as it was where the network may not answer."""
+    try:
+        points = shipped().points(silhouette_to_glance_at(evidence).look)
+    except FitRefused:
+        return evidence
+    return replace(evidence, supposed=read_only(points))
 
 
 def silhouette_to_glance_at(evidence: ShapeEvidence) -> Silhouette:

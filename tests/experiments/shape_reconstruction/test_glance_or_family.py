@@ -1,4 +1,4 @@
-"""A glance beside a household shape: it is the answer where it is surer by far, and says so."""
+"""A glance until something is touched; then household shapes, but where they are nowhere near it."""
 
 from dataclasses import replace
 
@@ -8,10 +8,13 @@ import pytest
 from experiments.shape_reconstruction import glance_or_family
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import FamilySettings
-from experiments.shape_reconstruction.family_or_smooth import ENOUGH
-from experiments.shape_reconstruction.glance_or_family import SPREAD, by_glance_or_family
+from experiments.shape_reconstruction.family_or_smooth import ENOUGH, by_family
+from experiments.shape_reconstruction.glance_or_family import ALOOF, by_glance_or_family
+from experiments.shape_reconstruction.pcn.glance import by_glance, shipped, with_supposed
 from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
 from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.faces.nearest_surface import NearestSurface
+from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, look_at, presses
 
@@ -23,40 +26,59 @@ def readings() -> ShapeEvidence:
 
 
 @pytest.mark.parametrize(
-    ("contacts", "sighted", "times", "glanced"),
+    ("contacts", "sighted", "aloof", "glanced"),
     [
-        (0, True, 0.5, True),
-        (1, True, 0.5, False),
-        (1, True, 0.9 / SPREAD, False),
-        (1, True, 1.1 / SPREAD, True),  # a household shape that is not sure of its depth
-        (ENOUGH - 1, True, 1.1 / SPREAD, True),
-        (ENOUGH, True, 1.1 / SPREAD, False),  # so many contacts are heeded whatever they leave open
-        (1, False, 1.1 / SPREAD, False),  # there is no picture to glance at
+        (0, True, False, True),
+        (1, True, False, False),
+        (1, True, True, True),  # a household shape that has nothing to do with what a glance supposes
+        (ENOUGH - 1, True, True, True),
+        (ENOUGH, True, True, False),  # so many contacts are heeded whatever they say
+        (1, False, True, False),  # there is no picture to glance at
     ],
 )
-def test_a_glance_that_is_surer_by_far_is_the_answer(
+def test_a_household_shape_nowhere_near_a_glance_does_not_count_beside_few_contacts(
     readings: ShapeEvidence,
     monkeypatch: pytest.MonkeyPatch,
     contacts: int,
     sighted: bool,
-    times: float,
+    aloof: bool,
     glanced: bool,
 ) -> None:
     part = replace(readings, touches=readings.touches[:contacts], look=readings.look if sighted else None)
     glance = by_glanced_surface(readings)
 
     def household(_: ShapeEvidence, __: FamilySettings | None) -> ShapeEstimate:
-        """As sure as a glance by so many times, and ten seconds long."""
+        """That of the glance, or moved up by twice what is allowed, and ten seconds long."""
+        up = np.array([0.0, 0.0, 2.0 * ALOOF * shipped().held_out if aloof else 0.0])
+        mesh = Mesh(glance.mesh.vertices + up, glance.mesh.faces)
         details: dict[str, object] = {"estimator": "household"}
-        return replace(
-            glance, deviation=times * glance.deviation, doubtful={1: 0.004}, seconds=10.0, details=details
-        )
+        return replace(glance, mesh=mesh, doubtful={1: 0.004}, seconds=10.0, details=details)
 
     monkeypatch.setattr(glance_or_family, "by_family", household)
     found = by_glance_or_family(part)
     assert (found.details["estimator"] == "glance") is glanced
     if glanced and contacts:
-        assert f"by {contacts} contacts are less sure" in found.flags[-1]
+        assert f"by {contacts} contacts is nowhere near a glance" in found.flags[-1]
         assert found.doubtful == {1: 0.004}  # what was told of contacts is kept
         assert found.seconds > 10.0
         np.testing.assert_array_equal(found.mesh.vertices, glance.mesh.vertices)
+
+
+def test_beside_few_contacts_a_household_shape_is_held_against_a_glance(
+    readings: ShapeEvidence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = replace(readings, touches=readings.touches[:1])
+    points = by_glance(one).points
+
+    def apart() -> float:
+        return float(NearestSurface(by_family(one).mesh).distances(points).mean())
+
+    near = apart()
+    monkeypatch.setattr("experiments.shape_reconstruction.family_or_smooth.with_supposed", lambda seen: seen)
+    assert near < 0.8 * apart()
+
+
+def test_what_is_supposed_is_a_glance_s_points_and_nothing_without_a_picture(readings: ShapeEvidence) -> None:
+    supposed = with_supposed(readings).supposed
+    np.testing.assert_array_equal(supposed, shipped().points(readings.look))  # type: ignore[arg-type]
+    assert len(with_supposed(replace(readings, look=None)).supposed) == 0

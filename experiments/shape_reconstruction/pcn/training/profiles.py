@@ -30,6 +30,7 @@ PROFILES = MappingProxyType(
             "completion": CompletionProfile(520, 6, 1600),
             "glance": CompletionProfile(2000, 6, 3000, 24, 512),
         },
+        "long": {"glance": CompletionProfile(12000, 6, 24000, 96, 768)},
     }
 )
 """Of the networks that ship: by touch, and by a glance."""

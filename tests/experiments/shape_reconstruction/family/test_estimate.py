@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.contacts_fit import ContactFit
+from experiments.shape_reconstruction.family.contacts.fit import ContactFit
 from experiments.shape_reconstruction.family.estimate import (
     BLIND,
     LOOSE,

@@ -8,10 +8,9 @@ import pytest
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import SOLID, FamilyShape, draw_shape, rarity
-from experiments.shape_reconstruction.family.contact_rows import contact_row_count
-from experiments.shape_reconstruction.family.contacts_fit import contact_fit
+from experiments.shape_reconstruction.family.contacts.fit import contact_fit
+from experiments.shape_reconstruction.family.contacts.rows import contact_row_count
 from experiments.shape_reconstruction.family.distance import distances
-from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
 from experiments.shape_reconstruction.family.posterior import mixture_of
@@ -22,28 +21,22 @@ from experiments.shape_reconstruction.family.residuals import (
     active_rows,
     evaluate,
     frozen,
+    hold_rays,
     prepared_room,
+    row_count,
     rows_for,
 )
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family.sight import PASS
 from harness.basics.arrays import FloatArray
-from harness.basics.faces.isosurface import isosurface
 from harness.basics.geometry import apply, transform, translation
-from harness.basics.mesh import Mesh
+from tests.support.family_shapes import surface_of
 from tests.support.shape_readings import look_at, missed, shape_readings, touches_on
 
 pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
 
 SHAPES = ("mug", "bowl", "tray", "bottle", "spanner")
-
-
-def surface_of(shape: FamilyShape, pitch: float = 1.5e-3) -> Mesh:
-    corners = corners_of(shape)
-    low, high = corners.min(axis=0) - 3e-3, corners.max(axis=0) + 3e-3
-    counts = np.ceil((high - low) / pitch).astype(np.int64) + 1
-    return isosurface(grid_distances(shape, low, pitch, counts), low, pitch)
 
 
 def made(name: str) -> tuple[FamilyShape, ShapeEvidence]:
@@ -86,22 +79,27 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     shape, evidence = made(name)
     # Places said to be clear that lie in the shape, some of them, pull too.
     touches = tuple(replace(one, clear=one.points - 6e-3 * one.normals) for one in evidence.touches)
-    seen = observe(replace(evidence, touches=touches))
+    supposed = np.concatenate([one.points + 2e-3 for one in touches])
+    seen = observe(replace(evidence, touches=touches, supposed=supposed))
     theta = nudged(shape, 0.05)
     out, q = rows_for(seen), prepared_room()
     evaluate(shape.code, theta, seen, False, out, q)
     rows = active_rows(seen, out.values)
     base, moved = np.empty(len(rows)), np.empty(len(rows))
-    frozen(shape.code, theta, seen, rows, out.along, q, base)
+    hold_rays(shape.code, theta, seen, rows, out, q)
+    frozen(shape.code, theta, seen, rows, out.held, q, base)
     np.testing.assert_allclose(base, out.values[rows], atol=1e-9)
     direction = np.zeros(layout.SIZE)
     direction[layout.X] = 0.5e-3  # far beyond what a ray searched anew may be off
-    frozen(shape.code, theta + direction, seen, rows, out.along, q, moved)
+    frozen(shape.code, theta + direction, seen, rows, out.held, q, moved)
     again = rows_for(seen)
     evaluate(shape.code, theta + direction, seen, False, again, q)
-    contacts = rows < contact_row_count(seen)
+    contacts, count = rows < contact_row_count(seen), len(seen.supposed)
     assert (rows[contacts] >= len(seen.points) + 3 * len(seen.middles)).any()
     assert np.array_equal(again.values[rows][contacts], moved[contacts])
+    assert 0 < count == np.sum(rows >= row_count(seen) - count)
+    assert np.array_equal(again.values[-count:], moved[-count:])
+    rows, contacts, base, moved = rows[:-count], contacts[:-count], base[:-count], moved[:-count]
     # Along a flat side a ray's nearest place jumps as the shape moves: held there, it is off by that.
     true, held = again.values[rows] - base, moved - base
     assert true @ held > 0.5 * np.linalg.norm(true) * np.linalg.norm(held)

@@ -7,7 +7,7 @@ import numpy as np
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
-from experiments.shape_reconstruction.family.contact_rows import SLIPPED, contact_sums
+from experiments.shape_reconstruction.family.contacts.rows import SLIPPED, contact_sums
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
 from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for

@@ -1,0 +1,123 @@
+"""A ray of sight's row: how near it passes to a shape, and where it is held as derivatives are taken.
+
+A ray's least distance changes as that at its nearest place does (the envelope theorem). Where that place is
+at an edge, distances on both sides of it change otherwise, and the least one as their mean that has no slope
+along the ray (Danskin's theorem): by one side alone a plate would seem pinned along the line of sight.
+"""
+
+import numpy as np
+
+from experiments.shape_reconstruction.family.distance import distance
+from experiments.shape_reconstruction.family.layout import (
+    CAMERA_DOWN,
+    CAMERA_RIGHT,
+    CAMERA_SCALE,
+    OUTLINE,
+)
+from experiments.shape_reconstruction.family.sight import GRAZE, PASS, SightRays
+from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.compiled import compiled
+
+RAY_MODEL = 0.5e-3
+"""M by which the outline of the nearest shape is off a real one."""
+
+PIXELS = 0.5
+"""Of an outline's deviation: one standard deviation of where a mask ends."""
+
+_GOLDEN, _SECTIONS = 0.6180339887498949, 9
+"""Of a part of a ray, what is kept of it at each section, and sections: of 5 mm, 0.04 mm are left."""
+
+_SIDE, _LEVEL = 0.15e-3, 0.05
+"""M to both sides of a ray's nearest place where slopes are looked at, and slopes from which on it is at an
+edge."""
+
+
+@compiled
+def ray_origin(theta: FloatArray, rays: SightRays, origin: FloatArray) -> None:
+    """Fill in where rays begin, were the camera off by what the shape's vector says."""
+    for a in range(3):
+        origin[a] = rays.eye[a] + theta[CAMERA_RIGHT] * rays.right[a] + theta[CAMERA_DOWN] * rays.down[a]
+
+
+@compiled
+def turned_ray(theta: FloatArray, rays: SightRays, i: int, towards: FloatArray) -> None:
+    """Fill in a ray's direction, were the picture's scale off by what the shape's vector says."""
+    scale = theta[CAMERA_SCALE]
+    for a in range(3):
+        towards[a] = rays.directions[i, a] + scale * (rays.directions[i, a] - rays.middle[a])
+
+
+@compiled
+def sighted(theta: FloatArray, rays: SightRays, i: int, d: float) -> float:
+    """A ray's residual where it passes the shape at ``d`` m."""
+    sigma = np.hypot(PIXELS * rays.pixel, RAY_MODEL)
+    if rays.kinds[i] == GRAZE:
+        return float((d - theta[OUTLINE]) / sigma)
+    if rays.kinds[i] == PASS:
+        return float(min(d, 0.0) * rays.gain[i] / sigma)
+    return float(max(d, 0.0) / sigma)
+
+
+@compiled
+def hold_ray(
+    code: IntArray,
+    q: FloatArray,
+    origin: FloatArray,
+    towards: FloatArray,
+    near: float,
+    step: float,
+    held: FloatArray,
+) -> None:
+    """Fill in two places on a ray, m along it, and the share of the second: where it is held.
+
+    Args:
+        code: of the shape.
+        q: its prepared numbers.
+        origin: ``(3,)`` m.
+        towards: ``(3,)``.
+        near: m along it, of the place of least distance so far.
+        step: m by which that may be off.
+        held: ``(3,)`` to fill in; the places are one where the distance has no edge there.
+    """
+    t = _least_on_ray(code, q, origin, towards, near - step, near + step)
+    here = _on_ray(code, q, origin, towards, t)
+    falls = here - _on_ray(code, q, origin, towards, t - _SIDE)
+    rises = _on_ray(code, q, origin, towards, t + _SIDE) - here
+    edge = max(abs(rises), abs(falls)) > _LEVEL * _SIDE and rises > falls
+    aside = _SIDE if edge else 0.0
+    held[0], held[1] = t - aside, t + aside
+    held[2] = min(max(-falls / (rises - falls), 0.0), 1.0) if edge else 0.0
+
+
+@compiled
+def held_distance(
+    code: IntArray, q: FloatArray, origin: FloatArray, towards: FloatArray, held: FloatArray
+) -> float:
+    """M from a shape at a held ray's places, their mean by its share."""
+    d = (1.0 - held[2]) * _on_ray(code, q, origin, towards, held[0])
+    return float(d + held[2] * _on_ray(code, q, origin, towards, held[1]) if held[2] > 0.0 else d)
+
+
+@compiled
+def _on_ray(code: IntArray, q: FloatArray, origin: FloatArray, towards: FloatArray, t: float) -> float:
+    x, y, z = origin[0] + t * towards[0], origin[1] + t * towards[1], origin[2] + t * towards[2]
+    return float(distance(code, q, True, x, y, z))
+
+
+@compiled
+def _least_on_ray(
+    code: IntArray, q: FloatArray, origin: FloatArray, towards: FloatArray, low: float, high: float
+) -> float:
+    """Where between two places on a ray the distance is least, by golden sections."""
+    a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    at_a, at_b = _on_ray(code, q, origin, towards, a), _on_ray(code, q, origin, towards, b)
+    for _ in range(_SECTIONS):
+        if at_a < at_b:
+            high, b, at_b = b, a, at_a
+            a = high - _GOLDEN * (high - low)
+            at_a = _on_ray(code, q, origin, towards, a)
+        else:
+            low, a, at_a = a, b, at_b
+            b = low + _GOLDEN * (high - low)
+            at_b = _on_ray(code, q, origin, towards, b)
+    return 0.5 * (low + high)
