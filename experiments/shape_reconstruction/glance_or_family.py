@@ -13,8 +13,8 @@ from harness.basics.faces.nearest_surface import NearestSurface
 
 ALOOF = 3.0
 """Of what a glance is off on shapes held out, the mean distance of its points from a household shape by few
-contacts above which that is not believed. On 32 answers by one or two contacts of 16 development runs a glance
-was 6.3 mm off in the mean and 10.6 at most, the household shape 4.2, and once 24."""
+contacts above which that is not believed. On 32 answers by one or two contacts of 16 development runs a
+glance was 6.3 mm off in the mean and 10.6 at most, the household shape 4.2, and once 24."""
 
 
 def by_glance_or_family(evidence: ShapeEvidence, settings: FamilySettings | None = None) -> ShapeEstimate:

@@ -77,6 +77,14 @@ def _fields(shapes: list[FamilyShape], low: FloatArray, high: FloatArray, cell: 
 
 
 def _thickness(shape: FamilyShape) -> float:
+    """M of the shortest side of a body's own box; of a hollow one, of wall or floor where that is thinner."""
+    q = np.empty(PREPARED)
+    prepare(shape.code, shape.theta, q)
+    shortest = float((q[BOX + 3 : BOX + 6] - q[BOX : BOX + 3]).min())
+    return min(shortest, _wall(shape))
+
+
+def _wall(shape: FamilyShape) -> float:
     """M of a hollow body's wall and floor, the thinner; infinite of any other, which has none."""
     if shape.code[KIND] != TURNED or not shape.code[HOLLOW]:
         return np.inf
@@ -85,7 +93,7 @@ def _thickness(shape: FamilyShape) -> float:
 
 def _thickened(shape: FamilyShape, least: float) -> FamilyShape:
     """The same, its wall and floor at least so many m thick; its outside as it was."""
-    if _thickness(shape) >= least:
+    if _wall(shape) >= least:
         return shape
     theta = shape.theta.copy()
     theta[[WALL, FLOOR]] = np.maximum(theta[[WALL, FLOOR]], np.log(least))

@@ -33,7 +33,7 @@ def estimate_of(*shapes: FamilyShape, weights: tuple[float, ...] = ()) -> ShapeE
     mesh = build("mug")
     stated = [
         {"class": one.name, "weight": weight, "code": one.code.tolist(), "numbers": one.theta.tolist()}
-        for one, weight in zip(shapes, weights or [1.0 / len(shapes)] * len(shapes), strict=True)
+        for one, weight in zip(shapes, weights or [1.0 / max(len(shapes), 1)] * len(shapes), strict=True)
     ]
     nothing = np.zeros(len(mesh.vertices))
     known = np.zeros(len(mesh.vertices), np.int64)
@@ -91,11 +91,11 @@ def test_a_shape_listed_twice_counts_as_once_with_both_weights() -> None:
 
 def test_what_lies_farther_apart_is_told_apart_more_surely() -> None:
     shares = []
-    for by in (4e-3, 6e-3, 12e-3):
+    for by in (6e-3, 8e-3, 16e-3):
         two = shape_at(0.0), shape_at(by)
         shares.append(spared(*two)[0] / (0.5 * distances_apart(two)[0, 1]))
     assert shares == sorted(shares)
-    assert shares[0] < 0.99 < shares[-1]
+    assert shares[0] < 0.9999 < shares[-1]
 
 
 def test_what_matters_little_to_the_surface_is_worth_little() -> None:
@@ -120,7 +120,7 @@ def test_the_gel_is_as_wide_as_it_is() -> None:
     assert found[0] > 1e-3
 
 
-@pytest.mark.parametrize("name", ["mug", "bowl", "spanner", "tray", "jug", "banana"])
+@pytest.mark.parametrize("name", ["mug", "bowl", "spanner", "tray", "jug", "bent body"])
 def test_lines_meet_a_shape_where_its_surface_is(name: str) -> None:
     random = np.random.default_rng(4)
     shape = draw_shape(name, random)

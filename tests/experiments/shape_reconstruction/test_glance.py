@@ -85,11 +85,13 @@ def test_without_a_silhouette_there_is_no_glance() -> None:
 
 
 def test_the_card_says_what_was_held_out() -> None:
-    held = shipped().card["held_out"]
+    held, fitted = shipped().card["held_out"], shipped().card["fitted"]
     assert isinstance(held, dict)
+    assert isinstance(fitted, dict)
     assert held["sets"] > 200
     assert shipped().held_out < 0.01
-    assert shipped().card["profile"] == "standard"
+    assert shipped().card["profile"] == "long"
+    assert shipped().held_out < 1.3 * fitted["mean_chamfer_points_m"]  # it has not learnt by heart
     with pytest.raises(DataRefused, match="train it again"):
         replace(shipped(), card={}).held_out  # noqa: B018 - it is computed
 

@@ -74,6 +74,18 @@ def test_bodies_that_lie_apart_are_answered_by_the_likeliest() -> None:
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.parametrize("thick", [2.0e-3, 3.0e-3])
+def test_a_thin_board_is_whole_however_it_is_turned_on_the_grid(thick: float) -> None:
+    for yaw in (0.0, 0.02, 0.5):
+        board = board_at(0.0, thick)
+        board.theta[layout.YAW], board.theta[layout.TILT_X] = yaw, 0.01
+        mesh = surface_of(board, 4e-3)
+        assert holes_and_pieces(mesh) == 2
+        corners = corners_of(board)
+        assert np.ptp(mesh.bounds, axis=0) == pytest.approx(np.ptp(corners, axis=0), abs=4e-3)
+
+
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("thick", [0.05e-3, 0.4e-3, 1.5e-3])
 def test_a_body_thinner_than_the_grid_has_a_surface(thick: float) -> None:
     assert volume(surface_of(board_at(0.0, thick), 4e-3)) > 0.0

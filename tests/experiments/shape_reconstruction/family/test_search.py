@@ -88,7 +88,11 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     base, moved = np.empty(len(rows)), np.empty(len(rows))
     hold_rays(shape.code, theta, seen, rows, out, q)
     frozen(shape.code, theta, seen, rows, out.held, q, base)
-    np.testing.assert_allclose(base, out.values[rows], atol=1e-9)
+    first = contact_row_count(seen) + len(seen.free)
+    seen_by_rays = (rows >= first) & (rows < first + len(seen.rays.kinds))
+    np.testing.assert_allclose(base[~seen_by_rays], out.values[rows][~seen_by_rays], atol=1e-9)
+    # A ray is held where it is nearest, which is found to half a step as costs are computed.
+    assert np.all(base[seen_by_rays] < out.values[rows][seen_by_rays] + 0.15)
     direction = np.zeros(layout.SIZE)
     direction[layout.X] = 0.5e-3  # far beyond what a ray searched anew may be off
     frozen(shape.code, theta + direction, seen, rows, out.held, q, moved)
@@ -101,7 +105,7 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     assert np.array_equal(again.values[-count:], moved[-count:])
     rows, contacts, base, moved = rows[:-count], contacts[:-count], base[:-count], moved[:-count]
     # Along a flat side a ray's nearest place jumps as the shape moves: held there, it is off by that.
-    true, held = again.values[rows] - base, moved - base
+    true, held = again.values[rows] - out.values[rows], moved - base
     assert true @ held > 0.5 * np.linalg.norm(true) * np.linalg.norm(held)
     assert np.linalg.norm(held) == pytest.approx(np.linalg.norm(true), rel=0.2)
 
@@ -235,9 +239,8 @@ def test_looking_beside_the_best_finds_better_and_loses_nothing_that_was_likely(
             FamilySearch(readings, replace(LEVELS["coarse"], hops=hops)).found() for hops in (0, 2)
         )
         assert with_hops[0].cost < without[0].cost + 1e-3
-        assert {one.shape.code.tobytes() for one in without} <= {
-            one.shape.code.tobytes() for one in with_hops
-        }
+        likely = {one.shape.code.tobytes() for one in without[: LEVELS["coarse"].finals - 1]}
+        assert likely <= {one.shape.code.tobytes() for one in with_hops}
         gained += without[0].cost - with_hops[0].cost
     assert gained > 0.1
 
