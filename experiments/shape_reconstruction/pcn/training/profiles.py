@@ -33,7 +33,7 @@ PROFILES = MappingProxyType(
         "long": {"glance": CompletionProfile(12000, 6, 24000, 96, 768)},
     }
 )
-"""Of the networks that ship: by touch, and by a glance."""
+"""Of the networks that ship: by touch, and by a glance; that of the latter is ``long``."""
 PAPER_PROFILES = MappingProxyType(
     {"paper-smoke": CompletionProfile(26, 1, 2, 4), "paper": CompletionProfile(2600, 8, 6000, 32, 4096)}
 )
