@@ -82,7 +82,7 @@ def _searched(evidence: ShapeEvidence, settings: FamilySettings) -> ShapeEstimat
 
     What one search misses another finds. Of what fits well the least cost is taken, of what fits ill that
     whose contacts fit best, as a cost that lets contacts go is low for a shape that lets most of them go: a
-    bent body for a teapot, 7 to 12 mm off in three of four first searches, and twice cheaper than two teapots.
+    bent body for a teapot, 7 to 12 mm off in three of four first searches, and twice cheaper than two others.
     """
     best = family_estimate(evidence, settings)
     seconds = best.seconds

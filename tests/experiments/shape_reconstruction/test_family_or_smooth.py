@@ -144,7 +144,7 @@ def test_of_ill_fits_that_whose_contacts_fit_best_is_taken_and_of_good_ones_the_
     made: int,
     taken: int,
 ) -> None:
-    """Numbers below zero, here, are costs of what fits well; others say how ill contacts fit, at less cost."""
+    """Below zero, here, are costs of what fits well; others say how ill contacts fit, at less cost."""
     part = replace(readings, touches=readings.touches[:contacts])
     by_rbf, seeds = by_hermite(part, symmetric=False), list[int]()
 
