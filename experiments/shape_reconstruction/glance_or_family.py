@@ -5,10 +5,9 @@ from dataclasses import replace
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.family_or_smooth import ENOUGH, by_family
-from experiments.shape_reconstruction.pcn.glance import shipped, silhouette_to_glance_at
+from experiments.shape_reconstruction.pcn.glance import shipped, with_supposed
 from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from harness.basics.errors import FitRefused
 from harness.basics.faces.nearest_surface import NearestSurface
 
 ALOOF = 3.0
@@ -31,18 +30,16 @@ def by_glance_or_family(evidence: ShapeEvidence, settings: FamilySettings | None
     Raises:
         OutOfDomain: nothing was touched or seen.
     """
-    if not evidence.sighted or len(evidence.contacts) >= ENOUGH:
-        return by_family(evidence, settings)
-    try:
-        glanced = by_glanced_surface(evidence)
-    except FitRefused:
-        return by_family(evidence, settings)  # of the family's shapes one may still have this outline
+    few = len(evidence.contacts) < ENOUGH
+    evidence = with_supposed(evidence) if few else evidence
+    if not few or not len(evidence.supposed):
+        return by_family(evidence, settings)  # of its shapes one may still have this outline
     if not evidence.contacts:
-        return glanced
+        return by_glanced_surface(evidence)
     found = by_family(evidence, settings)
-    if _apart(found, evidence) <= ALOOF * shipped().held_out:
+    if NearestSurface(found.mesh).distances(evidence.supposed).mean() <= ALOOF * shipped().held_out:
         return found
-    count = len(evidence.contacts)
+    glanced, count = by_glanced_surface(evidence), len(evidence.contacts)
     said = f"the household shape by {count} contacts is nowhere near a glance: it does not count"
     return replace(
         glanced,
@@ -50,9 +47,3 @@ def by_glance_or_family(evidence: ShapeEvidence, settings: FamilySettings | None
         flags=(*glanced.flags, said),
         seconds=glanced.seconds + found.seconds,
     )
-
-
-def _apart(found: ShapeEstimate, evidence: ShapeEvidence) -> float:
-    """M in the mean from the points of a glance to an answer."""
-    points = shipped().points(silhouette_to_glance_at(evidence).look)
-    return float(NearestSurface(found.mesh).distances(points).mean())

@@ -19,8 +19,8 @@ class ShapeRun(Section):
     Attributes:
         presses: how many guarded ways of the gel; those that meet nothing count.
         choose: where they lead. ``"random"``: anywhere into the space that the object may take.
-            ``"farthest"``: far from what was touched and passed so far. ``"active"``: where the estimates of
-            the shape differ most. ``"planned"``: to places drawn on the object's mesh, as a benchmark of
+            ``"farthest"``: far from what was touched and passed so far. ``"active"``: where a press
+            should spare most error. ``"planned"``: to places drawn on the object's mesh, as a benchmark of
             touches anywhere; the object is then no unknown one to the arm.
         depth: m, from and to: how far to press on after the first touch, uniform.
         tilt: rad, the greatest angle of the tool from the surface's normal, of ``"planned"`` ways.

@@ -78,7 +78,9 @@ def by_glance(evidence: ShapeEvidence) -> PointEstimate:
 
 
 def with_supposed(evidence: ShapeEvidence) -> ShapeEvidence:
-    """The same, with the places that a glance supposes; as it was where the network may not answer."""
+    """The same, with the places that a glance supposes; as it was where it has them, or none may be given."""
+    if len(evidence.supposed):
+        return evidence
     try:
         points = shipped().points(silhouette_to_glance_at(evidence).look)
     except FitRefused:
