@@ -18,7 +18,13 @@ from experiments.shape_reconstruction.family.contacts.rows import (
     weigh_contacts,
 )
 from experiments.shape_reconstruction.family.distance import PREPARED, ball, distance, inside_depth, prepare
-from experiments.shape_reconstruction.family.layout import CAMERA_DOWN, CAMERA_RIGHT
+from experiments.shape_reconstruction.family.layout import (
+    CAMERA_DOWN,
+    CAMERA_RIGHT,
+    GEL,
+    OUTLINE,
+    POSE_END,
+)
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
 from experiments.shape_reconstruction.family.ray_depth import nearest_along
 from experiments.shape_reconstruction.family.ray_rows import (
@@ -40,6 +46,10 @@ SUPPOSED_SIGMA = 5.0e-3
 
 _BEND = 3.0
 """Standard deviations beyond which a ray, a free or a supposed place costs in proportion, not its square."""
+
+
+ALL, OF_TOUCH, OF_SIGHT = 0, 1, 2
+"""Rows: of every reading, of contacts, and of rays and of what is supposed by the picture."""
 
 
 class Rows(NamedTuple):
@@ -169,10 +179,22 @@ def frozen(
     seen: FamilyEvidence,
     active: IntArray,
     held: FloatArray,
+    which: int,
     q: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill in the residuals of some rows with rays held in place: what derivatives are taken of."""
+    """Fill in the residuals of some rows with rays held in place: what derivatives are taken of.
+
+    Args:
+        code: of the shape.
+        theta: ``(SIZE,)``.
+        seen: readings.
+        active: rows, ascending.
+        held: of all rays, as ``hold_rays`` leaves it.
+        which: of those rows ``ALL`` are filled in, or only ``OF_TOUCH`` or ``OF_SIGHT``.
+        q: room.
+        out: ``(active,)``.
+    """
     prepare(code, theta, q)
     n, k = len(seen.points), len(seen.free)
     clear, first, rays = n + 3 * len(seen.middles), contact_row_count(seen), seen.rays
@@ -181,6 +203,8 @@ def frozen(
     off = np.empty(0)
     for row in range(len(active)):
         i = active[row]
+        if (which == OF_SIGHT and i < first + k) or (which == OF_TOUCH and i >= first):
+            continue
         if i < n:
             out[row] = point_row(code, theta, seen, q, i)
         elif i < clear:
@@ -202,6 +226,23 @@ def frozen(
             turned_ray(theta, rays, i, towards)
             d = held_distance(code, q, origin, towards, held[i])
             out[row] = sighted(theta, rays, i, d)
+
+
+@compiled
+def moved_rows(direction: FloatArray) -> int:
+    """Which rows a ``(SIZE,)`` direction changes: the camera's errors move no contact, the gel's no ray."""
+    camera, gel, others = False, False, False
+    for i in range(len(direction)):
+        if direction[i] != 0.0:
+            if CAMERA_RIGHT <= i <= OUTLINE:
+                camera = True
+            elif GEL <= i < POSE_END:
+                gel = True
+            else:
+                others = True
+    if others or (camera and gel):
+        return ALL
+    return OF_SIGHT if camera else OF_TOUCH
 
 
 @compiled
