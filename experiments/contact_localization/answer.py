@@ -135,6 +135,17 @@ class ContactAnswering:
         refused_pictures = readings.refused_pictures
         return Answer(seen, heights, self.model, self.prior, last, seconds, sense, others, refused_pictures)
 
+    def so_far(self) -> Estimate:
+        """The estimate by the contacts read so far, which is not judged: more are to come.
+
+        Raises:
+            WrongUse: no contact was read; or none was struck, and an answer by sound alone was asked for.
+            FitRefused: no place on this object explains the readings, or no picture of them may be used.
+        """
+        readings = self.readings
+        struck = any(seen.strike is not None for seen in readings.observations)
+        return self._located(self._sense_of(readings, struck), readings, None, judged=False)[-1]
+
     def _sense_of(self, readings: Readings, struck: bool) -> Senses:
         """What the answer is by."""
         wanted = self._accuracy.of(SENSES)

@@ -10,6 +10,7 @@ from experiments.contact_localization.accuracy.paper import PAPER_CM
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
 from experiments.contact_localization.accuracy.table_cell import HEARD, METHODS, run_cell
 from experiments.contact_localization.answer import ContactAnswering
+from experiments.contact_localization.choosing.next_contact import ChosenContacts
 from experiments.contact_localization.lines import answer_lines
 from experiments.contact_localization.plan import plan
 from experiments.contact_localization.report.comparison import GIVES, sources
@@ -17,20 +18,25 @@ from experiments.contact_localization.report.report import write
 from experiments.contact_localization.report.result import result_of
 from experiments.contact_localization.section import Localization
 from harness.bench.scene import SceneFile
+from harness.bench.station import Bench
 from harness.effects.accuracy import Setting
 from harness.effects.file_levels import networks_of
 from harness.effects.scene_object import named_file
 from harness.experiment.experiment import Experiment, Helpers, MeasuredCondition, Measurement
 from harness.objectfile.entries import Modality
 from harness.recording.run_folder import RunFiles
+from harness.recording.session import StepPerformer
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 
 PLAN_KEY = "contacts"
 
 
-def _performer(_run: RunFiles, helpers: Helpers) -> PressPerformer:
-    return PressPerformer(partial(way_between, helpers.twin), ask=helpers.ask, plan_key=PLAN_KEY)
+def _performer(run: RunFiles, helpers: Helpers) -> StepPerformer[Bench]:
+    press = PressPerformer(partial(way_between, helpers.twin), ask=helpers.ask, plan_key=PLAN_KEY)
+    if run.scene.section(Localization).choose == "planned":
+        return press
+    return ChosenContacts(run, helpers.twin, press, helpers.say)
 
 
 def _cells(objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]) -> list[Cell]:

@@ -16,6 +16,11 @@ class Localization(Section):
         contacts: how many.
         spacing: ``"close"``, each within ``step`` of the last; ``"spread"``, over the object.
         step: m, the greatest distance between successive close contacts.
+        choose: where the contacts go. ``"planned"``: anywhere that spacing allows, drawn and rehearsed before
+            the first. ``"active"``: after the first, each where it should leave least error, planned and
+            rehearsed once those before it are read.
+        until: m: contacts that are chosen one by one end when 90 % of what is believed lies within so much of
+            the answer; None to make them all.
         depth: m, from and to: how far to press on after the first touch, uniform.
         tilt: rad, the greatest angle of the tool from the surface's normal.
         yaw: whether the estimator is told the object's yaw.
@@ -26,6 +31,8 @@ class Localization(Section):
     contacts: int = Field(default=6, ge=1, le=100)
     spacing: Literal["close", "spread"] = "close"
     step: Annotated[Length, Positive] = 0.025
+    choose: Literal["planned", "active"] = "planned"
+    until: Annotated[Length, Positive] | None = None
     depth: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] = (0.5e-3, 2e-3)
     tilt: Annotated[Angle, Nonnegative] = math.radians(15.0)
     yaw: Literal["known", "unknown"] = "known"

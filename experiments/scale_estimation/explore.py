@@ -36,7 +36,8 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, _seed: int) -> Planned:
         raise WrongUse("nothing is to be read: ask for vision, for contacts, or for both")
     model = ObjectModel(mesh, scene, station)
     bench = model.twin_around(model.nowhere)
-    return Planned(kinds(looks, count - looks), rehearse(bench, []), bench)
+    steps = kinds(looks, count - looks)
+    return Planned(steps, rehearse(bench, []), bench, on_the_way=count - looks)
 
 
 def performer(run: RunFiles, helpers: Helpers) -> Exploration:

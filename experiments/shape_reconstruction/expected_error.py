@@ -1,10 +1,7 @@
 """Where the next press says most: by how much it should bring the answer nearer to the truth, in the mean.
 
-The shapes that the readings still allow stand for the truth, each by its weight. What the gel would read
-along a line on each of them tells some of them from others; of those that it leaves, one is nearest to all
-of them. How far that is from them, before less after, is what the line is worth: the expected reduction of
-Bayes risk, of the distance that answers are judged by (Raiffa and Schlaifer, Applied statistical decision
-theory, 1961).
+The shapes that the readings still allow stand for the truth, each by its weight. What a line is worth is the
+Bayes risk, of the distance that answers are judged by, less that after what the gel would read along it.
 """
 
 from collections.abc import Sequence
@@ -19,6 +16,7 @@ from experiments.shape_reconstruction.family.field import corners_of, grid_dista
 from experiments.shape_reconstruction.family.ray_depth import first_met
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.skills.exploring.bayes_risk import bayes_risk, bayes_risk_after
 
 BEFORE = 0.15
 """M before a line's end from where on it is followed."""
@@ -61,24 +59,12 @@ def error_spared(evidence: ShapeEvidence, estimate: ShapeEstimate, lines: FloatA
     if not shapes:
         return None
     apart = distances_apart(shapes)
-    now = float((apart @ weights).min())
+    now = bayes_risk(weights, apart)
     if now < AGREE:
         return None
     read = readings_on(shapes, lines, max(BEFORE, 0.5 * evidence.largest))
-    left = np.array([_left(one, weights, apart) for one in read.transpose(1, 0, 2)])
+    left = np.array([bayes_risk_after(one, weights, apart, MOST) for one in read.transpose(1, 0, 2)])
     return np.maximum(now - left, 0.0)  # rounding apart, no reading makes it worse
-
-
-def _left(read: FloatArray, weights: FloatArray, apart: FloatArray) -> float:
-    """M of expected error after a press that reads ``(shapes, 4)`` on each, the best answer given to each."""
-    met = np.isfinite(read[:, 0])
-    both = met[:, None] & met
-    seen = np.where(met[:, None], read, 0.0)
-    halves = 0.5 * np.sum((seen[:, None] - seen) ** 2, axis=2)
-    cost = np.where(both, np.minimum(halves, MOST), np.where(met[:, None] ^ met, MOST, 0.0))
-    believed = np.exp(-cost) * weights
-    believed /= believed.sum(axis=1, keepdims=True)
-    return float(weights @ (believed @ apart).min(axis=1))
 
 
 def readings_on(shapes: Sequence[FamilyShape], lines: FloatArray, back: float) -> FloatArray:

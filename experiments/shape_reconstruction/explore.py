@@ -58,7 +58,7 @@ def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:
     if settings.choose != "planned" or _presses(scene) == 0:
         place = np.array(scene.object.pose.position)
         bench = twin_of(scene, station, nowhere(place), np.eye(4))
-        return Planned(kinds(looks, _presses(scene)), rehearse(bench, []), bench)
+        return Planned(kinds(looks, _presses(scene)), rehearse(bench, []), bench, on_the_way=_presses(scene))
     wanted = ContactRequest(_presses(scene), "spread", PressLimits(tilt=settings.tilt, depth=settings.depth))
     made = plan_run(scene, station, mesh, seed, wanted)
     presses = [{"kind": "contact", **parameters} for parameters in made.parameters()]

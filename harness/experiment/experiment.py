@@ -39,12 +39,14 @@ class Planned:
         rehearsal: what the twin found.
         bench: the twin it was rehearsed in.
         described: more that ``run.json`` keeps of the plan, as JSON values.
+        on_the_way: how many steps are planned, and rehearsed, once those before them are read.
     """
 
     steps: Sequence[Mapping[str, Any]]
     rehearsal: "RehearsalReport"
     bench: "TwinBench"
     described: Mapping[str, Any] = field(default_factory=dict)
+    on_the_way: int = 0
 
 
 @dataclass(frozen=True, eq=False)

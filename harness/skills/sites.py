@@ -1,6 +1,6 @@
 """Where a flat sensor can be pressed on an object, and which of these places a run visits."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -129,6 +129,41 @@ def plan_sites(
     raise WrongUse(_none_found(search, count, longest))
 
 
+def candidate_sites(
+    raster: RasterMesh,
+    sensor: TactileSensor,
+    base_from_object: FloatArray,
+    count: int,
+    steps: Steps,
+    seed: int | tuple[int, ...],
+    before: Sequence[FloatArray],
+    reachable: Reachable = from_above_or_aside,
+    presses: PressLimits = PressLimits(),
+) -> tuple[Site, ...]:
+    """Contacts of which one is to be the next, drawn as those of ``plan_sites`` are.
+
+    Args: as ``plan_sites`` has them, but for
+        count: at most so many; fewer where few fit.
+        before: ``(3,)`` m each, in the object: contacts so far, the last of which the next must be close to.
+
+    Raises:
+        WrongUse: none was found; the message says what the places drawn lacked.
+    """
+    search = _Search(raster, sensor, base_from_object, steps, reachable, presses, None, tuple(before))
+    rng = np.random.default_rng(seed)
+    found: list[Site] = []
+    fruitless = 0
+    while len(found) < count and fruitless < _PATIENCE:
+        points, faces = random_points(raster.mesh, _DRAWN_AT_ONCE, rng)
+        drawn = zip(points, raster.mesh.face_normals[faces], strict=True)
+        fitting = [site for place in drawn if (site := search.next_at(*place, rng, False))]
+        found += fitting
+        fruitless = 0 if fitting else fruitless + len(points)
+    if not found:
+        raise WrongUse(_none_found(search, 1, 0))
+    return tuple(found[:count])
+
+
 @dataclass
 class _Tally:
     """How many of the places drawn passed each question so far."""
@@ -151,6 +186,7 @@ class _Search:
     reachable: Reachable
     presses: PressLimits
     visit: Visit | None
+    before: Sequence[FloatArray] = ()
     sites: list[Site] = field(default_factory=list)
     tally: _Tally = field(default_factory=_Tally)
 
@@ -163,17 +199,18 @@ class _Search:
             for point, normal in zip(points, self.raster.mesh.face_normals[faces], strict=True):
                 if len(self.sites) == count:
                     break
-                site = self._next(point, normal, rng, patient)
+                site = self.next_at(point, normal, rng, patient)
                 if site is not None:
                     self.sites.append(site)
             fruitless = 0 if len(self.sites) > before else fruitless + len(points)
 
-    def _next(
+    def next_at(
         self, point: FloatArray, normal: FloatArray, rng: np.random.Generator, patient: bool
     ) -> Site | None:
         """The place as the chain's next site; None where it cannot be. The cheap questions come first."""
         self.tally.drawn += 1
-        if not _may_follow(point, self.sites, self.steps, self.presses.longest_step):
+        so_far = [*self.before, *(site.point_in_object for site in self.sites)]
+        if not _may_follow(point, so_far, self.steps, self.presses.longest_step):
             return None
         self.tally.near += 1
         site = try_site(self.raster, self.sensor, self.base_from_object, point, normal, rng, self.presses)
@@ -203,13 +240,10 @@ def _none_found(search: _Search, count: int, longest: int) -> str:
     )
 
 
-def _may_follow(point: FloatArray, sites: list[Site], steps: Steps, longest_step: float) -> bool:
-    if not sites:
-        return True
-    gaps = np.array([np.linalg.norm(point - site.point_in_object) for site in sites])
-    if gaps.min() < SHORTEST_STEP:
-        return False
-    return steps == "spread" or bool(gaps[-1] <= longest_step)
+def _may_follow(point: FloatArray, so_far: list[FloatArray], steps: Steps, longest_step: float) -> bool:
+    gaps = np.linalg.norm(np.array(so_far).reshape(-1, 3) - point, axis=1)
+    near = steps == "spread" or gaps[-1:].max(initial=0.0) <= longest_step
+    return bool(near and gaps.min(initial=np.inf) >= SHORTEST_STEP)
 
 
 def try_site(

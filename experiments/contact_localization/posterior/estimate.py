@@ -68,6 +68,8 @@ class Estimate:
         points: ``(n, 3)`` metres: hypotheses of the last contact, for pictures.
         weights: ``(n,)`` of the hypotheses, summing to 1.
         seconds: by stage.
+        hypotheses: where the gel was at the first contact; turns that the object does not show are not among
+            them.
         doubts: what a reader must know of an answer whose sound may be another object's, or whose bench is
             further off than stated.
         strain: how many times further off the readings are than the bench's stated errors allow
@@ -86,6 +88,7 @@ class Estimate:
     points: FloatArray
     weights: FloatArray
     seconds: dict[str, float]
+    hypotheses: Hypotheses
     doubts: tuple[str, ...] = ()
     strain: float = 0.0
 
@@ -200,6 +203,7 @@ def _answer(
         points=read_only(points),
         weights=read_only(weights),
         seconds=seconds,
+        hypotheses=found.hypotheses,
         doubts=doubts,
         strain=strain_of(search, found.hypotheses, found.fits) if len(found.fits) else 0.0,
     )

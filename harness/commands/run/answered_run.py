@@ -98,7 +98,8 @@ def _performed(run: PlannedRun, as_json: bool, conclude: Callable[[Performed], N
         step_progress(run.recording.committed, total, run.experiment.step) as progress,
     ):
         ask = None if as_json else _ask
-        return perform_on_bench(run.experiment, run.recording, progress, ask, accuracy, conclude=conclude)
+        given = run.experiment, run.recording, progress, ask, accuracy
+        return perform_on_bench(*given, say=progress.say, conclude=conclude)
 
 
 def _resuming(run: PlannedRun) -> str:

@@ -160,7 +160,7 @@ def _describe(experiment: Experiment, begun: Begun, accuracy: Accuracy) -> None:
     )
     CONSOLE.print(
         f"rehearsed in the twin: {begun.plan.rehearsal.segments} motions, none refused; "
-        f"{len(begun.plan.rehearsal.warnings)} warnings"
+        f"{len(begun.plan.rehearsal.warnings)} warnings" + _on_the_way(begun.plan.on_the_way, experiment)
     )
     effects = scene_plan(run.scene, run.station.gel.sensor, accuracy)
     CONSOLE.print(as_table(effects, left_out=False))
@@ -170,6 +170,14 @@ def _describe(experiment: Experiment, begun: Begun, accuracy: Accuracy) -> None:
     CONSOLE.print("not simulated:")
     for sentence in left_out(effects):
         CONSOLE.print(f"  {sentence}", markup=False)
+
+
+def _on_the_way(count: int, experiment: Experiment) -> str:
+    """What is said of steps that are not planned yet."""
+    if count == 0:
+        return ""
+    what = f"{count} {experiment.plural} are" if count > 1 else f"1 {experiment.step} is"
+    return f"; {what} planned, and rehearsed, once those before are read"
 
 
 def _spaced(section: Any) -> str:

@@ -1,0 +1,1 @@
+"""Which place is touched next, by what the contacts so far say."""
