@@ -3,8 +3,9 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, performed, preparations
+from experiments.contact_localization.accuracy.benchmark_runs import performed, preparations
 from experiments.contact_localization.accuracy.budget import BUDGETS
+from experiments.contact_localization.accuracy.cells import Cell, cells
 from experiments.contact_localization.accuracy.dials import KNOBS, setting_name, settings, settings_by_count
 from experiments.contact_localization.accuracy.paper import PAPER_CM
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
@@ -41,7 +42,7 @@ def _performer(run: RunFiles, helpers: Helpers) -> StepPerformer[Bench]:
 
 def _cells(objects: Sequence[str], seeds: Sequence[int], chosen: Mapping[str, Sequence[str]]) -> list[Cell]:
     heard = _heard(chosen)
-    return cells(objects, seeds, chosen["spacing"], chosen["gap"], chosen["yaw"], heard)
+    return cells(objects, seeds, chosen["spacing"], chosen["gap"], chosen["yaw"], heard, chosen["choose"])
 
 
 def _heard(chosen: Mapping[str, Sequence[str]]) -> bool:
@@ -65,6 +66,7 @@ MEASUREMENT = Measurement(
     conditions=(
         MeasuredCondition("spacing", ("close", "spread"), ("close", "spread")),
         MeasuredCondition("yaw", ("known", "unknown"), ("known",), ("known", "unknown")),
+        MeasuredCondition("choose", ("planned", "active"), ("planned",), ("planned",)),
         MeasuredCondition("sense", ("touch", "both"), ("both",)),
     ),
     cells=_cells,

@@ -14,14 +14,17 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.accuracy.budget import Run
+from experiments.contact_localization.accuracy.cells import Cell, scene_of
 from experiments.contact_localization.accuracy.dials import HEARD, needs_images
 from experiments.contact_localization.accuracy.solving import (
+    PROGRAM,
     Models,
     Readings,
     loaded,
     prepare,
     solve,
 )
+from experiments.contact_localization.answer import observe
 from experiments.contact_localization.build_model import model_of_scene
 from experiments.contact_localization.model import Prior
 from experiments.contact_localization.plan import plan_contacts
@@ -38,49 +41,18 @@ from harness.cost.curve import Sample
 from harness.effects.accuracy import Setting
 from harness.effects.file_levels import scene_levels
 from harness.effects.scene_object import known_object
+from harness.experiment import in_process
 from harness.experiment.experiment import Say
+from harness.experiment.lookup import named
 from harness.experiment.solving import Solved
 from harness.experiment.subjects import object_key
 from harness.picture.square_pixels import aspect_stated
 from harness.recording.observation import Observation, in_time, observe_step
-from harness.recording.run_folder import station_acquisition, station_calibration
+from harness.recording.run_folder import RunFiles, station_acquisition, station_calibration
 from harness.recording.step_file import Step, StepRecord
 from harness.skills.press import PressPerformer
 from harness.twin.bench_of import way_between
 from mocks.in_process.bench import in_process_bench
-
-
-@dataclass(frozen=True)
-class Cell:
-    """Which run.
-
-    Attributes:
-        object: its name in the table.
-        spacing: ``"close"`` or ``"spread"``.
-        gap: ``"default"`` or ``"none"``.
-        yaw: ``"known"`` to the estimator or ``"unknown"``.
-        seed: of the sites, the world and the draws.
-        sound: whether every place is struck too.
-    """
-
-    object: str
-    spacing: str
-    gap: str
-    yaw: str
-    seed: int
-    sound: bool = False
-
-    @property
-    def conditions(self) -> dict[str, str]:
-        """What was varied."""
-        return {"spacing": self.spacing, "gap": self.gap, "yaw": self.yaw}
-
-    @property
-    def name(self) -> str:
-        """Of the cell's file; a gap may be a path."""
-        gap = self.gap.replace("/", "_")
-        plain = f"{self.object}-{self.spacing}-{gap}-{self.yaw}-{self.seed}"
-        return f"{plain}-sound" if self.sound else plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,16 +131,6 @@ def _uncollected() -> Iterator[None]:
             gc.enable()
 
 
-def scene_of(cell: Cell, scene: SceneFile) -> SceneFile:
-    """The scene of a run: the object turned by an angle of the run's own."""
-    turned = np.random.default_rng((cell.seed, 7)).uniform(0.0, 360.0)
-    tree = scene.model_dump(mode="json", by_alias=True)
-    tree.setdefault("localization", {})["spacing"] = cell.spacing
-    tree["object"]["pose"]["yaw"] = f"{turned:.3f} deg"
-    tree["sensors"]["sound"] = cell.sound
-    return scene_from_json(tree, "the table")
-
-
 def perform(cell: Cell, scene: SceneFile, station: Station, models: MutableMapping[str, Models]) -> Case:
     """Plan and perform a run on the mocked bench in process.
 
@@ -186,8 +148,21 @@ _Recorded = tuple[tuple[Observation, ...], FloatArray]
 
 
 def _recorded(cell: Cell, scene: SceneFile, station: Station) -> _Recorded:
-    """In memory alone: a recording keeps times to the nanosecond, and these are whole."""
     scene = scene_of(cell, scene)
+    return _planned(cell, scene, station) if cell.choose == "planned" else _chosen(cell, scene, station)
+
+
+def _chosen(cell: Cell, scene: SceneFile, station: Station) -> _Recorded:
+    """Contacts chosen one by one are chosen on what is recorded of those before."""
+    with TemporaryDirectory(prefix="touchstone-table-") as folder:
+        recording = in_process.performed(named(PROGRAM), cell, scene, station, Path(folder) / "run")
+        contacts = json.loads(recording.truth_path.read_text(encoding="utf-8"))["contacts"]
+        seen = observe(RunFiles(recording))
+    return seen, np.array([contact["point_in_object_m"] for contact in contacts])
+
+
+def _planned(cell: Cell, scene: SceneFile, station: Station) -> _Recorded:
+    """In memory alone: a recording keeps times to the nanosecond, and these are whole."""
     mesh = known_object(scene).mesh
     plan, acquisition = plan_contacts(scene, station, mesh, cell.seed), station_acquisition(scene, station)
     aspect = aspect_stated(station_calibration(station).header.made_from)
@@ -239,19 +214,6 @@ def believed(base_from_object: FloatArray, cell: Cell, yaw_sigma: float = USUAL.
     # Turned by chance, so that the unknown yaw falls between the grid's yaws, not on one of them.
     angle = float(np.random.default_rng((cell.seed, 11)).uniform(0.0, 2.0 * np.pi))
     return Prior(rotation_about(np.array([0.0, 0.0, 1.0]), angle) @ base_from_object, "unknown")
-
-
-def cells(
-    objects: Sequence[str],
-    seeds: Sequence[int],
-    spacings: Sequence[str],
-    gaps: Sequence[str],
-    yaws: Sequence[str],
-    sound: bool = False,
-) -> list[Cell]:
-    """Every run of a table, one seed of every object before the next: a table that is stopped is even."""
-    first = [Cell(o, s, g, y, 0, sound) for y in yaws for g in gaps for s in spacings for o in objects]
-    return [replace(cell, seed=seed) for seed in seeds for cell in first]
 
 
 def performed(

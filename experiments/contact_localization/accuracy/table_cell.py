@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contact_localization.accuracy.benchmark_runs import Cell, perform
+from experiments.contact_localization.accuracy.benchmark_runs import perform
+from experiments.contact_localization.accuracy.cells import Cell
 from experiments.contact_localization.accuracy.dials import accuracy_at, needs_images
 from experiments.contact_localization.accuracy.solving import Readings, solve
 from experiments.contact_localization.posterior.baselines import mean_random_error, without_images

@@ -2,8 +2,9 @@
 
 Hypotheses that readings still allow stand for the truth, each by its weight. The best answer among them is
 the one that is nearest to all in the mean, and how far it is from them is the Bayes risk. What would be read
-on each tells some of them from others, and of those that it leaves another may be best: what a reading spares
-is the risk before it less the risk after it (Raiffa and Schlaifer, Applied statistical decision theory, 1961).
+on each tells some of them from others, and of those that it leaves another may be best: what a reading
+spares is the risk before it less the risk after it (Raiffa and Schlaifer, Applied statistical decision
+theory, 1961).
 """
 
 import numpy as np

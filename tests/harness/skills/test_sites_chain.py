@@ -14,7 +14,15 @@ from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.household import build
 from harness.sim.gel.height_map import RasterMesh
 from harness.skills import sites as sites_module
-from harness.skills.sites import SHORTEST_STEP, PressLimits, Site, Steps, Visit, plan_sites
+from harness.skills.sites import (
+    SHORTEST_STEP,
+    PressLimits,
+    Site,
+    Steps,
+    Visit,
+    candidate_sites,
+    plan_sites,
+)
 
 MESH = build("tray", 2e-3)
 RASTER = RasterMesh(MESH)
@@ -140,3 +148,23 @@ def test_an_object_out_of_reach_is_given_up_soon() -> None:
     assert told["longest"] == told["reached"] == 0
     assert told["fitting"] == len(asked) > 10
     assert told["drawn"] == 2 * FEW
+
+
+def test_every_candidate_may_follow_the_contacts_so_far() -> None:
+    before = [site.point_in_object for site in sites(3, "close", None)]
+    step = PressLimits().longest_step
+    found = candidate_sites(RASTER, GELSIGHT_R15, POSE, 10, "close", 5, before)
+    assert len(found) == 10
+    for site in found:
+        gaps = [np.linalg.norm(site.point_in_object - point) for point in before]
+        assert gaps[-1] <= step
+        assert min(gaps) >= SHORTEST_STEP
+    anywhere = candidate_sites(RASTER, GELSIGHT_R15, POSE, 10, "spread", 5, before)
+    assert max(np.linalg.norm(site.point_in_object - before[-1]) for site in anywhere) > step
+    assert same(found, candidate_sites(RASTER, GELSIGHT_R15, POSE, 10, "close", 5, before))
+
+
+def test_where_none_may_follow_the_message_says_what_was_lacking(hasty: None) -> None:
+    far = [np.array([1.0, 0.0, 0.0])]
+    with pytest.raises(WrongUse, match=r"only 0 of 1 contacts with close steps .* 0 were within 25 mm"):
+        candidate_sites(RASTER, GELSIGHT_R15, POSE, 4, "close", 5, far)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.contact_localization.accuracy import table_cell
-from experiments.contact_localization.accuracy.benchmark_runs import Cell, cells, scene_of
+from experiments.contact_localization.accuracy.cells import Cell, cells, scene_of
 from experiments.contact_localization.accuracy.solving import read
 from experiments.contact_localization.accuracy.table_cell import METHODS
 from experiments.contact_localization.experiment import EXPERIMENT, MEASUREMENT
