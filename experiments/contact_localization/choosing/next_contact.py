@@ -33,6 +33,12 @@ from harness.twin.rehearsal import Segment, rehearse
 CANDIDATES = 24
 """Places drawn for each contact; of those with a free way the one that leaves least error is taken."""
 
+FARTHER = 0.3
+"""Share of the expected error by which the farthest place from all contacts so far seems better: one contact is
+looked ahead, and on a flat side no place near by tells much, while a walk that goes on comes to an edge. Errors
+after three and five contacts of 32 development runs, beyond 20 mm alike: 2.7 and 1.5 mm with, 3.4 and 2.1
+without (errors then capped), 4.1 and 2.2 by planned contacts."""
+
 EXPECTED = "expected_error_m"
 """Of a step's parameters: the error that was expected to be left after it; not there where nothing told."""
 
@@ -110,8 +116,7 @@ class ChosenContacts:
         before = [recording.step(k).step.parameters for k in range(index)]
         sites = self._candidates(before, (recording.header.seed, index))
         left = self._errors_left(sites, estimate)
-        order = np.argsort(left, kind="stable")
-        for k in order:
+        for k in np.argsort(left * (1.0 - FARTHER * self._far(sites, before)), kind="stable"):
             planned = self._planned(sites[k], before[-1], index)
             if planned is not None:
                 told = {} if estimate is None else {EXPECTED: float(left[k])}
@@ -122,6 +127,13 @@ class ChosenContacts:
             f"the arm has no free way to any of {len(sites)} places where the next contact may be; ask for "
             "fewer contacts, longer steps, or another pose of the object"
         )
+
+    def _far(self, sites: Sequence[Site], before: Sequence[Mapping[str, Any]]) -> FloatArray:
+        """``(n,)`` from 0 to 1: how far each is from all contacts so far, beside the farthest."""
+        touched = np.array([self._touched(parameters) for parameters in before])
+        points = np.array([site.point_in_object for site in sites])
+        gaps = np.linalg.norm(points[:, None] - touched, axis=2).min(axis=1)
+        return np.asarray(gaps / gaps.max())
 
     def _candidates(self, before: Sequence[Mapping[str, Any]], seed: tuple[int, int]) -> tuple[Site, ...]:
         asked, bench = self._asked, self._bench

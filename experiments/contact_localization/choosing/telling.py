@@ -12,7 +12,7 @@ import numpy as np
 
 from experiments.contact_localization.model import Prior
 from experiments.contact_localization.posterior.hypotheses import Hypotheses
-from experiments.contact_localization.posterior.posterior import ALIKE_BEYOND, thinned
+from experiments.contact_localization.posterior.posterior import thinned
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.skills.exploring.bayes_risk import bayes_risk_after
@@ -72,7 +72,9 @@ def believed_gels(hypotheses: Hypotheses, prior: Prior, first_in_base: FloatArra
 
 
 def errors_left(rays: RayMesh, at: BelievedGels, places: Sequence[FloatArray]) -> FloatArray:
-    """``(n,)`` m: the error that is expected of a contact at each place once it is made, beyond 20 mm alike.
+    """``(n,)`` m: the error that is expected of a contact at each place once it is made.
+
+    However large: that a posterior over a whole side shrinks to half of it is worth something.
 
     Args:
         rays: to the object's surface.
@@ -85,7 +87,7 @@ def errors_left(rays: RayMesh, at: BelievedGels, places: Sequence[FloatArray]) -
 def _error_left(rays: RayMesh, at: BelievedGels, base_from_gel: FloatArray) -> float:
     read, points = readings_at(rays, at, base_from_gel)
     apart = np.linalg.norm(points[:, None] - points, axis=2)
-    return bayes_risk_after(read, at.weights, np.minimum(apart, ALIKE_BEYOND), MOST)
+    return bayes_risk_after(read, at.weights, apart, MOST)
 
 
 def readings_at(rays: RayMesh, at: BelievedGels, base_from_gel: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -7,9 +7,7 @@ import numpy as np
 from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.sim.solid.surface_samples import Surface
 
-ALIKE_BEYOND = 20.0e-3
-"""M: errors beyond it count alike where an answer is chosen."""
-
+_GROSS = 20.0e-3
 _MODE_RADIUS = 12.0e-3
 _SMALLEST_MODE = 0.05
 _MOST_POINTS = 400
@@ -68,7 +66,7 @@ def best_point(points: FloatArray, weights: FloatArray) -> FloatArray:
     """
     few, their_weights = thinned(points, weights)
     gaps = np.linalg.norm(few[:, None] - few[None], axis=2)
-    expected = np.minimum(gaps, ALIKE_BEYOND) @ their_weights
+    expected = np.minimum(gaps, _GROSS) @ their_weights
     return settled(points, weights, few[int(np.argmin(expected))])
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from experiments.contact_localization.answer import Answer as Found
+from experiments.contact_localization.choosing.next_contact import EXPECTED
 from experiments.contact_localization.posterior.consistency import Gate
 from experiments.contact_localization.posterior.dials import METHOD, Senses
 from experiments.contact_localization.posterior.dials import SENSES as BY
@@ -16,6 +17,7 @@ from experiments.contact_localization.report.result import by_translations, flag
 from experiments.contact_localization.report.sound_report import posterior_of, sound_of
 from experiments.contact_localization.report.sweep import SweepPoint, trade
 from experiments.contact_localization.report.twin_check import deviations
+from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
 from harness.basics.geometry import inverse
@@ -105,7 +107,7 @@ def _contacts(
             truth=None if true is None else true[k],
             error=None if true is None else _error(after, true[k]),
             flags=() if gate is None else tuple(flags_of(gate, scored.found.refused_pictures.get(k))),
-            notes=(("fit", _fit(gate)),),
+            notes=(("fit", _fit(gate)), *_expected(scored.run, k)),
         )
         for k, (after, gate) in enumerate(zip(history, _gates(scored.found, len(history)), strict=True))
     )
@@ -134,6 +136,14 @@ def _fit(gate: Gate | None) -> str:
     if gate is None:
         return "the image was not used"
     return "no contact in the image" if gate.fit is None else f"{gate.fit:.1f} nats"
+
+
+def _expected(run: RunFiles, contact: int) -> tuple[tuple[str, str], ...]:
+    """Of contacts that were chosen one by one, what error the choice expected; nothing of planned ones."""
+    if run.scene.section(Localization).choose == "planned":
+        return ()
+    error = run.recording.step(contact).step.parameters.get(EXPECTED)
+    return (("error expected when it was chosen", "planned" if error is None else f"{1e3 * error:.1f} mm"),)
 
 
 def _bench(run: RunFiles, found: Found) -> BenchScene:
