@@ -34,10 +34,10 @@ CANDIDATES = 24
 """Places drawn for each contact; of those with a free way the one that leaves least error is taken."""
 
 FARTHER = 0.3
-"""Share of the expected error by which the farthest place from all contacts so far seems better: one contact is
-looked ahead, and on a flat side no place near by tells much, while a walk that goes on comes to an edge. Errors
-after three and five contacts of 32 development runs, beyond 20 mm alike: 2.7 and 1.5 mm with, 3.4 and 2.1
-without (errors then capped), 4.1 and 2.2 by planned contacts."""
+"""Share of the expected error by which the farthest place from all contacts so far seems better: one contact
+is looked ahead, and on a flat side no place near by tells much, while a walk that goes on comes to an edge.
+Errors after three and five contacts of 32 development runs, beyond 20 mm alike: 2.7 and 1.5 mm with, 3.4 and
+2.1 without (errors then capped), 4.1 and 2.2 by planned contacts."""
 
 EXPECTED = "expected_error_m"
 """Of a step's parameters: the error that was expected to be left after it; not there where nothing told."""

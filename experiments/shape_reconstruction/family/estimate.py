@@ -32,7 +32,7 @@ NOISE = 0.6e-3
 WIDER = 1.2
 """Factor on the hypotheses' spread: few of them are kept, and their costs are of one likelihood."""
 
-BLIND = 1.4
+BLIND = 1.3
 """Factor on every deviation where there is no picture: hypotheses are then of few of the valleys of the cost.
 Found on 24 development runs, as UNDERSIDE is."""
 

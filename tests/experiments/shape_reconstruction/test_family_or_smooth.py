@@ -9,7 +9,7 @@ import trimesh
 from experiments.shape_reconstruction import family_or_smooth
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.estimate import LOOSE, family_estimate
+from experiments.shape_reconstruction.family.estimate import LOOSE, RIVAL, family_estimate
 from experiments.shape_reconstruction.family.settings import CONTINUED, LEVELS, FamilySettings
 from experiments.shape_reconstruction.family.strain import STRAINED
 from experiments.shape_reconstruction.family_or_smooth import (
@@ -17,6 +17,7 @@ from experiments.shape_reconstruction.family_or_smooth import (
     BEYOND,
     ENOUGH,
     MANY,
+    UNEASY,
     by_family,
     deviations_apart,
 )
@@ -37,7 +38,7 @@ def details_of(foreign: bool, beyond: float = 0.0, strain: float = 0.0) -> dict[
     typical = 3.0 * LOOSE if foreign else 0.1 * LOOSE
     return {
         "foreign": foreign, "beyond_m": beyond, "cost": 1.0, "contact_cost": typical, "strain": strain,
-        "hypotheses": [],
+        "hypotheses": [], "classes": {"mug": 1.0},
     }  # fmt: skip
 
 
@@ -162,6 +163,37 @@ def test_of_ill_fits_that_whose_contacts_fit_best_is_taken_and_of_good_ones_the_
     assert found.flags[0] == f"search {taken}"
     assert len(seeds) == len(set(seeds)) == made  # by draws of its own
     assert found.seconds == made  # the time of all is stated
+
+
+@pytest.mark.parametrize(
+    ("contacts", "rival", "strain", "searches"),
+    [
+        (ENOUGH, RIVAL, 0.0, 2),
+        (ENOUGH, 0.9 * RIVAL, 1.1 * UNEASY, 1),
+        (ENOUGH - 1, 0.9 * RIVAL, 1.1 * UNEASY, 2),
+        (ENOUGH - 1, RIVAL, 0.9 * UNEASY, 1),  # few contacts leave several classes as they should
+    ],
+)
+def test_what_two_classes_fit_alike_or_what_strains_by_few_contacts_is_searched_once_more(
+    readings: ShapeEvidence,
+    monkeypatch: pytest.MonkeyPatch,
+    contacts: int,
+    rival: float,
+    strain: float,
+    searches: int,
+) -> None:
+    part = replace(readings, touches=readings.touches[:contacts])
+    by_rbf, seeds = by_hermite(part, symmetric=False), list[int]()
+
+    def searched(_: ShapeEvidence, settings: FamilySettings, previous: object = ()) -> ShapeEstimate:
+        seeds.append(settings.seed)
+        details = details_of(False, strain=strain)
+        details |= {"classes": {"mug": 1.0 - rival, "jug": rival}, "cost": 10.0 - len(seeds)}
+        return replace(by_rbf, details=details, flags=(f"search {len(seeds)}",))
+
+    monkeypatch.setattr(family_or_smooth, "family_estimate", searched)
+    assert by_family(part).flags[0] == f"search {searches}"  # of good fits the cheapest
+    assert len(set(seeds)) == searches
 
 
 @pytest.mark.parametrize(("contacts", "searches"), [(ENOUGH, 2), (ENOUGH - 1, 1)])
