@@ -125,9 +125,8 @@ class ContactAnswering:
             FitRefused: no place on this object explains the readings, or no picture of them may be used.
         """
         readings = self.readings
-        struck = any(seen.strike is not None for seen in readings.observations)
-        senses: tuple[Senses, ...] = SENSES.levels if struck else ("touch",)
-        sense = self._sense_of(readings, struck)
+        senses: tuple[Senses, ...] = SENSES.levels if readings.struck else ("touch",)
+        sense = self._sense_of(readings)
         last = loaded(lambda: self._by(sense, readings))
         others = {other: self._tried(other, readings) for other in senses if other != sense}
         seconds = sum(last.seconds.values())
@@ -143,13 +142,12 @@ class ContactAnswering:
             FitRefused: no place on this object explains the readings, or no picture of them may be used.
         """
         readings = self.readings
-        struck = any(seen.strike is not None for seen in readings.observations)
-        return self._located(self._sense_of(readings, struck), readings, None, judged=False)[-1]
+        return self._located(self._sense_of(readings), readings, None, judged=False)[-1]
 
-    def _sense_of(self, readings: Readings, struck: bool) -> Senses:
+    def _sense_of(self, readings: Readings) -> Senses:
         """What the answer is by."""
         wanted = self._accuracy.of(SENSES)
-        if wanted == "audio" and not struck:
+        if wanted == "audio" and not readings.struck:
             raise WrongUse("an estimate by sound was asked for, and no contact was struck; ask for touch")
         if not readings.heard:
             return "touch"

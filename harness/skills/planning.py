@@ -111,9 +111,7 @@ def plan_run(scene: SceneFile, station: Station, mesh: Mesh, seed: int, wanted: 
         presses=wanted.presses,
         visit=itinerary.visit,
     )
-    contacts, strikes = tuple(itinerary.contacts), tuple(itinerary.strikes)
-    plan = RunPlan(bench, sites, contacts, strikes, RehearsalReport(0, (), (), ()))
-    return replace(plan, rehearsal=rehearse(bench, plan.segments()).require())
+    return itinerary.rehearsed(sites)
 
 
 class Itinerary:
@@ -154,6 +152,16 @@ class Itinerary:
             self._in_vain += patient
             return False
         return True
+
+    def rehearsed(self, sites: tuple[Site, ...]) -> RunPlan:
+        """Its motions to all of these sites, each visited, gone through in the twin.
+
+        Raises:
+            MotionRefused: the rehearsal found a motion that must not be made.
+        """
+        contacts, strikes = tuple(self.contacts), tuple(self.strikes)
+        plan = RunPlan(self._bench, sites, contacts, strikes, RehearsalReport(0, (), (), ()))
+        return replace(plan, rehearsal=rehearse(self._bench, plan.segments()).require())
 
     def _visit(self, base_from_gel: FloatArray, searched: int) -> bool:
         contact = plan_contact(

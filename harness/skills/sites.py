@@ -1,7 +1,8 @@
 """Where a flat sensor can be pressed on an object, and which of these places a run visits."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Literal, Protocol
 
 import numpy as np
@@ -150,18 +151,10 @@ def candidate_sites(
         WrongUse: none was found; the message says what the places drawn lacked.
     """
     search = _Search(raster, sensor, base_from_object, steps, reachable, presses, None, tuple(before))
-    rng = np.random.default_rng(seed)
-    found: list[Site] = []
-    fruitless = 0
-    while len(found) < count and fruitless < _PATIENCE:
-        points, faces = random_points(raster.mesh, _DRAWN_AT_ONCE, rng)
-        drawn = zip(points, raster.mesh.face_normals[faces], strict=True)
-        fitting = [site for place in drawn if (site := search.next_at(*place, rng, False))]
-        found += fitting
-        fruitless = 0 if fitting else fruitless + len(points)
+    found = tuple(islice(search.fitting(np.random.default_rng(seed), patient=False), count))
     if not found:
         raise WrongUse(_none_found(search, 1, 0))
-    return tuple(found[:count])
+    return found
 
 
 @dataclass
@@ -192,19 +185,22 @@ class _Search:
 
     def grow(self, count: int, rng: np.random.Generator, patient: bool) -> None:
         """Add sites until there are ``count``, or none of many places drawn can be the next."""
-        fruitless = 0
-        while len(self.sites) < count and fruitless < _PATIENCE:
-            points, faces = random_points(self.raster.mesh, _DRAWN_AT_ONCE, rng)
-            before = len(self.sites)
-            for point, normal in zip(points, self.raster.mesh.face_normals[faces], strict=True):
-                if len(self.sites) == count:
-                    break
-                site = self.next_at(point, normal, rng, patient)
-                if site is not None:
-                    self.sites.append(site)
-            fruitless = 0 if len(self.sites) > before else fruitless + len(points)
+        for site in islice(self.fitting(rng, patient), count - len(self.sites)):
+            self.sites.append(site)
 
-    def next_at(
+    def fitting(self, rng: np.random.Generator, patient: bool) -> Iterator[Site]:
+        """Places that can be the next, drawn one after another, until many are drawn in vain."""
+        fruitless = 0
+        while fruitless < _PATIENCE:
+            points, faces = random_points(self.raster.mesh, _DRAWN_AT_ONCE, rng)
+            fruitless += len(points)
+            for point, normal in zip(points, self.raster.mesh.face_normals[faces], strict=True):
+                site = self._next(point, normal, rng, patient)
+                if site is not None:
+                    fruitless = 0
+                    yield site
+
+    def _next(
         self, point: FloatArray, normal: FloatArray, rng: np.random.Generator, patient: bool
     ) -> Site | None:
         """The place as the chain's next site; None where it cannot be. The cheap questions come first."""

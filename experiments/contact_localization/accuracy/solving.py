@@ -66,10 +66,14 @@ class Readings:
         return not self.refused_pictures or len(self.refused_pictures) < len(self.observations)
 
     @property
+    def struck(self) -> bool:
+        """Whether any contact was."""
+        return any(observation.strike is not None for observation in self.observations)
+
+    @property
     def heard(self) -> bool:
         """Whether any contact was struck, and the object has modes to compare its sound with."""
-        struck = any(observation.strike is not None for observation in self.observations)
-        return struck and not self.model.sound_refusal
+        return self.struck and not self.model.sound_refusal
 
     def under(self, model: Model) -> "Readings":
         """The same readings, to be compared with another model of the object."""

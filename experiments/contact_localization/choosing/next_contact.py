@@ -12,7 +12,7 @@ from experiments.contact_localization.choosing.telling import believed_gels, err
 from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.section import Localization
 from harness.basics.arrays import FloatArray
-from harness.basics.errors import FitRefused, WrongUse
+from harness.basics.errors import FitRefused, MotionRefused, WrongUse
 from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import apply, inverse
 from harness.bench.reading import Reading
@@ -25,10 +25,10 @@ from harness.skills.exploring.surroundings import end_of
 from harness.skills.planning import Itinerary
 from harness.skills.press import ContactMotion, PressPerformer
 from harness.skills.sites import PressLimits, Site, candidate_sites
-from harness.skills.strike import StrikeMotion, planner
+from harness.skills.strike import planner
 from harness.twin.bench import TwinBench
 from harness.twin.motion import reachable
-from harness.twin.rehearsal import Segment, rehearse
+from harness.twin.strike_motion import StrikePlanner
 
 CANDIDATES = 24
 """Places drawn for each contact; of those with a free way the one that leaves least error is taken."""
@@ -61,7 +61,11 @@ class ChosenContacts:
     ) -> None:
         self._run, self._bench, self._press, self._say = run, bench, press, say
         self._asked = run.scene.section(Localization)
-        self._read = 0
+        self._before: list[Mapping[str, Any]] = []
+
+    @cached_property
+    def _strikes(self) -> StrikePlanner | None:
+        return planner(self._run.scene, self._run.station, self._bench)
 
     @cached_property
     def _answering(self) -> ContactAnswering:
@@ -98,9 +102,10 @@ class ChosenContacts:
 
     def _estimate(self, recording: Recording, index: int) -> Estimate | None:
         """By the contacts before one; None where they say nothing yet."""
-        for k in range(self._read, index):
-            self._answering.read(recording.step(k))
-        self._read = index
+        for k in range(len(self._before), index):
+            record = recording.step(k)
+            self._answering.read(record)
+            self._before.append(record.step.parameters)
         try:
             return self._answering.so_far()
         except (FitRefused, WrongUse):
@@ -111,33 +116,25 @@ class ChosenContacts:
 
         Raises:
             WrongUse: none of many places drawn can be touched on a free way.
-            MotionRefused: the rehearsal found a motion that must not be made.
         """
-        before = [recording.step(k).step.parameters for k in range(index)]
-        sites = self._candidates(before, (recording.header.seed, index))
+        touched = np.array([self._touched(parameters) for parameters in self._before])
+        sites = self._candidates(touched, (recording.header.seed, index))
         left = self._errors_left(sites, estimate)
-        for k in np.argsort(left * (1.0 - FARTHER * self._far(sites, before)), kind="stable"):
-            planned = self._planned(sites[k], before[-1], index)
-            if planned is not None:
-                told = {} if estimate is None else {EXPECTED: float(left[k])}
-                if told:
-                    self._say(f"contact {index + 1}: {1e3 * left[k]:.1f} mm of error are expected after it")
-                return {**planned, **told}
+        for k in np.argsort(left * (1.0 - FARTHER * _far(sites, touched)), kind="stable"):
+            planned = self._planned(sites[k], index)
+            if planned is None:
+                continue
+            if estimate is None:
+                return planned
+            self._say(f"contact {index + 1}: {1e3 * left[k]:.1f} mm of error are expected after it")
+            return {**planned, EXPECTED: float(left[k])}
         raise WrongUse(
             f"the arm has no free way to any of {len(sites)} places where the next contact may be; ask for "
             "fewer contacts, longer steps, or another pose of the object"
         )
 
-    def _far(self, sites: Sequence[Site], before: Sequence[Mapping[str, Any]]) -> FloatArray:
-        """``(n,)`` from 0 to 1: how far each is from all contacts so far, beside the farthest."""
-        touched = np.array([self._touched(parameters) for parameters in before])
-        points = np.array([site.point_in_object for site in sites])
-        gaps = np.linalg.norm(points[:, None] - touched, axis=2).min(axis=1)
-        return np.asarray(gaps / gaps.max())
-
-    def _candidates(self, before: Sequence[Mapping[str, Any]], seed: tuple[int, int]) -> tuple[Site, ...]:
+    def _candidates(self, touched: FloatArray, seed: tuple[int, int]) -> tuple[Site, ...]:
         asked, bench = self._asked, self._bench
-        touched = [self._touched(parameters) for parameters in before]
         return candidate_sites(
             self._answering.model.raster,
             self._run.station.gel.sensor,
@@ -145,7 +142,7 @@ class ChosenContacts:
             CANDIDATES,
             asked.spacing,
             seed,
-            touched,
+            list(touched),
             partial(reachable, bench),
             PressLimits(asked.step, asked.tilt, asked.depth),
         )
@@ -165,19 +162,20 @@ class ChosenContacts:
         at = believed_gels(estimate.hypotheses, readings.prior, first)
         return errors_left(self._rays, at, [site.base_from_gel for site in sites])
 
-    def _planned(self, site: Site, last: Mapping[str, Any], index: int) -> dict[str, Any] | None:
+    def _planned(self, site: Site, index: int) -> dict[str, Any] | None:
         """The parameters of a contact there, rehearsed; None where there is no free way."""
-        run, bench = self._run, self._bench
-        strikes = planner(run.scene, run.station, bench)
-        itinerary = Itinerary(bench, index, strikes, 1, end_of(last.get("strike", last)))
+        last = self._before[-1]
+        itinerary = Itinerary(self._bench, index, self._strikes, 1, end_of(last.get("strike", last)))
         if not itinerary.visit(0, site.base_from_gel, patient=False):
             return None
-        contact = itinerary.contacts[0]
-        motions: list[Segment] = [*contact.segments(index)]
-        for strike in itinerary.strikes:
-            motions += strike.segments(index)
-        rehearse(bench, motions).require()
-        made = ContactMotion.planned(contact, bench.flange_from_gel, site.press).to_parameters()
-        for strike in itinerary.strikes:
-            made["strike"] = StrikeMotion.planned(strike).to_parameters()
-        return made
+        try:
+            return itinerary.rehearsed((site,)).parameters()[0]
+        except MotionRefused:
+            return None
+
+
+def _far(sites: Sequence[Site], touched: FloatArray) -> FloatArray:
+    """``(n,)`` from 0 to 1: how far each is from all contacts so far, beside the farthest."""
+    points = np.array([site.point_in_object for site in sites])
+    gaps = np.linalg.norm(points[:, None] - touched, axis=2).min(axis=1)
+    return np.asarray(gaps / gaps.max())

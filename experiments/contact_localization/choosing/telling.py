@@ -110,7 +110,8 @@ def readings_at(rays: RayMesh, at: BelievedGels, base_from_gel: FloatArray) -> t
     met = rays.first_hits(starts.reshape(-1, 3), ways).distance.reshape(len(centres), -1) - BEFORE
     met = np.where(met < BEYOND, met, np.inf)
     stopped = met.min(axis=1)
-    heights = np.minimum(met - np.where(np.isfinite(stopped), stopped, 0.0)[:, None], DEEPEST)
+    along = np.where(np.isfinite(stopped), stopped, 0.0)[:, None]
+    heights = np.minimum(met - along, DEEPEST)
     off = np.hypot(STOPPED, STOPPED_PER_METRE * np.linalg.norm(moved))
     read = np.column_stack([stopped / off, heights / SHAPED])
-    return read, centres + np.where(np.isfinite(stopped), stopped, 0.0)[:, None] * axes
+    return read, centres + along * axes

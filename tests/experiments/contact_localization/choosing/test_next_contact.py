@@ -12,15 +12,16 @@ from experiments.contact_localization.choosing import next_contact, telling
 from experiments.contact_localization.choosing.next_contact import EXPECTED, PLACEHOLDER, ChosenContacts
 from experiments.contact_localization.experiment import EXPERIMENT, PLAN_KEY
 from experiments.contact_localization.section import Localization
-from harness.basics.errors import WrongUse
+from harness.basics.errors import MotionRefused, WrongUse
 from harness.bench.scene import SceneFile, Sensors, scene_from_options
 from harness.bench.station_file import load_station, station_path
 from harness.experiment.begin import begin
 from harness.experiment.in_process import performed
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
-from harness.skills.planning import Itinerary
+from harness.skills.planning import Itinerary, RunPlan
 from harness.skills.press import ContactMotion, PressPerformer
+from harness.skills.sites import Site
 from harness.twin.bench_of import twin_of, way_between
 
 STATION = load_station(station_path("mock"))
@@ -127,6 +128,25 @@ def test_a_contact_that_nowhere_has_a_free_way_ends_the_run_and_says_so(
     assert list(contacts_of(ended, said).steps(ended.recording)) == []
     (sentence,) = said
     assert "no more contacts are made than 1: the arm has no free way to any of" in sentence
+
+
+def test_a_place_whose_rehearsal_is_refused_is_passed_over(
+    run: RunFiles, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused: list[object] = []
+    inner = Itinerary.rehearsed
+
+    def once(itinerary: Itinerary, sites: tuple[Site, ...]) -> RunPlan:
+        if not refused:
+            refused.append(sites)
+            raise MotionRefused("the gel is in the table")
+        return inner(itinerary, sites)
+
+    ended = after(run, 2, tmp_path / "run")
+    monkeypatch.setattr(Itinerary, "rehearsed", once)
+    step = next(contacts_of(ended, []).steps(ended.recording))
+    assert refused
+    assert step.parameters != run.recording.step(2).step.parameters
 
 
 def test_each_place_is_struck_where_the_scene_is_heard(tmp_path: Path) -> None:
