@@ -49,6 +49,12 @@ class GuardedTouch:
         length = float(np.linalg.norm(total))
         return np.asarray(total / length if length > 0.0 else -self.stand_from_gel[:3, 2])
 
+    @property
+    def normal_spread(self) -> float:
+        """Rad, roughly: root mean square of how far its normals are from their mean; zero of a plane's."""
+        apart = self.normals - self.mean_normal
+        return float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))) if self.met else 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class SeenMask:

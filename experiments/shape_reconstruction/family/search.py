@@ -23,6 +23,7 @@ from experiments.shape_reconstruction.family.proposing.proposals import lay
 from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
 from experiments.shape_reconstruction.family.settings import FamilySettings
+from experiments.shape_reconstruction.family.sizes import rarity_of_size
 from experiments.shape_reconstruction.family.strain import Strain, strain_of
 from harness.basics.arrays import FloatArray
 
@@ -60,9 +61,9 @@ class Hypothesis:
     Attributes:
         shape: in the frame ``stand``.
         prior: that its numbers are refined under.
-        cost: half the sum of squares of readings and prior, and the price of parts that are rare.
+        cost: half the sum of squares of readings and prior, and the price of parts and sizes that are rare.
         curvature: ``(n, n)`` of the cost along its free numbers; empty until it is refined for the last time.
-        price: of its parts.
+        price: of its parts and its size.
     """
 
     shape: FamilyShape
@@ -73,7 +74,7 @@ class Hypothesis:
 
     @property
     def misfit(self) -> float:
-        """The cost less the price: how well the shape fits, however rare its parts are."""
+        """The cost less the price: how well the shape fits, however rare it is."""
         return self.cost - self.price
 
 
@@ -238,7 +239,7 @@ class FamilySearch:
             code, one.shape.theta, self.full, one.prior, basis, last, rounds, last
         )
         shape = FamilyShape(one.shape.name, code, theta)
-        price = TEMPERATURE * rarity(shape)
+        price = TEMPERATURE * (rarity(shape) + rarity_of_size(shape))
         return Hypothesis(shape, one.prior, cost + price, curvature, price)
 
 

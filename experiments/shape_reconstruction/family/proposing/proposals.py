@@ -6,17 +6,13 @@ from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.freedom import has_yaw, sizes_of
 from experiments.shape_reconstruction.family.layout import (
-    BENT,
     CORED,
-    FLAT_SIDED,
     KNOTS,
-    LOOP,
-    SUPER,
-    TOOL,
     TURNED,
 )
 from experiments.shape_reconstruction.family.proposing.guides import Guides, long_way
-from harness.basics.arrays import FloatArray, IntArray
+from experiments.shape_reconstruction.family.sizes import size_of
+from harness.basics.arrays import FloatArray
 
 _Random = np.random.Generator
 
@@ -47,7 +43,7 @@ def lay(shape: FamilyShape, guides: Guides, random: _Random, place_error: float,
     """
     theta = shape.theta.copy()
     long = _is_long(shape)
-    turn = long_way(guides.on_level(0.5 * _size(shape.code, theta)[1])) if guides.sighted and long else None
+    turn = long_way(guides.on_level(0.5 * size_of(shape.code, theta)[1])) if guides.sighted and long else None
     theta[list(sizes_of(shape.code))] += _log_scale(shape, guides, random, turn)
     theta[layout.X : layout.Y + 1] = _middle(shape, theta, guides, random, place_error, long)
     count = yaws if has_yaw(shape.code) else 1
@@ -76,29 +72,11 @@ def _is_long(shape: FamilyShape) -> bool:
     return bool(shape.code[layout.KIND] != TURNED)
 
 
-def _size(code: IntArray, theta: FloatArray) -> tuple[float, float]:
-    """M: half the width and the height of a shape, roughly."""
-    kind = int(code[layout.KIND])
-    if kind == TOOL:
-        return 0.5 * float(np.exp(theta[layout.LENGTH])), 2.0 * float(np.exp(theta[layout.HEAD_THICK]))
-    if kind == BENT:
-        girth = float(np.exp(theta[layout.GIRTHS + 2]))
-        return 0.5 * float(np.exp(theta[layout.ARC])), 2.0 * girth
-    half = float(np.exp(theta[layout.RADII : layout.RADII + KNOTS].max()))
-    if code[layout.PLAN] == CORED:
-        half += 0.7 * float(np.exp(theta[layout.CORE_X]) + np.exp(theta[layout.CORE_Y]))
-    if code[layout.PLAN] in (SUPER, FLAT_SIDED):
-        half *= 0.5 * (1.0 + float(np.exp(theta[layout.ACROSS])))
-    if code[layout.LIMB] == LOOP:
-        half += 0.35 * float(np.exp(theta[layout.LIMB_REACH]))
-    return half, float(np.exp(theta[layout.HEIGHT]))
-
-
 def _log_scale(shape: FamilyShape, guides: Guides, random: _Random, turn: float | None) -> float:
     """By which all lengths of a draw are scaled, so that it is as large as what was seen or touched."""
     if random.random() < OWN:
         return 0.0
-    half, height = _size(shape.code, shape.theta)
+    half, height = size_of(shape.code, shape.theta)
     if guides.sighted:
         return float(np.clip(np.log(_seen_scale(guides, half, height, turn)), -_MOST_SCALE, _MOST_SCALE))
     if not guides.touched:
@@ -131,7 +109,7 @@ def _middle(
         return np.asarray(near + random.normal(0.0, 5e-3, 2))
     if not guides.sighted:
         return np.asarray(random.normal(0.0, place_error, 2))
-    height = _size(shape.code, theta)[1]
+    height = size_of(shape.code, theta)[1]
     if long:
         level = guides.on_level(0.5 * height)
         if len(level):

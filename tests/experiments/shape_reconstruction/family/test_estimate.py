@@ -197,7 +197,7 @@ def test_displacements_meet_their_places_and_die_away() -> None:
 
 def test_a_mug_s_handle_is_in_the_answer() -> None:
     mug = build("mug", 4e-3)
-    found = family_estimate(shape_readings(touches_on(mug, 10, seed=0), look_at(mug)), COARSE)
+    found = family_estimate(shape_readings(touches_on(mug, 10, seed=0), look_at(mug)), LEVELS["coarse"])
     require_sound(found)
     assert shape_error(found.mesh, mug, samples=3000).chamfer < 4e-3
 

@@ -296,3 +296,20 @@ def test_a_vessel_much_longer_than_wide_is_rare() -> None:
     before = rarity(solid)
     solid.theta[[layout.CORE_X, layout.CORE_Y]] = np.log([0.2, 0.001])
     assert rarity(solid) == pytest.approx(before)
+
+
+def test_a_normal_counts_for_less_where_the_surface_bends_within_a_contact() -> None:
+    _, readings = made("bowl")
+    flat = readings.contacts[0]
+    lean = 0.6 * np.linspace(-1.0, 1.0, len(flat.points))
+    across = np.cross(
+        flat.mean_normal, [0.0, 0.0, 1.0] if abs(flat.mean_normal[2]) < 0.9 else [1.0, 0.0, 0.0]
+    )
+    across /= np.linalg.norm(across)
+    bent = np.cos(lean)[:, None] * flat.mean_normal + np.sin(lean)[:, None] * across
+    plane = np.repeat(flat.mean_normal[None], len(flat.points), axis=0)
+    seen = observe(replace(readings, touches=(replace(flat, normals=plane), replace(flat, normals=bent))))
+    np.testing.assert_allclose(seen.normals[0], seen.normals[1], atol=1e-9)
+    at_plane, at_rim = seen.normal_sigma
+    assert at_plane == pytest.approx(np.hypot(flat.normal_sigma, np.radians(6.0)), rel=1e-6)
+    assert at_rim > 1.5 * at_plane
