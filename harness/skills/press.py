@@ -114,6 +114,7 @@ class Speeds:
         retreat: m/s away from the object.
         acceleration: m/s^2 of every straight line.
         touch_force: N that end the search; the press is measured from where half of it was met.
+        press_force: N that end a press into what nobody knows: the housing may have met it, not the gel.
         overtravel: m beyond the nominal surface before a touch is given up.
     """
 
@@ -124,6 +125,7 @@ class Speeds:
     retreat: float = 0.040
     acceleration: float = 0.2
     touch_force: float = 0.3
+    press_force: float = 5.0
     overtravel: float = 0.008
 
 
@@ -215,6 +217,9 @@ class PressPerformer:
     def _press(self, motion: ContactMotion, arm: Arm, began: float) -> float:
         """On to the planned depth behind the first touch, wherever the search came to rest.
 
+        Into what nobody knows until something resists firmly, if that is sooner: a housing that met a rim
+        is not driven into it.
+
         Returns:
             m by which the touch was farther than planned.
         """
@@ -222,9 +227,11 @@ class PressPerformer:
         search = arm.history(state.time - began)
         touched = first_touch(search, motion.axis, 0.5 * self.speeds.touch_force)
         further = motion.press - (float(state.base_from_flange[:3, 3] @ motion.axis) - touched)
-        self._line(
-            arm, _moved(motion.base_from_stand_off, state.base_from_flange, further * motion.axis), "press"
-        )
+        if self._explores and further > 0.0:
+            arm.move_until_contact(motion.axis, self.speeds.press, self.speeds.press_force, further)
+        else:
+            pressed = _moved(motion.base_from_stand_off, state.base_from_flange, further * motion.axis)
+            self._line(arm, pressed, "press")
         return touched - float(motion.base_from_stand_off[:3, 3] @ motion.axis) - motion.search
 
     def _contact(

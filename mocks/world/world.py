@@ -24,6 +24,7 @@ from mocks.camera.scene_view import Body, SceneView, box
 from mocks.world.gap_draw import GapDraw
 from mocks.world.gel import WorldGel
 from mocks.world.gel_contact import GelContact
+from mocks.world.housing_contact import HousingContact
 from mocks.world.mesh import nearest_face, split_long_edges
 
 LONGEST_EDGE = 5.0e-3
@@ -142,7 +143,9 @@ class World:
         self._raster = RasterMesh(self.mesh)
         self._middle = apply(self.base_from_object, self.mesh.bounds.mean(axis=0)[None])[0]
         tool = float(np.linalg.norm(bench.flange_from_gel[:3, 3]))
-        self._touching_distance = self.mesh.diagonal / 2 + tool + float(np.hypot(*self.sensor.window)) + REACH
+        self._touching_distance = (
+            self.mesh.diagonal / 2 + tool + float(np.hypot(*self.sensor.housing)) + REACH
+        )
         steeper = bench.sensor.pitch / self._grid.mean_pitch
         other = bench.other_calibration if gap.gel.calibration == "other presses" else None
         self._believed = other is None
@@ -150,6 +153,7 @@ class World:
         self.background = self._gel.background
         self._shading = self._draw.shading(self.sensor.rows, self.sensor.columns)
         self._contact = GelContact(self.mesh, self.sensor.window, SPRING_SPACING, REACH)
+        self._housing = HousingContact(self.mesh, self.sensor)
 
     def tactile_image(self, base_from_flange: FloatArray, step: int, sample: int) -> ByteArray:
         """What the gel's camera sees, ``(rows, columns, 3)`` uint8, RGB; without contact, the background."""
@@ -161,13 +165,14 @@ class World:
         return self._gel.picture(penetration, self._draw.run.height_gain, offset + self._shading + noise)
 
     def contact_wrench(self, base_from_flange: FloatArray, step: int) -> FloatArray:
-        """``(6,)`` N and N m that the object exerts at the flange, in base."""
+        """``(6,)`` N and N m that the object exerts at the flange, on gel and housing, in base."""
         offset = base_from_flange[:3, 3] - self._middle
         if float(offset @ offset) > self._touching_distance**2:
             return np.zeros(6)
         flange_from_gel = self._true_flange_from_gel(step)
         base_from_gel = self._true_base_from_flange(base_from_flange, step) @ flange_from_gel
-        in_gel = self._contact.wrench(self._object_from_base @ base_from_gel)
+        object_from_gel = self._object_from_base @ base_from_gel
+        in_gel = self._contact.wrench(object_from_gel) + self._housing.wrench(object_from_gel)
         rotation = base_from_gel[:3, :3]
         force = rotation @ in_gel[:3]
         x, y, z = base_from_flange[:3, :3] @ flange_from_gel[:3, 3]
