@@ -55,6 +55,8 @@ class SensorGap(StrictModel):
         gel_centre: m, per axis of the gel's frame, per run.
         pitch: relative, of the length of gel that a pixel shows, per run.
         aspect: relative, of a pixel's height against its width, per run.
+        housing: whether the rigid face around the gel stops at the object, or passes through it as if it were
+            not there.
     """
 
     tilt: Annotated[Angle, Nonnegative]
@@ -63,6 +65,7 @@ class SensorGap(StrictModel):
     gel_centre: Annotated[Length, Nonnegative]
     pitch: Annotated[Ratio, Nonnegative] = 0.0
     aspect: Annotated[Ratio, Nonnegative] = 0.0
+    housing: Literal["rigid", "not there"] = "not there"
 
 
 class GelGap(StrictModel):

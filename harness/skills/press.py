@@ -114,7 +114,8 @@ class Speeds:
         retreat: m/s away from the object.
         acceleration: m/s^2 of every straight line.
         touch_force: N that end the search; the press is measured from where half of it was met.
-        press_force: N that end a press into what nobody knows: the housing may have met it, not the gel.
+        press_force: N that end a press into what nobody knows: the housing may have met it, not the gel,
+            which resists less at any depth that is asked for.
         overtravel: m beyond the nominal surface before a touch is given up.
     """
 
@@ -125,7 +126,7 @@ class Speeds:
     retreat: float = 0.040
     acceleration: float = 0.2
     touch_force: float = 0.3
-    press_force: float = 5.0
+    press_force: float = 7.0
     overtravel: float = 0.008
 
 

@@ -153,7 +153,7 @@ class World:
         self.background = self._gel.background
         self._shading = self._draw.shading(self.sensor.rows, self.sensor.columns)
         self._contact = GelContact(self.mesh, self.sensor.window, SPRING_SPACING, REACH)
-        self._housing = HousingContact(self.mesh, self.sensor)
+        self._housing = HousingContact(self.mesh, self.sensor) if gap.sensor.housing == "rigid" else None
 
     def tactile_image(self, base_from_flange: FloatArray, step: int, sample: int) -> ByteArray:
         """What the gel's camera sees, ``(rows, columns, 3)`` uint8, RGB; without contact, the background."""
@@ -172,7 +172,9 @@ class World:
         flange_from_gel = self._true_flange_from_gel(step)
         base_from_gel = self._true_base_from_flange(base_from_flange, step) @ flange_from_gel
         object_from_gel = self._object_from_base @ base_from_gel
-        in_gel = self._contact.wrench(object_from_gel) + self._housing.wrench(object_from_gel)
+        in_gel = self._contact.wrench(object_from_gel)
+        if self._housing is not None:
+            in_gel += self._housing.wrench(object_from_gel)
         rotation = base_from_gel[:3, :3]
         force = rotation @ in_gel[:3]
         x, y, z = base_from_flange[:3, :3] @ flange_from_gel[:3, 3]

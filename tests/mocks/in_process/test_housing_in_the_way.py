@@ -15,11 +15,13 @@ from mocks.ur.hooks import HOME
 from mocks.world.world import NominalBench, World
 
 RANGE = np.array([[-2 * np.pi] * 6, [2 * np.pi] * 6])
+NONE = load_gap("none")
+RIGID = NONE.model_copy(update={"sensor": NONE.sensor.model_copy(update={"housing": "rigid"})})
 BESIDE, ABOVE, PRESS = 13.0e-3, 0.02, 1.5e-3
 
 
 def test_a_rim_beside_the_gel_stops_the_arm_and_leaves_no_mark(mug_bench: NominalBench) -> None:
-    world, stage = World(mug_bench, load_gap("none"), 0), Stage()
+    world, stage = World(mug_bench, RIGID, 0), Stage()
     stage.step = 0
     vertices = mug_bench.mesh.vertices
     top = float(vertices[:, 2].max())
