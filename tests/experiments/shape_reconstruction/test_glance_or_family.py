@@ -10,10 +10,9 @@ from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.family_or_smooth import ENOUGH, by_family
 from experiments.shape_reconstruction.glance_or_family import ALOOF, by_glance_or_family
-from experiments.shape_reconstruction.pcn.glance import by_glance, shipped, with_supposed
+from experiments.shape_reconstruction.pcn.glance import shipped, with_supposed
 from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from harness.basics.faces.nearest_surface import NearestSurface
 from harness.basics.mesh import Mesh
 from harness.objects.builtin import build
 from tests.experiments.shape_reconstruction.touched import evidence_of, look_at, presses
@@ -64,18 +63,25 @@ def test_a_household_shape_nowhere_near_a_glance_does_not_count_beside_few_conta
         np.testing.assert_array_equal(found.mesh.vertices, glance.mesh.vertices)
 
 
-def test_beside_few_contacts_a_household_shape_is_held_against_a_glance(
-    readings: ShapeEvidence, monkeypatch: pytest.MonkeyPatch
+class _Asked(Exception):
+    """The family was searched."""
+
+
+@pytest.mark.parametrize(("contacts", "held"), [(1, True), (ENOUGH - 1, True), (ENOUGH, False)])
+def test_beside_few_contacts_household_shapes_are_held_against_a_glance(
+    readings: ShapeEvidence, monkeypatch: pytest.MonkeyPatch, contacts: int, held: bool
 ) -> None:
-    one = replace(readings, touches=readings.touches[:1])
-    points = by_glance(one).points
+    asked: list[ShapeEvidence] = []
 
-    def apart() -> float:
-        return float(NearestSurface(by_family(one).mesh).distances(points).mean())
+    def searched(evidence: ShapeEvidence, *_: object) -> ShapeEstimate:
+        asked.append(evidence)
+        raise _Asked
 
-    near = apart()
-    monkeypatch.setattr("experiments.shape_reconstruction.family_or_smooth.with_supposed", lambda seen: seen)
-    assert near < 0.95 * apart()
+    monkeypatch.setattr("experiments.shape_reconstruction.family_or_smooth.family_estimate", searched)
+    with pytest.raises(_Asked):
+        by_family(replace(readings, touches=readings.touches[:contacts]))
+    expected = with_supposed(readings).supposed if held else np.zeros((0, 3))
+    np.testing.assert_array_equal(asked[0].supposed, expected)
 
 
 def test_what_is_supposed_is_a_glance_s_points_and_nothing_without_a_picture(readings: ShapeEvidence) -> None:
