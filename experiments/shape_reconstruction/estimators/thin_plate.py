@@ -1,8 +1,9 @@
 """A field from places of a surface and its normals there: a Gaussian process with a thin-plate prior.
 
 The covariance is that of Williams and Fitzgibbon (Gaussian process implicit surfaces, 2007),
-``2 r^3 - 3 R r^2 + R^3`` within a ball that is ``R`` across; values and gradients are both observed. Its mean
-is the triharmonic interpolant of Hermite data, its variance says how far the surface may be from it.
+``2 r^3 - 3 R r^2 + R^3``, where ``R`` is ``WIDER`` times what holds all data; values and gradients are both
+observed. Its mean is the triharmonic interpolant of Hermite data, its variance says how far the surface may be
+from it.
 """
 
 from dataclasses import dataclass
@@ -20,6 +21,11 @@ _AMPLITUDES = (0.3, 1.0, 3.0, 10.0)
 """Over ``UNIT``, of which the likeliest is taken."""
 
 _JITTER = 1e-10
+
+WIDER = 1.3
+"""Times the ball that holds all data, ``R``: over the whole of a ball ``R`` across the covariance of values and
+gradients is not positive definite, over one of ``R / 1.2`` it is (eigenvalues for data on balls, spheres, rings
+and rods)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +63,7 @@ class ThinPlateField:
 
     Attributes:
         centre: ``(3,)`` m.
-        reach: m, across the ball within which the covariance holds.
+        reach: m, the ``R`` of the covariance.
         data: that it was fitted to.
         weights: ``(n, 4)`` of value and gradient at every place.
         factor: ``(4 n, 4 n)`` lower Cholesky factor of the covariance of all data.
@@ -101,7 +107,7 @@ def fitted(
     """
     corners = np.concatenate([data.points, low[None], high[None]])
     centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    reach = 2.0 * float(np.linalg.norm(corners - centre, axis=1).max())
+    reach = WIDER * 2.0 * float(np.linalg.norm(corners - centre, axis=1).max())
     local = np.ascontiguousarray((data.points - centre) / reach)
     prior = _cross(local, local, gradients=True)
     observed = np.column_stack([data.values / reach, data.normals]).ravel()
