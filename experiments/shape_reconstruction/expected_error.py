@@ -24,6 +24,14 @@ BEFORE = 0.15
 GEL = read_only(6.0e-3 * np.array([[0.0, 0.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]]))
 """``(5, 2)`` m along x and y of the gel: places of its face; the first that meets something stops it."""
 
+AROUND = read_only(
+    0.5 * np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if (x, y) != (0.0, 0.0)])
+)
+"""``(8, 2)`` sides of the sensor's face: places of its border; where one is met first, nothing is read."""
+
+PRESSED = 1.0e-3
+"""M that the gel is pressed on by, which the housing must stay clear for."""
+
 DEPTH, NORMAL = 1.5e-3, 0.25
 """M and length of a unit normal's change: deviations of what is read, with how far shapes of the family are
 off real ones."""
@@ -62,31 +70,38 @@ def error_spared(evidence: ShapeEvidence, estimate: ShapeEstimate, lines: FloatA
     now = bayes_risk(weights, apart)
     if now < AGREE:
         return None
-    read = readings_on(shapes, lines, max(BEFORE, 0.5 * evidence.largest))
+    face = evidence.housing, evidence.gel_thickness
+    read = readings_on(shapes, lines, max(BEFORE, 0.5 * evidence.largest), face)
     left = np.array([bayes_risk_after(one, weights, apart, MOST) for one in read.transpose(1, 0, 2)])
     return np.maximum(now - left, 0.0)  # rounding apart, no reading makes it worse
 
 
-def readings_on(shapes: Sequence[FamilyShape], lines: FloatArray, back: float) -> FloatArray:
+def readings_on(
+    shapes: Sequence[FamilyShape], lines: FloatArray, back: float, face: tuple[tuple[float, float], float]
+) -> FloatArray:
     """What a press along each line reads on each shape, in deviations of a reading.
 
     Args:
         shapes: in ``stand``.
         lines: ``(n, 4, 4)`` ``stand_from_gel`` at their ends.
         back: m before its end from where on each is followed.
+        face: m, sides ``(x, y)`` of the sensor's housing, and by how much the gel stands out of it.
 
     Returns:
         ``(shapes, n, 4)``: how far from its end the gel is stopped, and the surface's normal there; infinite
-        where the gel goes on to the line's end.
+        where the gel goes on to the line's end, or the housing stops it.
     """
-    aside = np.einsum("nij,kj->nki", lines[:, :3, :2], GEL)
+    (sides, thickness), gel = face, len(GEL)
+    aside = np.einsum("nij,kj->nki", lines[:, :3, :2], np.concatenate([GEL, AROUND * sides]))
     starts = lines[:, None, :3, 3] - back * lines[:, None, :3, 2] + aside
-    ways = np.ascontiguousarray(np.repeat(lines[:, :3, 2], len(GEL), axis=0))
+    starts[:, gel:] -= thickness * lines[:, None, :3, 2]
+    ways = np.ascontiguousarray(np.repeat(lines[:, :3, 2], starts.shape[1], axis=0))
     rows, found = np.arange(len(lines)), np.full((len(shapes), len(lines), 4), np.inf)
     for one, shape in zip(found, shapes, strict=True):
         along = first_met(shape.code, shape.theta, starts.reshape(-1, 3), ways, back).reshape(len(lines), -1)
-        first = along.argmin(axis=1)
-        met = np.isfinite(along[rows, first])
+        first = along[:, :gel].argmin(axis=1)
+        at = along[rows, first]
+        met = np.isfinite(at) & (along[:, gel:].min(axis=1) > at + PRESSED)
         depth = back - along[rows, first][met]
         places = lines[met, :3, 3] - depth[:, None] * lines[met, :3, 2] + aside[rows, first][met]
         one[met] = np.column_stack([depth / DEPTH, _normals(shape, places) / NORMAL])

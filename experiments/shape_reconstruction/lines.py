@@ -16,8 +16,9 @@ from harness.skills.exploring.unknown_space import LYING, SeenThing
 BEYOND = 0.02
 """M behind the estimated surface where a line ends that meets nothing."""
 
-TILT = float(np.radians(20.0))
-"""Rad, the most between a line and the estimated surface's normal."""
+TILT = float(np.radians(10.0))
+"""Rad, the most between a line and the estimated surface's normal; from some 20 degrees on a sensor's housing is
+stopped by a plane before its gel is."""
 
 _LESS = (1.0, 0.3, 0.0)
 """Shares of a drawn tilt that are tried in turn: over a flat object the sensor has room for little."""

@@ -2,8 +2,8 @@
 
 The covariance is that of Williams and Fitzgibbon (Gaussian process implicit surfaces, 2007),
 ``2 r^3 - 3 R r^2 + R^3``, where ``R`` is ``WIDER`` times what holds all data; values and gradients are both
-observed. Its mean is the triharmonic interpolant of Hermite data, its variance says how far the surface may be
-from it.
+observed. Its mean is the triharmonic interpolant of Hermite data, its variance says how far the surface may
+be from it.
 """
 
 from dataclasses import dataclass
@@ -23,9 +23,9 @@ _AMPLITUDES = (0.3, 1.0, 3.0, 10.0)
 _JITTER = 1e-10
 
 WIDER = 1.3
-"""Times the ball that holds all data, ``R``: over the whole of a ball ``R`` across the covariance of values and
-gradients is not positive definite, over one of ``R / 1.2`` it is (eigenvalues for data on balls, spheres, rings
-and rods)."""
+"""Times the ball that holds all data, ``R``: over the whole of a ball ``R`` across the covariance of values
+and gradients is not positive definite, over one of ``R / 1.2`` it is (eigenvalues for data on balls, spheres,
+rings and rods)."""
 
 
 @dataclass(frozen=True, eq=False)

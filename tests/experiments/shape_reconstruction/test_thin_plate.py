@@ -29,7 +29,7 @@ def ball_data(kind: str, count: int) -> FloatArray:
 def test_data_anywhere_in_a_ball_are_fitted_to_within_what_they_are_known(
     kind: str, amplitude: float | None
 ) -> None:
-    """Of a plane through the ball, known to 0.1 mm: its covariance alone has negative eigenvalues at ``R``."""
+    """Of a plane, known to 0.1 mm; where ``R`` just spans the ball, the covariance has negative eigenvalues."""
     points = ball_data(kind, 120)
     normal = np.array([0.6, 0.0, 0.8])
     count = len(points)
