@@ -15,22 +15,12 @@ from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.field import corners_of, grid_distances
 from experiments.shape_reconstruction.family.ray_depth import first_met
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from harness.basics.arrays import FloatArray, IntArray, read_only
+from harness.basics.arrays import FloatArray, IntArray
 from harness.skills.exploring.bayes_risk import bayes_risk, bayes_risk_after
+from harness.skills.exploring.sensor_face import face_places, gel_first, ways_of
 
 BEFORE = 0.15
 """M before a line's end from where on it is followed."""
-
-GEL = read_only(6.0e-3 * np.array([[0.0, 0.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]]))
-"""``(5, 2)`` m along x and y of the gel: places of its face; the first that meets something stops it."""
-
-AROUND = read_only(
-    0.5 * np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if (x, y) != (0.0, 0.0)])
-)
-"""``(8, 2)`` sides of the sensor's face: places of its border; where one is met first, nothing is read."""
-
-PRESSED = 1.0e-3
-"""M that the gel is pressed on by, which the housing must stay clear for."""
 
 DEPTH, NORMAL = 1.5e-3, 0.25
 """M and length of a unit normal's change: deviations of what is read, with how far shapes of the family are
@@ -91,20 +81,16 @@ def readings_on(
         ``(shapes, n, 4)``: how far from its end the gel is stopped, and the surface's normal there; infinite
         where the gel goes on to the line's end, or the housing stops it.
     """
-    (sides, thickness), gel = face, len(GEL)
-    aside = np.einsum("nij,kj->nki", lines[:, :3, :2], np.concatenate([GEL, AROUND * sides]))
-    starts = lines[:, None, :3, 3] - back * lines[:, None, :3, 2] + aside
-    starts[:, gel:] -= thickness * lines[:, None, :3, 2]
-    ways = np.ascontiguousarray(np.repeat(lines[:, :3, 2], starts.shape[1], axis=0))
+    places = face_places(*face)
+    starts, ways = ways_of(lines, places, back)
     rows, found = np.arange(len(lines)), np.full((len(shapes), len(lines), 4), np.inf)
     for one, shape in zip(found, shapes, strict=True):
-        along = first_met(shape.code, shape.theta, starts.reshape(-1, 3), ways, back).reshape(len(lines), -1)
-        first = along[:, :gel].argmin(axis=1)
-        at = along[rows, first]
-        met = np.isfinite(at) & (along[:, gel:].min(axis=1) > at + PRESSED)
-        depth = back - along[rows, first][met]
-        places = lines[met, :3, 3] - depth[:, None] * lines[met, :3, 2] + aside[rows, first][met]
-        one[met] = np.column_stack([depth / DEPTH, _normals(shape, places) / NORMAL])
+        along = first_met(shape.code, shape.theta, starts, ways, back).reshape(len(lines), -1)
+        met, first = gel_first(along)
+        gone = along[rows, first][met]
+        depth = back - gone
+        at = starts.reshape(len(lines), -1, 3)[rows, first][met] + gone[:, None] * lines[met, :3, 2]
+        one[met] = np.column_stack([depth / DEPTH, _normals(shape, at) / NORMAL])
     return found
 
 

@@ -176,7 +176,7 @@ class ShapeExplorer:
         """``(n, 4, 4)`` in ``stand``."""
         if estimate is None:
             return np.zeros((0, 4, 4))
-        return lines_at_surface(estimate, self._run.station.gel.sensor.housing, DRAWN, random)
+        return lines_at_surface(estimate, self._run.station.gel.sensor, DRAWN, random)
 
     def _blind(self, here: Surroundings, random: np.random.Generator) -> FloatArray:
         """``(n, 4, 4)`` in ``stand``: to what was seen, or to where the object should be."""

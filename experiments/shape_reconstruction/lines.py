@@ -4,21 +4,24 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from experiments.shape_reconstruction.choosing import meeting_places
+from experiments.shape_reconstruction.choosing import BEHIND
 from experiments.shape_reconstruction.evidence import SeenMask
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import FloatArray
+from harness.basics.faces.ray_mesh import RayMesh
 from harness.basics.geometry import frame_facing, rotation_about, transform
+from harness.bench.sensor import TactileSensor
 from harness.sim.solid.surface_samples import random_points
 from harness.skills.exploring.lines import LOWEST, LineTarget
+from harness.skills.exploring.sensor_face import MIDDLE, face_places, gel_first, ways_of
 from harness.skills.exploring.unknown_space import LYING, SeenThing
 
 BEYOND = 0.02
 """M behind the estimated surface where a line ends that meets nothing."""
 
 TILT = float(np.radians(10.0))
-"""Rad, the most between a line and the estimated surface's normal; from some 20 degrees on a sensor's housing is
-stopped by a plane before its gel is."""
+"""Rad, the most between a line and the estimated surface's normal; from some 20 degrees on a sensor's housing
+is stopped by a plane before its gel is."""
 
 _LESS = (1.0, 0.3, 0.0)
 """Shares of a drawn tilt that are tried in turn: over a flat object the sensor has room for little."""
@@ -60,22 +63,25 @@ def aims_at_mask(
 
 
 def lines_at_surface(
-    estimate: ShapeEstimate, housing: tuple[float, float], count: int, random: np.random.Generator
+    estimate: ShapeEstimate, sensor: TactileSensor, count: int, random: np.random.Generator
 ) -> FloatArray:
     """``(n, 4, 4)`` in ``stand``: where the gel would end, led to places drawn on an estimate's surface.
 
     Args:
         estimate: of the shape.
-        housing: ``(x, y)`` m, sides of the sensor's face, which stays above the support.
-        count: of the places drawn; fewer lines, as none leads steeply up, or past the estimate.
+        sensor: whose face stays above the support.
+        count: of the places drawn; fewer lines, as none leads steeply up, or past the estimate, or where the
+            estimate meets the sensor's housing before its gel.
         random: what places, tilts and turns are drawn from.
     """
     points, faces = random_points(estimate.mesh, count, random)
     normals = estimate.mesh.face_normals[faces]
-    drawn = [_line(*one, 0.5 * max(housing), random) for one in zip(points, normals, strict=True)]
+    drawn = [_line(*one, 0.5 * max(sensor.housing), random) for one in zip(points, normals, strict=True)]
     lines = np.array([line for line in drawn if line is not None]).reshape(-1, 4, 4)
-    behind = lines[:, :3, 3] - meeting_places(estimate, lines)
-    return np.asarray(lines[np.einsum("ij,ij->i", behind, lines[:, :3, 2]) >= _LEAST_BEYOND])
+    places = face_places(sensor.housing, sensor.gel_thickness)
+    hits = RayMesh(estimate.mesh).first_hits(*ways_of(lines, places, BEHIND))
+    along = hits.distance.reshape(len(lines), -1)
+    return np.asarray(lines[gel_first(along)[0] & (along[:, MIDDLE] <= BEHIND - _LEAST_BEYOND)])
 
 
 def _line(

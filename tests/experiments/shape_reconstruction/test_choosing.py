@@ -14,6 +14,7 @@ from experiments.shape_reconstruction.surface import SUPPOSED, ShapeEstimate
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, transform
 from harness.basics.mesh import Mesh
+from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.builtin import build
 
 HOUSING = (0.034, 0.030)
@@ -88,7 +89,7 @@ def test_moving_everything_moves_no_score() -> None:
 @pytest.mark.parametrize("name", ["mug", "plate", "wrench"])
 def test_lines_at_a_surface_pass_it_and_keep_the_sensor_off_the_support(name: str) -> None:
     estimate = estimated(build(name))
-    lines = lines_at_surface(estimate, HOUSING, 100, np.random.default_rng(1))
+    lines = lines_at_surface(estimate, GELSIGHT_R15, 100, np.random.default_rng(1))
     assert len(lines) > 5
     lowest = lines[:, 2, 3] - 0.5 * max(HOUSING) * np.linalg.norm(lines[:, :2, 2], axis=1)
     assert np.all(lowest > 0.0)

@@ -13,7 +13,7 @@ def ball_data(kind: str, count: int) -> FloatArray:
     unit = random.normal(size=(count, 3))
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    return {
+    places: dict[str, FloatArray] = {
         "sphere": unit,
         "ball": unit * np.cbrt(random.uniform(size=(count, 1))),
         "two caps": unit[np.abs(unit[:, 2]) > 0.8],
@@ -21,7 +21,8 @@ def ball_data(kind: str, count: int) -> FloatArray:
         "rod": np.column_stack([0.0 * angle, 0.0 * angle, np.linspace(-1.0, 1.0, count)]),
         "two ends": random.normal(0.0, 0.01, (count, 3))
         + np.where(angle < np.pi, 0.98, -0.98)[:, None] * [0, 0, 1],
-    }[kind] * 0.1
+    }
+    return 0.1 * places[kind]
 
 
 @pytest.mark.parametrize("kind", ["sphere", "ball", "two caps", "ring", "rod", "two ends"])
@@ -29,7 +30,7 @@ def ball_data(kind: str, count: int) -> FloatArray:
 def test_data_anywhere_in_a_ball_are_fitted_to_within_what_they_are_known(
     kind: str, amplitude: float | None
 ) -> None:
-    """Of a plane, known to 0.1 mm; where ``R`` just spans the ball, the covariance has negative eigenvalues."""
+    """Of a plane known to 0.1 mm; where ``R`` only spans the ball, some eigenvalues are negative."""
     points = ball_data(kind, 120)
     normal = np.array([0.6, 0.0, 0.8])
     count = len(points)
