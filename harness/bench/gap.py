@@ -65,7 +65,7 @@ class SensorGap(StrictModel):
     gel_centre: Annotated[Length, Nonnegative]
     pitch: Annotated[Ratio, Nonnegative] = 0.0
     aspect: Annotated[Ratio, Nonnegative] = 0.0
-    housing: Literal["rigid", "not there"] = "not there"
+    housing: Literal["rigid", "not there"] = "rigid"
 
 
 class GelGap(StrictModel):
