@@ -35,7 +35,7 @@ from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import Step, StepRecord
 from harness.skills.exploring.exploration import SKIPPED
-from harness.skills.exploring.lines import LineTarget, contact_along, lines_to
+from harness.skills.exploring.lines import LineTarget, contact_along, lines_to, unlike_first
 from harness.skills.exploring.surroundings import Surroundings, end_of
 from harness.skills.exploring.unknown_space import (
     SeenThing,
@@ -73,6 +73,7 @@ class Explorer:
         self._joints: FloatArray = HOME
         self._struck = 0
         self._contacts = 0
+        self._followed: list[FloatArray] = []
         self._skipped = 0
         self._travels: TwinBench | None = None
         self._nothing: TwinBench | None = None
@@ -118,7 +119,8 @@ class Explorer:
                 return contact_on_object(here, self._model, self._answering.patches, stand, random, strikes)
         aims, support = self._aims(random), float(self._model.place[2])
         press = float(np.mean(self._asked.depth))
-        return contact_along(here, lines_to(aims, here, support, random), press)
+        lines = unlike_first(lines_to(aims, here, support, random), self._followed)
+        return contact_along(here, lines, press)
 
     def strike(self, step: Step, read: Sequence[Reading]) -> StrikeMotion | None:
         """A strike where a contact has just met the object; None where none is left, or none is free.
@@ -160,6 +162,8 @@ class Explorer:
         if record.step.kind != "press":
             return
         self._contacts += 1
+        base_from_stand_off = np.asarray(record.step.parameters["base_from_stand_off"])
+        self._followed.append(base_from_stand_off @ self._run.station.flange_from_gel)
         self._struck += POSE in record.readings and not self._answering.strikes[-1].fault
         if READY in record.readings:
             self._joints = np.asarray(record.readings[READY].values[-1])

@@ -1,6 +1,6 @@
 """Lines into what is not known: straight ways of the gel that end at a touch, or nowhere."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +17,16 @@ from harness.twin.rehearsal import rehearse
 LINES = 40
 """Lines that are tried, for a way that suggests itself first and then once more for one that is searched."""
 
-SLANTS = (0.0, 0.0, 0.45, 0.9, 1.3)
-"""Rad from straight down, of lines into the unknown: a flat thing is met from above alone."""
+SLANTS = (0.0, 0.0, 1.3, 1.5, 1.5)
+"""Rad from straight down, of lines into the unknown: most things have level tops and upright sides, and a
+sensor that slants to what it meets is stopped by its housing. A flat thing is met from above alone."""
 
 LOWEST = 6.0e-3
 """M above the support where a line from above ends, unless what it leads to is known to be flatter."""
+
+
+_LIKE = (10.0e-3, float(np.cos(np.radians(20.0))))
+"""M beside each other, and cosine between them, of lines that would read the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +66,22 @@ def lines_to(
         height = lowest if slant == 0.0 else max(lowest, aim.end[2])
         end = np.array([*aim.end[:2], height])
         yield transform(frame_facing(inward, random.uniform(0.0, 2.0 * np.pi)), end)
+
+
+def unlike_first(lines: Iterable[FloatArray], before: Sequence[FloatArray]) -> list[FloatArray]:
+    """The same lines, those last that would go where others have gone.
+
+    Args:
+        lines: ``(4, 4)`` each, of ``gel`` at their ends.
+        before: ``(4, 4)`` each, those that were followed, whatever they met.
+    """
+
+    def like(one: FloatArray, other: FloatArray) -> bool:
+        apart = one[:3, 3] - other[:3, 3]
+        aside = apart - (apart @ one[:3, 2]) * one[:3, 2]
+        return bool(one[:3, 2] @ other[:3, 2] > _LIKE[1] and np.linalg.norm(aside) < _LIKE[0])
+
+    return sorted(lines, key=lambda line: any(like(line, other) for other in before))
 
 
 def contact_along(here: Surroundings, lines: Iterable[FloatArray], press: float) -> dict[str, Any]:

@@ -35,7 +35,12 @@ ENDS = (0.7, 0.95)
 """From and to: share of the way from an object's middle to its seen end that a line leads to."""
 
 _LEAST = 1.0e-3
-_ASIDE = (-0.8, 0.8)
+_ASIDE = (-0.3, 0.3)
+"""Rad from straight outward, where a line to an end comes from; from farther aside the housing meets a wall."""
+
+_WANDER = 0.2
+"""Of the way from the middle to an end: deviation of where lines lead about what they lead to."""
+
 _A_TARGET = 5
 """Lines to one target before the next is tried."""
 
@@ -182,12 +187,13 @@ def aims_of_seen(
         contacts: made before: each begins with another target.
         random: what heights and bearings are drawn from.
     """
+    wander = _WANDER * 0.5 * float(np.linalg.norm(seen.ends[1] - seen.ends[0]))
     for k in range(LINES):
         target = (contacts + k // _A_TARGET) % 3
         out = np.zeros(2)
         if target > 0:
             out = random.uniform(*ENDS) * (seen.ends[target - 1] - seen.middle)[:2]
-        off = random.normal() * seen.off if k else np.zeros(2)
+        off = random.normal() * seen.off + wander * random.normal(size=2) if k else np.zeros(2)
         height = support + random.uniform(0.0, 0.9) * seen.height
         bearing = None if target == 0 else float(np.arctan2(out[1], out[0])) + random.uniform(*_ASIDE)
         above = seen.lies or (k == 0 and contacts == 0)
