@@ -45,7 +45,7 @@ class ShapeRun(Section):
 
     table: ClassVar[str] = "shape"
     presses: int = Field(default=16, ge=0, le=MOST_PRESSES)
-    choose: Choice = "farthest"
+    choose: Choice = "active"
     depth: Annotated[tuple[Annotated[Length, Positive], Length], Ordered] = (0.5e-3, 1.5e-3)
     tilt: Annotated[Angle, Nonnegative] = math.radians(15.0)
     largest: Annotated[Length, Positive] = 0.3

@@ -7,11 +7,12 @@ import numpy as np
 
 from harness.basics.arrays import BoolArray, FloatArray, IntArray, read_only
 
-_THIRDS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
-_GEL = read_only(_THIRDS * [8.0e-3, 6.0e-3])
-_AROUND = read_only(0.5 * _THIRDS[_THIRDS.any(axis=1)])
+_STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)
+_GRID = np.array([[x, y] for x in _STEPS for y in _STEPS])
+_GEL = read_only(_GRID * [8.0e-3, 6.0e-3])
+_AROUND = read_only(0.5 * _GRID[np.abs(_GRID).max(axis=1) == 1.0])
 
-MIDDLE = 4
+MIDDLE = 12
 """Of ``face_places``, the gel's middle."""
 
 PRESSED = 1.0e-3
@@ -19,7 +20,7 @@ PRESSED = 1.0e-3
 
 
 def face_places(housing: tuple[float, float], gel_thickness: float) -> FloatArray:
-    """``(17, 3)`` m in ``gel``: nine places of the gel's face, then eight of the housing's border.
+    """``(41, 3)`` m in ``gel``: 25 places of the gel's face, then 16 of the housing's border.
 
     Args:
         housing: ``(x, y)`` m, sides of the housing.
@@ -50,7 +51,7 @@ def gel_first(along: FloatArray) -> tuple[BoolArray, IntArray]:
     """Whether the gel reads what is met.
 
     Args:
-        along: ``(n, 17)`` m that each of ``face_places`` goes until it meets something; infinite where it
+        along: ``(n, 41)`` m that each of ``face_places`` goes until it meets something; infinite where it
             meets nothing.
 
     Returns:

@@ -36,7 +36,7 @@ ENDS = (0.7, 0.95)
 
 _LEAST = 1.0e-3
 _ASIDE = (-0.3, 0.3)
-"""Rad from straight outward, where a line to an end comes from; from farther aside the housing meets a wall."""
+"""Rad from straight out, where a line to an end comes from; from farther aside the housing meets walls."""
 
 _WANDER = 0.2
 """Of the way from the middle to an end: deviation of where lines lead about what they lead to."""

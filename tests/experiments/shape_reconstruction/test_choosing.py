@@ -12,10 +12,12 @@ from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidenc
 from experiments.shape_reconstruction.lines import BEYOND, lines_at_surface
 from experiments.shape_reconstruction.surface import SUPPOSED, ShapeEstimate
 from harness.basics.arrays import FloatArray
-from harness.basics.geometry import frame_facing, transform
+from harness.basics.geometry import frame_facing, transform, translation
 from harness.basics.mesh import Mesh
 from harness.bench.sensor import GELSIGHT_R15
 from harness.objects.builtin import build
+from mocks.world.gel_contact import GelContact
+from mocks.world.housing_contact import HousingContact
 
 HOUSING = (0.034, 0.030)
 NOTHING = np.zeros((0, 3))
@@ -96,3 +98,19 @@ def test_lines_at_a_surface_pass_it_and_keep_the_sensor_off_the_support(name: st
     passed = np.einsum("ij,ij->i", lines[:, :3, 3] - meeting_places(estimate, lines), lines[:, :3, 2])
     assert np.all(passed > 1e-3)
     assert np.all(passed <= BEYOND + estimate.mesh.diagonal)
+
+
+@pytest.mark.parametrize("name", ["mug", "bowl", "pitcher", "wrench"])
+def test_along_lines_at_a_surface_the_gel_is_pressed_and_the_housing_stays_clear(name: str) -> None:
+    """By the mocked world's own contact, at the depth where the gel is pressed by half of a millimetre."""
+    mesh = build(name)
+    lines = lines_at_surface(estimated(mesh), GELSIGHT_R15, 60, np.random.default_rng(2))
+    assert len(lines) > 5
+    housing, world = HousingContact(mesh, GELSIGHT_R15), GelContact(mesh, GELSIGHT_R15.window, 5e-4, 5e-3)
+    clear = []
+    for one in lines:
+        ways = np.arange(-0.2, 0.0, 2.5e-4)
+        poses = [one @ translation(np.array([0.0, 0.0, way])) for way in ways]
+        pressed = next(pose for pose in poses if world.indentation(pose).max() > 0.5e-3)
+        clear.append(not housing.wrench(pressed).any())
+    assert np.mean(clear) > 0.9

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.shape_reconstruction.choosing import farthest, most_informative
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.expected_error import distances_apart, error_spared
+from experiments.shape_reconstruction.expected_error import distances_apart, error_spared, readings_on
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
 from experiments.shape_reconstruction.family.ray_depth import first_met
@@ -118,6 +118,21 @@ def test_the_gel_is_as_wide_as_it_is() -> None:
     found = error_spared(evidence(), two, beside)
     assert found is not None
     assert found[0] > 1e-3
+
+
+def test_a_press_that_the_housing_stops_reads_nothing() -> None:
+    """A can is read from straight aside; from 25 degrees above only by a gel that stands far out."""
+    can, slant = shape_at(0.0), np.radians(25.0)
+    slanting = line((0.0, 0.0, 0.005), (-np.cos(slant), 0.0, -np.sin(slant)))
+    level = line((0.0, 0.0, 0.025), (-1.0, 0.0, 0.0))
+    housing = evidence().housing
+
+    def read(out: float) -> list[bool]:
+        found = readings_on([can], np.array([slanting, level]), 0.15, (housing, out))
+        return np.isfinite(found[0]).all(axis=1).tolist()
+
+    assert read(evidence().gel_thickness) == [False, True]
+    assert read(20e-3) == [True, True]
 
 
 @pytest.mark.parametrize("name", ["mug", "bowl", "spanner", "tray", "jug", "bent body"])
