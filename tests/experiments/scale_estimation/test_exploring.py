@@ -73,8 +73,8 @@ def test_an_object_never_seen_is_found_by_touch_or_its_size_stays_open(blind: Re
 
 @pytest.fixture(scope="module")
 def heard(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Recording:
-    scene = scene_of(4, camera=False, sound=True, mesh="builtin:bowl")
-    return ran(tmp_path_factory.mktemp("heard") / "run", scene, station, 60)
+    scene = scene_of(4, camera=False, sound=True)
+    return ran(tmp_path_factory.mktemp("heard") / "run", scene, station, 3)
 
 
 @pytest.mark.slow  # a whole run with strikes
@@ -92,8 +92,8 @@ def test_a_run_that_was_stopped_after_a_strike_goes_on_with_the_same_contacts(
     heard: Recording, tmp_path: Path, station: Station
 ) -> None:
     """Where such a strike has left the arm is not in the step's parameters, but among its readings."""
-    scene = scene_of(4, camera=False, sound=True, mesh="builtin:bowl")
-    recording = begin(EXPERIMENT, scene, station, 60, "unplaced", tmp_path / "run").recording
+    scene = scene_of(4, camera=False, sound=True)
+    recording = begin(EXPERIMENT, scene, station, 3, "unplaced", tmp_path / "run").recording
 
     class Stops(Quiet):
         def ended(self, step: Any, seconds: float) -> None:

@@ -77,7 +77,7 @@ def test_a_size_beyond_the_range_that_was_asked_about_is_named(touched: Recordin
 
 def test_a_spoiled_picture_is_named_and_the_rest_answers(touched: Recording, tmp_path: Path) -> None:
     result = answered(with_spoiled_pictures(touched, tmp_path / "run", "mirrored", 2))
-    assert result["contacts"] == 2
+    assert result["contacts"] == answered(touched)["contacts"] - 1
     assert result["warnings"][0].startswith("step 3: its picture is left out")
     assert result["estimates"]["touch"]["size_m"] is not None
 
