@@ -129,7 +129,7 @@ def test_a_press_that_the_housing_stops_reads_nothing() -> None:
 
     def read(out: float) -> list[bool]:
         found = readings_on([can], np.array([slanting, level]), 0.15, (housing, out))
-        return np.isfinite(found[0]).all(axis=1).tolist()
+        return [bool(one) for one in np.isfinite(found[0]).all(axis=1)]
 
     assert read(evidence().gel_thickness) == [False, True]
     assert read(20e-3) == [True, True]
