@@ -23,6 +23,10 @@ SAME_SURFACE = 0.5e-3
 """m between the mean distances of both: an arm on its wires stops up to 0.3 mm elsewhere."""
 
 
+PRESSES = {"bowl": "8"}
+"""Of those that four blind presses mostly meet with the housing: too few contacts have no hull."""
+
+
 def surfaces(result: dict[str, Any]) -> dict[str, Any]:
     return {sense: (one["extents_m"], one["chamfer_m"]) for sense, one in result["estimates"].items()}
 
@@ -59,7 +63,7 @@ def test_each_object_over_every_wire_is_what_it_is_in_process(name: str, tmp_pat
         "--object",
         f"builtin:{name}",
         "--presses",
-        "4",
+        PRESSES.get(name, "4"),
         "--seed",
         "0",
     ]
