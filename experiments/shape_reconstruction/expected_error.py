@@ -85,11 +85,11 @@ def readings_on(
     starts, ways = ways_of(lines, places, back)
     rows, found = np.arange(len(lines)), np.full((len(shapes), len(lines), 4), np.inf)
     for one, shape in zip(found, shapes, strict=True):
-        along = first_met(shape.code, shape.theta, starts, ways, back).reshape(len(lines), -1)
+        along = first_met(shape.code, shape.theta, starts, ways, back).reshape(-1, len(places))
         met, first = gel_first(along)
         gone = along[rows, first][met]
         depth = back - gone
-        at = starts.reshape(len(lines), -1, 3)[rows, first][met] + gone[:, None] * lines[met, :3, 2]
+        at = starts.reshape(-1, len(places), 3)[rows, first][met] + gone[:, None] * lines[met, :3, 2]
         one[met] = np.column_stack([depth / DEPTH, _normals(shape, at) / NORMAL])
     return found
 

@@ -80,7 +80,7 @@ def lines_at_surface(
     lines = np.array([line for line in drawn if line is not None]).reshape(-1, 4, 4)
     places = face_places(sensor.housing, sensor.gel_thickness)
     hits = RayMesh(estimate.mesh).first_hits(*ways_of(lines, places, BEHIND))
-    along = hits.distance.reshape(len(lines), -1)
+    along = hits.distance.reshape(-1, len(places))
     return np.asarray(lines[gel_first(along)[0] & (along[:, MIDDLE] <= BEHIND - _LEAST_BEYOND)])
 
 

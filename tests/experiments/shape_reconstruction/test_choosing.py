@@ -114,3 +114,11 @@ def test_along_lines_at_a_surface_the_gel_is_pressed_and_the_housing_stays_clear
         pressed = next(pose for pose in poses if world.indentation(pose).max() > 0.5e-3)
         clear.append(not housing.wrench(pressed).any())
     assert np.mean(clear) > 0.9
+
+
+def test_a_surface_with_no_room_above_the_support_has_no_lines() -> None:
+    """All of it lower than a line from above ends: an empty answer, not an error in the middle of a run."""
+    tray = build("tray")
+    flat = Mesh(tray.vertices * [1.0, 1.0, 1e-3], tray.faces)
+    level = Mesh(flat.vertices - [0.0, 0.0, flat.bounds[0, 2]], flat.faces)
+    assert lines_at_surface(estimated(level), GELSIGHT_R15, 40, np.random.default_rng(3)).shape == (0, 4, 4)
