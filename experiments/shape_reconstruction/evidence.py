@@ -26,6 +26,7 @@ class GuardedTouch:
         normal_sigma: rad, one standard deviation of the normals.
         index: the step of the run that it is.
         clear: ``(k, 3)`` m, places of the unpressed gel's face that touched nothing where others did.
+        stopped: whether something ended its way before the line was at its end.
     """
 
     stand_from_gel: FloatArray
@@ -36,6 +37,12 @@ class GuardedTouch:
     normal_sigma: float
     index: int
     clear: FloatArray = field(default_factory=lambda: read_only(np.zeros((0, 3))))
+    stopped: bool = False
+
+    @property
+    def by_housing(self) -> bool:
+        """Whether the housing's face met the object: something did, and the gel shows nothing."""
+        return self.stopped and not self.met
 
     @property
     def met(self) -> bool:

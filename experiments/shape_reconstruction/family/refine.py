@@ -140,12 +140,12 @@ def _normal_equations(
     rows = active_rows(seen, out.values)
     base, here = np.empty(len(rows)), np.empty(len(rows))
     hold_rays(code, theta, seen, rows, out, q)
-    frozen(code, theta, seen, rows, out.held, ALL, q, base)
+    frozen(code, theta, seen, rows, out, ALL, q, base)
     slopes = np.empty((len(basis), len(rows)))
     root = np.sqrt(out.weights[rows])
     for i in range(len(basis)):
         here[:] = base
-        frozen(code, theta + _NUDGE * basis[i], seen, rows, out.held, moved_rows(basis[i]), q, here)
+        frozen(code, theta + _NUDGE * basis[i], seen, rows, out, moved_rows(basis[i]), q, here)
         slopes[i] = (here - base) / _NUDGE * root
     off = prior.rows @ (theta - prior.middle)
     curvature = slopes @ slopes.T + along.T @ along

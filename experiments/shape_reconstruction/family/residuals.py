@@ -1,14 +1,15 @@
 """How a shape of the family disagrees with the readings: weighted residuals, and the cost they add up to.
 
 One likelihood for touch, sight and both: what was not read has no rows. Rows: of each contact its points, its
-normal and the places where its gel touched nothing, every free place, every ray, every place that is
-supposed. A contact counts as a whole: one that slipped loses all its weight.
+normal and the places where its gel touched nothing, every housing that met it, every free place, every ray,
+every place that is supposed. A contact counts as a whole: one that slipped loses all its weight.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from experiments.shape_reconstruction.family.contacts.housing import held_housing_row, housing_row
 from experiments.shape_reconstruction.family.contacts.rows import (
     clear_row,
     contact_row_count,
@@ -60,23 +61,30 @@ class Rows(NamedTuple):
         weights: ``(rows,)`` by which a squared residual counts at this shape: worth times robustness.
         along: ``(rays,)`` m along each ray where the shape is nearest.
         held: ``(rays, 3)`` where each is held as derivatives are taken: two places, m, the second's share.
+        met: ``(faces, 3)`` m, the place of each housing's face that is nearest to the shape.
     """
 
     values: FloatArray
     weights: FloatArray
     along: FloatArray
     held: FloatArray
+    met: FloatArray
 
 
 @compiled
 def row_count(seen: FamilyEvidence) -> int:
-    """Rows of all readings: of contacts, free places, rays, and of what is supposed."""
+    """Rows of all readings: of contacts, housings, free places, rays, and of what is supposed."""
     return int(_first_supposed(seen) + len(seen.supposed))
 
 
 @compiled
+def _first_ray(seen: FamilyEvidence) -> int:
+    return int(contact_row_count(seen) + len(seen.faces) + len(seen.free))
+
+
+@compiled
 def _first_supposed(seen: FamilyEvidence) -> int:
-    return int(contact_row_count(seen) + len(seen.free) + len(seen.rays.kinds))
+    return int(_first_ray(seen) + len(seen.rays.kinds))
 
 
 @compiled
@@ -88,7 +96,7 @@ def evaluate(
     ``robust`` lets go of contacts that do not fit; without it they pull with at most a constant force.
     """
     prepare(code, theta, q)
-    n, m, k = len(seen.points), len(seen.middles), len(seen.free)
+    n, m = len(seen.points), len(seen.middles)
     for i in range(n):
         out.values[i] = point_row(code, theta, seen, q, i)
     for j in range(m):
@@ -98,10 +106,14 @@ def evaluate(
         out.values[n + 3 * m + i] = clear_row(code, theta, seen, q, off, i)
     cost = weigh_contacts(seen, robust, out.values, out.weights)
     first = contact_row_count(seen)
-    for i in range(k):
+    for i in range(len(seen.faces)):
+        out.values[first + i] = housing_row(code, theta, seen, q, i, out.met[i])
+        cost += _weigh(first + i, 1.0, out)
+    first += len(seen.faces)
+    for i in range(len(seen.free)):
         out.values[first + i] = _free(code, seen, q, i)
         cost += _weigh(first + i, 1.0, out)
-    cost += _evaluate_rays(code, theta, seen, out, q, first + k)
+    cost += _evaluate_rays(code, theta, seen, out, q, _first_ray(seen))
     for i in range(len(seen.supposed)):
         row = _first_supposed(seen) + i
         out.values[row] = _supposed(code, theta, seen, q, i)
@@ -162,7 +174,7 @@ def hold_rays(
 ) -> None:
     """Fill in where rays are held, ``out.held``, of those that are active."""
     prepare(code, theta, q)
-    first, rays = contact_row_count(seen) + len(seen.free), seen.rays
+    first, rays = _first_ray(seen), seen.rays
     origin, towards = np.empty(3), np.empty(3)
     ray_origin(theta, rays, origin)
     for row in active:
@@ -178,32 +190,32 @@ def frozen(
     theta: FloatArray,
     seen: FamilyEvidence,
     active: IntArray,
-    held: FloatArray,
+    held: Rows,
     which: int,
     q: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill in the residuals of some rows with rays held in place: what derivatives are taken of.
+    """Fill in the residuals of some rows with rays and housings held in place: what derivatives are taken of.
 
     Args:
         code: of the shape.
         theta: ``(SIZE,)``.
         seen: readings.
         active: rows, ascending.
-        held: of all rays, as ``hold_rays`` leaves it.
+        held: where, as ``evaluate`` and ``hold_rays`` leave it.
         which: of those rows ``ALL`` are filled in, or only ``OF_TOUCH`` or ``OF_SIGHT``.
         q: room.
         out: ``(active,)``.
     """
     prepare(code, theta, q)
-    n, k = len(seen.points), len(seen.free)
-    clear, first, rays = n + 3 * len(seen.middles), contact_row_count(seen), seen.rays
+    n, first, ray = len(seen.points), contact_row_count(seen), _first_ray(seen)
+    clear, free, rays = n + 3 * len(seen.middles), first + len(seen.faces), seen.rays
     towards, origin, triple, last = np.empty(3), np.empty(3), np.empty(3), -1
     ray_origin(theta, rays, origin)
     off = np.empty(0)
     for row in range(len(active)):
         i = active[row]
-        if (which == OF_SIGHT and i < first + k) or (which == OF_TOUCH and i >= first):
+        if (which == OF_SIGHT and i < ray) or (which == OF_TOUCH and i >= free):
             continue
         if i < n:
             out[row] = point_row(code, theta, seen, q, i)
@@ -217,14 +229,16 @@ def frozen(
             if not len(off):
                 off = contacts_off(seen, out)  # all points are active: their rows are the first
             out[row] = clear_row(code, theta, seen, q, off, i - clear)
-        elif i < first + k:
-            out[row] = _free(code, seen, q, i - first)
+        elif i < free:
+            out[row] = held_housing_row(code, theta, seen, q, i - first, held.met[i - first])
+        elif i < ray:
+            out[row] = _free(code, seen, q, i - free)
         elif i >= _first_supposed(seen):
             out[row] = _supposed(code, theta, seen, q, i - _first_supposed(seen))
         else:
-            i -= first + k
+            i -= ray
             turned_ray(theta, rays, i, towards)
-            d = held_distance(code, q, origin, towards, held[i])
+            d = held_distance(code, q, origin, towards, held.held[i])
             out[row] = sighted(theta, rays, i, d)
 
 
@@ -247,9 +261,9 @@ def moved_rows(direction: FloatArray) -> int:
 
 @compiled
 def active_rows(seen: FamilyEvidence, values: FloatArray) -> IntArray:
-    """Rows that pull: all of points, normals and grazing rays, and of the others those that are violated."""
+    """Rows that pull: of points, normals, housings and grazing rays all, of the others those not zero."""
     first, end = len(seen.points) + 3 * len(seen.middles), _first_supposed(seen)
-    rays = contact_row_count(seen) + len(seen.free)
+    rays = _first_ray(seen)
     found = np.empty(len(values), np.int64)
     count = 0
     for i in range(len(values)):
@@ -264,7 +278,8 @@ def rows_for(seen: FamilyEvidence) -> Rows:
     """Room for the rows of some readings."""
     count = row_count(seen)
     rays = len(seen.rays.kinds)
-    return Rows(np.zeros(count), np.zeros(count), np.zeros(rays), np.zeros((rays, 3)))
+    met = np.zeros((len(seen.faces), 3))
+    return Rows(np.zeros(count), np.zeros(count), np.zeros(rays), np.zeros((rays, 3)), met)
 
 
 @compiled
