@@ -38,9 +38,9 @@ by 4, 8 and 32 presses and a picture, and by 32 without, are 1.62, 1.35, 1.13 an
 
 LOOSELY = 2.0
 """Times a contact's deviation by which the housing's face may seem to be off a shape that met it. On 554 such
-ways of 48 development runs the true surface is within 1.6 mm of the face; but the place that touches jumps as
-a shape moves, and held as tightly as contacts are, more searches end in a wrong valley: 40 answers by 32 blind
-presses alone are then 3.2 mm off in the mean, 2.8 with this, and 3.7 where a shape may keep off the face."""
+ways of 48 development runs the true surface is within 1.6 mm of the face. But the place that touches jumps as
+a shape moves, and held as tightly as contacts are, more searches end in a wrong valley: 40 answers by 32
+blind presses are then 3.2 mm off in the mean, 2.8 with this, and 3.7 where a shape may keep off the face."""
 
 _LEVEL_SIGHT = 0.1
 """A camera that looks less steeply down does not see places on the support apart."""

@@ -8,6 +8,7 @@ import numpy as np
 from experiments.shape_reconstruction.experiment import EXPERIMENT
 from experiments.shape_reconstruction.methods import QUICK
 from experiments.shape_reconstruction.result import true_surface
+from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest_surface import NearestSurface
 from harness.bench.experiments import loaded
 from harness.bench.scene import SceneFile, scene_from_json
@@ -68,8 +69,13 @@ def timeless(result: Any) -> Any:
     return {key: timeless(value) for key, value in result.items() if key != "seconds"}
 
 
-def off_truth(recording: Recording, points: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+def off_truth(recording: Recording, points: FloatArray) -> float:
     """M, root mean square distance of ``(n, 3)`` places in ``stand`` from the true surface."""
+    return float(np.sqrt(np.mean(to_truth(recording, points) ** 2)))
+
+
+def to_truth(recording: Recording, points: FloatArray) -> FloatArray:
+    """``(n,)`` m from ``(n, 3)`` places in ``stand`` to the true surface."""
     truth = true_surface(RunFiles(recording))
     assert truth is not None
-    return float(np.sqrt(np.mean(NearestSurface(truth).distances(points) ** 2)))
+    return NearestSurface(truth).distances(points)

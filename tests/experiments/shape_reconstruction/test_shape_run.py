@@ -16,6 +16,7 @@ from experiments.shape_reconstruction.readings import evidence_of
 from experiments.shape_reconstruction.running import RunningShape
 from experiments.shape_reconstruction.section import ShapeRun
 from harness.basics.errors import FitRefused, WrongUse
+from harness.basics.geometry import apply
 from harness.basics.mesh import Mesh
 from harness.bench.scene import scene_from_json
 from harness.bench.station_file import Station
@@ -29,7 +30,15 @@ from harness.recording.session import Quiet
 from harness.skills.exploring.exploration import MOST_SKIPPED, SKIPPED
 from harness.twin.rehearsal import Segment, rehearse
 from tests.docs.result_keys import COMMON, SHAPE, SHAPE_ESTIMATE
-from tests.experiments.shape_reconstruction.runs import QUICKLY, answered, off_truth, ran, scene_of, went_on
+from tests.experiments.shape_reconstruction.runs import (
+    QUICKLY,
+    answered,
+    off_truth,
+    ran,
+    scene_of,
+    to_truth,
+    went_on,
+)
 from tests.support.whole_run import with_spoiled_pictures
 
 pytestmark = pytest.mark.timeout(300)  # explores objects press by press
@@ -191,6 +200,20 @@ def test_a_way_that_met_nothing_is_a_reading(blind: Recording) -> None:
         assert touch.points.shape == touch.normals.shape == (0, 3)
         planned = blind.step(touch.index).step.parameters["search_m"]
         assert touch.way == pytest.approx(planned, abs=3e-3)
+        assert not touch.stopped
+
+
+def test_a_way_that_the_housing_ended_says_where_the_surface_is(tmp_path: Path, station: Station) -> None:
+    recording = ran(tmp_path / "run", scene_of(5, "random", mesh="builtin:bowl"), station)
+    found = evidence_of(RunFiles(recording), recording.steps())
+    ended = [touch for touch in found.touches if touch.by_housing]
+    assert len(ended) >= 2  # a flat sensor meets a bowl with little but its housing
+    x, y = np.meshgrid(*(np.linspace(-0.5, 0.5, 61) * side for side in found.housing))
+    face = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, -found.gel_thickness)])
+    for touch in ended:
+        planned = recording.step(touch.index).step.parameters["search_m"]
+        assert touch.way < planned - 2e-3
+        assert to_truth(recording, apply(touch.stand_from_gel, face)).min() < 2e-3
 
 
 def refuses(monkeypatch: pytest.MonkeyPatch) -> None:

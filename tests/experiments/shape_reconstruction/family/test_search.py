@@ -91,7 +91,7 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     rows = active_rows(seen, out.values)
     base, moved = np.empty(len(rows)), np.empty(len(rows))
     hold_rays(shape.code, theta, seen, rows, out, q)
-    frozen(shape.code, theta, seen, rows, out.held, ALL, q, base)
+    frozen(shape.code, theta, seen, rows, out, ALL, q, base)
     first = contact_row_count(seen) + len(seen.free)
     seen_by_rays = (rows >= first) & (rows < first + len(seen.rays.kinds))
     np.testing.assert_allclose(base[~seen_by_rays], out.values[rows][~seen_by_rays], atol=1e-9)
@@ -99,7 +99,7 @@ def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: s
     assert np.all(base[seen_by_rays] < out.values[rows][seen_by_rays] + 0.15)
     direction = np.zeros(layout.SIZE)
     direction[layout.X] = 0.5e-3  # far beyond what a ray searched anew may be off
-    frozen(shape.code, theta + direction, seen, rows, out.held, ALL, q, moved)
+    frozen(shape.code, theta + direction, seen, rows, out, ALL, q, moved)
     again = rows_for(seen)
     evaluate(shape.code, theta + direction, seen, False, again, q)
     contacts, count = rows < contact_row_count(seen), len(seen.supposed)
@@ -124,14 +124,12 @@ def test_rows_that_a_direction_is_said_not_to_change_do_not_change(name: str) ->
     rows = active_rows(seen, out.values)
     hold_rays(shape.code, shape.theta, seen, rows, out, q)
     base, every = np.empty(len(rows)), np.empty(len(rows))
-    frozen(shape.code, shape.theta, seen, rows, out.held, ALL, q, base)
+    frozen(shape.code, shape.theta, seen, rows, out, ALL, q, base)
     basis = basis_of(shape.code, True, True)
     for direction in basis:
         few = base.copy()
-        frozen(shape.code, shape.theta + 1e-3 * direction, seen, rows, out.held, ALL, q, every)
-        frozen(
-            shape.code, shape.theta + 1e-3 * direction, seen, rows, out.held, moved_rows(direction), q, few
-        )
+        frozen(shape.code, shape.theta + 1e-3 * direction, seen, rows, out, ALL, q, every)
+        frozen(shape.code, shape.theta + 1e-3 * direction, seen, rows, out, moved_rows(direction), q, few)
         assert np.array_equal(few, every)
     assert {moved_rows(direction) for direction in basis} == {ALL, OF_TOUCH, OF_SIGHT}
     assert moved_rows(basis.sum(axis=0)) == ALL

@@ -1,0 +1,156 @@
+"""Laws of ways that the housing ended: the shape touches the housing's face, and does not keep off it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
+from experiments.shape_reconstruction.family import layout
+from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
+from experiments.shape_reconstruction.family.contacts.housing import nearest_on_face
+from experiments.shape_reconstruction.family.contacts.rows import contact_row_count
+from experiments.shape_reconstruction.family.distance import distances, prepare
+from experiments.shape_reconstruction.family.observed import LOOSELY, MODEL, observe
+from experiments.shape_reconstruction.family.residuals import (
+    ALL,
+    OF_TOUCH,
+    active_rows,
+    evaluate,
+    frozen,
+    hold_rays,
+    prepared_room,
+    rows_for,
+)
+from harness.basics.arrays import FloatArray
+from harness.basics.geometry import frame_facing, transform
+from tests.support.family_shapes import surface_of
+from tests.support.shape_readings import look_at, missed, shape_readings, touches_on
+
+pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
+
+SHAPES = ("mug", "bowl", "tray", "bottle", "spanner")
+
+
+def faces_around(middle: FloatArray, count: int, seed: int) -> list[FloatArray]:
+    """Rectangles of a housing's size anywhere near a place."""
+    random = np.random.default_rng(seed)
+    found = []
+    for _ in range(count):
+        away = random.standard_normal(3)
+        frame = frame_facing(away / np.linalg.norm(away), random.uniform(0.0, 6.0))
+        found.append(np.array([middle + 0.04 * away, 0.5 * 34e-3 * frame[:, 0], 0.5 * 30e-3 * frame[:, 1]]))
+    return found
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_nearest_place_of_a_face_is_that_of_all_its_places(name: str) -> None:
+    shape = draw_shape(name, np.random.default_rng(3))
+    q, place = prepared_room(), np.empty(3)
+    prepare(shape.code, shape.theta, q)
+    share = np.linspace(-1.0, 1.0, 41)
+    a, b = (one.reshape(-1, 1) for one in np.meshgrid(share, share))
+    off = []
+    for face in faces_around(surface_of(shape).vertices.mean(axis=0), 60, seed=1):
+        found = nearest_on_face(shape.code, q, face, place)
+        every = distances(shape.code, shape.theta, face[0] + a * face[1] + b * face[2])
+        assert found == pytest.approx(distances(shape.code, shape.theta, place[None])[0], abs=1e-12)
+        off.append(found - every.min())
+    assert np.quantile(np.abs(off), 0.9) < 0.6e-3  # the grid's own places are 0.8 mm apart
+    assert np.max(off) < 4e-3  # where two places are as near, and the other was followed
+
+
+def ended_at(name: str, gap: float) -> tuple[FamilyShape, ShapeEvidence]:
+    """A shape, and ways from above and aside that ended where the housing's face is so far before it."""
+    shape = draw_shape(name, np.random.default_rng(3))
+    mesh = surface_of(shape)
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    evidence = shape_readings(touches_on(mesh, 3, seed=1), look_at(mesh))
+    ways = []
+    for k, axis in enumerate(([0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0])):
+        ways.append(stopped(shape, evidence, np.array(axis), 0.5 * (low + high), gap, k))
+    return shape, replace(evidence, touches=(*evidence.touches, *ways))
+
+
+def stopped(
+    shape: FamilyShape, evidence: ShapeEvidence, axis: FloatArray, aim: FloatArray, gap: float, index: int
+) -> GuardedTouch:
+    """A way along an axis that its housing ended, m before the shape or, below zero, within it."""
+    frame = frame_facing(axis, 0.0)
+    half = 0.5 * np.array(evidence.housing)
+    x, y = np.meshgrid(half[0] * np.linspace(-1, 1, 69), half[1] * np.linspace(-1, 1, 61))
+    face = aim + x.reshape(-1, 1) * frame[:, 0] + y.reshape(-1, 1) * frame[:, 1]
+    back = 0.3  # m, from outside on
+    while distances(shape.code, shape.theta, face - back * axis).min() > 0.05e-3:
+        back -= max(0.02e-3, 0.9 * float(distances(shape.code, shape.theta, face - back * axis).min()))
+    end = aim - (back + gap) * axis + evidence.gel_thickness * axis
+    touch = missed(evidence.touches[0], transform(frame, end))
+    return replace(touch, index=10 + index, stopped=True)
+
+
+def housing_rows(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
+    """``(faces,)`` in standard deviations."""
+    seen, q = observe(evidence), prepared_room()
+    out = rows_for(seen)
+    evaluate(shape.code, shape.theta, seen, False, out, q)
+    first = contact_row_count(seen)
+    return out.values[first : first + len(seen.faces)].copy()
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("gap", [-3e-3, 0.0, 3e-3])
+def test_a_shape_before_the_face_disagrees_as_one_within_it_does(name: str, gap: float) -> None:
+    shape, evidence = ended_at(name, gap)
+    sigma = LOOSELY * np.hypot(evidence.touches[-1].sigma, MODEL)
+    rows = housing_rows(shape, evidence) * sigma
+    assert len(rows) == 3
+    # Within a thin wall no place is as deep as the face went.
+    assert np.all(np.abs(rows) < abs(gap) + 0.5e-3)
+    assert np.all(rows > 0.6 * gap - 0.1e-3 if gap > 0.0 else rows < 0.5e-3)
+    kept_off = replace(evidence, touches=tuple(replace(one, stopped=False) for one in evidence.touches))
+    seen, loose = observe(evidence), observe(kept_off)
+    q = prepared_room()
+    cost = evaluate(shape.code, shape.theta, seen, False, rows_for(seen), q)
+    without = evaluate(shape.code, shape.theta, loose, False, rows_for(loose), q)
+    assert cost - without == pytest.approx(0.5 * np.sum((rows / sigma) ** 2))
+
+
+def test_a_face_that_nothing_is_near_costs_no_more_than_in_proportion() -> None:
+    shape, evidence = ended_at("mug", 0.05)
+    far = housing_rows(shape, evidence)
+    seen, q = observe(evidence), prepared_room()
+    out = rows_for(seen)
+    evaluate(shape.code, shape.theta, seen, False, out, q)
+    first = contact_row_count(seen)
+    assert far.min() > 10.0
+    assert np.all(out.weights[first : first + 3] * far <= 3.0 + 1e-9)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_face_is_held_where_it_is_met_and_moves_with_the_gel(name: str) -> None:
+    shape, evidence = ended_at(name, 2e-3)
+    seen, q = observe(evidence), prepared_room()
+    theta = shape.theta.copy()
+    theta[layout.GEL : layout.GEL + 3] = [0.4e-3, -0.3e-3, 0.6e-3]
+    out = rows_for(seen)
+    evaluate(shape.code, theta, seen, False, out, q)
+    rows, first = active_rows(seen, out.values), contact_row_count(seen)
+    faces = (rows >= first) & (rows < first + len(seen.faces))
+    assert faces.sum() == 3
+    base, moved = np.empty(len(rows)), np.empty(len(rows))
+    hold_rays(shape.code, theta, seen, rows, out, q)
+    frozen(shape.code, theta, seen, rows, out, ALL, q, base)
+    np.testing.assert_allclose(base[faces], out.values[rows][faces], atol=1e-9)
+    deeper = theta.copy()
+    deeper[layout.GEL + 2] += 0.2e-3
+    moved[:] = base
+    frozen(shape.code, deeper, seen, rows, out, OF_TOUCH, q, moved)
+    nearer = (base - moved)[faces] * seen.face_sigma
+    assert np.all(nearer > 0.05e-3)  # the sensor is farther on, so that the shape is nearer
+    assert np.all(nearer < 0.2e-3 + 1e-9)
+
+
+def test_draws_are_laid_without_the_faces() -> None:
+    evidence = ended_at("mug", 0.0)[1]
+    assert len(observe(evidence, coarse=True).faces) == 0
+    assert len(observe(evidence).faces) == 3
