@@ -152,7 +152,8 @@ def _untested(found: ShapeEstimate, contacts: int) -> ShapeEstimate:
     """A household shape, which says where its contacts are too few to find it out as none."""
     if not 0 < contacts < ENOUGH:
         return found
-    said = f"a household shape is supposed: {contacts} contacts cannot tell whether it is one ({ENOUGH} can)"
+    few = "1 contact" if contacts == 1 else f"{contacts} contacts"
+    said = f"a household shape is supposed: {few} cannot tell whether it is one ({ENOUGH} can)"
     return replace(found, flags=(*found.flags, said))
 
 

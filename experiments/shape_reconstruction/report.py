@@ -53,13 +53,21 @@ def _surface(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
     found, truth = answer.fused, _truth(scored)
     shown = _shown(found, answer.evidence)
     words = (
-        f"By all readings: {len(shown.contacts)} contacts (white), {len(shown.passed)} ways that met nothing "
-        f"(dotted). {_sources(found)} The colour is one standard deviation of the surface along its normal: "
+        f"By all readings: {_readings(answer.evidence)}. {_sources(found)} The colour is one standard deviation of the surface along its normal: "
         f"the darker, the less sure. {'' if truth is None else _held(found, truth)}"
         f"Beside result.json: {stem_of('fused')}.ply (deviation and source of each vertex), .obj, .glb, .npz."
     )
     picture = album.photograph("surface", surface_figure(shown))
     return PageSection("The surface", words, picture, turned_surface(shown))
+
+
+def _readings(evidence: ShapeEvidence) -> str:
+    ended = sum(touch.by_housing for touch in evidence.touches)
+    met = len(evidence.contacts)
+    return (
+        f"{met} contact{'' if met == 1 else 's'} (white); dotted, {ended} way{'' if ended == 1 else 's'} that "
+        f"the sensor's housing ended and {len(evidence.touches) - met - ended} that met nothing"
+    )
 
 
 def _sources(found: ShapeEstimate) -> str:

@@ -62,7 +62,8 @@ SHAPE = {
     "method": "the estimator",
     "choose": "what chose where the presses led",
     "presses": "how many guarded ways the gel has followed, those that met nothing too",
-    "contacts": "how many of them met the object",
+    "contacts": "how many of them the gel read",
+    "ended_by_housing": "how many ended as the sensor's housing met it, with nothing in the gel",
     "estimates": "by sense (`vision`, `touch`, `fused`): an estimate, or `refused` with the reason",
     "seconds": "s that the answers took, the reading of the pictures included",
 }

@@ -63,7 +63,7 @@ def by_hull(evidence: ShapeEvidence) -> ShapeEstimate:
     """The convex hull of all contacts, and of what is below the lowest of them.
 
     Raises:
-        FitRefused: no touch met the object, or all contacts lie in one plane.
+        FitRefused: no touch met the object, or all contacts lie in one plane, or nearly.
     """
     start = time.perf_counter()
     samples = all_samples(evidence)
@@ -80,6 +80,11 @@ def by_hull(evidence: ShapeEvidence) -> ShapeEstimate:
     beyond = np.full(len(grid.points), -np.inf)
     for corner, normal in zip(corners, hull.face_normals, strict=True):
         np.maximum(beyond, (grid.points - corner) @ normal, out=beyond)
+    if beyond.min() >= 0.0:
+        raise FitRefused(
+            f"{len(evidence.contacts)} contacts span a body less than {1e3 * PITCH:g} mm thick, the hull's own "
+            "pitch; touch another side"
+        )
     return plain_answer(evidence, samples, None, grid.surface(beyond), "hull", start)
 
 

@@ -76,6 +76,17 @@ def test_every_answer_is_a_closed_body_that_says_how_well_it_is_known(
     require_whole(BY_TOUCH[name](evidence))
 
 
+def test_a_hull_too_thin_for_its_grid_is_refused_by_what_was_touched() -> None:
+    y, z = (one.ravel() for one in np.meshgrid(np.linspace(0.0, 0.1, 8), np.linspace(0.01, 0.1, 8)))
+    sides = []
+    for k, side in enumerate((1.0, -1.0)):
+        normal = np.array([side, 0.0, 0.0])
+        points = np.column_stack([np.full(y.size, 0.2e-3 * side), y, z])
+        sides.append(touch_of(points, normal, np.repeat(normal[None], y.size, axis=0), k))
+    with pytest.raises(FitRefused, match="2 contacts span a body less than 4 mm thick"):
+        by_hull(evidence_of(tuple(sides)))
+
+
 def test_the_surface_through_contacts_is_near_them_and_better_than_plainer_answers() -> None:
     evidence = evidence_of(TOUCHES)
     ours = shape_error(by_hermite(evidence).mesh, MUG, samples=4000)
