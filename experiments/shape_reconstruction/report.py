@@ -53,8 +53,9 @@ def _surface(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
     found, truth = answer.fused, _truth(scored)
     shown = _shown(found, answer.evidence)
     words = (
-        f"By all readings: {_readings(answer.evidence)}. {_sources(found)} The colour is one standard deviation of the surface along its normal: "
-        f"the darker, the less sure. {'' if truth is None else _held(found, truth)}"
+        f"By all readings: {_readings(answer.evidence)}. {_sources(found)} The colour is one standard "
+        f"deviation of the surface along its normal: the darker, the less sure. "
+        f"{'' if truth is None else _held(found, truth)}"
         f"Beside result.json: {stem_of('fused')}.ply (deviation and source of each vertex), .obj, .glb, .npz."
     )
     picture = album.photograph("surface", surface_figure(shown))
@@ -62,11 +63,12 @@ def _surface(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
 
 
 def _readings(evidence: ShapeEvidence) -> str:
-    ended = sum(touch.by_housing for touch in evidence.touches)
-    met = len(evidence.contacts)
+    ended, met = sum(touch.by_housing for touch in evidence.touches), len(evidence.contacts)
+    contacts, ways = f"contact{'' if met == 1 else 's'}", f"way{'' if ended == 1 else 's'}"
+    nothing = len(evidence.touches) - met - ended
     return (
-        f"{met} contact{'' if met == 1 else 's'} (white); dotted, {ended} way{'' if ended == 1 else 's'} that "
-        f"the sensor's housing ended and {len(evidence.touches) - met - ended} that met nothing"
+        f"{met} {contacts} (white); dotted, {ended} {ways} that the sensor's housing ended, and {nothing} that "
+        "met nothing"
     )
 
 

@@ -82,8 +82,8 @@ def by_hull(evidence: ShapeEvidence) -> ShapeEstimate:
         np.maximum(beyond, (grid.points - corner) @ normal, out=beyond)
     if beyond.min() >= 0.0:
         raise FitRefused(
-            f"{len(evidence.contacts)} contacts span a body less than {1e3 * PITCH:g} mm thick, the hull's own "
-            "pitch; touch another side"
+            f"{len(evidence.contacts)} contacts span a body less than {1e3 * PITCH:g} mm thick, the pitch of "
+            "the hull's grid; touch another side"
         )
     return plain_answer(evidence, samples, None, grid.surface(beyond), "hull", start)
 
