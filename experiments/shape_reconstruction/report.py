@@ -67,8 +67,8 @@ def _readings(evidence: ShapeEvidence) -> str:
     contacts, ways = f"contact{'' if met == 1 else 's'}", f"way{'' if ended == 1 else 's'}"
     nothing = len(evidence.touches) - met - ended
     return (
-        f"{met} {contacts} (white); dotted, {ended} {ways} that the sensor's housing ended, and {nothing} that "
-        "met nothing"
+        f"{met} {contacts} (white); dotted, {ended} {ways} that the sensor's housing ended, and "
+        f"{nothing} that met nothing"
     )
 
 

@@ -18,7 +18,7 @@ from experiments.shape_reconstruction.family.field import median_surface
 from experiments.shape_reconstruction.family.known import beyond_contacts, known_by, not_bounded
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
-from experiments.shape_reconstruction.family.settings import FamilySettings
+from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
 from experiments.shape_reconstruction.family.strain import Strain
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.surface import ShapeEstimate
@@ -60,6 +60,9 @@ many contacts it is twice that."""
 
 SLIPPING = 0.15
 """Share of contacts that may have slipped."""
+
+FINER = "if they did not slip, a finer search may fit them: shape.method=family-fine, in three times the time"
+"""Said where several contacts do not fit: a search may have missed the shape."""
 
 LEFT = "hypotheses_left"
 """In the details of an answer that is not the family's: hypotheses of the family that fitted ill."""
@@ -108,7 +111,10 @@ def family_estimate(
         known_by=known_by(mesh.vertices, evidence),
         not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE or strain.beyond_belief),
         doubtful=doubtful,
-        flags=(*_flags(mixture, fit, strain, doubtful), *_turned_flags(evidence, turned)),
+        flags=(
+            *_flags(mixture, fit, strain, doubtful, settings.draws < LEVELS["fine"].draws),
+            *_turned_flags(evidence, turned),
+        ),
         seconds=time.perf_counter() - began,
         details={
             **_details(mixture, fit),
@@ -180,7 +186,9 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh, fit: ContactFit, sight
     return np.asarray(np.sqrt(known + UNDERSIDE**2 * under) * (1.0 if sighted else BLIND))
 
 
-def _flags(mixture: Mixture, fit: ContactFit, strain: Strain, doubtful: dict[int, float]) -> tuple[str, ...]:
+def _flags(
+    mixture: Mixture, fit: ContactFit, strain: Strain, doubtful: dict[int, float], may_be_finer: bool
+) -> tuple[str, ...]:
     flags = []
     classes = mixture.by_class()
     rivals = [name for name, weight in classes.items() if weight >= RIVAL]
@@ -193,7 +201,8 @@ def _flags(mixture: Mixture, fit: ContactFit, strain: Strain, doubtful: dict[int
     if strain.beyond_belief:
         flags.append(f"outside the family: such a shape fits with {strain.most}")
     if doubtful:
-        flags.append(f"contacts that do not fit the rest: {', '.join(str(index) for index in doubtful)}")
+        said = f"contacts that do not fit the rest: {', '.join(str(index) for index in doubtful)}"
+        flags.append(f"{said}; {FINER}" if may_be_finer and len(doubtful) > 1 else said)
     return tuple(flags)
 
 

@@ -177,6 +177,8 @@ def test_the_report_and_the_surfaces_are_beside_the_result(touched: Recording, t
     assert set(re.findall('href="#([^"]+)"', page)) <= set(re.findall('id="([^"]+)"', page))
     assert max(len(cell) for cell in re.findall("<td>(.*?)</td>", page)) < 400  # result.json has them whole
     assert "MOCK" in page
+    assert f"By all readings: {result['contacts']} contact" in page
+    assert f"{result['ended_by_housing']} way" in page
     for sense in ("touch", "fused"):
         assert (tmp_path / result["estimates"][sense]["mesh"]).stat().st_size > 100
     assert len(EXPERIMENT.lines(result)) == 3
@@ -214,6 +216,7 @@ def test_a_way_that_the_housing_ended_says_where_the_surface_is(tmp_path: Path, 
         planned = recording.step(touch.index).step.parameters["search_m"]
         assert touch.way < planned - 2e-3
         assert to_truth(recording, apply(touch.stand_from_gel, face)).min() < 2e-3
+    assert answered(recording)["ended_by_housing"] == len(ended)
 
 
 def refuses(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,8 @@
 """The estimate's promises: finite, closed, convergent, and honest where nothing limits the object."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,10 +15,12 @@ from experiments.shape_reconstruction.family.estimate import (
     LOOSE,
     NOISE,
     _believed,
+    _flags,
     family_estimate,
 )
+from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.family.settings import LEVELS
-from experiments.shape_reconstruction.family.strain import STRAINED
+from experiments.shape_reconstruction.family.strain import STRAINED, Strain
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.metric import shape_error
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
@@ -231,3 +235,16 @@ def test_contacts_that_slipped_do_not_move_the_surface_and_too_many_have_not(
 ) -> None:
     fit = ContactFit(np.ones(count), np.zeros(count), np.arange(count) < doubtful, 0.0)
     assert _believed(fit).sum() == believed
+
+
+@pytest.mark.parametrize(
+    ("doubtful", "finer", "said"), [(1, True, False), (3, True, True), (3, False, False)]
+)
+def test_several_contacts_that_do_not_fit_name_the_finer_search(
+    doubtful: int, finer: bool, said: bool
+) -> None:
+    mixture = cast(Mixture, SimpleNamespace(by_class=lambda: {"can": 1.0}))
+    fit = ContactFit(np.ones(8), np.zeros(8), np.arange(8) < doubtful, 0.0)
+    flags = _flags(mixture, fit, Strain(0.0, ""), dict.fromkeys(range(doubtful), 2e-3), finer)
+    assert len(flags) == 1
+    assert ("shape.method=family-fine" in flags[0]) == said
