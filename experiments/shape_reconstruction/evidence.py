@@ -131,6 +131,11 @@ class ShapeEvidence:
         return tuple(touch for touch in self.touches if touch.met)
 
     @property
+    def ended_by_housing(self) -> tuple[GuardedTouch, ...]:
+        """Those touches that the sensor's housing ended, with nothing in the gel."""
+        return tuple(touch for touch in self.touches if touch.by_housing)
+
+    @property
     def sighted(self) -> bool:
         """Whether a camera saw something of the object."""
         return self.look is not None and bool(self.look.mask.any())

@@ -19,6 +19,7 @@ from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
 from harness.sim.optics.inverse import invert_mean
 from harness.skills.exploring.exploration import SPEEDS
+from harness.skills.press import ContactMotion
 
 LEAST_PIXELS = 12
 """That an object must cover to be seen."""
@@ -26,7 +27,7 @@ LEAST_PIXELS = 12
 HOUSING_DEPTH = 0.12
 """M behind the face of the sensor's housing that are the sensor's."""
 
-SHORT = 2.0e-3
+EARLY = 2.0e-3
 """M that a way ends early at least where something ended it: more than the arm's place is uncertain by."""
 
 
@@ -99,6 +100,7 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
     stand_from_gel[:3, 3] -= base_from_stand(run)[:3, 3]
     nothing = np.zeros((0, 3))
     way = _way(run, record, seen.base_from_gel)
+    longest = ContactMotion.from_parameters(record.step.parameters).longest(SPEEDS)
     return GuardedTouch(
         stand_from_gel=read_only(stand_from_gel),
         way=way,
@@ -108,7 +110,7 @@ def guarded_touch(run: RunFiles, record: StepRecord) -> GuardedTouch:
         normal_sigma=settings.contact_tilt_error,
         index=record.step.index,
         clear=read_only(nothing if found is None else apply(stand_from_gel, found.clear)),
-        stopped=way < _longest(record) - SHORT,
+        stopped=way < longest - EARLY,
     )
 
 
@@ -116,12 +118,6 @@ def _way(run: RunFiles, record: StepRecord, base_from_gel: FloatArray) -> float:
     """M from the stand-off to where the gel ended; the arm's noise makes no way shorter than none."""
     stand_off = np.asarray(record.step.parameters["base_from_stand_off"]) @ run.station.flange_from_gel
     return max(0.0, float(stand_off[:3, 2] @ (base_from_gel[:3, 3] - stand_off[:3, 3])))
-
-
-def _longest(record: StepRecord) -> float:
-    """M of the way where nothing is met."""
-    asked = record.step.parameters
-    return float(asked["search_m"] + asked.get("overtravel_m", SPEEDS.overtravel))
 
 
 def seen_mask(run: RunFiles, live: ByteArray, bare: ByteArray) -> SeenMask | None:

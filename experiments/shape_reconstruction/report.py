@@ -63,7 +63,7 @@ def _surface(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
 
 
 def _readings(evidence: ShapeEvidence) -> str:
-    ended, met = sum(touch.by_housing for touch in evidence.touches), len(evidence.contacts)
+    ended, met = len(evidence.ended_by_housing), len(evidence.contacts)
     contacts, ways = f"contact{'' if met == 1 else 's'}", f"way{'' if ended == 1 else 's'}"
     nothing = len(evidence.touches) - met - ended
     return (

@@ -57,7 +57,7 @@ def result_of(scored: Scored) -> dict[str, Any]:
         "choose": scored.run.scene.section(ShapeRun).choose,
         "presses": len(answer.evidence.touches),
         "contacts": len(answer.evidence.contacts),
-        "ended_by_housing": sum(touch.by_housing for touch in answer.evidence.touches),
+        "ended_by_housing": len(answer.evidence.ended_by_housing),
         "estimates": estimates,
         "seconds": sum(answer.seconds[sense] for sense in answer.by_sense),
         "warnings": _warnings(scored, answer),

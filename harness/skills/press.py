@@ -98,6 +98,10 @@ class ContactMotion:
             parameters.get("overtravel_m"),
         )
 
+    def longest(self, speeds: "Speeds") -> float:
+        """M of the way from the stand-off on where nothing is met."""
+        return self.search + (speeds.overtravel if self.overtravel is None else self.overtravel)
+
 
 _ARRAYS = ("start_rad", "travel_rad", "base_from_stand_off", "axis_in_base")
 
@@ -257,8 +261,7 @@ class PressPerformer:
             raise
 
     def _touch(self, step: Step, motion: ContactMotion, bench: Bench) -> bool:
-        over = self.speeds.overtravel if motion.overtravel is None else motion.overtravel
-        travel = motion.search + over
+        travel = motion.longest(self.speeds)
         if meets(bench, motion.axis, travel, SearchGuard(self.speeds.approach, self.speeds.touch_force)):
             self._met = bench.arm.state().base_from_flange[:3, 3]
             return True

@@ -61,7 +61,7 @@ many contacts it is twice that."""
 SLIPPING = 0.15
 """Share of contacts that may have slipped."""
 
-FINER = "if they did not slip, a finer search may fit them: shape.method=family-fine, in three times the time"
+FINER = "if they did not slip, a finer search may fit them: shape.method=family-fine, in thrice family's time"
 """Said where several contacts do not fit: a search may have missed the shape."""
 
 LEFT = "hypotheses_left"

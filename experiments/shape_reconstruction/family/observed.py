@@ -117,7 +117,7 @@ def observe(evidence: ShapeEvidence, coarse: bool = False) -> FamilyEvidence:
     # They lie far from each other, each from those before: the first are spread as all are.
     clear = [touch.clear[: CLEAR // 2 if coarse else CLEAR] for touch in contacts]
     sigma = np.array([np.hypot(touch.sigma, MODEL) for touch in contacts])
-    stopped = [] if coarse else [touch for touch in evidence.touches if touch.by_housing]
+    stopped = () if coarse else evidence.ended_by_housing
     supposed = _some(evidence.supposed, SUPPOSED // 3 if coarse else SUPPOSED)
     rays = no_rays() if evidence.look is None else sight_rays(evidence.look, coarse)
     return FamilyEvidence(

@@ -5,6 +5,7 @@ Where is not known. It is the place of the face that lies nearest to the shape, 
 
 import numpy as np
 
+from experiments.shape_reconstruction.family.contacts.rows import moved_by_gel
 from experiments.shape_reconstruction.family.distance import distance
 from experiments.shape_reconstruction.family.layout import GEL
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
@@ -12,7 +13,7 @@ from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
 
 _ACROSS = 4
-"""Places along each half of a side of the face where the nearest one is looked for at first."""
+"""Places along each side of the face among which the nearest one is looked for at first."""
 
 _HALVINGS = 4
 """Times that the step to its neighbours is halved then: it is known to half a millimetre."""
@@ -73,9 +74,5 @@ def held_housing_row(
     code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int, place: FloatArray
 ) -> float:
     """The same where the place that touches is held on the face."""
-    r = seen.face_gel[i]
-    a, b, c = theta[GEL], theta[GEL + 1], theta[GEL + 2]
-    x = place[0] + r[0, 0] * a + r[0, 1] * b + r[0, 2] * c
-    y = place[1] + r[1, 0] * a + r[1, 1] * b + r[1, 2] * c
-    z = place[2] + r[2, 0] * a + r[2, 1] * b + r[2, 2] * c
+    x, y, z = moved_by_gel(theta, seen.face_gel[i], place)
     return float(distance(code, q, False, x, y, z) / seen.face_sigma[i])

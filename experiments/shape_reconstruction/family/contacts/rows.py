@@ -32,18 +32,23 @@ def contact_row_count(seen: FamilyEvidence) -> int:
 def point_row(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
     """Distance of a touched point from the shape, in standard deviations."""
     j = seen.touch[i]
-    x, y, z = _moved(theta, seen, j, seen.points[i])
+    x, y, z = moved_by_gel(theta, seen.gel[j], seen.points[i])
     return float(distance(code, q, False, x, y, z) / seen.sigma[j])
 
 
 @compiled
-def _moved(theta: FloatArray, seen: FamilyEvidence, j: int, point: FloatArray) -> tuple[float, float, float]:
-    """Where a place of contact ``j`` is, were the gel off by what the shape's vector says."""
-    r = seen.gel[j]
+def moved_by_gel(theta: FloatArray, turn: FloatArray, point: FloatArray) -> tuple[float, float, float]:
+    """Where a place of the sensor is, were the gel off by what the shape's vector says.
+
+    Args:
+        theta: ``(SIZE,)``.
+        turn: ``(3, 3)`` stand from gel.
+        point: ``(3,)`` m.
+    """
     a, b, c = theta[GEL], theta[GEL + 1], theta[GEL + 2]
-    x = point[0] + r[0, 0] * a + r[0, 1] * b + r[0, 2] * c
-    y = point[1] + r[1, 0] * a + r[1, 1] * b + r[1, 2] * c
-    z = point[2] + r[2, 0] * a + r[2, 1] * b + r[2, 2] * c
+    x = point[0] + turn[0, 0] * a + turn[0, 1] * b + turn[0, 2] * c
+    y = point[1] + turn[1, 0] * a + turn[1, 1] * b + turn[1, 2] * c
+    z = point[2] + turn[2, 0] * a + turn[2, 1] * b + turn[2, 2] * c
     return x, y, z
 
 
@@ -52,7 +57,7 @@ def normal_rows(
     code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, j: int, out: FloatArray
 ) -> None:
     """The gradient just outside a contact less its normal; four places give it."""
-    x, y, z = _moved(theta, seen, j, seen.middles[j])
+    x, y, z = moved_by_gel(theta, seen.gel[j], seen.middles[j])
     h = NORMAL_STEP
     n = seen.normals[j]
     x, y, z = x + h * n[0], y + h * n[1], z + h * n[2]
@@ -83,7 +88,7 @@ def clear_row(
 ) -> float:
     """How deep the shape reaches into the gel where that touched nothing, were it moved to the contact."""
     j = seen.clear_touch[i]
-    x, y, z = _moved(theta, seen, j, seen.clear[i])
+    x, y, z = moved_by_gel(theta, seen.gel[j], seen.clear[i])
     return float(min(distance(code, q, False, x, y, z) - off[j], 0.0) / CLEAR_SIGMA)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
 from experiments.shape_reconstruction.family import layout
-from experiments.shape_reconstruction.family.classes import FamilyShape, draw_shape
+from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contacts.housing import nearest_on_face
 from experiments.shape_reconstruction.family.contacts.rows import contact_row_count
 from experiments.shape_reconstruction.family.distance import distances, prepare
@@ -24,12 +24,10 @@ from experiments.shape_reconstruction.family.residuals import (
 )
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing, transform
-from tests.support.family_shapes import surface_of
+from tests.support.family_shapes import SHAPES, drawn, surface_of
 from tests.support.shape_readings import look_at, missed, shape_readings, touches_on
 
 pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
-
-SHAPES = ("mug", "bowl", "tray", "bottle", "spanner")
 
 
 def faces_around(middle: FloatArray, count: int, seed: int) -> list[FloatArray]:
@@ -45,7 +43,7 @@ def faces_around(middle: FloatArray, count: int, seed: int) -> list[FloatArray]:
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_nearest_place_of_a_face_is_that_of_all_its_places(name: str) -> None:
-    shape = draw_shape(name, np.random.default_rng(3))
+    shape = drawn(name)
     q, place = prepared_room(), np.empty(3)
     prepare(shape.code, shape.theta, q)
     share = np.linspace(-1.0, 1.0, 41)
@@ -62,7 +60,7 @@ def test_the_nearest_place_of_a_face_is_that_of_all_its_places(name: str) -> Non
 
 def ended_at(name: str, gap: float) -> tuple[FamilyShape, ShapeEvidence]:
     """A shape, and ways from above and aside that ended where the housing's face is so far before it."""
-    shape = draw_shape(name, np.random.default_rng(3))
+    shape = drawn(name)
     mesh = surface_of(shape)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     evidence = shape_readings(touches_on(mesh, 3, seed=1), look_at(mesh))
@@ -81,8 +79,8 @@ def stopped(
     x, y = np.meshgrid(half[0] * np.linspace(-1, 1, 69), half[1] * np.linspace(-1, 1, 61))
     face = aim + x.reshape(-1, 1) * frame[:, 0] + y.reshape(-1, 1) * frame[:, 1]
     back = 0.3  # m, from outside on
-    while distances(shape.code, shape.theta, face - back * axis).min() > 0.05e-3:
-        back -= max(0.02e-3, 0.9 * float(distances(shape.code, shape.theta, face - back * axis).min()))
+    while (off := float(distances(shape.code, shape.theta, face - back * axis).min())) > 0.05e-3:
+        back -= max(0.02e-3, 0.9 * off)
     end = aim - (back + gap) * axis + evidence.gel_thickness * axis
     touch = missed(evidence.touches[0], transform(frame, end))
     return replace(touch, index=10 + index, stopped=True)

@@ -35,16 +35,14 @@ from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family.sight import PASS
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply, transform, translation
-from tests.support.family_shapes import surface_of
+from tests.support.family_shapes import SHAPES, drawn, surface_of
 from tests.support.shape_readings import look_at, missed, shape_readings, touches_on
 
 pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
 
-SHAPES = ("mug", "bowl", "tray", "bottle", "spanner")
-
 
 def made(name: str) -> tuple[FamilyShape, ShapeEvidence]:
-    shape = draw_shape(name, np.random.default_rng(3))
+    shape = drawn(name)
     mesh = surface_of(shape)
     return shape, shape_readings(touches_on(mesh, 6, seed=1), look_at(mesh))
 
