@@ -107,11 +107,13 @@ def distances_apart(shapes: Sequence[FamilyShape]) -> FloatArray:
     low, high = corners.min(axis=0) - CELL, corners.max(axis=0) + CELL
     cell = max(CELL, float((high - low).max()) / MOST_CELLS)
     counts: IntArray = np.ceil((high - low) / cell).astype(np.int64) + 1
-    gaps = np.array([grid_distances(shape, low, cell, counts).ravel() for shape in shapes])
+    # By places, then shapes: those near one surface are rows.
+    gaps = np.column_stack([grid_distances(shape, low, cell, counts).ravel() for shape in shapes])
     one_way = np.zeros((len(shapes), len(shapes)))
-    for k, near in enumerate(np.abs(gaps) < NEAR * cell):
-        if near.any():
-            one_way[k] = np.abs(gaps[:, near] - gaps[k, near]).mean(axis=1)
+    for k in range(len(shapes)):
+        near = gaps[np.abs(gaps[:, k]) < NEAR * cell]
+        if len(near):
+            one_way[k] = np.abs(near - near[:, k : k + 1]).mean(axis=0)
     return 0.5 * (one_way + one_way.T)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from experiments.shape_reconstruction.family.layout import ARC, BEND, FLAT, GIRTH_KNOTS, GIRTHS
 from harness.basics.arrays import FloatArray
-from harness.basics.compiled import compiled, compiled_fast
+from harness.basics.compiled import compiled
 
 _LENGTH, _BEND, _FLAT, _G, _MIDDLE = 8, 9, 10, 11, 16
 
@@ -33,7 +33,7 @@ def bent_box(q: FloatArray, box: FloatArray) -> None:
     box[3], box[4], box[5] = half, most + (bow if q[_BEND] > 0.0 else 0.0), 2.0 * q[_MIDDLE]
 
 
-@compiled_fast
+@compiled
 def bent_distance(q: FloatArray, x: float, y: float, z: float) -> float:
     """Metres from the surface, negative inside."""
     half = 0.5 * q[_LENGTH]

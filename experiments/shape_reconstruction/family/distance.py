@@ -17,7 +17,7 @@ from experiments.shape_reconstruction.family.layout import (
 )
 from experiments.shape_reconstruction.family.turned import prepare_turned, turned_box, turned_distance
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.compiled import compiled, compiled_fast
+from harness.basics.compiled import compiled
 
 PREPARED = 64
 """Numbers that a distance is computed from."""
@@ -58,7 +58,7 @@ def ball(q: FloatArray, middle: FloatArray) -> float:
     return float(np.sqrt(a * a + b * b + c * c))
 
 
-@compiled_fast
+@compiled
 def inside_depth(code: IntArray, q: FloatArray, x: float, y: float, z: float) -> float:
     """The signed distance where it is negative, else zero: most places are told by the body's box."""
     px, py, pz = x - q[0], y - q[1], z - q[2]
@@ -70,7 +70,7 @@ def inside_depth(code: IntArray, q: FloatArray, x: float, y: float, z: float) ->
     return float(min(distance(code, q, False, x, y, z), 0.0))
 
 
-@compiled_fast
+@compiled
 def distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
     """Metres from the surface at a place in ``stand``, negative inside.
 

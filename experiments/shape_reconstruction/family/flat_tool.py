@@ -20,7 +20,7 @@ from experiments.shape_reconstruction.family.layout import (
     SLOT_TURN,
 )
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.compiled import compiled, compiled_fast
+from harness.basics.compiled import compiled
 
 _HALF, _WA, _WB, _TS, _TH, _RA, _RB, _HA, _HB, _TURN = 8, 9, 10, 11, 12, 13, 14, 15, 16, 17
 _MIDDLE = 18
@@ -52,7 +52,7 @@ def tool_box(code: IntArray, q: FloatArray, box: FloatArray) -> None:
     box[1], box[2], box[4], box[5] = -wide, 0.0, wide, 2.0 * q[_MIDDLE]
 
 
-@compiled_fast
+@compiled
 def tool_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
     """Metres from the tool's surface, negative inside; ``filled`` closes its holes, as masks do."""
     up = abs(z - q[_MIDDLE])
@@ -68,7 +68,7 @@ def tool_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: floa
     return float(best)
 
 
-@compiled_fast
+@compiled
 def _thick(flat: float, up: float) -> float:
     """A plane distance made thick."""
     if flat > 0.0 and up > 0.0:
@@ -76,7 +76,7 @@ def _thick(flat: float, up: float) -> float:
     return max(flat, up)
 
 
-@compiled_fast
+@compiled
 def _shaft(q: FloatArray, x: float, y: float) -> float:
     """A trapezium with half widths that differ at its ends."""
     half, slope = q[_HALF], 0.5 * (q[_WB] - q[_WA]) / q[_HALF]
@@ -85,7 +85,7 @@ def _shaft(q: FloatArray, x: float, y: float) -> float:
     return float(_thick(u, v))
 
 
-@compiled_fast
+@compiled
 def _cut(end: int, filled: bool, x: float, y: float, hole: float, turn: float) -> float:
     """Minus the distance from what is cut out of an end: a hole, or a slot open to its outside."""
     if end == RING:

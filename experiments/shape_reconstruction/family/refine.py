@@ -51,11 +51,29 @@ def total_cost(
     robust: bool,
     out: Rows,
     q: FloatArray,
+    most: float = np.inf,
 ) -> float:
-    """Half the sum of squares of readings and prior; very large where the shape is no number."""
+    """Half the sum of squares of readings and prior; very large where the shape is no number.
+
+    Of a shape that costs more than ``most``, some number above that, and ``out`` is filled in part.
+    """
     off = prior.rows @ (theta - prior.middle)
-    cost = evaluate(code, theta, seen, robust, out, q) + 0.5 * np.dot(off, off)
+    believed = 0.5 * np.dot(off, off)
+    cost = evaluate(code, theta, seen, robust, out, q, most - believed) + believed
     return cost if np.isfinite(cost) else _HOPELESS
+
+
+@compiled
+def cheapest(
+    code: IntArray, tried: FloatArray, seen: FamilyEvidence, prior: PriorRows, out: Rows, q: FloatArray
+) -> tuple[int, float]:
+    """Which of ``(n, SIZE)`` vectors of one shape costs least, the first of equals, and what it costs."""
+    best, least = 0, np.inf
+    for k in range(len(tried)):
+        cost = total_cost(code, tried[k], seen, prior, False, out, q, least)
+        if cost < least:
+            best, least = k, cost
+    return best, least
 
 
 @compiled
@@ -100,7 +118,7 @@ def refine(
             damped[i, i] += damping * curvature[i, i] + 1e-9
         step = _bounded(np.linalg.solve(damped, -slope).astype(np.float64))
         moved = best + step @ basis
-        now = total_cost(code, moved, seen, prior, robust, trial, q)
+        now = total_cost(code, moved, seen, prior, robust, trial, q, cost)
         if now < cost:
             gain = cost - now
             best, cost, current = moved, now, False

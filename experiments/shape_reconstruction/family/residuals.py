@@ -89,11 +89,25 @@ def _first_supposed(seen: FamilyEvidence) -> int:
 
 @compiled
 def evaluate(
-    code: IntArray, theta: FloatArray, seen: FamilyEvidence, robust: bool, out: Rows, q: FloatArray
+    code: IntArray,
+    theta: FloatArray,
+    seen: FamilyEvidence,
+    robust: bool,
+    out: Rows,
+    q: FloatArray,
+    most: float = np.inf,
 ) -> float:
     """Fill in the rows of a shape; returns half the sum of what they cost.
 
-    ``robust`` lets go of contacts that do not fit; without it they pull with at most a constant force.
+    Args:
+        code: of the shape.
+        theta: ``(SIZE,)``.
+        seen: readings.
+        robust: lets go of contacts that do not fit; without it they pull with at most a constant force.
+        out: to fill in.
+        q: room.
+        most: a shape that costs more is not asked for: where its rows come to more, that is returned, and
+            ``out`` is filled in part.
     """
     prepare(code, theta, q)
     n, m = len(seen.points), len(seen.middles)
@@ -109,11 +123,15 @@ def evaluate(
     for i in range(len(seen.faces)):
         out.values[first + i] = housing_row(code, theta, seen, q, i, out.met[i])
         cost += _weigh(first + i, 1.0, out)
+    if cost > most:
+        return cost
     first += len(seen.faces)
     for i in range(len(seen.free)):
         out.values[first + i] = _free(code, seen, q, i)
         cost += _weigh(first + i, 1.0, out)
-    cost += _evaluate_rays(code, theta, seen, out, q, _first_ray(seen))
+    cost += _evaluate_rays(code, theta, seen, out, q, most - cost)
+    if cost > most:
+        return cost
     for i in range(len(seen.supposed)):
         row = _first_supposed(seen) + i
         out.values[row] = _supposed(code, theta, seen, q, i)
@@ -123,9 +141,9 @@ def evaluate(
 
 @compiled
 def _evaluate_rays(
-    code: IntArray, theta: FloatArray, seen: FamilyEvidence, out: Rows, q: FloatArray, first: int
+    code: IntArray, theta: FloatArray, seen: FamilyEvidence, out: Rows, q: FloatArray, most: float
 ) -> float:
-    rays, cost = seen.rays, 0.0
+    rays, first, cost = seen.rays, _first_ray(seen), 0.0
     origin, towards, to_middle = np.empty(3), np.empty(3), np.empty(3)
     radius = ball(q, to_middle)
     ray_origin(theta, rays, origin)
@@ -137,6 +155,8 @@ def _evaluate_rays(
         )
         out.values[first + i] = sighted(theta, rays, i, d)
         cost += _weigh(first + i, rays.worth[i], out)
+        if cost > most:
+            break
     return cost
 
 

@@ -20,7 +20,7 @@ from experiments.shape_reconstruction.family.observed import FamilyEvidence, obs
 from experiments.shape_reconstruction.family.proposing.changes import beside, changes
 from experiments.shape_reconstruction.family.proposing.guides import Guides, guides_of
 from experiments.shape_reconstruction.family.proposing.proposals import lay
-from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
+from experiments.shape_reconstruction.family.refine import PriorRows, cheapest, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import prepared_room, rows_for
 from experiments.shape_reconstruction.family.settings import FamilySettings
 from experiments.shape_reconstruction.family.sizes import rarity_of_size
@@ -184,10 +184,9 @@ class FamilySearch:
         middle = self._middle(tried[0])
         prior = PriorRows(middle, np.concatenate([self._bench, stand_rows(shape.code)]))
         out, q = rows_for(self.coarse), prepared_room()
-        costs = [total_cost(shape.code, one, self.coarse, prior, False, out, q) for one in tried]
-        best = int(np.argmin(costs))
+        best, cost = cheapest(shape.code, tried, self.coarse, prior, out, q)
         placed = FamilyShape(shape.name, shape.code, tried[best])
-        return Hypothesis(placed, prior, costs[best], np.empty((0, 0)))
+        return Hypothesis(placed, prior, cost, np.empty((0, 0)))
 
     def _stood(self, one: Hypothesis, rounds: int) -> Hypothesis:
         """Moved, turned and scaled to fit the coarse readings better."""

@@ -1,5 +1,6 @@
 """Rays of sight through a silhouette: those that graze the object, those that pass it, those that meet it."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -75,8 +76,9 @@ def no_rays() -> SightRays:
     )
 
 
+@lru_cache(maxsize=4)
 def sight_rays(look: SeenMask, coarse: bool) -> SightRays:
-    """Rays through a mask; none where it is empty."""
+    """Rays through a mask; none where it is empty. A run's estimates share one look: its rays are kept."""
     if not look.mask.any():
         return no_rays()
     which = 0 if coarse else 1

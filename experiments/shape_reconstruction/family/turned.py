@@ -42,7 +42,7 @@ from experiments.shape_reconstruction.family.layout import (
     WARP,
 )
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.compiled import compiled, compiled_fast
+from harness.basics.compiled import compiled
 
 # Of the prepared numbers: metres, as the distance needs them.
 _H, _WALL, _FLOOR, _BX, _BY, _ACROSS, _POWER = 8, 9, 10, 11, 12, 13, 14
@@ -141,7 +141,7 @@ def turned_box(code: IntArray, q: FloatArray, box: FloatArray) -> None:
         box[1], box[4] = min(box[1], -wide), max(box[4], wide)
 
 
-@compiled_fast
+@compiled
 def turned_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
     """Metres from the body's surface, negative inside.
 
@@ -161,7 +161,7 @@ def turned_distance(code: IntArray, q: FloatArray, filled: bool, x: float, y: fl
     return float(body)
 
 
-@compiled_fast
+@compiled
 def _side(code: IntArray, q: FloatArray, x: float, y: float, z: float) -> float:
     """Distance from the section's outer side, which goes on straight below the foot and above the rim."""
     stretch, level = 1.0, 1.0
@@ -185,7 +185,7 @@ def _side(code: IntArray, q: FloatArray, x: float, y: float, z: float) -> float:
     return float(_from_section(q, rho, z, stretch, level))
 
 
-@compiled_fast
+@compiled
 def _flattened(radius: float, half: float) -> tuple[float, float]:
     """Depth over width where flat sides are ``half`` m from the middle, and how far they hold that depth.
 
@@ -198,7 +198,7 @@ def _flattened(radius: float, half: float) -> tuple[float, float]:
     return half / np.sqrt(np.sqrt(np.sqrt(wide + deep))), wide / (wide + deep)
 
 
-@compiled_fast
+@compiled
 def _radius_at(q: FloatArray, z: float) -> float:
     if z <= q[_Z]:
         return float(q[_R])
@@ -208,7 +208,7 @@ def _radius_at(q: FloatArray, z: float) -> float:
     return float(q[_R + KNOTS - 1])
 
 
-@compiled_fast
+@compiled
 def _corner(u: float, v: float) -> float:
     """Distance from a quarter plane's corner, of what is beyond its two sides by ``u`` and ``v``."""
     if u > 0.0 and v > 0.0:
@@ -216,7 +216,7 @@ def _corner(u: float, v: float) -> float:
     return float(max(u, v))
 
 
-@compiled_fast
+@compiled
 def _from_section(q: FloatArray, rho: float, z: float, stretch: float, level: float) -> float:
     """Distance from the side; pieces next to the height first, others only as far as they can be nearer.
 
@@ -255,7 +255,7 @@ def _from_section(q: FloatArray, rho: float, z: float, stretch: float, level: fl
     return float(-gap if rho < edge else gap)
 
 
-@compiled_fast
+@compiled
 def _from_piece(q: FloatArray, i: int, rho: float, z: float) -> tuple[float, float]:
     """From the nearest place of a straight piece of the side, in radius and height."""
     er, ez = q[_R + i + 1] - q[_R + i], q[_Z + i + 1] - q[_Z + i]
@@ -264,7 +264,7 @@ def _from_piece(q: FloatArray, i: int, rho: float, z: float) -> tuple[float, flo
     return pr - share * er, pz - share * ez
 
 
-@compiled_fast
+@compiled
 def _loop(q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
     """A handle along a rectangle with round corners about the axis, of elliptic section."""
     up = z - q[_LIMB_Z]
@@ -276,14 +276,14 @@ def _loop(q: FloatArray, filled: bool, x: float, y: float, z: float) -> float:
     return float(_ellipse(line, y, q[_LIMB_A], q[_LIMB_B]))
 
 
-@compiled_fast
+@compiled
 def _bar(q: FloatArray, x: float, y: float, z: float) -> float:
     out = q[_LIMB_OUT]
     line = z - q[_LIMB_Z] - q[_LIMB_SLANT] * x
     return float(max(_ellipse(line, y, q[_LIMB_A], q[_LIMB_B]), x - out))
 
 
-@compiled_fast
+@compiled
 def _ellipse(u: float, v: float, a: float, b: float) -> float:
     """Distance from an ellipse of half axes ``a``, ``b``; first order near it (Quilez)."""
     s, t = (u / a) ** 2, (v / b) ** 2
@@ -294,7 +294,7 @@ def _ellipse(u: float, v: float, a: float, b: float) -> float:
     return float(first * (first - 1.0) / second)
 
 
-@compiled_fast
+@compiled
 def _spout(q: FloatArray, x: float, y: float, z: float) -> float:
     """A round cone from within the wall out along -x."""
     ax, az, bx, bz = q[_SPOUT], q[_SPOUT + 1], q[_SPOUT + 2], q[_SPOUT + 3]

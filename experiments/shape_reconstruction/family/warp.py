@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial.distance import cdist
 
 from harness.basics.arrays import FloatArray
 
@@ -40,6 +41,14 @@ def displacement(
 
 
 def _kernel(a: FloatArray, b: FloatArray, far: float) -> FloatArray:
-    squares = np.maximum(np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1) - 2.0 * a @ b.T, 0.0)
-    near = AMPLITUDE**2 * np.exp(-0.5 * squares / LENGTH**2)
-    return np.asarray(near + far**2 * np.exp(-0.5 * squares / FAR**2) if far > 0.0 else near)
+    squares = cdist(a, b, "sqeuclidean")
+    near = _falling(squares, AMPLITUDE, LENGTH)
+    return np.asarray(near + _falling(squares, far, FAR) if far > 0.0 else near)
+
+
+def _falling(squares: FloatArray, amplitude: float, length: float) -> FloatArray:
+    """A squared-exponential covariance at squared distances; made in one array, which is large."""
+    found = squares * (-0.5 / length**2)
+    np.exp(found, out=found)
+    found *= amplitude**2
+    return found
