@@ -26,6 +26,11 @@ def copy_line(target: AnyArray, source: AnyArray) -> None:
         target[i] = source[i]
 
 
+def inlined(function: _F) -> _F:
+    """As ``compiled``, copied into what calls it: where its arguments are many, passing them costs more."""
+    return cast(_F, numba.njit(inline="always", nogil=True, cache=True)(function))
+
+
 def compiled_fast(function: _F) -> _F:
     """As ``compiled``, free to reorder sums and fuse products: for levels that state an error.
 

@@ -16,7 +16,7 @@ from experiments.shape_reconstruction.family.layout import (
 )
 from experiments.shape_reconstruction.family.sight import GRAZE, PASS, SightRays
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, inlined
 
 RAY_MODEL = 0.5e-3
 """M by which the outline of the nearest shape is off a real one."""
@@ -39,7 +39,7 @@ def ray_origin(theta: FloatArray, rays: SightRays, origin: FloatArray) -> None:
         origin[a] = rays.eye[a] + theta[CAMERA_RIGHT] * rays.right[a] + theta[CAMERA_DOWN] * rays.down[a]
 
 
-@compiled
+@inlined
 def turned_ray(theta: FloatArray, rays: SightRays, i: int, towards: FloatArray) -> None:
     """Fill in a ray's direction, were the picture's scale off by what the shape's vector says."""
     scale = theta[CAMERA_SCALE]
@@ -47,10 +47,16 @@ def turned_ray(theta: FloatArray, rays: SightRays, i: int, towards: FloatArray) 
         towards[a] = rays.directions[i, a] + scale * (rays.directions[i, a] - rays.middle[a])
 
 
-@compiled
+@inlined
+def ray_sigma(rays: SightRays) -> float:
+    """M that a ray passes the shape at, one standard deviation."""
+    return float(np.hypot(PIXELS * rays.pixel, RAY_MODEL))
+
+
+@inlined
 def sighted(theta: FloatArray, rays: SightRays, i: int, d: float) -> float:
     """A ray's residual where it passes the shape at ``d`` m."""
-    sigma = np.hypot(PIXELS * rays.pixel, RAY_MODEL)
+    sigma = ray_sigma(rays)
     if rays.kinds[i] == GRAZE:
         return float((d - theta[OUTLINE]) / sigma)
     if rays.kinds[i] == PASS:
@@ -89,7 +95,7 @@ def hold_ray(
     held[2] = min(max(-falls / (rises - falls), 0.0), 1.0) if edge else 0.0
 
 
-@compiled
+@inlined
 def held_distance(
     code: IntArray, q: FloatArray, origin: FloatArray, towards: FloatArray, held: FloatArray
 ) -> float:

@@ -5,22 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
-from experiments.shape_reconstruction.family.residuals import (
-    ALL,
-    Rows,
-    active_rows,
-    evaluate,
-    frozen,
-    hold_rays,
-    moved_rows,
-    prepared_room,
-    rows_for,
-)
+from experiments.shape_reconstruction.family.residuals import Rows, evaluate, prepared_room, rows_for
+from experiments.shape_reconstruction.family.slopes import active_rows, slopes_along
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
-
-_NUDGE = 1.0e-5
-"""Of every direction: m, rad or logarithm."""
 
 _SETTLED = 1.0e-3
 """Of the cost: a round that gains less is the last."""
@@ -156,15 +144,8 @@ def _normal_equations(
 ) -> tuple[FloatArray, FloatArray]:
     """Gauss-Newton's curvature and slope along the directions."""
     rows = active_rows(seen, out.values)
-    base, here = np.empty(len(rows)), np.empty(len(rows))
-    hold_rays(code, theta, seen, rows, out, q)
-    frozen(code, theta, seen, rows, out, ALL, q, base)
-    slopes = np.empty((len(basis), len(rows)))
     root = np.sqrt(out.weights[rows])
-    for i in range(len(basis)):
-        here[:] = base
-        frozen(code, theta + _NUDGE * basis[i], seen, rows, out, moved_rows(basis[i]), q, here)
-        slopes[i] = (here - base) / _NUDGE * root
+    slopes = slopes_along(code, theta, seen, basis, rows, out, q) * root
     off = prior.rows @ (theta - prior.middle)
     curvature = slopes @ slopes.T + along.T @ along
     slope = slopes @ (out.values[rows] * root) + along.T @ off

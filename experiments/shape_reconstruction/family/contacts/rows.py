@@ -6,7 +6,7 @@ from experiments.shape_reconstruction.family.distance import distance
 from experiments.shape_reconstruction.family.layout import GEL
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.compiled import compiled
+from harness.basics.compiled import compiled, inlined
 
 NORMAL_STEP = 1.2e-3
 """M between the places of which a shape's normal is taken."""
@@ -28,7 +28,7 @@ def contact_row_count(seen: FamilyEvidence) -> int:
     return int(len(seen.points) + 3 * len(seen.middles) + len(seen.clear))
 
 
-@compiled
+@inlined
 def point_row(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, i: int) -> float:
     """Distance of a touched point from the shape, in standard deviations."""
     j = seen.touch[i]
@@ -36,7 +36,7 @@ def point_row(code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatA
     return float(distance(code, q, False, x, y, z) / seen.sigma[j])
 
 
-@compiled
+@inlined
 def moved_by_gel(theta: FloatArray, turn: FloatArray, point: FloatArray) -> tuple[float, float, float]:
     """Where a place of the sensor is, were the gel off by what the shape's vector says.
 
@@ -52,7 +52,7 @@ def moved_by_gel(theta: FloatArray, turn: FloatArray, point: FloatArray) -> tupl
     return x, y, z
 
 
-@compiled
+@inlined
 def normal_rows(
     code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, j: int, out: FloatArray
 ) -> None:
@@ -82,7 +82,7 @@ def contacts_off(seen: FamilyEvidence, points: FloatArray) -> FloatArray:
     return np.minimum(np.maximum(off / np.maximum(count, 1.0), -SHARED), SHARED)
 
 
-@compiled
+@inlined
 def clear_row(
     code: IntArray, theta: FloatArray, seen: FamilyEvidence, q: FloatArray, off: FloatArray, i: int
 ) -> float:
