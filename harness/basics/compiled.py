@@ -34,7 +34,9 @@ def inlined(function: _F) -> _F:
 def compiled_fast(function: _F) -> _F:
     """As ``compiled``, free to reorder sums and fuse products: for levels that state an error.
 
-    Infinities and NaN keep their meaning; only rounding may differ.
+    Infinities and NaN keep their meaning; only rounding may differ. It may differ from one process to the
+    next: a kernel that was just compiled and the same one from disk may call different copies of a function.
+    Where a last digit can decide which of two answers is given, use ``compiled``.
     """
     flags = {"contract", "arcp", "nsz", "reassoc"}
     return cast(_F, numba.njit(cache=True, nogil=True, fastmath=flags)(function))

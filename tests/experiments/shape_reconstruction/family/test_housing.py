@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
+from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contacts.housing import nearest_on_face
@@ -13,19 +13,15 @@ from experiments.shape_reconstruction.family.contacts.rows import contact_row_co
 from experiments.shape_reconstruction.family.distance import distances, prepare
 from experiments.shape_reconstruction.family.observed import LOOSELY, MODEL, observe
 from experiments.shape_reconstruction.family.residuals import (
-    ALL,
-    OF_TOUCH,
-    active_rows,
     evaluate,
-    frozen,
-    hold_rays,
     prepared_room,
     rows_for,
 )
+from experiments.shape_reconstruction.family.slopes import active_rows, frozen, hold_rays
 from harness.basics.arrays import FloatArray
-from harness.basics.geometry import frame_facing, transform
+from harness.basics.geometry import frame_facing
+from tests.support.family_readings import ended_at
 from tests.support.family_shapes import SHAPES, drawn, surface_of
-from tests.support.shape_readings import look_at, missed, shape_readings, touches_on
 
 pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
 
@@ -56,34 +52,6 @@ def test_the_nearest_place_of_a_face_is_that_of_all_its_places(name: str) -> Non
         off.append(found - every.min())
     assert np.quantile(np.abs(off), 0.9) < 0.6e-3  # the grid's own places are 0.8 mm apart
     assert np.max(off) < 4e-3  # where two places are as near, and the other was followed
-
-
-def ended_at(name: str, gap: float) -> tuple[FamilyShape, ShapeEvidence]:
-    """A shape, and ways from above and aside that ended where the housing's face is so far before it."""
-    shape = drawn(name)
-    mesh = surface_of(shape)
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    evidence = shape_readings(touches_on(mesh, 3, seed=1), look_at(mesh))
-    ways = []
-    for k, axis in enumerate(([0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0])):
-        ways.append(stopped(shape, evidence, np.array(axis), 0.5 * (low + high), gap, k))
-    return shape, replace(evidence, touches=(*evidence.touches, *ways))
-
-
-def stopped(
-    shape: FamilyShape, evidence: ShapeEvidence, axis: FloatArray, aim: FloatArray, gap: float, index: int
-) -> GuardedTouch:
-    """A way along an axis that its housing ended, m before the shape or, below zero, within it."""
-    frame = frame_facing(axis, 0.0)
-    half = 0.5 * np.array(evidence.housing)
-    x, y = np.meshgrid(half[0] * np.linspace(-1, 1, 69), half[1] * np.linspace(-1, 1, 61))
-    face = aim + x.reshape(-1, 1) * frame[:, 0] + y.reshape(-1, 1) * frame[:, 1]
-    back = 0.3  # m, from outside on
-    while (off := float(distances(shape.code, shape.theta, face - back * axis).min())) > 0.05e-3:
-        back -= max(0.02e-3, 0.9 * off)
-    end = aim - (back + gap) * axis + evidence.gel_thickness * axis
-    touch = missed(evidence.touches[0], transform(frame, end))
-    return replace(touch, index=10 + index, stopped=True)
 
 
 def housing_rows(shape: FamilyShape, evidence: ShapeEvidence) -> FloatArray:
@@ -137,12 +105,11 @@ def test_a_face_is_held_where_it_is_met_and_moves_with_the_gel(name: str) -> Non
     assert faces.sum() == 3
     base, moved = np.empty(len(rows)), np.empty(len(rows))
     hold_rays(shape.code, theta, seen, rows, out, q)
-    frozen(shape.code, theta, seen, rows, out, ALL, q, base)
+    frozen(shape.code, theta, seen, rows, out, False, q, base)
     np.testing.assert_allclose(base[faces], out.values[rows][faces], atol=1e-9)
     deeper = theta.copy()
     deeper[layout.GEL + 2] += 0.2e-3
-    moved[:] = base
-    frozen(shape.code, deeper, seen, rows, out, OF_TOUCH, q, moved)
+    frozen(shape.code, deeper, seen, rows, out, False, q, moved)
     nearer = (base - moved)[faces] * seen.face_sigma
     assert np.all(nearer > 0.05e-3)  # the sensor is farther on, so that the shape is nearer
     assert np.all(nearer < 0.2e-3 + 1e-9)

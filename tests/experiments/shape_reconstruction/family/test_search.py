@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.shape_reconstruction.evidence import GuardedTouch, ShapeEvidence
+from experiments.shape_reconstruction.evidence import GuardedTouch
 from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import SOLID, FamilyShape, draw_shape, rarity
 from experiments.shape_reconstruction.family.contacts.fit import contact_fit
-from experiments.shape_reconstruction.family.contacts.rows import contact_row_count
 from experiments.shape_reconstruction.family.distance import distances
 from experiments.shape_reconstruction.family.freedom import basis_of, bench_rows, shape_rows
 from experiments.shape_reconstruction.family.observed import FamilyEvidence, observe
@@ -18,33 +17,19 @@ from experiments.shape_reconstruction.family.proposing.guides import guides_of
 from experiments.shape_reconstruction.family.proposing.proposals import lay
 from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import (
-    ALL,
-    OF_SIGHT,
-    OF_TOUCH,
-    active_rows,
     evaluate,
-    frozen,
-    hold_rays,
-    moved_rows,
     prepared_room,
-    row_count,
     rows_for,
 )
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family.sight import PASS
-from harness.basics.arrays import FloatArray
 from harness.basics.geometry import apply, transform, translation
-from tests.support.family_shapes import SHAPES, drawn, surface_of
-from tests.support.shape_readings import look_at, missed, shape_readings, touches_on
+from tests.support.family_readings import made, nudged
+from tests.support.family_shapes import SHAPES
+from tests.support.shape_readings import missed, shape_readings
 
 pytestmark = pytest.mark.timeout(300)  # the first test on a machine waits for the compiler
-
-
-def made(name: str) -> tuple[FamilyShape, ShapeEvidence]:
-    shape = drawn(name)
-    mesh = surface_of(shape)
-    return shape, shape_readings(touches_on(mesh, 6, seed=1), look_at(mesh))
 
 
 def cost_of(shape: FamilyShape, seen: FamilyEvidence, robust: bool = True) -> float:
@@ -58,13 +43,6 @@ def prior_of(shape: FamilyShape) -> PriorRows:
     return PriorRows(middle, rows)
 
 
-def nudged(shape: FamilyShape, by: float, seed: int = 0) -> FloatArray:
-    basis = basis_of(shape.code, True, True)
-    step = by * np.random.default_rng(seed).standard_normal(len(basis))
-    own = basis[:, layout.POSE_END :].any(axis=1)
-    return np.asarray(shape.theta + np.where(own, step, 0.05 * step) @ basis)
-
-
 @pytest.mark.parametrize("name", [pytest.param("mug", marks=pytest.mark.slow), *SHAPES[1:]])
 def test_a_shape_fits_its_own_readings_better_than_its_neighbours_do(name: str) -> None:
     shape, evidence = made(name)
@@ -74,63 +52,6 @@ def test_a_shape_fits_its_own_readings_better_than_its_neighbours_do(name: str) 
     for seed in range(5):
         other = FamilyShape(name, shape.code, nudged(shape, 0.3, seed))
         assert cost_of(other, seen) > own
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_contacts_have_the_exact_slope_and_held_rays_one_that_leads_down(name: str) -> None:
-    shape, evidence = made(name)
-    # Places said to be clear that lie in the shape, some of them, pull too.
-    touches = tuple(replace(one, clear=one.points - 6e-3 * one.normals) for one in evidence.touches)
-    supposed = np.concatenate([one.points + 2e-3 for one in touches])
-    seen = observe(replace(evidence, touches=touches, supposed=supposed))
-    theta = nudged(shape, 0.05)
-    out, q = rows_for(seen), prepared_room()
-    evaluate(shape.code, theta, seen, False, out, q)
-    rows = active_rows(seen, out.values)
-    base, moved = np.empty(len(rows)), np.empty(len(rows))
-    hold_rays(shape.code, theta, seen, rows, out, q)
-    frozen(shape.code, theta, seen, rows, out, ALL, q, base)
-    first = contact_row_count(seen) + len(seen.free)
-    seen_by_rays = (rows >= first) & (rows < first + len(seen.rays.kinds))
-    np.testing.assert_allclose(base[~seen_by_rays], out.values[rows][~seen_by_rays], atol=1e-9)
-    # A ray is held where it is nearest, which is found to half a step as costs are computed.
-    assert np.all(base[seen_by_rays] < out.values[rows][seen_by_rays] + 0.15)
-    direction = np.zeros(layout.SIZE)
-    direction[layout.X] = 0.5e-3  # far beyond what a ray searched anew may be off
-    frozen(shape.code, theta + direction, seen, rows, out, ALL, q, moved)
-    again = rows_for(seen)
-    evaluate(shape.code, theta + direction, seen, False, again, q)
-    contacts, count = rows < contact_row_count(seen), len(seen.supposed)
-    assert (rows[contacts] >= len(seen.points) + 3 * len(seen.middles)).any()
-    assert np.array_equal(again.values[rows][contacts], moved[contacts])
-    assert 0 < count == np.sum(rows >= row_count(seen) - count)
-    assert np.array_equal(again.values[-count:], moved[-count:])
-    rows, contacts, base, moved = rows[:-count], contacts[:-count], base[:-count], moved[:-count]
-    # Along a flat side a ray's nearest place jumps as the shape moves: held there, it is off by that.
-    true, held = again.values[rows] - out.values[rows], moved - base
-    assert true @ held > 0.5 * np.linalg.norm(true) * np.linalg.norm(held)
-    assert np.linalg.norm(held) == pytest.approx(np.linalg.norm(true), rel=0.2)
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_rows_that_a_direction_is_said_not_to_change_do_not_change(name: str) -> None:
-    shape, evidence = made(name)
-    supposed = np.concatenate([one.points for one in evidence.touches])
-    seen = observe(replace(evidence, supposed=supposed))
-    out, q = rows_for(seen), prepared_room()
-    evaluate(shape.code, shape.theta, seen, False, out, q)
-    rows = active_rows(seen, out.values)
-    hold_rays(shape.code, shape.theta, seen, rows, out, q)
-    base, every = np.empty(len(rows)), np.empty(len(rows))
-    frozen(shape.code, shape.theta, seen, rows, out, ALL, q, base)
-    basis = basis_of(shape.code, True, True)
-    for direction in basis:
-        few = base.copy()
-        frozen(shape.code, shape.theta + 1e-3 * direction, seen, rows, out, ALL, q, every)
-        frozen(shape.code, shape.theta + 1e-3 * direction, seen, rows, out, moved_rows(direction), q, few)
-        assert np.array_equal(few, every)
-    assert {moved_rows(direction) for direction in basis} == {ALL, OF_TOUCH, OF_SIGHT}
-    assert moved_rows(basis.sum(axis=0)) == ALL
 
 
 def across_a_shaft(depth: float) -> tuple[FamilyShape, GuardedTouch]:
