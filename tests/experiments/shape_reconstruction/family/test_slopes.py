@@ -96,14 +96,13 @@ def test_the_slope_along_every_direction_is_that_of_its_rows(name: str) -> None:
 
 _FIT = """
 import numpy as np
+from experiments.shape_reconstruction.family.classes import CLASSES, draw_shape
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
 from tests.support.family_readings import made
-shape, evidence = made("mug")
-search = FamilySearch(evidence, LEVELS["coarse"])
-for name in ("mug", "tray", "spanner", "bowl"):
-    other = made(name)[0]
-    found = search.refined(search.seeded(other, other.theta), 4, last=True)
+search, random = FamilySearch(made("mug")[1], LEVELS["coarse"]), np.random.default_rng(3)
+for other in [draw_shape(name, random) for name in CLASSES for _ in range(12)]:
+    found = search.refined(search.seeded(other, other.theta), 2, last=True)
     print(found.cost.hex(), *(number.hex() for number in found.shape.theta.tolist()))
 """
 
@@ -118,5 +117,5 @@ def test_a_fit_has_the_same_bits_when_its_kernels_were_just_compiled_and_when_th
         for _ in range(2)
     )
     assert any(tmp_path.rglob("*.nbc"))
-    assert len(first.stdout.splitlines()) == 4
+    assert len(first.stdout.splitlines()) >= 100
     assert first.stdout == second.stdout
