@@ -43,12 +43,12 @@ def total_cost(
 ) -> float:
     """Half the sum of squares of readings and prior; very large where the shape is no number.
 
-    Of a shape that costs more than ``most``, some number above that, and ``out`` is filled in part.
+    Of a shape that costs more than ``most``, a number above that, or none; ``out`` is filled in part then.
     """
     off = prior.rows @ (theta - prior.middle)
     believed = 0.5 * np.dot(off, off)
     cost = evaluate(code, theta, seen, robust, out, q, most - believed) + believed
-    return cost if np.isfinite(cost) else _HOPELESS
+    return cost if np.isfinite(cost) or np.isfinite(most) else _HOPELESS
 
 
 @compiled

@@ -99,8 +99,8 @@ def evaluate(
         robust: lets go of contacts that do not fit; without it they pull with at most a constant force.
         out: to fill in.
         q: room.
-        most: a shape that costs more is not asked for: where its rows come to more, that is returned, and
-            ``out`` is filled in part.
+        most: a shape that costs more is not asked for: as soon as its rows come to more, infinity is
+            returned, and ``out`` is filled in part.
     """
     prepare(code, theta, q)
     n, m = len(seen.points), len(seen.middles)
@@ -117,14 +117,14 @@ def evaluate(
         out.values[first + i] = housing_row(code, theta, seen, q, i, out.met[i])
         cost += _weigh(first + i, 1.0, out)
     if cost > most:
-        return cost
+        return np.inf
     first += len(seen.faces)
     for i in range(len(seen.free)):
         out.values[first + i] = free_row(code, seen, q, i)
         cost += _weigh(first + i, 1.0, out)
     cost += _evaluate_rays(code, theta, seen, out, q, most - cost)
     if cost > most:
-        return cost
+        return np.inf
     for i in range(len(seen.supposed)):
         row = first_supposed(seen) + i
         out.values[row] = supposed_row(code, theta, seen, q, i)
@@ -149,7 +149,7 @@ def _evaluate_rays(
         out.values[first + i] = sighted(theta, rays, i, d)
         cost += _weigh(first + i, rays.worth[i], out)
         if cost > most:
-            break
+            return np.inf
     return cost
 
 

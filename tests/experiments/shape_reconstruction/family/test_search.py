@@ -15,7 +15,7 @@ from experiments.shape_reconstruction.family.observed import FamilyEvidence, obs
 from experiments.shape_reconstruction.family.posterior import mixture_of
 from experiments.shape_reconstruction.family.proposing.guides import guides_of
 from experiments.shape_reconstruction.family.proposing.proposals import lay
-from experiments.shape_reconstruction.family.refine import PriorRows, refine, total_cost
+from experiments.shape_reconstruction.family.refine import PriorRows, cheapest, refine, total_cost
 from experiments.shape_reconstruction.family.residuals import (
     evaluate,
     prepared_room,
@@ -41,6 +41,23 @@ def prior_of(shape: FamilyShape) -> PriorRows:
     middle = shape.theta.copy()
     middle[: layout.POSE_END] = 0.0
     return PriorRows(middle, rows)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_shape_that_costs_more_than_is_asked_for_is_left_and_no_other(name: str) -> None:
+    shape, evidence = made(name)
+    seen, q, prior = observe(evidence), prepared_room(), prior_of(shape)
+    tried = np.array([nudged(shape, 0.2, seed) for seed in range(6)])
+    costs = [total_cost(shape.code, one, seen, prior, False, rows_for(seen), q) for one in tried]
+    best, least = cheapest(shape.code, tried, seen, prior, rows_for(seen), q)
+    assert (best, least) == (int(np.argmin(costs)), min(costs))
+    for one in tried:
+        whole, out = rows_for(seen), rows_for(seen)
+        cost = evaluate(shape.code, one, seen, False, whole, q)
+        assert evaluate(shape.code, one, seen, False, out, q, (1.0 + 1e-9) * cost) == cost
+        assert np.array_equal(out.values, whole.values)
+        for share in (0.0, 0.3, 0.9, 0.999):
+            assert evaluate(shape.code, one, seen, False, out, q, share * cost) == np.inf
 
 
 @pytest.mark.parametrize("name", [pytest.param("mug", marks=pytest.mark.slow), *SHAPES[1:]])
