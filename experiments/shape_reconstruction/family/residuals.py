@@ -19,17 +19,10 @@ from experiments.shape_reconstruction.family.contacts.rows import (
     weigh_contacts,
 )
 from experiments.shape_reconstruction.family.distance import PREPARED, ball, distance, inside_depth, prepare
-from experiments.shape_reconstruction.family.layout import (
-    CAMERA_DOWN,
-    CAMERA_RIGHT,
-)
+from experiments.shape_reconstruction.family.layout import CAMERA_DOWN, CAMERA_RIGHT
 from experiments.shape_reconstruction.family.observed import FamilyEvidence
 from experiments.shape_reconstruction.family.ray_depth import nearest_along
-from experiments.shape_reconstruction.family.ray_rows import (
-    ray_origin,
-    sighted,
-    turned_ray,
-)
+from experiments.shape_reconstruction.family.ray_rows import ray_origin, sighted, turned_ray
 from experiments.shape_reconstruction.family.sight import MEET
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled, inlined

@@ -11,6 +11,7 @@ from experiments.shape_reconstruction.family.contacts.rows import (
     clear_row,
     contact_row_count,
     contacts_off,
+    moved_by_gel,
     normal_rows,
     point_row,
 )
@@ -52,7 +53,7 @@ NUDGE = 1.0e-5
 _MOVES = (X, Y, LIFT)
 """The body's three moves along the axes of ``stand``."""
 
-_CARRIED = (X, Y, LIFT, CAMERA_RIGHT, CAMERA_DOWN, OUTLINE, GEL, GEL + 1, GEL + 2)
+_CARRIED = (*_MOVES, CAMERA_RIGHT, CAMERA_DOWN, OUTLINE, GEL, GEL + 1, GEL + 2)
 """Numbers whose derivatives follow from those three."""
 
 
@@ -91,7 +92,7 @@ def slopes_along(
         for slot in _CARRIED:
             rest[slot] = 0.0
         if (rest != basis[i]).any():
-            carried(seen, active, moves, basis[i], slopes[i])
+            _carried(seen, active, moves, basis[i], slopes[i])
         if rest.any():
             # The picture's scale changes no row of touch.
             scale = rest[CAMERA_SCALE] != 0.0 and np.count_nonzero(rest) == 1
@@ -102,7 +103,7 @@ def slopes_along(
 
 
 @compiled
-def carried(
+def _carried(
     seen: FamilyEvidence, active: IntArray, moves: FloatArray, direction: FloatArray, out: FloatArray
 ) -> None:
     """Fill in what a direction's moves of body, gel and camera, and of the outline, change of some rows.
@@ -116,26 +117,28 @@ def carried(
     """
     faces = contact_row_count(seen)
     free, ray, supposed = faces + len(seen.faces), first_ray(seen), first_supposed(seen)
-    gel, right, down = direction[GEL : GEL + 3], direction[CAMERA_RIGHT], direction[CAMERA_DOWN]
+    right, down, nowhere = direction[CAMERA_RIGHT], direction[CAMERA_DOWN], np.zeros(3)
+    seen_off = right * seen.rays.right + down * seen.rays.down
+    supposed_off = right * seen.supposed_right + down * seen.supposed_down
     per_outline = direction[OUTLINE] / ray_sigma(seen.rays)
     for row in range(len(active)):
-        i, change = active[row], 0.0
-        for k in range(3):
-            by = direction[_MOVES[k]]
-            if i < faces:
-                turn = seen.gel[_contact_of(seen, i)]
-                by -= turn[k, 0] * gel[0] + turn[k, 1] * gel[1] + turn[k, 2] * gel[2]
-            elif i < free:
-                turn = seen.face_gel[i - faces]
-                by -= turn[k, 0] * gel[0] + turn[k, 1] * gel[1] + turn[k, 2] * gel[2]
-            elif i >= supposed:
-                by -= right * seen.supposed_right[k] + down * seen.supposed_down[k]
-            elif i >= ray:
-                by -= right * seen.rays.right[k] + down * seen.rays.down[k]
-            change += by * moves[k, row]
+        i, x, y, z = active[row], 0.0, 0.0, 0.0
+        if i < faces:
+            x, y, z = moved_by_gel(direction, seen.gel[_contact_of(seen, i)], nowhere)
+        elif i < free:
+            x, y, z = moved_by_gel(direction, seen.face_gel[i - faces], nowhere)
+        elif i >= supposed:
+            x, y, z = supposed_off[0], supposed_off[1], supposed_off[2]
+        elif i >= ray:
+            x, y, z = seen_off[0], seen_off[1], seen_off[2]
+        # What reads there is farther on by that: as if the body were farther back.
+        out[row] = (
+            (direction[X] - x) * moves[0, row]
+            + (direction[Y] - y) * moves[1, row]
+            + (direction[LIFT] - z) * moves[2, row]
+        )
         if ray <= i < supposed and seen.rays.kinds[i - ray] == GRAZE:
-            change -= per_outline
-        out[row] = change
+            out[row] -= per_outline
 
 
 @compiled

@@ -12,11 +12,7 @@ from experiments.shape_reconstruction.family.contacts.housing import nearest_on_
 from experiments.shape_reconstruction.family.contacts.rows import contact_row_count
 from experiments.shape_reconstruction.family.distance import distances, prepare
 from experiments.shape_reconstruction.family.observed import LOOSELY, MODEL, observe
-from experiments.shape_reconstruction.family.residuals import (
-    evaluate,
-    prepared_room,
-    rows_for,
-)
+from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
 from experiments.shape_reconstruction.family.slopes import active_rows, frozen, hold_rays
 from harness.basics.arrays import FloatArray
 from harness.basics.geometry import frame_facing

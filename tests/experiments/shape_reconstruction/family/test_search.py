@@ -16,11 +16,7 @@ from experiments.shape_reconstruction.family.posterior import mixture_of
 from experiments.shape_reconstruction.family.proposing.guides import guides_of
 from experiments.shape_reconstruction.family.proposing.proposals import lay
 from experiments.shape_reconstruction.family.refine import PriorRows, cheapest, refine, total_cost
-from experiments.shape_reconstruction.family.residuals import (
-    evaluate,
-    prepared_room,
-    rows_for,
-)
+from experiments.shape_reconstruction.family.residuals import evaluate, prepared_room, rows_for
 from experiments.shape_reconstruction.family.search import FamilySearch
 from experiments.shape_reconstruction.family.settings import LEVELS
 from experiments.shape_reconstruction.family.sight import PASS
