@@ -34,7 +34,7 @@ from experiments.contact_localization.sound.consistency import (
 )
 from experiments.contact_localization.sound.evidence import StrikeEvidence, hear
 from harness.basics.arrays import FloatArray, IntArray, read_only
-from harness.basics.errors import WrongUse
+from harness.basics.errors import FitRefused, WrongUse
 from harness.basics.faces.nearest import nearest_point
 from harness.bench.acquisition import Strike
 from harness.effects.accuracy import Accuracy
@@ -45,6 +45,11 @@ sound alone they name no error that the contacts share, which therefore is here.
 
 AGREES = 6.0e-3
 """Metres from the answer at which a hypothesis of the last contact still agrees with it."""
+
+SOUND_LEFT_OUT = (
+    "the strikes do not fit any place that fits the tactile images, so this answer is from touch alone; "
+    "check the object's material and wall thickness, and that the microphone did not move"
+)
 
 _CANDIDATES = 10
 _TURNED = 4000
@@ -144,7 +149,18 @@ def locate(
         # Sound that tells no places apart leaves both senses with the answer and the floor of touch.
         weighed = heard if heard is not None and (alone or heard.term.says_something) else None
         found = solve_run(search, k, accuracy, seed, seconds, weighed)
-        doubts = _judged(search, found, accuracy, heard, k, seconds) if judged and k == count else ()
+        doubts: tuple[str, ...] = ()
+        if judged and k == count:
+            try:
+                doubts = _judged(search, found, accuracy, heard, k, seconds)
+            except FitRefused:
+                if weighed is None or alone:
+                    raise
+                # The images are the better judge of the object: if they fit without the strikes, the strikes
+                # are what does not fit.
+                weighed = None
+                found = solve_run(search, k, accuracy, seed, seconds, None)
+                doubts = (*_judged(search, found, accuracy, None, k, seconds), SOUND_LEFT_OUT)
         floor = noise.floor * FLOORS[senses if weighed else "touch"]
         answers.append(_answer(search, k, found, seconds, floor, doubts))
     return tuple(answers)

@@ -8,10 +8,11 @@ from scipy.ndimage import gaussian_filter
 
 from experiments.contact_localization.model import Model, Prior
 from experiments.contact_localization.posterior.baselines import without_images
-from experiments.contact_localization.posterior.estimate import Estimate, locate
+from experiments.contact_localization.posterior.estimate import SOUND_LEFT_OUT, Estimate, locate
 from experiments.contact_localization.posterior.hypotheses import Contact, Hypotheses, Noise
 from experiments.contact_localization.posterior.search import Search
 from experiments.contact_localization.posterior.shared_errors import SharedNoise
+from experiments.contact_localization.sound.evidence import StrikeEvidence
 from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest import nearest_point
 from harness.basics.geometry import rotation_about, rotation_from_vector, translation
@@ -21,7 +22,7 @@ from tests.samples.synthetic_press import BASE_FROM_OBJECT, PRESSES
 from tests.support.localization import dials
 
 QUICK = dials(spacing=3e-3, samples=1000)
-UP = np.array([0.0, 0.0, 1.0])
+UP = np.array([0.0, 0.0, -0.03])
 TRUE = np.array([press.point for press in PRESSES])
 ALL = np.arange(len(PRESSES))
 
@@ -71,6 +72,32 @@ def test_strikes_of_an_object_without_modes_leave_touch_as_sure_as_it_is(
     np.testing.assert_array_equal(both.position_in_object, found.position_in_object)
     np.testing.assert_array_equal(both.region.inside, found.region.inside)
     assert both.credible90 == found.credible90
+
+
+def test_strikes_that_fit_no_place_of_the_images_do_not_refuse_what_touch_answers(
+    found: Estimate,
+    contacts: tuple[Contact, ...],
+    block: Model,
+    prior: Prior,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Strikes whose likelihood is greatest 30 mm from the contacts, by thousands of nats."""
+    wrong = PRESSES[0].object_from_gel[:3, 3] + np.array([0.0, 0.03, 0.0])
+
+    def misleading(*arguments: object, **_: object) -> FloatArray:
+        hypotheses = next(one for one in arguments if isinstance(one, Hypotheses))
+        return np.asarray(-1.0e5 * np.linalg.norm(hypotheses.gels - wrong, axis=1))
+
+    sounding = plate.plate_modes()
+    places = plate.places(len(contacts), np.random.default_rng(0))
+    strikes = plate.strikes(sounding, places, np.random.default_rng(1))
+    struck = replace(block, modes=sounding, material=MATERIALS["steel"])
+    monkeypatch.setattr(StrikeEvidence, "nats", misleading)
+    monkeypatch.setattr(StrikeEvidence, "nats_of_draws", misleading)
+    both = locate(contacts, struck, prior, QUICK, Noise(), strikes=strikes)[-1]
+    np.testing.assert_array_equal(both.position_in_object, found.position_in_object)
+    assert both.credible90 == found.credible90
+    assert SOUND_LEFT_OUT in both.doubts
 
 
 def test_the_answer_is_on_the_surface(found: Estimate, block: Model) -> None:
