@@ -6,9 +6,22 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from experiments.contact_localization.sound.kernels import faces_about, nearest_in_table
-from harness.basics.arrays import AnyArray, FloatArray, IntArray, read_only
+from harness.basics.arrays import AnyArray, BoolArray, FloatArray, IntArray, read_only
+from harness.basics.geometry import rotation_about
 from harness.sim.modal.modes import Modes
 from harness.sim.solid.surface_samples import Surface
+
+_PAIR_POINTS = 500
+"""Surface points on which two mode shapes are compared with their rotated copies."""
+
+_PAIR_ANGLES = (0.13, 0.45, 0.9)
+"""Rotations about the object's axis in rad, in no simple ratio to each other."""
+
+_PAIR_COVERAGE = 0.7
+"""Share of a rotated mode shape's square that the two shapes of a pair must span."""
+
+_PAIR_EXCHANGE = 0.25
+"""Share of a mode shape's square that some rotation must move into the other shape; less is no pair."""
 
 _CANDIDATES = 16
 """Faces about a sample among which the one nearest to a place is looked for."""
@@ -25,6 +38,8 @@ class GainTable:
         nodes: ``(nodes, 3)`` metres.
         faces: ``(f, 3)`` nodes of the mesh's surface.
         near_faces: ``(samples, k)`` faces about each sample.
+        rotation_pairs: ``(m - 1,)`` whether a mode and the next one are a pair that a rotation about the
+            object's axis turns into each other (``find_rotation_pairs``).
     """
 
     surface: Surface
@@ -33,6 +48,7 @@ class GainTable:
     nodes: FloatArray
     faces: IntArray
     near_faces: AnyArray
+    rotation_pairs: BoolArray
 
     @property
     def at_samples(self) -> AnyArray:
@@ -69,5 +85,49 @@ def gain_table(modes: Modes, surface: Surface) -> GainTable:
     middles = cKDTree(modes.points[modes.faces].mean(axis=1))
     near = np.asarray(middles.query(surface.points, k=count)[1], dtype=np.int32).reshape(-1, count)
     return GainTable(
-        surface, read_only(shapes), read_only(squares), modes.points, modes.faces, read_only(near)
+        surface,
+        read_only(shapes),
+        read_only(squares),
+        modes.points,
+        modes.faces,
+        read_only(near),
+        read_only(find_rotation_pairs(modes, surface.points)),
     )
+
+
+def find_rotation_pairs(modes: Modes, points: FloatArray) -> BoolArray:
+    """Find neighbouring modes that are one pair of a round object: cos(n a) and sin(n a) about its axis.
+
+    Small asymmetries, which a real object and its model do not share, decide where about the axis the nodal
+    lines of such a pair lie, and split its frequencies.
+
+    Args:
+        modes: modes of the object, in ascending order of frequency.
+        points: ``(n, 3)`` points of the surface in metres, evenly distributed.
+
+    Returns:
+        ``(m - 1,)`` for every mode but the last, whether it and the next one are such a pair.
+    """
+    count = len(modes.frequencies)
+    if count < 2:
+        return np.zeros(max(0, count - 1), np.bool_)
+    spread = np.linspace(0, len(points) - 1, min(_PAIR_POINTS, len(points))).astype(np.int64)
+    places, centre = points[spread], points.mean(axis=0)
+    moments, axes = np.linalg.eigh(np.cov((points - centre).T))
+    # The axis of a round object: the other two principal moments are the two nearest to each other.
+    axis = axes[:, 2] if moments[1] - moments[0] < moments[2] - moments[1] else axes[:, 0]
+    shapes = modes.at(places).transpose(1, 0, 2).reshape(count, -1)
+    squares = (shapes**2).sum(axis=1)
+    coverage, exchange = np.ones(count - 1), np.zeros(count - 1)
+    overlap = (shapes[:-1] * shapes[1:]).sum(axis=1) / np.sqrt(squares[:-1] * squares[1:])
+    for angle in _PAIR_ANGLES:
+        turn = rotation_about(axis, angle)
+        turned = modes.at((places - centre) @ turn.T + centre) @ turn
+        turned = turned.transpose(1, 0, 2).reshape(count, -1)[:-1]
+        lengths = np.sqrt((turned**2).sum(axis=1))
+        own = (turned * shapes[:-1]).sum(axis=1) / (lengths * np.sqrt(squares[:-1]))
+        other = (turned * shapes[1:]).sum(axis=1) / (lengths * np.sqrt(squares[1:]))
+        across = (other - overlap * own) / np.sqrt(np.maximum(1.0 - overlap**2, 1e-6))
+        coverage = np.minimum(coverage, own**2 + across**2)
+        exchange = np.maximum(exchange, across**2)
+    return np.asarray((coverage > _PAIR_COVERAGE) & (exchange > _PAIR_EXCHANGE))

@@ -110,7 +110,7 @@ class SoundTerm:
             raise WrongUse(f"groups of {noise.most} modes were asked for; 1 to {MOST_RANK} can be weighed")
         self.evidence = evidence
         self._table, self._modes, self._material, self._noise = table, modes, material, noise
-        self._starts = group_starts(modes.frequencies, noise)
+        self._starts = group_starts(modes.frequencies, table.rotation_pairs, noise)
         self._peaks = evidence.peaks if len(modes.frequencies) else ()
         frequencies = np.array([peak.frequency for peak in self._peaks])
         self.scales: Scales = likely_scales(frequencies, modes.frequencies, noise)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import BoolArray, FloatArray, IntArray
 
 _GRID = 1.0e-3
 _FAR = 4.0
@@ -36,6 +36,7 @@ class SoundNoise:
             tells are off together, as its modes, the hammer's mount and the object's attitude are.
         alone: ``weight`` by sound alone, where nothing names the errors that contacts share.
         group: modes whose frequencies differ by less than this share mix freely.
+        pair: relative difference in frequency up to which the two modes of a round object's pair mix freely.
         most: modes in one group at most; at most ``sound_kernels.MOST_RANK``.
     """
 
@@ -50,6 +51,7 @@ class SoundNoise:
     aside: float = 1.0e-3
     alone: float = 0.2
     group: float = 0.01
+    pair: float = 0.05
     most: int = 3
 
 
@@ -88,19 +90,22 @@ class Pairs:
         return Pairs(self.starts, self.groups, self.shares[one], self.clutter[one])
 
 
-def group_starts(frequencies: FloatArray, noise: SoundNoise) -> IntArray:
-    """``(G + 1,)`` first mode of every group of near-equal frequencies.
+def group_starts(frequencies: FloatArray, pairs: BoolArray, noise: SoundNoise) -> IntArray:
+    """Return ``(G + 1,)`` the first mode of every group of near-equal frequencies.
 
     Within a group the eigenvectors are any rotation of each other, and a small asymmetry of the real
     object picks another one; a group is therefore taken whole.
 
     Args:
-        frequencies: ``(m,)`` Hz, ascending.
-        noise: gives the group's width.
+        frequencies: ``(m,)`` frequencies in Hz, ascending.
+        pairs: ``(m - 1,)`` whether a mode and the next one are a pair of a round object, which its
+            asymmetries may split further.
+        noise: widths of the groups.
     """
     starts = [0]
     for mode in range(1, len(frequencies)):
-        close = frequencies[mode] < (1.0 + noise.group) * frequencies[mode - 1]
+        width = noise.pair if pairs[mode - 1] else noise.group
+        close = frequencies[mode] < (1.0 + width) * frequencies[mode - 1]
         if not close or mode - starts[-1] >= noise.most:
             starts.append(mode)
     return np.array([*starts, len(frequencies)] if len(frequencies) else [0], dtype=np.int64)

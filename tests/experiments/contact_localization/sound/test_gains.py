@@ -1,9 +1,11 @@
 """Gains at any place of a surface: the modes' own, without jumps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from experiments.contact_localization.sound.gains import GainTable, gain_table
+from experiments.contact_localization.sound.gains import GainTable, find_rotation_pairs, gain_table
 from experiments.contact_localization.sound.kernels import faces_about
 from experiments.contact_localization.sound.likelihood import SoundTerm
 from harness.basics.arrays import FloatArray, IntArray
@@ -120,6 +122,30 @@ def modes() -> Modes:
 def table(modes: Modes) -> GainTable:
     """Theirs."""
     return gain_table(modes, SAMPLES)
+
+
+def test_only_the_two_modes_of_a_wave_about_the_axis_are_a_pair(modes: Modes) -> None:
+    assert find_rotation_pairs(modes, SAMPLES.points).tolist() == [k % 2 == 0 for k in range(15)]
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.0])
+def test_which_modes_are_pairs_does_not_depend_on_the_azimuth_of_their_nodal_lines(
+    modes: Modes, turn: float
+) -> None:
+    cosine, sine = modes.shapes[:, 0::2], modes.shapes[:, 1::2]
+    shapes = np.empty_like(modes.shapes)
+    shapes[:, 0::2] = np.cos(turn) * cosine + np.sin(turn) * sine
+    shapes[:, 1::2] = np.cos(turn) * sine - np.sin(turn) * cosine
+    pairs = find_rotation_pairs(replace(modes, shapes=shapes), SAMPLES.points)
+    assert pairs.tolist() == [k % 2 == 0 for k in range(15)]
+
+
+def test_modes_of_a_bar_are_no_pairs(modes: Modes) -> None:
+    """Waves along x alone, however near their frequencies are to each other."""
+    along = ROUND.vertices[:, 0] / RIM
+    waves = np.array([np.cos(n * np.pi * along) for n in range(1, 17)]).T
+    bar = replace(modes, shapes=waves[..., None] * np.array([0.0, 0.0, 1.0]))
+    assert not find_rotation_pairs(bar, SAMPLES.points).any()
 
 
 def test_turning_a_round_object_under_its_strikes_says_nothing(table: GainTable, modes: Modes) -> None:

@@ -357,9 +357,16 @@ def test_the_mode_table_names_the_modes() -> None:
 
 def test_groups_are_as_wide_as_asked_and_no_larger() -> None:
     frequencies = np.array([100.0, 100.1, 100.2, 100.3, 200.0, 300.0, 300.5])
-    assert group_starts(frequencies, SoundNoise()).tolist() == [0, 3, 4, 5, 7]
-    assert group_starts(frequencies, SoundNoise(group=1e-9)).tolist() == list(range(8))
-    assert group_starts(np.zeros(0), SoundNoise()).tolist() == [0]
+    no_pairs = np.zeros(6, np.bool_)
+    assert group_starts(frequencies, no_pairs, SoundNoise()).tolist() == [0, 3, 4, 5, 7]
+    assert group_starts(frequencies, no_pairs, SoundNoise(group=1e-9)).tolist() == list(range(8))
+    assert group_starts(np.zeros(0), np.zeros(0, np.bool_), SoundNoise()).tolist() == [0]
+
+
+def test_a_pair_of_a_round_object_is_one_group_though_its_frequencies_are_split_further() -> None:
+    frequencies = np.array([100.0, 103.0, 150.0, 154.0, 200.0, 212.0])
+    pairs = np.array([True, False, False, False, True])
+    assert group_starts(frequencies, pairs, SoundNoise()).tolist() == [0, 2, 3, 4, 5, 6]
 
 
 @settings(max_examples=30, deadline=None)
