@@ -269,12 +269,12 @@ def _begin(arguments: argparse.Namespace) -> Lab:
         card = plug_in_card(told.station, arguments.scene.parent)
     start = forward(told.station.arm.model, np.array(LEFT_ABOVE))
     _compile(world, told.bench, start)
-    shared = SharedPose(start)
+    shared, sound = SharedPose(start), None if strikes is None else strikes.sound
     return Lab(
         world,
         _controller(world, told.station.arm, shared, arguments.seed),
         shared,
-        TruthFile(arguments.truth, world, arguments.seed, None if strikes is None else strikes.sound),
+        TruthFile(arguments.truth, world, arguments.seed, arguments.run, sound),
         free_address(),
         told.bench.camera is not None,
         strikes,
@@ -289,6 +289,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--gap", required=True, help="a gap file, or the name of a shipped one: default, none"
     )
+    parser.add_argument("--run", default="", help="identity of the run, which the truth repeats")
     parser.add_argument("--truth", type=Path, required=True, help="where to write what really happened")
     return parser
 

@@ -58,7 +58,11 @@ def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
     if recording.committed < total:
         CONSOLE.print(f"recording to {recording.folder}", markup=False)
         how = f"touchstone calibrate taxim --resume {recording.folder}"
-        with resumable(how), step_progress(recording.committed, total, presses.step) as told:
+        with (
+            recording.hold(),
+            resumable(how),
+            step_progress(recording.committed, total, presses.step) as told,
+        ):
             done = perform_on_bench(presses, recording, told, say=told.say)
         if not done.complete:
             stopped(f"{presses.step} {recording.committed}", recording.folder, how, as_json)

@@ -122,7 +122,7 @@ def _then(live: LiveEstimate, truth: Mesh | None) -> SurfaceThen:
 
 
 def _truth(scored: Scored) -> Mesh | None:
-    return None if scored.truth is None else true_surface(scored.run)
+    return true_surface(scored.run, scored.truth)
 
 
 def _way(stand_from_gel: FloatArray, length: float) -> FloatArray:

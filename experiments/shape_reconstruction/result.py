@@ -17,7 +17,7 @@ from harness.basics.errors import FitRefused
 from harness.basics.geometry import apply, inverse
 from harness.basics.mesh import Mesh
 from harness.experiment.experiment import Scored
-from harness.experiment.truth import read_true_surface
+from harness.experiment.truth import Truth
 from harness.recording.run_folder import RunFiles
 
 ERRORS = ("chamfer_m", "chamfer_points_m", "accuracy_m", "completeness_m", "f_score")
@@ -29,18 +29,17 @@ _BY = {"vision": "by the picture alone", "touch": "by touch alone", "fused": "by
 _NOT_ASKED = "the scene does not ask for it"
 
 
-def true_surface(run: RunFiles) -> Mesh | None:
-    """The true object of a mocked run in the frame ``stand``; None where nothing says it."""
-    found = read_true_surface(run.recording)
-    if found is None:
+def true_surface(run: RunFiles, truth: Truth | None) -> Mesh | None:
+    """Transform the true object of a mocked run to the frame ``stand``; None if its surface is unknown."""
+    if truth is None or truth.surface is None:
         return None
-    return Mesh(apply(inverse(base_from_stand(run)), found.vertices), found.faces)
+    return Mesh(apply(inverse(base_from_stand(run)), truth.surface.vertices), truth.surface.faces)
 
 
 def result_of(scored: Scored) -> dict[str, Any]:
     """The answer as JSON values; keys carry their unit."""
     answer: ShapeAnswer = scored.found
-    truth = None if scored.truth is None else true_surface(scored.run)
+    truth = true_surface(scored.run, scored.truth)
     estimates = {}
     for sense in SENSES:
         one = answer.by_sense.get(sense, _NOT_ASKED)

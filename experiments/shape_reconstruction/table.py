@@ -18,6 +18,7 @@ from harness.bench.station_file import Station
 from harness.experiment.experiment import Experiment, MeasuredColumn, MeasuredCondition
 from harness.experiment.lookup import named
 from harness.experiment.plain import PlainPerforms, perform_in_process, plain_measurement
+from harness.experiment.truth import read_truth
 from harness.recording.run_folder import RunFiles
 
 NAME = "shape-reconstruction"
@@ -114,7 +115,7 @@ def run_cell(
     networks = {} if asked.pcn is None else paper_completions(Path(asked.pcn))
     with closing(perform_in_process(experiment, cell, here, station, recordings)) as case:
         run = RunFiles(case.run.recording)
-        truth = true_surface(run)
+        truth = true_surface(run, read_truth(run.recording))
         if truth is None:
             raise DataRefused(
                 f"no true surface is beside {run.recording.folder.name}: no instrument read anything in this "

@@ -1,7 +1,7 @@
-"""The bench clock: monotonic seconds, and the wall time they started from."""
+"""The bench clock: monotonic seconds, and its offset to the wall clock."""
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
 
 
 def now() -> float:
@@ -9,13 +9,13 @@ def now() -> float:
     return time.monotonic()
 
 
-@dataclass(frozen=True)
-class ClockOffset:
-    """Wall-clock seconds since 1970 minus bench-clock seconds, read once a run."""
+def clock_offset_ns(bench_clock: Callable[[], float] = now) -> int:
+    """Measure the wall clock (ns since 1970) minus the bench clock.
 
-    seconds: float
+    The bench clock starts again at a reboot, so every session measures the offset for itself; corrections of
+    the wall clock during a session do not move the bench clock.
 
-    @classmethod
-    def measure(cls) -> "ClockOffset":
-        """The offset at this moment; NTP steps during a run do not move the bench clock."""
-        return cls(time.time() - time.monotonic())
+    Args:
+        bench_clock: returns s on the clock by which readings are stamped.
+    """
+    return time.time_ns() - round(bench_clock() * 1e9)

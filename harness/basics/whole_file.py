@@ -1,11 +1,15 @@
 """Files that are on the disk whole or not at all."""
 
 import os
+import secrets
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
+
+_NAME_LENGTH = 50
+"""Characters of a file's name that its temporary file keeps: file systems allow 255 bytes in all."""
 
 
 def sync_folder(folder: Path) -> None:
@@ -28,22 +32,23 @@ def make_folder(folder: Path) -> None:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
-    """A stream beside ``path`` that becomes the file, flushed to the disk, once it is written to the end.
+    """Open a temporary file that replaces ``path``, flushed to the disk, when the block ends.
 
-    Readers see the old file or the new one; where writing fails, nothing is left of it. A link stays one,
-    and a device is written to as it is.
+    Readers see the old file or the new one. If the block fails, nothing is left of the temporary file, whose
+    name belongs to this call alone: several processes may write the same path, and the last one wins. A link
+    stays a link, and a device is written to directly.
 
     Raises:
         OSError: with the path, which a full disk's own error does not name.
     """
     path = Path(os.path.realpath(path))
-    part = path.with_name(f".{path.name}.part")
+    part = path.with_name(f".{path.name[:_NAME_LENGTH]}.{os.getpid()}-{secrets.token_hex(4)}.part")
     try:
         if path.exists() and not path.is_file():
             with path.open("wb") as stream:
                 yield stream
             return
-        with part.open("wb") as stream:
+        with part.open("xb") as stream:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
@@ -71,22 +76,27 @@ def write_bytes_whole(path: Path, data: bytes) -> None:
 
 
 @contextmanager
-def removed_on_failure(folder: Path) -> Iterator[None]:
-    """Remove from a folder what a block that fails put there, and the folder itself where that was new."""
-    before = set(folder.iterdir()) if folder.is_dir() else None
+def removed_on_failure(folder: Path, names: Collection[str]) -> Iterator[None]:
+    """Remove the named entries of a folder if the block fails, and the folder if it is new and then empty.
+
+    Entries that were there before the block are kept. Other entries belong to another program and are kept.
+    """
+    before = {name for name in names if os.path.lexists(folder / name)}
+    is_new = not folder.is_dir()
     try:
         yield
     except BaseException:
-        for path in set(folder.glob("*")) | set(folder.glob(".*")):
-            if path not in (before or ()):
-                _remove(path)
-        if before is None and folder.is_dir():
-            folder.rmdir()
+        for name in names:
+            if name not in before:
+                _remove(folder / name)
+        if is_new:
+            with suppress(OSError):  # another program wrote there meanwhile
+                folder.rmdir()
         raise
 
 
 def _remove(path: Path) -> None:
     if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
+        shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)

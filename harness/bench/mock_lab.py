@@ -68,6 +68,7 @@ class MockLab:
         gap: path of the reality gap.
         truth: where the lab writes what is true.
         command: the program; None for ``python -m mocks.lab``.
+        run_id: identity of the run, which the truth repeats; empty where no run is recorded.
     """
 
     def __init__(
@@ -79,9 +80,11 @@ class MockLab:
         gap: Path,
         truth: Path,
         command: Sequence[str] | None = None,
+        run_id: str = "",
     ) -> None:
         self._scene, self._station, self._mesh = scene, station, mesh
         self._options = ["--seed", str(seed), "--gap", str(gap), "--truth", str(truth)]
+        self._options += ["--run", run_id]
         self._command = [*(command or (sys.executable, "-m", "mocks.lab"))]
         self._process: subprocess.Popen[bytes] | None = None
         self._folder: OwnedFolder | None = None

@@ -67,6 +67,8 @@ class Bench:
         pause: waits for so many seconds of the bench's own time.
         lab: behind a mocked bench, for cueing faults; None at a real one.
         microphone: that hears the strikes on a clock of its own; None where the hammer's box hears them.
+        simulated_clock: returns s of simulated time, by which readings are stamped; None where the readings
+            are stamped by the system's monotonic clock.
     """
 
     arm: Arm
@@ -78,6 +80,7 @@ class Bench:
     pause: Callable[[float], None] = time.sleep
     lab: MockLab | None = None
     microphone: Microphone | None = None
+    simulated_clock: Callable[[], float] | None = None
 
 
 @dataclass(frozen=True)
@@ -89,12 +92,14 @@ class RunContext:
         mesh: of the object, in metres, as the run is planned with.
         seed: of the world.
         gap: reality gap by name or path; None for the station's own.
+        run_id: identity of the run, which the truth repeats; empty where no run is recorded.
     """
 
     truth: Path
     mesh: Mesh
     seed: int = 0
     gap: str | None = None
+    run_id: str = ""
 
 
 @contextmanager
@@ -138,7 +143,8 @@ def wired(
     """
     if station.mock is None:
         return station, None
-    lab = MockLab(scene, station, run.mesh, run.seed, gap_path(run.gap or station.mock.gap), run.truth)
+    gap = gap_path(run.gap or station.mock.gap)
+    lab = MockLab(scene, station, run.mesh, run.seed, gap, run.truth, run_id=run.run_id)
     stack.callback(lab.close)
     started = lab.start()
     _surround(stack, started.environment)

@@ -18,7 +18,7 @@ from harness.effects.accuracy import Accuracy, Level
 from harness.effects.explain import as_json
 from harness.experiment.compare import Comparison, compare, planned
 from harness.experiment.experiment import Answering, Experiment, Scored
-from harness.experiment.truth import read_truth
+from harness.experiment.truth import truth_or_notes
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 
@@ -56,8 +56,9 @@ def score(
         for record in recording.steps():
             answering.read(record)
     found = answering.answer()
-    warnings = tuple(recording.header.plan.get("warnings", ()))
-    scored = Scored(run, answering, found, read_truth(recording), accuracy, warnings)
+    truth, notes = truth_or_notes(recording)
+    warnings = (*recording.header.plan.get("warnings", ()), *recording.order_notes(), *notes)
+    scored = Scored(run, answering, found, truth, accuracy, warnings)
     return replace(scored, result=experiment.result(scored))
 
 

@@ -11,7 +11,7 @@ from harness.bench.station_file import Station
 from harness.effects.scene_object import KnownObject, known_object
 from harness.experiment.compare import require_sources
 from harness.experiment.experiment import Experiment, Planned, Procedure
-from harness.experiment.lookup import runs_folder
+from harness.experiment.lookup import new_runs_folder
 from harness.experiment.solving import TARGET, Target
 from harness.recording.recording import Recording, require_unused
 from harness.recording.run_folder import create_run, station_acquisition, station_calibration
@@ -78,21 +78,12 @@ def begin(
         **({} if target is None else {TARGET: target.as_json()}),
         "warnings": [*known.warnings, *plan.rehearsal.warnings],
     }
+    run = procedure.name, scene, station, known.mesh, calibration, described, seed, mock, acquisition
+    if folder is not None:
+        return Begun(create_run(folder, *run), plan, known)
     stamp = dt.datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
-    where = folder or runs_folder(procedure.name, scene.object.name, stamp)
-    recording = create_run(
-        where,
-        procedure.name,
-        scene,
-        station,
-        known.mesh,
-        calibration,
-        described,
-        seed,
-        mock,
-        acquisition,
-    )
-    return Begun(recording, plan, known)
+    with new_runs_folder(procedure.name, scene.object.name, stamp) as own:
+        return Begun(create_run(own, *run), plan, known)
 
 
 def _mock(

@@ -6,10 +6,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from harness.basics.errors import WrongUse
+from harness.basics.files.lock_file import hold_briefly
 from harness.bench.experiments import loaded
 from harness.bench.gap import lasting_name
 from harness.bench.scene import SceneFile
-from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.experiment.begin import begin
 from harness.experiment.experiment import Experiment, RunCell
@@ -35,8 +35,7 @@ def performed(
     gap = cell.conditions["gap"]
     recording = begin(experiment, scene, station, cell.seed, gap, folder).recording
     run = RunFiles(recording)
-    context = RunContext(recording.truth_path, run.mesh, cell.seed, gap)
-    perform_on(experiment, loaded(IN_PROCESS_BENCH)(run.scene, run.station, context), recording, Quiet())
+    perform_on(experiment, loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context), recording, Quiet())
     return recording
 
 
@@ -63,10 +62,17 @@ def recorded(
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".performing-", dir=folder) as aside:
         made = performed(experiment, cell, scene, station, Path(aside) / cell.name)
-        for truth in truth_paths(made):
-            if truth.exists():
-                truth.replace(folder / truth.name)
-        made.folder.replace(path)
+        return _moved(made, path)
+
+
+def _moved(made: Recording, path: Path) -> Recording:
+    """Move a run with its truth to its place; where another process was first, its run stays."""
+    with hold_briefly(path.with_name(f".{path.name}.lock")):
+        if not path.exists():
+            for truth in truth_paths(made):
+                if truth.exists():
+                    truth.replace(path.parent / truth.name)
+            made.folder.replace(path)
     return Recording(path)
 
 

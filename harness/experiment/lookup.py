@@ -1,9 +1,13 @@
 """Experiments by name, and whose run a folder is."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 
 from harness.basics.errors import WrongUse
 from harness.basics.toml_file import nearest
+from harness.basics.whole_file import make_folder
 from harness.bench.experiments import EXPERIMENTS, loaded
 from harness.experiment.experiment import Experiment
 from harness.recording.recording import Recording
@@ -62,8 +66,21 @@ def require_of(recording: Recording, name: str, doing: str) -> None:
         raise WrongUse(f"{doing} {recording.folder}: it is a run of {whose}, not of {name}")
 
 
-def runs_folder(name: str, object_name: str | None, stamp: str) -> Path:
-    """A folder under ``runs/`` that does not exist yet."""
+@contextmanager
+def new_runs_folder(name: str, object_name: str | None, stamp: str) -> Iterator[Path]:
+    """Create a folder under ``runs/`` for this process alone; a block that fails leaves no empty folder."""
     base = Path("runs") / "-".join(part for part in (stamp, name, object_name) if part)
-    candidates = (base, *(base.with_name(f"{base.name}-{k}") for k in range(2, 1000)))
-    return next(path for path in candidates if not path.exists())
+    make_folder(base.parent)
+    folder = base
+    for number in count(2):
+        try:
+            folder.mkdir()
+            break
+        except FileExistsError:
+            folder = base.with_name(f"{base.name}-{number}")
+    try:
+        yield folder
+    except BaseException:
+        with suppress(OSError):  # it is not empty
+            folder.rmdir()
+        raise

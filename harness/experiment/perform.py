@@ -5,11 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
-from harness.basics.clock import now
+from harness.basics.clock import clock_offset_ns, now
 from harness.basics.errors import FitRefused, WrongUse
 from harness.bench.device import Health
 from harness.bench.experiments import loaded
-from harness.bench.station import Bench, RunContext, open_station
+from harness.bench.station import Bench, open_station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.experiment import Answering, Experiment, Helpers, Procedure
 from harness.recording.recording import Recording
@@ -99,12 +99,10 @@ def perform_on_bench(
 def _bench_of(run: RunFiles) -> Iterator[Bench]:
     """The bench that a run was begun for, open."""
     recording = run.recording
-    mock = recording.header.mock or {}
-    context = RunContext(recording.truth_path, run.mesh, recording.header.seed, mock.get("gap"))
-    if mock.get("bench", WIRES) == IN_PROCESS:
-        yield loaded(IN_PROCESS_BENCH)(run.scene, run.station, context)
+    if (recording.header.mock or {}).get("bench", WIRES) == IN_PROCESS:
+        yield loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context)
         return
-    with open_station(run.station, run.scene, context) as bench:
+    with open_station(run.station, run.scene, run.context) as bench:
         yield bench
 
 
@@ -117,8 +115,14 @@ def perform_on(
     answering: Answering | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Performed:
-    """Perform what is left of a run on an open bench."""
+    """Perform what is left of a run on an open bench, as a session with a clock offset of its own.
+
+    Raises:
+        WrongUse: the wall clock is before the end of the last step; nothing has moved.
+    """
     run = RunFiles(recording)
+    offset = clock_offset_ns(bench.simulated_clock or now)
+    recording.begin_session(offset, is_simulated=bench.simulated_clock is not None)
     helpers = Helpers(twin_of(run.scene, run.station, run.mesh), ask, say)
     if answering is not None:
         for record in recording.steps():

@@ -1,14 +1,11 @@
-"""Checksums of a run's own files: whatever happens to their bytes is noticed before they are read.
+"""Checksums of a run's step files: any change of their bytes is noticed before they are read.
 
 MCAP's checksums cover the messages alone: not what a step was asked to do, nor what its channels mean. So a
 step file carries the SHA-256 of all of its bytes in its head, where viewers show it as the library's name;
-the checksum's own place counts as zeros. ``run.json`` carries that of its values.
+the checksum's own place counts as zeros.
 """
 
-import json
-from collections.abc import Mapping
 from hashlib import sha256
-from typing import Any
 
 _TITLE = "touchstone step 2 sha256 "
 _BLANK = "0" * 64
@@ -18,9 +15,6 @@ UNSUMMED_LIBRARY = _TITLE + _BLANK
 _TITLE_AT = 25
 """Bytes of an MCAP file before the library's name: magic, the head's opcode and length, an empty profile."""
 _SUM_AT = slice(_TITLE_AT + len(_TITLE), _TITLE_AT + len(UNSUMMED_LIBRARY))
-
-SUM = "sha256"
-"""The key of ``run.json``'s checksum."""
 
 
 def with_checksum(step_file: bytes) -> bytes:
@@ -36,12 +30,6 @@ def has_checksum(step_file: bytes) -> bool:
 def is_intact(step_file: bytes) -> bool:
     """Whether a step file's bytes agree with the checksum in its head."""
     return has_checksum(step_file) and step_file[_SUM_AT] == _sum_of(step_file)
-
-
-def sum_of_values(fields: Mapping[str, Any]) -> str:
-    """Of JSON values, however they are laid out in a file; the checksum's own key is left out."""
-    summed = {key: value for key, value in fields.items() if key != SUM}
-    return sha256(json.dumps(summed, sort_keys=True).encode()).hexdigest()
 
 
 def _sum_of(step_file: bytes) -> bytes:

@@ -4,23 +4,38 @@
 whole or not at all, and the first step that is not is where a run resumes.
 """
 
+import datetime as dt
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from harness.basics.clock import now
 from harness.basics.errors import RecordingDamaged, WrongUse
+from harness.basics.files.json_file import CHECKSUM, checksum_of
+from harness.basics.files.lock_file import hold_folder
 from harness.basics.whole_file import make_folder, write_text_whole
 from harness.bench.reading import Reading
-from harness.recording.checksums import SUM, sum_of_values
-from harness.recording.step_file import Step, StepRecord, read_step, write_step
+from harness.recording.step_file import Step, StepRecord, read_step, read_wall_span, write_step
 
-SCHEMA = 2
+SCHEMA = 3
+_READABLE = (1, 2, SCHEMA)
 _UNSUMMED = 1
 """The schema of runs whose files carry no checksums; they are read as they are."""
+
+HEADER, STEPS = "run.json", "steps"
+"""Names in a run's folder."""
+
+IN_USE = "wait for it to end, or name another folder"
+"""Advice for a folder that another program writes to."""
+
+_BACKWARDS_TOLERANCE_NS = 10**9
+"""Steps closer than this are in order: wall clocks of two sessions are corrected by fractions of a second."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +51,11 @@ class RunHeader:
         versions: of the project, its git commit and the libraries that shape numbers.
         seed: of everything random in the run.
         mock: how the mocked bench was started; None at a real bench.
-        clock_offset_ns: wall clock minus bench clock.
+        clock_offset_ns: wall clock minus bench clock when the run was created; steps carry the offset of
+            their own session.
         created: wall time, ISO 8601.
         schema: of this file.
+        run_id: random identity of the run, which the truth of a mocked run repeats; empty before schema 3.
     """
 
     experiment: str
@@ -52,6 +69,7 @@ class RunHeader:
     clock_offset_ns: int
     created: str
     schema: int = field(default=SCHEMA)
+    run_id: str = ""
 
 
 class Recording:
@@ -60,17 +78,62 @@ class Recording:
     def __init__(self, folder: Path) -> None:
         """Open an existing run; ``RecordingDamaged`` or ``WrongUse`` where it is none."""
         self.folder = folder
-        self.header = _read_header(folder / "run.json")
+        self.header = _read_header(folder / HEADER)
+        self._session_offset_ns = self.header.clock_offset_ns
 
     @classmethod
     def create(cls, folder: Path, header: RunHeader) -> "Recording":
         """Make the folder and its ``run.json``; refuses a folder that holds a run already."""
         require_unused(folder)
-        make_folder(folder / "steps")
+        make_folder(folder / STEPS)
         fields = json.loads(json.dumps(asdict(header), allow_nan=False))
-        summed = {**fields, SUM: sum_of_values(fields)}
-        write_text_whole(folder / "run.json", json.dumps(summed, indent=1, allow_nan=False))
+        summed = {**fields, CHECKSUM: checksum_of(fields)}
+        write_text_whole(folder / HEADER, json.dumps(summed, indent=1, allow_nan=False))
         return cls(folder)
+
+    def hold(self) -> AbstractContextManager[None]:
+        """Hold the folder for one writer; ``WrongUse`` where another process performs or answers this run."""
+        return hold_folder(self.folder, IN_USE)
+
+    def begin_session(self, clock_offset_ns: int, is_simulated: bool = False) -> None:
+        """Set the clock offset of the steps that are committed from now on.
+
+        Args:
+            clock_offset_ns: wall clock minus bench clock, measured as the bench was opened.
+            is_simulated: whether the bench clock is simulated and starts at 0 in every session. Such a
+                session goes on where the last step ended, as simulated time may run ahead of the wall clock.
+
+        Raises:
+            WrongUse: the wall clock is before the end of the last step; nothing has moved.
+        """
+        spans = self._wall_spans()
+        if spans:
+            last, _, end = spans[-1]
+            start = clock_offset_ns + (0 if is_simulated else round(now() * 1e9))
+            if is_simulated:
+                clock_offset_ns = max(clock_offset_ns, end)
+            elif start < end - _BACKWARDS_TOLERANCE_NS:
+                raise WrongUse(
+                    f"this computer's clock says {_utc(start)}, and step {last + 1} of {self.folder} was "
+                    f"recorded until {_utc(end)}; set the clock, then resume"
+                )
+        self._session_offset_ns = clock_offset_ns
+
+    def order_notes(self) -> tuple[str, ...]:
+        """Report each step that begins before the one before it ended, by the wall clock, in one sentence."""
+        return tuple(
+            f"step {index + 1} was recorded {_duration(end - start)} before step {before + 1} ended, by the "
+            "computer's clock: the clock was wrong in one of the sessions, or a step is of another run; "
+            "times between steps are not usable"
+            for (before, _, end), (index, start, _) in pairwise(self._wall_spans())
+            if start < end - _BACKWARDS_TOLERANCE_NS
+        )
+
+    def _wall_spans(self) -> list[tuple[int, int, int]]:
+        """Index, first and last time stamp, in ns of the wall clock, of each step with readings."""
+        summed = self.header.schema != _UNSUMMED
+        spans = [(index, read_wall_span(self._path(index), summed)) for index in range(self.committed)]
+        return [(index, *span) for index, span in spans if span is not None]
 
     @property
     def truth_path(self) -> Path:
@@ -87,7 +150,7 @@ class Recording:
     @property
     def committed(self) -> int:
         """How many steps are on disk; ``RecordingDamaged`` where one is missing in between."""
-        found = sorted(int(path.stem) for path in (self.folder / "steps").glob("[0-9]*.mcap"))
+        found = sorted(int(path.stem) for path in (self.folder / STEPS).glob("[0-9]*.mcap"))
         if found != list(range(len(found))):
             missing = sorted(set(range(len(found))) - set(found))
             raise RecordingDamaged(f"{self.folder}: step {missing[0]} is missing but later steps are there")
@@ -98,7 +161,7 @@ class Recording:
         if step.index != self.committed:
             raise ValueError(f"step {step.index} cannot follow {self.committed} committed steps")
         by_name = {reading.channel.name: reading for reading in readings}
-        write_step(self._path(step.index), StepRecord(step, by_name, seconds), self.header.clock_offset_ns)
+        write_step(self._path(step.index), StepRecord(step, by_name, seconds), self._session_offset_ns)
 
     def step(self, index: int) -> StepRecord:
         """Step ``index`` as it was performed."""
@@ -113,12 +176,12 @@ class Recording:
         return [self.step(index) for index in range(self.committed)]
 
     def _path(self, index: int) -> Path:
-        return self.folder / "steps" / f"{index:03d}.mcap"
+        return self.folder / STEPS / f"{index:03d}.mcap"
 
 
 def require_unused(folder: Path) -> None:
     """Refuse a folder that holds a run, before anything in it is touched."""
-    if (folder / "run.json").exists() or any((folder / "steps").glob("[0-9]*.mcap")):
+    if (folder / HEADER).exists() or any((folder / STEPS).glob("[0-9]*.mcap")):
         raise WrongUse(f"{folder} holds a run already; resume it with --resume, or name another folder")
 
 
@@ -141,9 +204,9 @@ def header_of(data: bytes, path: Path) -> RunHeader:
 
 def _checked(fields: Any, path: Path) -> RunHeader:
     schema = fields.get("schema") if isinstance(fields, dict) else None
-    if schema not in (SCHEMA, _UNSUMMED) or isinstance(schema, bool):
-        raise RecordingDamaged(f"{path}: schema {schema!r}; this version reads {_UNSUMMED} and {SCHEMA}")
-    if schema == SCHEMA and fields.pop(SUM, None) != sum_of_values(fields):
+    if schema not in _READABLE or isinstance(schema, bool):
+        raise RecordingDamaged(f"{path}: schema {schema!r}; this version reads {_UNSUMMED} to {SCHEMA}")
+    if schema != _UNSUMMED and fields.pop(CHECKSUM, None) != checksum_of(fields):
         raise RecordingDamaged(f"{path}: its values do not agree with its checksum; {_COPY}")
     try:
         # As JSON: of Python values the strict check asks for the dataclass itself.
@@ -153,6 +216,15 @@ def _checked(fields: Any, path: Path) -> RunHeader:
         key = ".".join(str(part) for part in first["loc"])
         raise RecordingDamaged(f"{path}: {key!r}: {first['msg'].lower()}; {_COPY}") from error
     return RunHeader(**fields)
+
+
+def _utc(wall_ns: int) -> str:
+    return dt.datetime.fromtimestamp(wall_ns / 1e9, dt.UTC).isoformat(sep=" ", timespec="seconds")
+
+
+def _duration(nanoseconds: int) -> str:
+    seconds = nanoseconds / 1e9
+    return f"{seconds:.1f} s" if seconds < 120.0 else f"{seconds / 60.0:,.0f} min"
 
 
 def _no_constant(name: str) -> float:

@@ -2,7 +2,9 @@
 
 import datetime as dt
 import importlib.metadata
+import os
 import subprocess
+import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,21 +13,23 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from harness.basics.clock import ClockOffset
+from harness.basics.clock import clock_offset_ns
 from harness.basics.errors import RecordingDamaged, WrongUse
+from harness.basics.files.lock_file import hold_folder
 from harness.basics.mesh import Mesh
 from harness.basics.npz_file import read_arrays, write_arrays
-from harness.basics.whole_file import make_folder, removed_on_failure, write_bytes_whole
+from harness.basics.whole_file import removed_on_failure, write_bytes_whole
 from harness.bench.acquisition import AcquisitionCalibration
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.sensor import sensor_path, shipped_sensors
+from harness.bench.station import RunContext
 from harness.bench.station_file import Station, station_from_json
 from harness.effects.accuracy import Level
 from harness.effects.file_levels import network_levels, senses_of
 from harness.effects.scene_object import known_file
 from harness.objectfile.file import ObjectFile, copied
 from harness.objects.builtin import DESCRIPTION
-from harness.recording.recording import Recording, RunHeader, require_unused
+from harness.recording.recording import HEADER, IN_USE, STEPS, Recording, RunHeader, require_unused
 from harness.sim.optics.lit_calibration import named_calibration, read_calibration, shadow_of
 from harness.sim.optics.pressed_gel import require_own
 from harness.sim.optics.tactile_calibration import TactileCalibration, save_calibration
@@ -36,6 +40,9 @@ OBJECTFILE = "objectfile"
 """The folder of the object's ObjectFile within that of a run."""
 
 _DESCRIBED = f"{OBJECTFILE}/{DESCRIPTION}"
+
+OWN_NAMES = (OBJECT, CALIBRATION, ACQUISITION, SENSOR, OBJECTFILE, STEPS, HEADER)
+"""What ``create_run`` may write into the folder of a run; nothing else there is ever replaced or removed."""
 
 _NUMBERS_COME_FROM = ("numpy", "scipy", "numba", "opencv-contrib-python-headless", "mujoco", "touchstone-lab")
 
@@ -89,7 +96,9 @@ def create_run(
     mock: Mapping[str, Any] | None,
     acquisition: AcquisitionCalibration | None = None,
 ) -> Recording:
-    """Make a run folder with everything an estimate will need; refuses one that holds a run.
+    """Create a run folder with everything that an estimate needs.
+
+    One process creates it; another process with the same folder is refused and removes nothing.
 
     Args:
         folder: of the run.
@@ -104,13 +113,14 @@ def create_run(
         acquisition: of the hammer's box; None for a run without sound.
 
     Raises:
-        WrongUse: the folder holds a run; or the scene names an ObjectFile of another object.
+        WrongUse: the folder holds a run or is being written to, or files there have the names that a run
+            uses; or the scene names an ObjectFile of another object.
         DataRefused: that ObjectFile is damaged.
     """
     of = known_file(scene, mesh)
-    require_unused(folder)
-    with removed_on_failure(folder):
-        make_folder(folder)
+    with hold_folder(folder, IN_USE), removed_on_failure(folder, OWN_NAMES):
+        require_unused(folder)
+        _require_free_names(folder)
         carried = _carried(folder, scene, station, mesh, calibration, acquisition, of)
         header = RunHeader(
             experiment=experiment,
@@ -121,10 +131,17 @@ def create_run(
             versions=versions(),
             seed=seed,
             mock=mock,
-            clock_offset_ns=round(ClockOffset.measure().seconds * 1e9),
+            clock_offset_ns=clock_offset_ns(),
             created=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+            run_id=uuid.uuid4().hex,
         )
         return Recording.create(folder, header)
+
+
+def _require_free_names(folder: Path) -> None:
+    taken = [name for name in OWN_NAMES if os.path.lexists(folder / name)]
+    if taken:
+        raise WrongUse(f"{folder} holds {', '.join(taken)}, which a run would replace; name another folder")
 
 
 def _carried(
@@ -216,6 +233,13 @@ class RunFiles:
     def network_levels(self) -> dict[str, Level]:
         """Levels at which networks of the carried ObjectFile stand for the simulation; none without one."""
         return network_levels(self.scene, self.objectfile.description) if self.carries_objectfile else {}
+
+    @property
+    def context(self) -> RunContext:
+        """What a mocked bench needs to know of this run."""
+        header = self.recording.header
+        gap = (header.mock or {}).get("gap")
+        return RunContext(self.recording.truth_path, self.mesh, header.seed, gap, header.run_id)
 
     @property
     def _where(self) -> str:

@@ -50,7 +50,13 @@ class StepRecord:
 
 
 def write_step(path: Path, record: StepRecord, clock_offset_ns: int) -> None:
-    """Write beside ``path``, flush to the disk, then rename: a crash leaves the whole file or none."""
+    """Write beside ``path``, flush to the disk, then rename: a crash leaves the whole file or none.
+
+    Args:
+        path: of the file.
+        record: readings of the step, on the bench clock of its session.
+        clock_offset_ns: wall clock minus bench clock of that session; the file keeps it.
+    """
     write_bytes_whole(path, with_checksum(_encoded(record, clock_offset_ns)))
 
 
@@ -61,7 +67,11 @@ def _encoded(record: StepRecord, clock_offset_ns: int) -> bytes:
     writer.start(profile="", library=UNSUMMED_LIBRARY)
     for reading in record.readings.values():
         _write_reading(writer, reading, clock_offset_ns)
-    described = {"step": asdict(record.step), "seconds": record.seconds}
+    described = {
+        "step": asdict(record.step),
+        "seconds": record.seconds,
+        "clock_offset_ns": clock_offset_ns,
+    }
     writer.add_metadata("touchstone.step", {"json": json.dumps(described, allow_nan=False)})
     writer.finish()  # type: ignore[no-untyped-call]  # mcap leaves it unannotated
     return stream.getvalue()
@@ -93,28 +103,58 @@ def read_step(path: Path, clock_offset_ns: int, summed: bool = True) -> StepReco
 
     Args:
         path: of the file.
-        clock_offset_ns: wall clock minus bench clock.
+        clock_offset_ns: wall clock minus bench clock, for files that do not keep that of their session.
         summed: whether the file must carry a checksum; only runs of schema 1 hold files without.
 
     Raises:
         RecordingDamaged: missing, or other bytes than were written; the file is named.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RecordingDamaged(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
-    return step_of(data, path, clock_offset_ns, summed)
+    return step_of(_read(path), path, clock_offset_ns, summed)
 
 
 def step_of(data: bytes, path: Path, clock_offset_ns: int, summed: bool = True) -> StepRecord:
-    """The step of a file's bytes; as ``read_step`` otherwise."""
-    if (summed or has_checksum(data)) and not is_intact(data):
-        raise _damaged(path, "its bytes do not agree with its checksum")
+    """Decode the bytes of a step file; the arguments are those of ``read_step``."""
+    _require_intact(data, path, summed)
     try:
         return _decoded(data, clock_offset_ns)
     # Without a checksum the libraries that decode a file meet any bytes, and fail on them in any way.
     except Exception as error:
         raise _damaged(path, "it does not decode") from error
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RecordingDamaged(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+
+
+def _require_intact(data: bytes, path: Path, summed: bool) -> None:
+    if (summed or has_checksum(data)) and not is_intact(data):
+        raise _damaged(path, "its bytes do not agree with its checksum")
+
+
+def read_wall_span(path: Path, summed: bool = True) -> tuple[int, int] | None:
+    """Read a step's first and last time stamp, in ns of the wall clock; None for a step without readings.
+
+    Args:
+        path: of the file.
+        summed: whether the file must carry a checksum.
+
+    Raises:
+        RecordingDamaged: missing, or other bytes than were written.
+    """
+    data = _read(path)
+    _require_intact(data, path, summed)
+    try:
+        summary = make_reader(BytesIO(data)).get_summary()
+        statistics = None if summary is None else summary.statistics
+    # Without a checksum the library meets any bytes, and fails on them in any way.
+    except Exception as error:
+        raise _damaged(path, "it does not decode") from error
+    if statistics is None or statistics.message_count == 0:
+        return None
+    return statistics.message_start_time, statistics.message_end_time
 
 
 def _damaged(path: Path, why: str) -> RecordingDamaged:
@@ -131,6 +171,7 @@ def _decoded(data: bytes, clock_offset_ns: int) -> StepRecord:
         (channel.metadata["channel"], message.log_time, message.data)
         for _, channel, message in reader.iter_messages(log_time_order=False)
     ]
+    clock_offset_ns = int(described.get("clock_offset_ns", clock_offset_ns))
     step = Step(**described["step"])
     return StepRecord(step, _readings(messages, clock_offset_ns), float(described["seconds"]))
 

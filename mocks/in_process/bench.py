@@ -110,7 +110,7 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
     nominal = nominal_bench(scene, station, mesh, scene.base_from_object(run.mesh), draw)
     world = World(nominal, gap, run.seed)
     strikes = strikes_of(world, scene, station, gap, run.seed)
-    truth = TruthFile(run.truth, world, run.seed, None if strikes is None else strikes.sound)
+    truth = TruthFile(run.truth, world, run.seed, run.run_id, None if strikes is None else strikes.sound)
     stage = Stage()
     arm = InProcessArm(station.arm.model, np.array(LEFT_ABOVE), world, stage, PACKET_RATE)
 
@@ -131,7 +131,17 @@ def in_process_bench(scene: SceneFile, station: Station, run: RunContext) -> Ben
     if seen is not None:
         shape = seen.rows, seen.columns
         camera = InProcessCamera("camera", "scene camera", shape, world.scene_image, arm, stage)
-    return Bench(arm, gel, camera, station, hammer, mark, stage.pause, microphone=microphone)
+    return Bench(
+        arm,
+        gel,
+        camera,
+        station,
+        hammer,
+        mark,
+        stage.pause,
+        microphone=microphone,
+        simulated_clock=lambda: stage.time,
+    )
 
 
 def _hammer(strikes: "StrikeCounts", arm: InProcessArm, station: Station, stage: Stage) -> "InProcessHammer":

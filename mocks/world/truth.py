@@ -1,41 +1,44 @@
 """The truth of a run, written beside its folder for scoring; nothing that estimates reads it."""
 
-import json
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.basics.arrays import FloatArray
+from harness.basics.errors import TouchstoneError
 from harness.basics.geometry import apply
 from harness.basics.npz_file import write_arrays
-from harness.basics.whole_file import write_text_whole
 from harness.bench.station import STRIKE
+from harness.bench.truth_file import SCHEMA, read_truth_file, surface_path, write_truth_file
 from mocks.world.world import World
 
 if TYPE_CHECKING:
     from mocks.world.sound import WorldSound
-
-SCHEMA = 1
 
 
 class TruthFile:
     """``truth.json``: what the world knows, and where each contact really was.
 
     A step that is performed again, after a resume, replaces what was written of it. Beside it ``truth.npz``
-    has the true surface as it stands: ``vertices``, m in base, and ``faces``.
+    has the true surface in its true pose: ``vertices``, m in base, and ``faces``.
 
     Args:
-        path: of the file; contacts already in it are kept if it is of the same world.
+        path: of the file; contacts already in it are kept if it is undamaged and of the same run and world.
         world: whose truth it is.
         seed: of the run.
+        run_id: identity of the run; empty where no run is recorded.
         sound: of the run; None where the scene asks for none.
     """
 
-    def __init__(self, path: Path, world: World, seed: int, sound: "WorldSound | None" = None) -> None:
+    def __init__(
+        self, path: Path, world: World, seed: int, run_id: str = "", sound: "WorldSound | None" = None
+    ) -> None:
         self._path = path
         self._world = world
         self._sound = sound
         self._head = {
             "schema": SCHEMA,
+            "run_id": run_id,
             "seed": seed,
             "base_from_object": world.base_from_object.tolist(),
             "differences": {
@@ -44,7 +47,7 @@ class TruthFile:
             },
         }
         self._contacts: dict[int, dict[str, Any]] = self._resumed()
-        self._has_surface = False
+        self._surface_sum: str | None = None
 
     def append(self, base_from_flange: FloatArray, step: int, sample: int) -> None:
         """Write where the press or the strike of ``step`` is, with the flange reported at this pose."""
@@ -67,16 +70,18 @@ class TruthFile:
         self._write()
 
     def _write(self) -> None:
-        if not self._has_surface:
-            self._write_surface()
+        if self._surface_sum is None:
+            self._surface_sum = self._write_surface()
         contacts = [self._contacts[index] for index in sorted(self._contacts)]
-        write_text_whole(self._path, json.dumps({**self._head, "contacts": contacts}, indent=1) + "\n")
+        fields = {**self._head, "surface_sha256": self._surface_sum, "contacts": contacts}
+        write_truth_file(self._path, fields)
 
-    def _write_surface(self) -> None:
-        world, path = self._world, self._path.with_suffix(".npz")
+    def _write_surface(self) -> str:
+        """Write the true surface; the SHA-256 of its file."""
+        world, path = self._world, surface_path(self._path)
         vertices = apply(world.base_from_object, world.mesh.vertices)
         write_arrays(path, {"vertices": vertices, "faces": world.mesh.faces})
-        self._has_surface = True
+        return sha256(path.read_bytes()).hexdigest()
 
     def _strike(self, sound: "WorldSound", base_from_flange: FloatArray, step: int) -> dict[str, Any]:
         aim = sound.aim(base_from_flange, step, STRIKE)
@@ -89,9 +94,13 @@ class TruthFile:
         }
 
     def _resumed(self) -> dict[int, dict[str, Any]]:
+        """The contacts of the same run; none where the file is damaged or of another run."""
         if not self._path.exists():
             return {}
-        written = json.loads(self._path.read_text(encoding="utf-8"))
-        if any(written.get(key) != self._head[key] for key in ("schema", "seed", "base_from_object")):
+        try:
+            written = read_truth_file(self._path)
+        except TouchstoneError:
+            return {}
+        if any(written.get(key) != self._head[key] for key in ("run_id", "seed", "base_from_object")):
             return {}
         return {contact["step"]: contact for contact in written["contacts"]}

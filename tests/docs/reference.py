@@ -11,6 +11,7 @@ import typer
 from pydantic import BaseModel
 
 from harness.basics.errors import WrongUse
+from harness.basics.files.json_file import CHECKSUM
 from harness.bench.experiments import EXPERIMENTS, loaded, section_models
 from harness.bench.gap import Gap
 from harness.bench.scene import SceneFile, scene_from_json
@@ -26,7 +27,6 @@ from harness.experiment.compare import CARRIED
 from harness.experiment.lookup import named, names
 from harness.objectfile.description import Description
 from harness.objectfile.published.entries import PublishedDescription
-from harness.recording.checksums import SUM
 from harness.recording.recording import SCHEMA, RunHeader
 from tests.docs.model_tables import dataclass_keys, keys, markdown, nested, summary, table
 from tests.docs.result_keys import ASKED, COMMON, ESTIMATE, LOCALIZATION, SHAPE, SHAPE_ESTIMATE
@@ -111,7 +111,7 @@ def _run() -> list[str]:
         "`steps/NNN.mcap`, one file a step. "
         f"The schema's number is {SCHEMA}; runs of schema 1 had no checksums and are read as before."
     )
-    rows = [*dataclass_keys(RunHeader), (f"`{SUM}`", "the SHA-256 of all the other values.")]
+    rows = [*dataclass_keys(RunHeader), (f"`{CHECKSUM}`", "the SHA-256 of all the other values.")]
     return [*_page("`run.json`", about), *table(("key", "meaning"), rows)]
 
 

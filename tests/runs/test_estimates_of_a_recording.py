@@ -13,6 +13,7 @@ from experiments.contact_localization.posterior.estimate import Estimate
 from experiments.contact_localization.report.result import true_points
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
+from harness.bench.truth_file import write_truth_file
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.step_file import StepRecord
@@ -68,7 +69,7 @@ def test_a_false_truth_changes_no_estimate(done: Recording, found: Answer, tmp_p
     truth = json.loads(lied.truth_path.read_text())
     for contact in truth["contacts"]:
         contact["point_in_object_m"] = [0.5, 0.5, 0.5]
-    lied.truth_path.write_text(json.dumps(truth))
+    write_truth_file(lied.truth_path, truth)
     assert_same(numbers(answered(lied)), numbers(found))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import SafetyStop, TouchstoneError
-from harness.bench.station import Bench, RunContext
+from harness.bench.station import Bench
 from harness.cli import invoke
 from harness.experiment import perform
 from harness.experiment.experiment import Experiment
@@ -147,8 +147,7 @@ def test_a_stalled_camera(resume: Resume, begun: Recording) -> None:
     assert session.failed["beyond"] < 1e-3, "it does not stay pressed on the object"
     assert hashes(begun) == before
     run = RunFiles(begun)
-    context = RunContext(begun.truth_path, run.mesh, begun.header.seed, "default")
-    bench = in_process_bench(run.scene, run.station, context)
+    bench = in_process_bench(run.scene, run.station, run.context)
     assert session_of.perform_on(bench, begun, Quiet()).complete
     assert begun.committed == 3
     assert before.items() <= hashes(begun).items()

@@ -10,6 +10,7 @@ import pytest
 
 from drivers.ur import lock as arm_lock
 from harness.basics.errors import BenchFault
+from harness.basics.files import lock_file
 from harness.basics.files.owned_folder import OwnedFolder
 
 ADDRESS = "127.9.8.7"
@@ -113,14 +114,14 @@ def test_a_lock_taken_while_its_file_is_removed_is_taken_on_the_new_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = arm_lock.lock_path(ADDRESS, tmp_path)
-    locked, left = arm_lock._locked, [path]
+    locked, left = lock_file._lock, [path]
 
-    def locked_once_removed(descriptor: int, times: int = 1) -> bool:
+    def locked_once_removed(descriptor: int) -> bool:
         if left:
             left.pop().unlink()
-        return locked(descriptor, times)
+        return locked(descriptor)
 
-    monkeypatch.setattr(arm_lock, "_locked", locked_once_removed)
+    monkeypatch.setattr(lock_file, "_lock", locked_once_removed)
     descriptor = arm_lock.take(ADDRESS, tmp_path)
     with pytest.raises(BenchFault, match="owned by another program"):
         arm_lock.take(ADDRESS, tmp_path)

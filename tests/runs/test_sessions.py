@@ -13,7 +13,7 @@ import pytest
 
 from harness.basics.errors import BenchFault, NotTouched, WrongUse
 from harness.bench.reading import Reading
-from harness.bench.station import Bench, RunContext
+from harness.bench.station import Bench
 from harness.bench.station_file import load_station, station_path
 from harness.cli import invoke
 from harness.commands.output import warn
@@ -31,8 +31,7 @@ PACKETS_APART = 0.1e-3
 
 def bench_of(recording: Recording, gap: str = "default") -> Bench:
     run = RunFiles(recording)
-    context = RunContext(recording.truth_path, run.mesh, recording.header.seed, gap)
-    return in_process_bench(run.scene, run.station, context)
+    return in_process_bench(run.scene, run.station, replace(run.context, gap=gap))
 
 
 def cut(recording: Recording, folder: Path, steps: int) -> Recording:

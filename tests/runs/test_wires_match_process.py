@@ -26,7 +26,7 @@ from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.geometry import inverse
 from harness.bench.gap import load_gap
 from harness.bench.scene import SceneFile
-from harness.bench.station import PRESS, RunContext
+from harness.bench.station import PRESS
 from harness.bench.station_file import load_station, station_path
 from harness.experiment.subjects import REAL, objects
 from harness.objects.household import MATERIALS
@@ -98,8 +98,7 @@ def both(scene: SceneFile, folder: Path) -> tuple[Side, Side]:
     complete = session_of.perform_on_bench(wired, Quiet()).complete
     assert complete
     run = RunFiles(simulated)
-    context = RunContext(simulated.truth_path, run.mesh, SEED, GAP)
-    bench = in_process_bench(run.scene, run.station, context)
+    bench = in_process_bench(run.scene, run.station, run.context)
     assert session_of.perform_on(bench, simulated, Quiet()).complete
     return side(wired), side(simulated)
 

@@ -10,7 +10,7 @@ from harness.basics.arrays import ByteArray, FloatArray
 from harness.bench.device import Health, TactileCamera
 from harness.bench.gap import gap_path, load_gap
 from harness.bench.reading import Reading
-from harness.bench.station import Bench, RunContext
+from harness.bench.station import Bench
 from harness.bench.station_file import load_station, station_path
 from harness.experiment import begin, perform
 from harness.experiment.perform import Performed
@@ -37,10 +37,7 @@ def opened(recording: Recording) -> Bench:
     """The run's bench, in process."""
     run = RunFiles(recording)
     assert run.scene.object.builtin == BALL
-    mock = recording.header.mock
-    assert mock is not None
-    context = RunContext(recording.truth_path, run.mesh, recording.header.seed, mock["gap"])
-    return in_process_bench(run.scene, run.station, context)
+    return in_process_bench(run.scene, run.station, run.context)
 
 
 def perform_on(bench: Bench, recording: Recording, progress: Progress) -> Performed:

@@ -11,10 +11,9 @@ import cv2
 import numpy as np
 
 from harness.basics.arrays import ByteArray
+from harness.basics.files.json_file import CHECKSUM, checksum_of
 from harness.bench.scene import SceneFile, scene_from_json
-from harness.bench.station import RunContext
 from harness.bench.station_file import load_station, station_path
-from harness.recording.checksums import SUM, sum_of_values
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
@@ -40,8 +39,7 @@ def in_process_run(
     started = session_of.start(scene, load_station(station_path(station)), seed, gap, folder)
     recording = started.recording
     run = RunFiles(recording)
-    context = RunContext(recording.truth_path, run.mesh, seed, gap)
-    bench = in_process_bench(run.scene, run.station, context)
+    bench = in_process_bench(run.scene, run.station, run.context)
     complete = session_of.perform_on(bench, recording, Quiet()).complete
     assert complete
     return recording
@@ -61,7 +59,7 @@ def edited(recording: Recording, change: Callable[[dict[str, Any]], None]) -> Re
     path = recording.folder / "run.json"
     tree = json.loads(path.read_text())
     change(tree)
-    path.write_text(json.dumps({**tree, SUM: sum_of_values(tree)}))
+    path.write_text(json.dumps({**tree, CHECKSUM: checksum_of(tree)}))
     return Recording(recording.folder)
 
 

@@ -67,25 +67,20 @@ def _failed_for_good(record: ObjectRecord, key: str) -> bool:
 
 
 def build_all(plan: BuildPlan, spec: BuildSpec, of: BuildFolder, runner: Runner) -> Iterator[ObjectRecord]:
-    """Build what waits; the record of every object when it is over.
-
-    Raises:
-        WrongUse: another program builds into the folder.
-    """
-    of.prepare()
-    with held(of):
-        shutil.rmtree(of.aside, ignore_errors=True)
-        of.aside.mkdir()
-        yield from runner.run(Job(item, spec, of) for item in plan.waiting)
+    """Build the waiting objects in a folder that the caller holds; yields the record of each."""
+    shutil.rmtree(of.aside, ignore_errors=True)
+    of.aside.mkdir()
+    yield from runner.run(Job(item, spec, of) for item in plan.waiting)
 
 
 @contextmanager
 def held(of: BuildFolder) -> Iterator[None]:
-    """Hold a build's folder; whoever was killed holds nothing.
+    """Hold a build's folder, creating what must be there; the lock ends with the process.
 
     Raises:
         WrongUse: another program of this machine holds it.
     """
+    of.prepare()
     with of.lock.open("a+") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

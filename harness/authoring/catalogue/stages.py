@@ -1,6 +1,5 @@
 """One sense of one object, built once: a folder found by the hash of all that it depends on."""
 
-import fcntl
 import os
 import shutil
 import tempfile
@@ -20,6 +19,7 @@ from harness.authoring.touch.object_touch import BuiltTouch, TouchRequest, build
 from harness.authoring.training import Report
 from harness.authoring.vision.object_vision import BuiltVision, build_vision
 from harness.basics.files.json_file import read_model, write_model
+from harness.basics.files.lock_file import release_lock, take_lock
 from harness.basics.materials import MATERIALS
 from harness.basics.store import Store
 from harness.basics.whole_file import sync_folder
@@ -113,7 +113,7 @@ def _workspace(of: BuildFolder, name: str) -> Iterator[Path]:
     parent = of.stages / "aside"
     parent.mkdir(parents=True, exist_ok=True)
     lock = parent / f"{name}.lock"
-    held = _held(lock)
+    held = take_lock(lock)
     if held is None:  # a worker that was given up is still writing there
         folder = Path(tempfile.mkdtemp(prefix=f"{name}-", dir=parent))
     else:
@@ -126,24 +126,7 @@ def _workspace(of: BuildFolder, name: str) -> Iterator[Path]:
         raise
     finally:
         if held is not None:
-            lock.unlink(missing_ok=True)
-            os.close(held)
-
-
-def _held(lock: Path) -> int | None:
-    """The descriptor that holds a lock; None where another process holds it."""
-    while True:
-        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if os.path.samestat(os.fstat(descriptor), lock.stat()):
-                return descriptor
-        except BlockingIOError:
-            os.close(descriptor)
-            return None
-        except FileNotFoundError:
-            pass
-        os.close(descriptor)  # whoever held it has removed it meanwhile
+            release_lock(lock, held)
 
 
 def _request(item: BuildItem, spec: BuildSpec) -> PartRequest:

@@ -1,8 +1,10 @@
 """Files that programs write for programs: strict JSON of one model, whole or not at all."""
 
 import json
+from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -11,6 +13,15 @@ from harness.basics.files.foreign_file import MOST_JSON, read_bounded
 from harness.basics.whole_file import write_text_whole
 
 M = TypeVar("M", bound=BaseModel)
+
+CHECKSUM = "sha256"
+"""The key under which a JSON object carries the checksum of its other values."""
+
+
+def checksum_of(fields: Mapping[str, Any]) -> str:
+    """Compute the SHA-256 of JSON values, independent of their layout in a file and of ``CHECKSUM``."""
+    summed = {key: value for key, value in fields.items() if key != CHECKSUM}
+    return sha256(json.dumps(summed, sort_keys=True).encode()).hexdigest()
 
 
 def write_model(model: BaseModel, path: Path) -> None:

@@ -65,7 +65,7 @@ def build(
 
     Try: touchstone catalogue build objects.csv --meshes meshes --out built --profile smoke
     """
-    from harness.authoring.catalogue.build import build_all, build_plan
+    from harness.authoring.catalogue.build import build_all, build_plan, held
     from harness.authoring.catalogue.layout import BuildFolder
     from harness.authoring.catalogue.settings import write_settings
 
@@ -75,16 +75,16 @@ def build(
     _, rows, excluded = chosen.read(catalogue, meshes, material)
     of = BuildFolder(out.resolve(), None if stages is None else stages.resolve())
     plan = build_plan(rows, spec, of, retry)
-    of.prepare()
-    write_settings(of, catalogue, [item.row.name for item in plan.items], excluded)
     records: list[ObjectRecord] = []
-    if plan.waiting:
-        with build_progress(len(plan.waiting)) as count:
-            for record in build_all(plan, spec, of, chosen_runner):
-                records.append(record)
-                count(record.name, record.built)
-                if not record.built:
-                    warn(f"{record.name}: {record.outcome}: {record.reason}")
+    with held(of):
+        write_settings(of, catalogue, [item.row.name for item in plan.items], excluded)
+        if plan.waiting:
+            with build_progress(len(plan.waiting)) as count:
+                for record in build_all(plan, spec, of, chosen_runner):
+                    records.append(record)
+                    count(record.name, record.built)
+                    if not record.built:
+                        warn(f"{record.name}: {record.outcome}: {record.reason}")
     outcome = _Outcome(of.folder, plan, records, excluded, time.perf_counter() - begun)
     if json:
         emit(outcome.as_json())

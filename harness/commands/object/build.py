@@ -86,6 +86,7 @@ def build(
     """
     from harness.authoring.object_source import PartRequest
     from harness.basics.errors import WrongUse
+    from harness.basics.files.lock_file import hold_folder
     from harness.basics.materials import material as named
     from harness.basics.quantities import FREQUENCY, LENGTH
 
@@ -97,20 +98,21 @@ def build(
         raise WrongUse(f"--sensor is of touch, and --only {only} was asked for")
     thick = options.quantity("--wall", wall, LENGTH)
     wanted = PartRequest(mesh, named(material), profile, units, thick, licence, seed)
-    if only == "touch":
-        from harness.commands.object.build_touch import build_touch_part
-
-        return build_touch_part(wanted, sensor, out, threads or 1, json)
-    if only == "vision":
-        from harness.commands.object.build_vision import build_vision_part
-
-        return build_vision_part(wanted, out, threads, json, finish)
-    from harness.authoring.audio.object_audio import AudioRequest
-
     limit, longest = options.quantity("--up-to", up_to, FREQUENCY), options.quantity("--edge", edge, LENGTH)
-    return _build_audio_part(
-        AudioRequest(**vars(wanted), limit=limit, most=modes, edge=longest), out, threads or 1, json
-    )
+    with hold_folder(out):
+        if only == "touch":
+            from harness.commands.object.build_touch import build_touch_part
+
+            return build_touch_part(wanted, sensor, out, threads or 1, json)
+        if only == "vision":
+            from harness.commands.object.build_vision import build_vision_part
+
+            return build_vision_part(wanted, out, threads, json, finish)
+        from harness.authoring.audio.object_audio import AudioRequest
+
+        return _build_audio_part(
+            AudioRequest(**vars(wanted), limit=limit, most=modes, edge=longest), out, threads or 1, json
+        )
 
 
 def _build_audio_part(wanted: "AudioRequest", out: Path, threads: int, json: bool) -> int:

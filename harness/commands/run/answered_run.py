@@ -24,6 +24,11 @@ def perform_and_answer(run: PlannedRun, as_json: bool) -> int:
     Raises:
         TouchstoneError: of the bench, or of the answer; what was recorded is kept.
     """
+    with run.recording.hold():
+        return _perform_and_answer(run, as_json)
+
+
+def _perform_and_answer(run: PlannedRun, as_json: bool) -> int:
     written: list[WrittenAnswer] = []
 
     def conclude(done: Performed) -> None:

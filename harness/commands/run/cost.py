@@ -53,6 +53,8 @@ def cost(
     Try: touchstone cost contact-localization --seeds 2 --only mug --contacts 6
     """
     from harness.basics.errors import DataRefused
+    from harness.basics.files.lock_file import hold_briefly, hold_folder
+    from harness.basics.whole_file import make_folder
     from harness.bench.station_file import load_station, station_path
     from harness.cost.file import curve_path, load, save
     from harness.cost.provenance import code, machine, stale
@@ -77,7 +79,7 @@ def cost(
     station = load_station(station_path("mock"))
     points: list[Any] = []
     models: dict[str, Any] = {}
-    with run_progress(len(wanted)) as advance:
+    with hold_folder(out), run_progress(len(wanted)) as advance:
         cells = out / "cells"
         for _, found in measure(kind, work, scenes, station, cells, warn, own_cores(), models):
             points += found
@@ -88,11 +90,13 @@ def cost(
         kind, points, f"What {kind.title[:1].lower()}{kind.title[1:]} costs", measured.notes(models)
     )
     path = curve_path(kind.name)
-    if path.exists():
-        old = load(path)
-        if not stale(old, machine(), code(measured.estimator)):
-            curve = joined(kind, old, curve)
-    save(curve, path)
+    make_folder(path.parent)
+    with hold_briefly(path.with_suffix(".lock")):  # another measurement may join its points meanwhile
+        if path.exists():
+            old = load(path)
+            if not stale(old, machine(), code(measured.estimator)):
+                curve = joined(kind, old, curve)
+        save(curve, path)
     save(curve, out / "curve.json")
     page = write_cost_page(curve, (), _styled(kind), kind.plural, out)
     result = _result(curve, path, page)

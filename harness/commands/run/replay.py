@@ -31,6 +31,7 @@ def replay(
     Try: touchstone replay runs/... --level localization.method=particle
     """
     from harness.basics.errors import RecordingDamaged
+    from harness.basics.files.lock_file import hold_folder
     from harness.commands.run.answered_run import drawing, publisher, show_report
     from harness.experiment.answer import finish, levels_of_result
     from harness.experiment.levels import chosen_levels
@@ -51,6 +52,7 @@ def replay(
         warn(f"{error}; the default levels are taken")
     accuracy = chosen_levels(kind.knobs, level or [], own)
     folder = out or run.with_name(f"{run.name}-replay")
-    result = finish(kind, recording, accuracy, drawing(kind), None, folder, None, publisher(kind, json))
+    with hold_folder(folder):
+        result = finish(kind, recording, accuracy, drawing(kind), None, folder, None, publisher(kind, json))
     show_report(result, json)
     return 0

@@ -63,6 +63,7 @@ def tables(
     Try: touchstone tables contact-localization --seeds 2 --only mug
     """
     from harness.basics.errors import WrongUse
+    from harness.basics.files.lock_file import hold_folder
     from harness.basics.toml_file import nearest
     from harness.bench.gap import load_gap
     from harness.commands.scenes import with_assignments
@@ -81,7 +82,6 @@ def tables(
         if name not in scenes:
             raise WrongUse(f"no object {name!r} in this table; {nearest(name, scenes)}")
     scenes = with_assignments(scenes, kind.section, set_ or [])
-    require_same_keys(out, set_ or [])
     for name in gap or []:
         load_gap(name)
     sense = None if sound is None else ["both" if sound else "touch"]
@@ -92,7 +92,8 @@ def tables(
     }
     wanted = measured.cells(only or list(scenes), range(first_seed, first_seed + seeds), chosen)
     results: dict[Any, Any] = {}
-    with run_progress(len(wanted)) as advance:
+    with hold_folder(out), run_progress(len(wanted)) as advance:
+        require_same_keys(out, set_ or [])
         for cell, result in measure(kind, wanted, scenes, out, workers, recordings):
             results[cell] = result
             if "failed" in result:

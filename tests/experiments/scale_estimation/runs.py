@@ -16,7 +16,6 @@ from harness.basics.geometry import apply
 from harness.basics.mesh import Mesh
 from harness.bench.experiments import loaded
 from harness.bench.scene import SceneFile, scene_from_json
-from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import score
@@ -58,8 +57,7 @@ def ran(folder: Path, scene: SceneFile, station: Station, seed: int = 3) -> Reco
 def went_on(recording: Recording, progress: Quiet) -> bool:
     """Whether what was left of it is complete now."""
     run = RunFiles(recording)
-    context = RunContext(recording.truth_path, run.mesh, recording.header.seed, "unplaced")
-    bench = loaded(IN_PROCESS_BENCH)(run.scene, run.station, context)
+    bench = loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context)
     return perform_on(EXPERIMENT, bench, recording, progress).complete
 
 

@@ -12,12 +12,12 @@ from harness.basics.arrays import FloatArray
 from harness.basics.faces.nearest_surface import NearestSurface
 from harness.bench.experiments import loaded
 from harness.bench.scene import SceneFile, scene_from_json
-from harness.bench.station import RunContext
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import score
 from harness.experiment.begin import begin
 from harness.experiment.perform import IN_PROCESS_BENCH, perform_on
+from harness.experiment.truth import read_truth
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from harness.recording.session import Quiet
@@ -49,10 +49,8 @@ def ran(folder: Path, scene: SceneFile, station: Station, seed: int = 0, gap: st
 
 def went_on(recording: Recording, progress: Quiet) -> bool:
     """Whether what was left of it is complete now."""
-    run, mock = RunFiles(recording), recording.header.mock
-    assert mock is not None
-    context = RunContext(recording.truth_path, run.mesh, recording.header.seed, mock["gap"])
-    bench = loaded(IN_PROCESS_BENCH)(run.scene, run.station, context)
+    run = RunFiles(recording)
+    bench = loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context)
     return perform_on(EXPERIMENT, bench, recording, progress).complete
 
 
@@ -76,6 +74,6 @@ def off_truth(recording: Recording, points: FloatArray) -> float:
 
 def to_truth(recording: Recording, points: FloatArray) -> FloatArray:
     """``(n,)`` m from ``(n, 3)`` places in ``stand`` to the true surface."""
-    truth = true_surface(RunFiles(recording))
+    truth = true_surface(RunFiles(recording), read_truth(recording))
     assert truth is not None
     return NearestSurface(truth).distances(points)

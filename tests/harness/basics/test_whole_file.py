@@ -54,9 +54,9 @@ def test_a_link_stays_one_and_a_device_is_written_to(tmp_path: Path) -> None:
     assert not Path("/dev/null").is_file()
 
 
-def test_what_a_failing_block_put_there_is_removed(tmp_path: Path) -> None:
+def test_what_a_failing_block_put_there_is_removed_and_nothing_else(tmp_path: Path) -> None:
     def fail(folder: Path) -> None:
-        with removed_on_failure(folder):
+        with removed_on_failure(folder, ("a", ".hidden", "mine")):
             make_folder(folder / "a" / "b")
             (folder / "a" / "c").write_text("half")
             (folder / ".hidden").symlink_to(tmp_path / "mine")
@@ -68,3 +68,35 @@ def test_what_a_failing_block_put_there_is_removed(tmp_path: Path) -> None:
             fail(folder)
     assert list(tmp_path.iterdir()) == [tmp_path / "mine"]
     assert (tmp_path / "mine").read_text() == "of before"
+
+
+def test_files_of_another_program_are_kept_by_a_failing_block(tmp_path: Path) -> None:
+    folder = tmp_path / "new"
+
+    def fail() -> None:
+        with removed_on_failure(folder, ("own",)):
+            make_folder(folder)
+            (folder / "own").write_text("half")
+            (folder / "of-another").write_text("whole")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert [path.name for path in folder.iterdir()] == ["of-another"]
+
+
+def test_two_writers_of_one_path_do_not_share_a_temporary_file(tmp_path: Path) -> None:
+    path = tmp_path / "some"
+    with whole_file(path) as first:
+        first.write(b"first")
+        with whole_file(path) as second:
+            second.write(b"2")
+        assert path.read_bytes() == b"2"
+    assert path.read_bytes() == b"first"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_with_the_longest_name_is_written(tmp_path: Path) -> None:
+    path = tmp_path / ("a" * 255)
+    write_text_whole(path, "text")
+    assert path.read_text() == "text"

@@ -48,8 +48,10 @@ def import_published(
     """
     from harness.authoring.published.imported import LICENCE
     from harness.authoring.published.imported import import_published as read
+    from harness.basics.files.lock_file import hold_folder
 
-    of = read(file, out, name, LICENCE if licence is None else licence, audio_bounds, touch_bounds)
+    with hold_folder(out):
+        of = read(file, out, name, LICENCE if licence is None else licence, audio_bounds, touch_bounds)
     if json:
         emit(as_json(of))
     else:

@@ -20,6 +20,7 @@ from experiments.contact_localization.report.result import estimate_of, flags_of
 from harness.basics.errors import RecordingDamaged
 from harness.basics.geometry import translation
 from harness.basics.symmetry import SymmetryGroup, find_symmetries
+from harness.bench.truth_file import write_truth_file
 from harness.effects.accuracy import Accuracy
 from harness.experiment.answer import levels_of_result
 from harness.experiment.experiment import Scored
@@ -135,15 +136,19 @@ def test_flags_are_said_in_words_an_operator_counts_by(gate: Gate, said: list[st
 
 
 def test_a_run_without_a_truth_beside_it_has_none(tmp_path: Path) -> None:
+    class Header:
+        run_id, seed = "one", 3
+
     class Bare:
-        truth_path = tmp_path / "run.truth.json"
+        truth_path, folder, header = tmp_path / "run.truth.json", tmp_path / "run", Header()
 
     assert read_truth(cast(Recording, Bare())) is None
     contacts = [
         {"step": 0, "point_in_object_m": [1.0, 2.0, 3.0]},
         {"step": 2, "point_in_object_m": [0, 0, 1]},
     ]
-    Bare.truth_path.write_text(json.dumps({"contacts": contacts, "differences": {"mesh_faces": 7}}))
+    fields = {"schema": 2, "run_id": "one", "seed": 3, "surface_sha256": None}
+    write_truth_file(Bare.truth_path, {**fields, "contacts": contacts, "differences": {"mesh_faces": 7}})
     truth = read_truth(cast(Recording, Bare()))
     assert truth is not None
     assert sorted(truth.points) == [0, 2]
