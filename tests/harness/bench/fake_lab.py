@@ -19,6 +19,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     for name in ("--scene", "--seed", "--gap", "--truth"):
         parser.add_argument(name, required=True)
+    parser.add_argument("--run", default="")
     arguments = parser.parse_args()
     if arguments.seed == "1":
         say({"ready": False, "error": "no loopback address is free"})
