@@ -1,24 +1,23 @@
-"""A graph from a file is believed only after it was looked through; looking runs nothing of it.
+"""Check a graph from a file before it is run; the check runs nothing of it.
 
-What is refused: numbers kept in other files, operations beyond a list (so no loops, no code of
-others), weights that are not finite, results whose size cannot be known or is absurd.
+Refused are numbers kept in other files, operations that are not listed (so no loops and no code of others),
+weights that are not finite, and values whose size is unknown. ``graph_cost`` bounds memory and work.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 import onnx
 from google.protobuf.message import DecodeError
-from onnx import GraphProto, ModelProto, TensorProto, TypeProto, helper, numpy_helper
+from onnx import GraphProto, ModelProto, TensorProto, helper, numpy_helper
 
 from harness.basics.errors import DataRefused
 from harness.objectfile.entries import Tensor
+from harness.objectfile.graph_cost import require_bounded
 
-MOST_NUMBERS = 2**24
-"""In any one value that a graph computes for one query."""
-
-MOST_ASKED = 2**16
-"""In any one input of one query."""
+MAX_INPUT = 2**16
+"""Numbers of one input of one query."""
 
 OPERATIONS = frozenset({
     "Abs", "Add", "And", "Cast", "Ceil", "Clip", "Concat", "Constant", "Conv", "Cos", "Div", "Elu",
@@ -56,7 +55,8 @@ def checked_graph(data: bytes, name: str) -> ModelProto:
         onnx.checker.check_model(model, full_check=True)
     except (onnx.checker.ValidationError, onnx.shape_inference.InferenceError, ValueError) as error:
         raise DataRefused(f"{name} is not a valid graph ({_first_line(error)}); {_AGAIN}") from error
-    _check_sizes(model, name)
+    _check_inputs(model, name)
+    require_bounded(model, name)
     return model
 
 
@@ -102,47 +102,22 @@ def _check_tensor(tensor: TensorProto, name: str) -> None:
         )
 
 
-def _check_sizes(model: ModelProto, name: str) -> None:
-    """Every value's size for one query, known before anything is computed."""
-    single = ModelProto()
-    single.CopyFrom(model)
-    for value in single.graph.input:
-        for size in value.type.tensor_type.shape.dim:
-            if not size.HasField("dim_value"):
-                size.dim_value = 1
-        asked = _numbers(value.type.tensor_type) or 0.0
-        if not 0.0 < asked <= MOST_ASKED:
+def _check_inputs(model: ModelProto, name: str) -> None:
+    """Refuse an input that is free in another size than its first, or larger than any sensor's."""
+    for value in model.graph.input:
+        sizes = list(value.type.tensor_type.shape.dim)
+        free = [axis for axis, size in enumerate(sizes) if not size.HasField("dim_value")]
+        if not value.type.tensor_type.HasField("shape") or any(axis > 0 for axis in free):
             raise DataRefused(
-                f"{name}: one query takes {asked:.3g} numbers {value.name!r}, at most {MOST_ASKED} may be; "
+                f"{name}: its input {value.name!r} is free in other sizes than the first, the number of "
+                f"queries; {_AGAIN}"
+            )
+        numbers = math.prod(size.dim_value for axis, size in enumerate(sizes) if axis not in free)
+        if not 0 < numbers <= MAX_INPUT:
+            raise DataRefused(
+                f"{name}: one query takes {numbers:.3g} numbers {value.name!r}, at most {MAX_INPUT} may be; "
                 f"{_AGAIN}"
             )
-    del single.graph.value_info[:]
-    for value in single.graph.output:  # what a file claims of its results is not what they are
-        value.type.tensor_type.ClearField("shape")
-    shaped = onnx.shape_inference.infer_shapes(single, strict_mode=True, data_prop=True)
-    known = {value.name: value.type.tensor_type for value in shaped.graph.value_info}
-    known |= {value.name: value.type.tensor_type for value in shaped.graph.output}
-    for node in shaped.graph.node:
-        for output in node.output:
-            count = _numbers(known.get(output))
-            if count is None:
-                raise DataRefused(
-                    f"{name}: how large {output!r} becomes is not known before it runs; {_AGAIN}"
-                )
-            if count > MOST_NUMBERS:
-                raise DataRefused(
-                    f"{name}: one query computes {count:.3g} numbers {output!r}, more than "
-                    f"{MOST_NUMBERS}; {_AGAIN}"
-                )
-
-
-def _numbers(tensor: TypeProto.Tensor | None) -> float | None:
-    if tensor is None or not tensor.HasField("shape"):
-        return None
-    sizes = list(tensor.shape.dim)
-    if not all(size.HasField("dim_value") for size in sizes):
-        return None
-    return float(np.prod([float(size.dim_value) for size in sizes]))
 
 
 def declared(model: ModelProto) -> dict[str, tuple[str, tuple[int | str, ...]]]:

@@ -16,6 +16,7 @@ from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, WrongUse
 from harness.objectfile.entries import Input, Tensor
 from harness.objectfile.graph_check import checked_graph, require_declared, with_outputs
+from harness.objectfile.graph_cost import query_cost
 
 _FATAL = 4
 """onnxruntime's severity; what goes wrong is raised, and said once."""
@@ -52,6 +53,7 @@ class Network:
         if only:
             outputs = [tensor for tensor in outputs if tensor.name in only]
             data = with_outputs(model, only)
+        self._cost = query_cost(model, name)
         self.name, self.inputs, self.outputs = name, tuple(inputs), tuple(outputs)
         self._session = _session(data, name, threads)
 
@@ -59,16 +61,21 @@ class Network:
         """The outputs by name; of no queries, outputs of none.
 
         Raises:
-            DataRefused: onnxruntime cannot compute them.
+            DataRefused: onnxruntime cannot compute them, or so many at once take too much memory or work.
         """
         names = [tensor.name for tensor in self.outputs]
         if self._asks_nothing(inputs):
             # onnxruntime's products cannot broadcast over none.
             return {tensor.name: np.empty(_of_none(tensor), tensor.dtype) for tensor in self.outputs}
+        self._cost.require_call(self._rows(inputs), self.name)
         try:
             return dict(zip(names, self._session.run(names, dict(inputs)), strict=True))
         except Exception as error:
             raise _failed(self.name, error) from error
+
+    def _rows(self, inputs: Mapping[str, AnyArray]) -> int:
+        """The number of queries; inputs of other shapes are refused by onnxruntime."""
+        return max((len(array) for array in inputs.values() if np.ndim(array)), default=0)
 
     def _asks_nothing(self, inputs: Mapping[str, AnyArray]) -> bool:
         """Whether every input is there, in its shape, for no queries."""

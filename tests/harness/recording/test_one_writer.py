@@ -34,7 +34,7 @@ def create_all(folders: list[Path], seed: int, barrier: Any, queue: Any) -> None
         try:
             create(folder, seed)
             queue.put((folder, seed, None))
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - whatever it is, the test names it
             queue.put((folder, seed, (type(error).__name__, str(error))))
 
 
