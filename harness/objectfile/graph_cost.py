@@ -78,8 +78,8 @@ class GraphCost:
         """
         if rows * self.live_bytes > MAX_CALL_BYTES:
             raise DataRefused(
-                f"{name}: {rows} queries at once need {rows * self.live_bytes / 2**30:.1f} GiB, at most "
-                f"{MAX_CALL_BYTES / 2**30:.0f} GiB may be; ask for fewer at once, or {_AGAIN}"
+                f"{name}: {rows} queries at once need {rows * self.live_bytes / 2**20:,.0f} MiB, at most "
+                f"{MAX_CALL_BYTES / 2**20:.0f} MiB may be; ask for fewer at once, or {_AGAIN}"
             )
         if rows * self.work > MAX_CALL_WORK:
             raise DataRefused(

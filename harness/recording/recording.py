@@ -17,6 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from harness.basics.clock import now
 from harness.basics.errors import RecordingDamaged, WrongUse
+from harness.basics.files.foreign_file import MOST_JSON, read_bounded
 from harness.basics.files.json_file import CHECKSUM, checksum_of
 from harness.basics.files.lock_file import hold_folder
 from harness.basics.whole_file import make_folder, write_text_whole
@@ -188,10 +189,7 @@ def require_unused(folder: Path) -> None:
 def _read_header(path: Path) -> RunHeader:
     if not path.exists():
         raise WrongUse(f"{path.parent} is not a run: it has no run.json; give the folder that a run wrote")
-    try:
-        return header_of(path.read_bytes(), path)
-    except OSError as error:
-        raise RecordingDamaged(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+    return header_of(read_bounded(path, "the description of a run", MOST_JSON, RecordingDamaged), path)
 
 
 def header_of(data: bytes, path: Path) -> RunHeader:

@@ -8,21 +8,26 @@ import hashlib
 import pickle
 import zipfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from harness.authoring.published.stand_ins import ALLOWED, MOST_NUMBERS, PickledArray
+from harness.authoring.published.stand_ins import ALLOWED, PickledArray
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.files.foreign_file import MOST_DATA, refused_as, require_readable, require_unpackable
 from harness.basics.files.named_file import require_file
 
 Tree = Any
 """Tables (``dict`` with text or whole numbers as keys), lists, arrays, numbers, text, None."""
 
-_MOST_BYTES = 2 * 2**30
-"""Of a file and of what it unpacks to: a KiloOSF's 332 MB, several times."""
+_MAX_PICKLE_BYTES = 2**24
+"""Bytes of ``data.pkl``, which is read one operation at a time; tensors are not in it."""
+
+_MAX_ITEMS = 10**6
+"""Entries of all tables and lists together, counted as often as they are referred to."""
 
 _DEEPEST = 8
 """Tables within tables."""
@@ -50,20 +55,20 @@ def sha256_of(path: Path) -> str:
 
 def _require_archive(path: Path) -> None:
     """Looked at before torch is: a cut file has lost its table of contents, which stands last."""
-    size = path.stat().st_size
-    if size > _MOST_BYTES:
-        raise DataRefused(f"{path.name} has {size} bytes, more than {_MOST_BYTES}; {_FOREIGN}")
+    require_readable(path, "an ObjectFile", MOST_DATA)
     with path.open("rb") as stream:
         if stream.read(2) != b"PK":
             raise DataRefused(f"{path.name} is no archive of torch (of 1.6 or later); {_FOREIGN}")
-    try:
+    with refused_as(DataRefused, f"{path.name} is damaged or cut short; copy or download it again"):
+        require_unpackable(path, "an ObjectFile")
         with zipfile.ZipFile(path) as archive:
             listed = archive.infolist()
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
-        raise DataRefused(f"{path.name} is damaged or cut short; copy or download it again") from error
-    unpacked = sum(item.file_size for item in listed)
-    if unpacked > _MOST_BYTES:
-        raise DataRefused(f"{path.name} unpacks to {unpacked} bytes, more than {_MOST_BYTES}; {_FOREIGN}")
+    pickled = sum(item.file_size for item in listed if item.filename.endswith(".pkl"))
+    if pickled > _MAX_PICKLE_BYTES:
+        raise DataRefused(
+            f"{path.name} has a pickle of {pickled / 2**20:.0f} MiB, at most {_MAX_PICKLE_BYTES / 2**20:.0f} "
+            f"MiB may be; {_FOREIGN}"
+        )
     if not any(item.filename.endswith("data.pkl") for item in listed):
         raise DataRefused(f"{path.name} is an archive without torch's data.pkl; {_FOREIGN}")
 
@@ -95,43 +100,66 @@ def _reason(error: Exception) -> str:
     return said.strip().split(". ")[0][:160] or type(error).__name__
 
 
-def plain_tree(value: Any, where: str, depth: int = 0) -> Tree:
-    """Tables, lists, arrays of numbers, numbers and text; whatever else is there is refused.
+@dataclass
+class Budget:
+    """What a tree may still hold."""
+
+    items: int = _MAX_ITEMS
+    bytes: int = MOST_DATA
+
+    def take(self, where: str, items: int, size: int = 0) -> None:
+        """Count entries and bytes of arrays; refuse what is too many."""
+        self.items, self.bytes = self.items - items, self.bytes - size
+        if self.items < 0:
+            raise DataRefused(f"{where}: the file holds more than {_MAX_ITEMS} entries; {_FOREIGN}")
+        if self.bytes < 0:
+            raise DataRefused(
+                f"{where}: the arrays of the file take more than {MOST_DATA / 2**20:.0f} MiB; {_FOREIGN}"
+            )
+
+
+def plain_tree(value: Any, where: str, depth: int = 0, budget: Budget | None = None) -> Tree:
+    """Convert to tables, lists, arrays of numbers, numbers and text; anything else is refused.
 
     Args:
-        value: as it was loaded.
+        value: as it was loaded; what it refers to twice counts twice.
         where: for messages.
-        depth: of tables around it.
+        depth: number of tables around it.
+        budget: what the whole tree may still hold.
 
     Raises:
         DataRefused: naming the place.
     """
+    budget = budget or Budget()
     if depth > _DEEPEST:
         raise DataRefused(f"{where} lies deeper than any table of an ObjectFile; {_FOREIGN}")
     match value:
         case None | bool() | int() | float() | str():
             return value
         case Mapping():
-            return _table(value, where, depth)
+            budget.take(where, len(value))
+            return _table(value, where, depth, budget)
         case list() | tuple():
-            return [plain_tree(item, f"{where}[{k}]", depth + 1) for k, item in enumerate(value)]
+            budget.take(where, len(value))
+            return [plain_tree(item, f"{where}[{k}]", depth + 1, budget) for k, item in enumerate(value)]
         case PickledArray() if value.array is not None:
+            budget.take(where, 0, value.array.nbytes)
             return value.array
     if hasattr(value, "detach") and hasattr(value, "numel"):
-        return _of_tensor(value, where)
+        return _of_tensor(value, where, budget)
     raise DataRefused(f"{where} is a {type(value).__name__}, of which an ObjectFile has none; {_FOREIGN}")
 
 
-def _table(table: Mapping[Any, Any], where: str, depth: int) -> dict[Any, Tree]:
+def _table(table: Mapping[Any, Any], where: str, depth: int, budget: Budget) -> dict[Any, Tree]:
     for key in table:
         if not isinstance(key, str | int):
             raise DataRefused(f"{where} has a key that is a {type(key).__name__}; {_FOREIGN}")
-    return {key: plain_tree(item, f"{where}[{key!r}]", depth + 1) for key, item in table.items()}
+    return {key: plain_tree(item, f"{where}[{key!r}]", depth + 1, budget) for key, item in table.items()}
 
 
-def _of_tensor(tensor: Any, where: str) -> AnyArray:
-    if tensor.numel() > MOST_NUMBERS:
-        raise DataRefused(f"{where} has {tensor.numel()} numbers, more than {MOST_NUMBERS}; {_FOREIGN}")
+def _of_tensor(tensor: Any, where: str, budget: Budget) -> AnyArray:
+    # A view may be far larger than what is stored, and bfloat16 becomes float32.
+    budget.take(where, 0, tensor.numel() * max(4, tensor.element_size()))
     try:
         found = tensor.detach().contiguous()
         plain = found.float() if str(found.dtype) == "torch.bfloat16" else found

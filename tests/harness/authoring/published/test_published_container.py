@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.authoring.published.container import plain_tree, read_container
+from harness.authoring.published.container import Budget, plain_tree, read_container
 from harness.authoring.published.stand_ins import ALLOWED, PickledArray, PickledDtype
 from harness.basics.errors import DataRefused, TouchstoneError, WrongUse
 from harness.cli import invoke
@@ -226,4 +226,37 @@ def test_a_damaged_file_is_read_or_refused_and_nothing_else(seed: int, tmp_path:
         data[at] = random.integers(256)
     path.write_bytes(bytes(data))
     with suppress(TouchstoneError):
+        read_container(path)
+
+
+def test_tables_that_refer_to_each_other_are_counted_as_often_as_they_are_referred_to() -> None:
+    tree: Any = [0.0] * 100
+    for _ in range(6):
+        tree = [tree] * 100
+    with pytest.raises(DataRefused, match="more than 1000000 entries"):
+        plain_tree(tree, "a file")
+
+
+def test_views_of_little_that_are_large_are_refused_before_they_are_copied() -> None:
+    class View:
+        """As torch shows one number in the shape (2^27,)."""
+
+        def detach(self) -> None:
+            raise AssertionError("it was copied")
+
+        def numel(self) -> int:
+            return 2**27
+
+        def element_size(self) -> int:
+            return 2
+
+    with pytest.raises(DataRefused, match=r"a file\['b'\]: the arrays of the file take more than 512 MiB"):
+        plain_tree({"a": 1.0, "b": View(), "c": View()}, "a file", budget=Budget(bytes=2**29 - 1))
+
+
+def test_an_archive_whose_pickle_is_huge_is_refused_before_torch_reads_it(tmp_path: Path) -> None:
+    path = tmp_path / "large.pth"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("archive/data.pkl", bytes(2**24 + 1))
+    with pytest.raises(DataRefused, match="a pickle of 16 MiB, at most 16"):
         read_container(path)
