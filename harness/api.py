@@ -78,9 +78,10 @@ def tactile_image(
         OutOfDomain: the contact is off the surface, or the press is deeper than the gel.
         CalibrationRefused: there is no calibration for this sensor.
     """
-    from harness.bench.scene import BUILTIN, scene_from_options
+    from harness.bench.scene import scene_from_options
     from harness.effects.scene_object import known_object
     from harness.effects.touch_press import press_mesh
+    from harness.objects.builtin import BUILTIN
     from harness.sim.gel.press_pose import contact_place, gel_from_object
     from harness.sim.optics.known_gel import known_gel
 

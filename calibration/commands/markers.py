@@ -61,6 +61,8 @@ def markers(
     from harness.basics.files.named_file import refusals_name
     from harness.basics.quantities import LENGTH
 
+    options.require_files(("--out", out, ""))
+    options.require_folders(("--report", report))
     pictures = _pictures(source)
     printed = Printed(
         sensor,

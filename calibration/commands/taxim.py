@@ -30,7 +30,11 @@ def taxim(
     ] = None,
     station: Annotated[
         str | None,
-        typer.Option(help="Press the ball with the arm of this bench: a name or a file.", metavar="NAME"),
+        typer.Option(
+            help="Press the ball with the arm of this bench: a name or a file.",
+            metavar="NAME",
+            callback=options.check_station,
+        ),
     ] = None,
     ball_radius: Annotated[
         str | None,
@@ -61,6 +65,7 @@ def taxim(
         typer.Option(
             help="Where the ball stands, as scenes/ball_target.toml; its top to 1.5 mm in height.",
             metavar="FILE",
+            callback=options.check_scene,
         ),
     ] = None,
     presses: Annotated[
@@ -79,7 +84,11 @@ def taxim(
     ] = None,
     resume: Annotated[
         Path | None,
-        typer.Option(help="Go on with this run of the arm at its first missing press.", metavar="RUN"),
+        typer.Option(
+            help="Continue this run of the arm at its first missing press.",
+            metavar="RUN",
+            callback=options.check_run,
+        ),
     ] = None,
     seed: Annotated[
         int | None, typer.Option(help="Of the places, and of a mocked world; 0 if left out.", min=0)
@@ -171,6 +180,10 @@ def taxim(
     from harness.sim.optics.lit_calibration import read_calibration
     from harness.sim.optics.tactile_calibration import save_calibration
 
+    options.require_files(
+        ("--out", out, ""), ("--polycalib", polycalib, ""), ("--shadow-table", shadow_table, "")
+    )
+    options.require_folders(("--report", report), ("--run", run))
     wanted = PressRequest(
         station,
         scene,

@@ -17,7 +17,9 @@ def rendering(
     object_: Annotated[
         list[str] | None,
         typer.Option(
-            "--object", help="An ObjectFile: its folder, or a shipped one's name; may be given again."
+            "--object",
+            help="An ObjectFile: its folder, or the name of one that comes with the program; may be given "
+            "again.",
         ),
     ] = None,
     sense: Annotated[list[str] | None, typer.Option(help="vision, audio or touch; all if left out.")] = None,
@@ -41,6 +43,7 @@ def rendering(
 
     Try: touchstone tables rendering --object mug
     """
+    options.require_folders(("--out", out))
     from experiments.baselines.bench import RenderingWork
     from experiments.baselines.table import (
         RenderingCounts,
@@ -91,7 +94,7 @@ def _senses(wanted: list[str] | None) -> "list[Sense]":
     """
     from experiments.baselines.bench import SENSES
     from harness.basics.errors import WrongUse
-    from harness.basics.toml_file import nearest
+    from harness.basics.files.named_file import nearest
 
     for name in wanted or []:
         if name not in SENSES:

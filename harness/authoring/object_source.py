@@ -11,11 +11,10 @@ from harness.basics.errors import WrongUse
 from harness.basics.files.named_file import require_file
 from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
-from harness.bench.scene import BUILTIN
 from harness.objectfile.entries import Provenance, Source
 from harness.objectfile.file import MESH, ObjectFile, create_object, file_entry
 from harness.objectfile.surface_file import ply_bytes
-from harness.objects.builtin import DESCRIPTION
+from harness.objects.builtin import BUILTIN, DESCRIPTION
 
 
 @dataclass(frozen=True, eq=False)

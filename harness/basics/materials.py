@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from harness.basics.errors import WrongUse
-from harness.basics.toml_file import nearest
+from harness.basics.files.named_file import nearest
 
 
 @dataclass(frozen=True)

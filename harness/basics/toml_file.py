@@ -1,9 +1,8 @@
 """Files an operator writes: strict TOML, every mistake named at once, nothing guessed."""
 
-import difflib
 import tomllib
 import types
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin
 
@@ -12,6 +11,7 @@ from pydantic_core import ErrorDetails
 
 from harness.basics.errors import WrongUse
 from harness.basics.files.foreign_file import MOST_TEXT, read_bounded
+from harness.basics.files.named_file import nearest
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -97,15 +97,6 @@ def validate(tree: Any, model: type[M], where: str, folder: Path | None = None) 
     listed = "".join(f"\n  - {problem}" for problem in problems)
     more = "\n  - and more" if len(details) > len(problems) else ""
     raise WrongUse(f"{where}: {len(details)} mistakes:{listed}{more}")
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """``"; did you mean 'x'?"`` with the known name most like ``name``, and all of them beside it."""
-    names = sorted(known)
-    like = difflib.get_close_matches(name.lower(), [n.lower() for n in names], n=1, cutoff=0.5)
-    match = next((n for n in names if like and n.lower() == like[0]), None)
-    listed = f"there is {', '.join(names)}" if names else "there is none"
-    return f"did you mean {match!r}? ({listed})" if match else listed
 
 
 def _frozen(value: Any) -> Any:

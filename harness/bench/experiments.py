@@ -8,6 +8,9 @@ import importlib
 from dataclasses import dataclass
 from typing import Any
 
+from harness.basics.errors import WrongUse
+from harness.basics.files.named_file import nearest
+
 
 @dataclass(frozen=True)
 class ExperimentRow:
@@ -52,6 +55,23 @@ EXPERIMENTS: dict[str, ExperimentRow] = {
     ),
 }
 """By the name that a run's folder carries."""
+
+
+def experiment_names() -> tuple[str, ...]:
+    """Return the name of every experiment, in the order of the table."""
+    return tuple(name for name, row in EXPERIMENTS.items() if row.value is not None)
+
+
+def require_experiment(name: str) -> str:
+    """Return the import string of an experiment.
+
+    Raises:
+        WrongUse: there is no experiment of this name.
+    """
+    row = EXPERIMENTS.get(name)
+    if row is None or row.value is None:
+        raise WrongUse(f"there is no experiment {name!r}; {nearest(name, experiment_names())}")
+    return row.value
 
 
 def loaded(reference: str) -> Any:

@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from harness.basics.errors import WrongUse
-from harness.basics.files.named_file import real_path
+from harness.basics.files.named_file import nearest, real_path
 from harness.basics.quantities import Angle, Decay, Length, Level, Nonnegative, Ordered, Positive, Ratio, Time
-from harness.basics.toml_file import StrictModel, load_toml, nearest
+from harness.basics.toml_file import StrictModel, load_toml
 
 _FOLDER = Path(__file__).parent / "gaps"
 

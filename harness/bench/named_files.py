@@ -1,9 +1,10 @@
-"""Stations, scenes and ObjectFiles by name: those that come with the program, and those here."""
+"""Stations, scenes, ObjectFiles and runs by name: those that come with the program, and those here."""
 
+import difflib
 from pathlib import Path
 
 from harness.basics.errors import WrongUse
-from harness.basics.toml_file import nearest
+from harness.basics.files.named_file import nearest
 
 _CHECKOUT = Path(__file__).parents[2]
 
@@ -21,10 +22,14 @@ def named_file(name: str, kind: str) -> Path:
     known = _known(f"{kind}s")
     if name.endswith(".toml") or "/" in name:
         if not Path(name).is_file():
-            raise WrongUse(f"no {kind} file {name!r}; give a path or a shipped name: {nearest(name, known)}")
+            raise WrongUse(
+                f"there is no {kind} file {name!r}; give a path or a shipped name: {nearest(name, known)}"
+            )
         return Path(name).resolve()
     if name not in known:
-        raise WrongUse(f"no {kind} {name!r}; {nearest(name, known)}; or give the path of a {kind} file")
+        raise WrongUse(
+            f"there is no {kind} {name!r}; {nearest(name, known)}; or give the path of a {kind} file"
+        )
     return known[name]
 
 
@@ -36,3 +41,20 @@ def shipped_or_here(folder: str, pattern: str) -> list[Path]:
     """What matches in a folder of the checkout and then in that of the working directory, each in order."""
     places = (_CHECKOUT / folder, Path.cwd() / folder)
     return [path for place in places for path in sorted(place.glob(pattern))]
+
+
+HEADER = "run.json"
+"""The file that makes a folder a run."""
+
+
+def require_run(folder: Path) -> None:
+    """Refuse a folder that is not a run; ``WrongUse`` lists the runs next to it with a similar name."""
+    if (folder / HEADER).exists():
+        return
+    if folder.exists():
+        raise WrongUse(f"{folder} is not a run: it has no {HEADER}; give the folder that a run wrote")
+    runs = [path.parent.name for path in folder.parent.glob(f"*/{HEADER}")]
+    similar = difflib.get_close_matches(folder.name, runs, n=1)
+    suggested = f"did you mean {str(folder.with_name(similar[0]))!r}? or " if similar else ""
+    advice = f"{suggested}give the folder that a run wrote"
+    raise WrongUse(f"there is no run {folder}: no folder with {HEADER} in it; {advice}")

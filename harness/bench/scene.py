@@ -10,7 +10,7 @@ from pydantic import Field, create_model, field_validator, model_validator
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import WrongUse
-from harness.basics.files.named_file import real_path
+from harness.basics.files.named_file import nearest, real_path
 from harness.basics.geometry import rotation_about, transform, translation
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
@@ -23,18 +23,20 @@ from harness.basics.quantities import (
     Ratio,
     Time,
 )
-from harness.basics.toml_file import StrictModel, nearest, read_toml, validate
+from harness.basics.toml_file import StrictModel, read_toml, validate
 from harness.bench.experiments import loaded, section_models
 from harness.bench.named_files import named_file
 from harness.bench.scene_objectfile import (
     OBJECTFILE,
     holds_objectfile,
     objectfile_folder,
+    require_object,
     require_objectfile,
     with_objectfile,
 )
+from harness.objects.builtin import BUILTIN
+from harness.objects.builtin import MATERIALS as BUILTIN_MATERIALS
 
-BUILTIN = "builtin:"
 UNITS = ("m", "cm", "mm", "in")
 
 _REACHED = (0.05, 0.45)
@@ -134,12 +136,11 @@ class SceneObject(StrictModel):
         mesh = data.get("mesh") if isinstance(data, dict) else None
         if not (isinstance(mesh, str) and mesh.startswith(BUILTIN)):
             return data
-        from harness.objects.builtin import MATERIALS as OWN
-
         name = mesh.removeprefix(BUILTIN)
-        if name not in OWN:
-            raise ValueError(f"no built-in object {name!r}; {nearest(name, OWN)}")
-        return data if data.get("material") is not None else {**data, "material": OWN[name]}
+        if name not in BUILTIN_MATERIALS:
+            raise ValueError(f"there is no built-in object {name!r}; {nearest(name, BUILTIN_MATERIALS)}")
+        material = data.get("material")
+        return data if material is not None else {**data, "material": BUILTIN_MATERIALS[name]}
 
     @model_validator(mode="after")
     def _sizes_are_of_a_hidden_one(self) -> "SceneObject":
@@ -382,13 +383,10 @@ def _with_tables(named: tuple[tuple[str, str], ...]) -> type[SceneFile]:
 def _with_files_found(scene: SceneFile, folder: Path, where: str) -> SceneFile:
     named, found = scene.object, {}
     if named.builtin is None and not named.is_objectfile:
-        path = real_path(folder / named.mesh)
-        if not path.is_file():
-            own = f'our own objects are written "{BUILTIN}mug" and so on'
-            raise WrongUse(f"{where}: 'object.mesh': there is no file {path}; {own}")
-        found["mesh"] = str(path)
+        require_object(named.mesh, folder, f"{where}: 'object.mesh'", objectfiles=False)
+        found["mesh"] = str(real_path(folder / named.mesh))
     if named.objectfile is not None:
         path = objectfile_folder(named.objectfile, folder)
-        require_objectfile(path, where)
+        require_objectfile(path, f"{where}: 'object.objectfile'")
         found["objectfile"] = str(path)
     return scene.model_copy(update={"object": named.model_copy(update=found)}) if found else scene

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from harness.basics.errors import DataRefused, WrongUse
-from harness.basics.files.named_file import real_path
+from harness.basics.files.named_file import nearest, real_path
 from harness.bench.named_files import shipped_or_here
-from harness.objects.builtin import DESCRIPTION
+from harness.objects.builtin import BUILTIN, DESCRIPTION, MATERIALS
 
 OBJECTFILE = "objectfile:"
 """In place of a mesh file: the object is that of the folder beside it, whose name follows."""
@@ -41,15 +41,51 @@ def objectfile_folder(named: str, beside: Path) -> Path:
     return path if path.exists() else shipped_objectfiles().get(named, path)
 
 
+def require_object(named: str, beside: Path, where: str, objectfiles: bool = True) -> None:
+    """Refuse an object that does not exist.
+
+    Args:
+        named: ``"builtin:mug"``, the path of a mesh file, or an ObjectFile: its folder or its name.
+        beside: the folder that a path is relative to.
+        where: option or key that names the object, for the message.
+        objectfiles: whether an ObjectFile is accepted.
+
+    Raises:
+        WrongUse: there is none; the nearest known name is suggested.
+    """
+    if named.startswith(BUILTIN):
+        name = named.removeprefix(BUILTIN)
+        if name not in MATERIALS:
+            raise WrongUse(f"{where}: there is no built-in object {name!r}; {nearest(name, MATERIALS)}")
+        return
+    path = objectfile_folder(named, beside) if objectfiles else real_path(beside / named)
+    if path.is_file() or (objectfiles and holds_objectfile(path)):
+        return
+    if path.is_dir():
+        accepted = f"a mesh file, or a folder with {DESCRIPTION} in it" if objectfiles else "a mesh file"
+        raise WrongUse(f"{where}: {path} is a folder; give {accepted}")
+    known = [f"{BUILTIN}{name}" for name in MATERIALS] + (list(shipped_objectfiles()) if objectfiles else [])
+    raise WrongUse(f"{where}: there is no file {path} and no object of this name; {nearest(named, known)}")
+
+
 def require_objectfile(folder: Path, where: str) -> None:
-    """Refuse a folder that is none; ``WrongUse`` says where it was named."""
-    if not holds_objectfile(folder):
-        make = "make one with `touchstone object build`, or leave the key out"
-        own = (
-            f"those that come with the program have the names {', '.join(shipped_objectfiles()) or '(none)'}"
-        )
-        kind = f"ObjectFile {folder}, a folder with {DESCRIPTION} in it"
-        raise WrongUse(f"{where}: 'object.objectfile': there is no {kind}; {own}; {make}")
+    """Refuse a path that is not the folder of an ObjectFile.
+
+    Args:
+        folder: as ``objectfile_folder`` returns it.
+        where: option or key that names the folder, for the message.
+
+    Raises:
+        WrongUse: there is no such folder, or no ``object.json`` in it.
+    """
+    if holds_objectfile(folder):
+        return
+    own = f"give a folder with {DESCRIPTION} in it, or make one with `touchstone object build`"
+    if folder.exists():
+        raise WrongUse(f"{where}: {folder} is no ObjectFile: there is no {DESCRIPTION} in it; {own}")
+    raise WrongUse(
+        f"{where}: there is no ObjectFile {folder}; {nearest(folder.name, shipped_objectfiles())}; or {own}"
+    )
 
 
 def with_objectfile(tree: Any, folder: Path, where: str) -> Any:
@@ -73,7 +109,7 @@ def with_objectfile(tree: Any, folder: Path, where: str) -> Any:
             raise WrongUse(
                 f"{where}: 'object.{key}' is of a mesh, and the ObjectFile {path} says its own; leave it out"
             )
-    require_objectfile(path, where)
+    require_objectfile(path, f"{where}: 'object.objectfile'")
     name, material = _described(path / DESCRIPTION)
     return {**tree, "object": {**named, "mesh": OBJECTFILE + name, "material": material}}
 

@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 
 from harness.basics.errors import WrongUse
-from harness.basics.files.named_file import real_path
-from harness.basics.toml_file import load_toml, nearest
+from harness.basics.files.named_file import nearest, real_path
+from harness.basics.toml_file import load_toml
 from harness.bench.sensor_file import MarkerFigure, SensorFile, Sourced
 
 _SHIPPED = Path(__file__).parent / "sensors"

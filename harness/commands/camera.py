@@ -4,7 +4,6 @@ import tempfile
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from harness.commands import options
@@ -22,6 +21,8 @@ def camera(
     out: Annotated[Path, typer.Option(help="The picture, a PNG.", metavar="FILE")] = Path("live.png"),
     station: options.Station = "mock",
     object_: options.Object = "builtin:mug",
+    material: options.Material = None,
+    units: options.Units = None,
     json: options.Json = False,
 ) -> int:
     """Write what a camera of the station sees now; the arm and all else stay closed.
@@ -31,6 +32,8 @@ def camera(
 
     Try: touchstone camera gel --station mock --out live.png
     """
+    import numpy as np
+
     from harness.basics.whole_file import write_bytes_whole
     from harness.bench.opening.open_each import open_camera, scene_of_all
     from harness.bench.scene import scene_from_options
@@ -39,8 +42,9 @@ def camera(
     from harness.effects.scene_object import known_object
     from harness.picture.image_file import png_bytes
 
+    options.require_files(("--out", out, ".png"))
     bench_file = load_station(station_path(station))
-    scene = scene_of_all(bench_file, scene_from_options(object_ or "builtin:mug"))
+    scene = scene_of_all(bench_file, scene_from_options(object_ or "builtin:mug", material, units))
     with tempfile.TemporaryDirectory(prefix="touchstone-camera-") as folder:
         context = RunContext(Path(folder) / "truth.json", known_object(scene).mesh)
         with (

@@ -1,15 +1,117 @@
-"""Options that several commands take, each described once, and how one with a unit is read."""
+"""Options that several commands take, each described once, and how one with a unit is read.
+
+Names and paths are checked as the command line is read, before a command imports what it computes with: a
+mistyped name is refused at once.
+"""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, overload
 
 import typer
 
+from harness.basics.errors import WrongUse
+from harness.bench.experiments import require_experiment
+from harness.bench.named_files import named_file, require_run
+from harness.bench.scene_objectfile import (
+    holds_objectfile,
+    objectfile_folder,
+    require_object,
+    require_objectfile,
+)
+
 if TYPE_CHECKING:
     from harness.basics.quantities import Dimension
 
+
+def check_station(name: str | None) -> str | None:
+    """Refuse a station that does not exist."""
+    if name is not None:
+        named_file(name, "station")
+    return name
+
+
+def check_scene(path: Path | None) -> Path | None:
+    """Refuse a scene that does not exist."""
+    if path is not None:
+        named_file(str(path), "scene")
+    return path
+
+
+def check_scene_or_object(path: Path) -> Path:
+    """Refuse what is neither a scene nor an ObjectFile."""
+    return path if holds_objectfile(objectfile_folder(str(path), Path.cwd())) else check_scene(path) or path
+
+
+def check_object(name: str | None) -> str | None:
+    """Refuse an ``--object`` that does not exist."""
+    if name is not None:
+        require_object(name, Path.cwd(), "--object")
+    return name
+
+
+def check_objectfile(name: str | None) -> str | None:
+    """Refuse an ``--objectfile`` that does not exist."""
+    if name is not None:
+        require_objectfile(objectfile_folder(name, Path.cwd()), "--objectfile")
+    return name
+
+
+def check_mesh(name: str | None) -> str | None:
+    """Refuse a MESH that is neither a file nor a built-in object."""
+    if name is not None:
+        require_object(name, Path.cwd(), "MESH", objectfiles=False)
+    return name
+
+
+def check_touched(name: str | None) -> str | None:
+    """Refuse a MESH to be pressed that is neither a file, a built-in object nor an ObjectFile."""
+    if name is not None:
+        require_object(name, Path.cwd(), "MESH")
+    return name
+
+
+def check_experiment(name: str | None) -> str | None:
+    """Refuse an experiment that does not exist."""
+    if name is not None:
+        require_experiment(name)
+    return name
+
+
+def check_run(folder: Path | None) -> Path | None:
+    """Refuse a folder that is not a run."""
+    if folder is not None:
+        require_run(folder)
+    return folder
+
+
+def find_objectfile_option(folder: Path | None) -> Path | None:
+    """Return the folder of an ``--objectfile``, as ``find_objectfile``."""
+    return None if folder is None else _existing_objectfile(folder, "--objectfile")
+
+
+def find_objectfile(folder: Path) -> Path:
+    """Return the folder of an ObjectFile that is named by its path, or by its name in ``objects/``.
+
+    Raises:
+        WrongUse: there is none.
+    """
+    return _existing_objectfile(folder, "OBJECT")
+
+
+def _existing_objectfile(folder: Path, where: str) -> Path:
+    found = objectfile_folder(str(folder), Path.cwd())
+    require_objectfile(found, where)
+    return found
+
+
 Station = Annotated[
-    str, typer.Option("--station", help="A bench: a name under stations/, or a station file.", metavar="NAME")
+    str,
+    typer.Option(
+        "--station",
+        help="A bench: a name under stations/, or a station file.",
+        metavar="NAME",
+        callback=check_station,
+    ),
 ]
 StationOrOwn = Annotated[
     str | None,
@@ -17,19 +119,26 @@ StationOrOwn = Annotated[
         "--station",
         help="A bench: a name under stations/, or a station file; mock if left out.",
         metavar="NAME",
+        callback=check_station,
     ),
 ]
 SceneOption = Annotated[
     Path | None,
-    typer.Option("--scene", help="A name under scenes/, as mug_touch, or a scene file.", metavar="NAME"),
+    typer.Option(
+        "--scene",
+        help="A name under scenes/, e.g. mug_touch, or a scene file.",
+        metavar="NAME",
+        callback=check_scene,
+    ),
 ]
 Object = Annotated[
     str | None,
     typer.Option(
         "--object",
         help="A mesh file, builtin:mug and so on, or an ObjectFile: its folder, or the name of one that "
-        "comes with the program, as mug.",
+        "comes with the program, e.g. mug.",
         metavar="FILE",
+        callback=check_object,
     ),
 ]
 Material = Annotated[
@@ -47,7 +156,29 @@ Wall = Annotated[
 ]
 ObjectFileOption = Annotated[
     str | None,
-    typer.Option("--objectfile", help="Folder of the object's ObjectFile (with --object).", metavar="FOLDER"),
+    typer.Option(
+        "--objectfile",
+        help="The object's ObjectFile (with --object): its folder, or the name of one that comes with the "
+        "program.",
+        metavar="FOLDER",
+        callback=check_objectfile,
+    ),
+]
+MeshArgument = Annotated[
+    str,
+    typer.Argument(help="A mesh file, or builtin:mug and so on.", metavar="MESH", callback=check_mesh),
+]
+ObjectFolder = Annotated[
+    Path,
+    typer.Argument(
+        help="An ObjectFile: its folder, or the name of one that comes with the program, e.g. mug.",
+        metavar="OBJECT",
+        callback=find_objectfile,
+    ),
+]
+RunFolder = Annotated[
+    Path,
+    typer.Argument(help="A run folder, e.g. runs/20260101-120000-...", metavar="RUN", callback=check_run),
 ]
 Seed = Annotated[
     int | None,
@@ -109,8 +240,6 @@ def quantity(option: str, text: str | None, kind: "Dimension") -> float | None:
     Raises:
         WrongUse: naming the option, where the text is no such quantity.
     """
-    from harness.basics.errors import WrongUse
-
     if text is None:
         return None
     try:
@@ -121,8 +250,6 @@ def quantity(option: str, text: str | None, kind: "Dimension") -> float | None:
 
 def positive(option: str, text: str | None, kind: "Dimension") -> float | None:
     """As ``quantity``, of what has to be above zero; ``WrongUse`` where it is not."""
-    from harness.basics.errors import WrongUse
-
     value = quantity(option, text, kind)
     if value is not None and value <= 0.0:
         raise WrongUse(f"{option} {text}: it must be above zero")
@@ -130,22 +257,46 @@ def positive(option: str, text: str | None, kind: "Dimension") -> float | None:
 
 
 def require_files(*files: tuple[str, Path | None, str]) -> None:
-    """Refuse names of files that say another kind, or one name for two of them.
+    """Refuse output files that cannot be written, before anything is computed.
 
     Args:
-        files: option, its path or None, and how the name must end.
+        files: option, its path or None, and the required ending of the name, "" for any.
 
     Raises:
-        WrongUse: naming the option.
+        WrongUse: a name with another ending, one name for two files, or a folder that does not exist.
     """
-    from harness.basics.errors import WrongUse
-
     named: dict[Path, str] = {}
     for option, path, suffix in files:
         if path is None:
             continue
-        if path.suffix != suffix:
+        if suffix and path.suffix != suffix:
             raise WrongUse(f"{option} {path} would be a {suffix} file; let its name end in {suffix}")
         if path in named:
             raise WrongUse(f"{named[path]} and {option} are both {path}; give them two names")
+        if path.is_dir():
+            raise WrongUse(f"{option} {path} is a folder; give the name of a file")
+        if not path.parent.is_dir():
+            raise WrongUse(
+                f"{option} {path}: there is no folder {path.parent}; make it with "
+                f"`mkdir -p {path.parent}`, or name a file in another folder"
+            )
         named[path] = option
+
+
+def require_folders(*folders: tuple[str, Path | None]) -> None:
+    """Refuse output folders that cannot be made, before anything is computed.
+
+    Args:
+        folders: option, and its path or None; missing folders above it are made with it.
+
+    Raises:
+        WrongUse: a file is in the way.
+    """
+    for option, folder in folders:
+        if folder is None:
+            continue
+        for path in (folder, *folder.parents):
+            if path.exists():
+                if not path.is_dir():
+                    raise WrongUse(f"{option} {folder}: {path} is a file; name a folder")
+                break

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -24,7 +24,9 @@ from rich.progress import (
 
 from harness.basics.answers import write_answer
 from harness.basics.errors import TouchstoneError
-from harness.recording.step_file import Step
+
+if TYPE_CHECKING:
+    from harness.recording.step_file import Step
 
 WIDE = 132
 """Columns of a table where what it is written to is no terminal."""
@@ -121,7 +123,7 @@ class StepProgress:
         self._pace: Pace | None = None
         self._task = bar.add_task(f"{noun}s", completed=done, total=total)
 
-    def began(self, step: Step) -> None:
+    def began(self, step: "Step") -> None:
         """Say which step is performed."""
         if self._pace is None:
             # From the first step on: what opening a bench and loading kernels takes comes once.
@@ -129,7 +131,7 @@ class StepProgress:
             self._pace.left(self._done / self._total)
         self._bar.update(self._task, description=f"{self._noun} {step.index + 1}: {step.kind}")
 
-    def ended(self, step: Step, seconds: float) -> None:
+    def ended(self, step: "Step", seconds: float) -> None:
         """Count it, and say how long it took and how long the rest will take."""
         self._done += 1
         left = "" if self._pace is None else self._pace.left(self._done / self._total)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.basics.errors import WrongUse
-from harness.basics.toml_file import nearest
+from harness.basics.files.named_file import nearest
 from harness.bench.scene import SceneFile, Section, load_scene, scene_from_json, scene_from_options
 
 

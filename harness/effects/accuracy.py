@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Generic, Literal, TypeVar, cast
 
 from harness.basics.errors import WrongUse
-from harness.basics.toml_file import nearest
+from harness.basics.files.named_file import nearest
 
 Level = str | int | float
 """One position of a dial: the name of a method, or a number."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from harness.basics.errors import WrongUse
-from harness.basics.toml_file import nearest
+from harness.basics.files.named_file import nearest
 from harness.effects.accuracy import Accuracy, Knob, Level
 from harness.effects.effect import Effect, Facts, by_name, knobs_of
 

@@ -6,16 +6,10 @@ from itertools import count
 from pathlib import Path
 
 from harness.basics.errors import WrongUse
-from harness.basics.toml_file import nearest
 from harness.basics.whole_file import make_folder
-from harness.bench.experiments import EXPERIMENTS, loaded
+from harness.bench.experiments import EXPERIMENTS, loaded, require_experiment
 from harness.experiment.experiment import Experiment
 from harness.recording.recording import Recording
-
-
-def names() -> tuple[str, ...]:
-    """Of every experiment, in the order of the table."""
-    return tuple(name for name, row in EXPERIMENTS.items() if row.value is not None)
 
 
 def named(name: str) -> Experiment:
@@ -24,10 +18,7 @@ def named(name: str) -> Experiment:
     Raises:
         WrongUse: there is none.
     """
-    row = EXPERIMENTS.get(name)
-    if row is None or row.value is None:
-        raise WrongUse(f"no experiment {name!r}; {nearest(name, names())}")
-    found = loaded(row.value)
+    found = loaded(require_experiment(name))
     assert isinstance(found, Experiment)
     return found
 

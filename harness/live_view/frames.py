@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from harness.basics.errors import WrongUse
-from harness.basics.toml_file import nearest
+from harness.basics.files.named_file import nearest
 from harness.objectfile.vision.settings import LEVELS, RenderSettings, VisionLevel
 from harness.objectfile.vision.view import FIELD_OF_VIEW, camera_for, light_for
 from harness.objectfile.vision.vision import ObjectVision, vision_level

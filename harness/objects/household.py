@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
+from harness.objects.builtin import HOUSEHOLD
 from harness.objects.outline import half_profile, polygon, rounded, stroke, walked
 from harness.objects.slab import slab
 from harness.objects.solid import from_manifold, lathe, outward, to_manifold, tube, union
@@ -201,14 +202,5 @@ _BUILDERS: MappingProxyType[str, Callable[[float], Mesh]] = MappingProxyType(
     }
 )
 
-MATERIALS: MappingProxyType[str, str] = MappingProxyType(
-    {
-        "mug": "ceramic",
-        "bowl": "ceramic",
-        "plate": "ceramic",
-        "pitcher": "polycarbonate",
-        "tray": "wood",
-        "wrench": "steel",
-    }
-)
-"""What each object is made of unless the scene says otherwise."""
+MATERIALS = HOUSEHOLD
+"""Material of each object unless the scene names another."""

@@ -53,9 +53,6 @@ def _profile(edge: float) -> FloatArray:
 
 _BUILDERS: MappingProxyType[str, Callable[[float], Mesh]] = MappingProxyType({"ball": ball})
 
-MATERIALS: MappingProxyType[str, str] = MappingProxyType({"ball": "steel"})
-"""What each target is made of."""
-
 
 def build_target(name: str, edge: float = 3e-3) -> Mesh:
     """A target in metres.

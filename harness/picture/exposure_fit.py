@@ -11,8 +11,8 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, BoolArray, ByteArray, FloatArray, read_only
 from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.files.named_file import nearest
 from harness.basics.robust_fit import TUKEY, robust_fit, scatter
-from harness.basics.toml_file import nearest
 from harness.picture.exposure_error import BLOCK, Together, group_variance, mistaken_light, together
 from harness.picture.srgb import LINEAR_OF_BYTE
 

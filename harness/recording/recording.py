@@ -21,6 +21,7 @@ from harness.basics.files.foreign_file import MOST_JSON, read_bounded
 from harness.basics.files.json_file import CHECKSUM, checksum_of
 from harness.basics.files.lock_file import hold_folder
 from harness.basics.whole_file import make_folder, write_text_whole
+from harness.bench.named_files import require_run
 from harness.bench.reading import Reading
 from harness.recording.step_file import Step, StepRecord, read_step, read_wall_span, write_step
 
@@ -187,8 +188,7 @@ def require_unused(folder: Path) -> None:
 
 
 def _read_header(path: Path) -> RunHeader:
-    if not path.exists():
-        raise WrongUse(f"{path.parent} is not a run: it has no run.json; give the folder that a run wrote")
+    require_run(path.parent)
     return header_of(read_bounded(path, "the description of a run", MOST_JSON, RecordingDamaged), path)
 
 

@@ -27,8 +27,8 @@ from harness.authoring.audio.object_audio import MODES, STAGES, AudioRequest, bu
 from harness.authoring.audio.profiles import PROFILES
 from harness.basics.materials import material
 from harness.basics.store import Store
-from harness.bench.scene import BUILTIN
 from harness.experiment.subjects import REAL
+from harness.objects.builtin import BUILTIN
 from harness.objects.household import MATERIALS
 from harness.sim.modal.modal import default_edge
 from harness.sim.modal.stage_seconds import cpu, wall

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from harness.basics.errors import WrongUse
 from harness.basics.files.json_file import CHECKSUM
-from harness.bench.experiments import EXPERIMENTS, loaded, section_models
+from harness.bench.experiments import EXPERIMENTS, experiment_names, loaded, section_models
 from harness.bench.gap import Gap
 from harness.bench.scene import SceneFile, scene_from_json
 from harness.bench.sensor import MarkerGrid, described_sensor
@@ -24,7 +24,7 @@ from harness.effects.catalogue import EFFECTS
 from harness.effects.effect import Effect, Facts, knobs_of
 from harness.effects.plan import default_accuracy, plan
 from harness.experiment.compare import CARRIED
-from harness.experiment.lookup import named, names
+from harness.experiment.lookup import named
 from harness.objectfile.description import Description
 from harness.objectfile.published.entries import PublishedDescription
 from harness.recording.recording import SCHEMA, RunHeader
@@ -153,7 +153,7 @@ def _effects() -> list[str]:
     lines += table(("effect", "level", "computed from"), ways)
     lines += ["", "## Dials of the simulation", "", "Levels run from cheap to exact.", ""]
     lines += _dials(knobs_of(EFFECTS))
-    for name in names():
+    for name in experiment_names():
         lines += ["", f"## Dials of {name}", "", EXPERIMENTS[name].about, "", *_dials(named(name).own_knobs)]
     return lines
 
@@ -187,7 +187,7 @@ def _observed(effect: Effect) -> str:
     made = described_sensor("gelsight-r1.5").sensor
     marked = replace(made, casts_shadow=True, markers=MarkerGrid(7, 9, 2e-3, 4e-4))
     plain, rich = Facts(scene, made), Facts(scene.model_copy(update={"object": named_file}), marked)
-    given = {*CARRIED, *(name for experiment in names() for name in named(experiment).gives)}
+    given = {*CARRIED, *(name for experiment in experiment_names() for name in named(experiment).gives)}
     for facts, carried in ((plain, given), (rich, {*given, "sensor.shadow_table"})):
         try:
             sources = plan(EFFECTS, facts, (effect.provides,), default_accuracy(EFFECTS)).sources

@@ -13,9 +13,9 @@ from harness.authoring.vision.profiles import vision_profile
 from harness.basics.arrays import AnyArray, ByteArray
 from harness.basics.errors import DataRefused
 from harness.basics.store import digest
-from harness.bench.scene import BUILTIN
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.published.camera import FOCAL, SIZE
+from harness.objects.builtin import BUILTIN
 from harness.picture.linear_image import LinearImage
 from harness.picture.pinhole import DirectionalLight, Pinhole
 from harness.sim.light.appearance_source import appearance_of

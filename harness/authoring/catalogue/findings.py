@@ -10,7 +10,7 @@ from harness.basics.arrays import FloatArray
 from harness.basics.errors import DataRefused, MeshRefused, WrongUse
 from harness.basics.materials import MATERIALS
 from harness.basics.mesh import Mesh
-from harness.bench.scene import BUILTIN
+from harness.objects.builtin import BUILTIN
 from harness.sim.solid.intake import take_in
 from harness.sim.solid.mesh_read import METRES, read_mesh
 from harness.sim.solid.surface_measure import enclosed_volume, thin_wall

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from harness.authoring.catalogue.rows import CatalogueRow, ExcludedRow
-from harness.bench.scene import BUILTIN
+from harness.objects.builtin import BUILTIN
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf", ".3mf", ".msh")
 """Of files that are searched for, in order of preference; a row may name any other that reads."""

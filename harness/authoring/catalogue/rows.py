@@ -11,9 +11,8 @@ from pathlib import Path
 
 from harness.authoring.catalogue.toml_rows import read_toml_rows
 from harness.basics.errors import WrongUse
-from harness.basics.files.named_file import require_file
+from harness.basics.files.named_file import nearest, require_file
 from harness.basics.materials import MATERIALS
-from harness.basics.toml_file import nearest
 
 PUBLISHED = ("number", "name", "scale_m", "material", "source")
 """Columns of ObjectFolder's ``objects.csv``, which has no header."""

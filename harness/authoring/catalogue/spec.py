@@ -16,13 +16,12 @@ from harness.authoring.touch.profiles import touch_profile
 from harness.authoring.vision.profiles import vision_profile
 from harness.basics.code_version import content_hash
 from harness.basics.errors import WrongUse
-from harness.basics.files.named_file import require_file
+from harness.basics.files.named_file import nearest, require_file
 from harness.basics.materials import MATERIALS
 from harness.basics.store import digest
-from harness.basics.toml_file import nearest
-from harness.bench.scene import BUILTIN
 from harness.bench.sensor import GELSIGHT_R15, TactileSensor
 from harness.objectfile.entries import Modality
+from harness.objects.builtin import BUILTIN
 from harness.sim.modal.modal import HEARING
 
 SENSES: tuple[Modality, ...] = get_args(Modality)

@@ -14,11 +14,11 @@ from harness.authoring.training import Report
 from harness.authoring.vision.profiles import vision_profile
 from harness.authoring.vision.vision import AuthoredVision, author_vision, checkpoints
 from harness.basics.mesh import Mesh
-from harness.bench.scene import BUILTIN
 from harness.objectfile.entries import Source
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.same_object import is_same_surface
 from harness.objectfile.vision.part import VisionPart, with_vision
+from harness.objects.builtin import BUILTIN
 from harness.sim.light.appearance import Appearance
 from harness.sim.light.appearance_source import appearance_of
 from harness.sim.solid.surface_source import surface_of

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from harness.authoring.vision.finish_profiles import CellsFinish
 from harness.basics.errors import WrongUse
-from harness.basics.toml_file import nearest
+from harness.basics.files.named_file import nearest
 from harness.objectfile.vision.network.network import CELLS, PAPER, NetworkSize
 
 

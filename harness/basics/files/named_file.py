@@ -1,7 +1,8 @@
-"""A file that an operator names: there, or wrong use."""
+"""Names and files that an operator gives: refuse the missing ones, and suggest the nearest known name."""
 
+import difflib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -21,6 +22,27 @@ def require_file(path: Path, what: str, advice: str = "check the path") -> None:
     """
     if not path.is_file():
         raise WrongUse(f"there is no {what} {path}; {advice}")
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Suggest the known name most similar to a mistyped one, and list all known names.
+
+    Args:
+        name: the mistyped name.
+        known: every name that exists.
+
+    Returns:
+        ``"did you mean 'x'? (there are x, y, z)"``, or the list alone where no name is similar.
+    """
+    names = sorted(known)
+    similar = difflib.get_close_matches(name.lower(), [n.lower() for n in names], n=1, cutoff=_SIMILAR)
+    match = next((n for n in names if similar and n.lower() == similar[0]), None)
+    listed = f"there {'is' if len(names) == 1 else 'are'} {', '.join(names) or 'none'}"
+    return f"did you mean {match!r}? ({listed})" if match else listed
+
+
+_SIMILAR = 0.6
+"""Lowest ``difflib`` similarity of a suggestion; at 0.5 ``nosuch`` suggests ``wrench_touch``."""
 
 
 def real_path(path: Path) -> Path:

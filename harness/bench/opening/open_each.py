@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from harness.basics.errors import TouchstoneError, WrongUse
-from harness.basics.toml_file import nearest
+from harness.basics.files.named_file import nearest
 from harness.bench.device import Arm, ImpactHammer, Microphone, TactileCamera
 from harness.bench.scene import SceneFile, scene_from_options
 from harness.bench.station import (

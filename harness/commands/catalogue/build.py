@@ -65,6 +65,7 @@ def build(
 
     Try: touchstone catalogue build objects.csv --meshes meshes --out built --profile smoke
     """
+    options.require_folders(("--out", out), ("--stages", stages))
     from harness.authoring.catalogue.build import build_all, build_plan, held
     from harness.authoring.catalogue.layout import BuildFolder
     from harness.authoring.catalogue.settings import write_settings
@@ -98,8 +99,8 @@ def _spec(
 ) -> "BuildSpec":
     from harness.authoring.catalogue.spec import SENSES, BuildSpec
     from harness.basics.errors import WrongUse
+    from harness.basics.files.named_file import nearest
     from harness.basics.quantities import FREQUENCY, LENGTH
-    from harness.basics.toml_file import nearest
     from harness.bench.sensor import DEFAULT_MAKE, described_sensor
 
     named = {name.strip() for name in senses.split(",") if name.strip()}
@@ -129,7 +130,7 @@ def _runner(name: str, workers: int, address: str | None, limits: "WorkerLimits"
     from harness.authoring.catalogue.runner import LocalRunner
     from harness.basics.cores import own_cores
     from harness.basics.errors import WrongUse
-    from harness.basics.toml_file import nearest
+    from harness.basics.files.named_file import nearest
 
     if name == "local":
         if address is not None:

@@ -23,7 +23,7 @@ _ROWS = {
 
 
 def build(
-    mesh: Annotated[str, typer.Argument(help="A mesh file, or builtin:mug and so on.", metavar="MESH")],
+    mesh: options.MeshArgument,
     out: Annotated[Path, typer.Option(help="The ObjectFile's folder.", metavar="FOLDER")],
     material: Annotated[str, typer.Option(help="What it is made of.", metavar="M")],
     only: Annotated[str, typer.Option(help="Which modality: audio, touch or vision.")] = "audio",
@@ -84,6 +84,7 @@ def build(
 
     Try: touchstone object build builtin:bowl --material ceramic --profile smoke --out my/bowl
     """
+    options.require_folders(("--out", out))
     from harness.authoring.object_source import PartRequest
     from harness.basics.errors import WrongUse
     from harness.basics.files.lock_file import hold_folder

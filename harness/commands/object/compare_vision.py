@@ -49,7 +49,7 @@ class _Wanted:
 
 
 def compare(
-    folder: vision_options.Folder,
+    folder: options.ObjectFolder,
     out: Annotated[
         Path, typer.Option(help="Live, simulated and their difference, side by side.", metavar="FILE.png")
     ],

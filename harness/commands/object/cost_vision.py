@@ -28,7 +28,7 @@ CODE = "harness.authoring.vision.cost"
 
 
 def vision(
-    mesh: Annotated[str, typer.Argument(help="A mesh file, or builtin:mug and so on.", metavar="MESH")],
+    mesh: options.MeshArgument,
     units: Annotated[
         str | None, typer.Option(help="Of the file's numbers: m, cm, mm, um, in or ft.", metavar="U")
     ] = None,
@@ -56,6 +56,7 @@ def vision(
 
     Try: touchstone cost vision builtin:wrench --threads 1
     """
+    options.require_folders(("--out", out))
     from harness.authoring.vision.cost import Studio, measured
     from harness.authoring.vision.data import held_out_pictures
     from harness.authoring.vision.profiles import vision_profile
@@ -110,7 +111,7 @@ def vision(
 def _chosen(spec: "CellsSpec", size: int, knobs: list[str] | None) -> "tuple[Way, ...]":
     from harness.authoring.vision.cost import DEFAULT, ways
     from harness.basics.errors import WrongUse
-    from harness.basics.toml_file import nearest
+    from harness.basics.files.named_file import nearest
 
     every = ways(spec, size)
     known = [way.knob.partition(",")[0] for way in every]

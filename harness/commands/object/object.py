@@ -2,9 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from harness.commands import options
 from harness.commands.object.published.info import published_lines
@@ -14,12 +12,8 @@ if TYPE_CHECKING:
     from harness.objectfile.description import Description
     from harness.objectfile.published.entries import PublishedDescription
 
-Folder = Annotated[
-    Path, typer.Argument(help="The ObjectFile's folder: the one with object.json in it.", metavar="FOLDER")
-]
 
-
-def info(folder: Folder, json: options.Json = False) -> int:
+def info(folder: options.ObjectFolder, json: options.Json = False) -> int:
     """Say what an ObjectFile holds: the object, its modes, its networks, where they come from.
 
     Only object.json is read; whether the files are what it says is asked of `touchstone object verify`.
@@ -47,7 +41,7 @@ def _described(folder: Path) -> "tuple[Description | PublishedDescription, list[
     return description, _lines(description)
 
 
-def verify(folder: Folder, json: options.Json = False) -> int:
+def verify(folder: options.ObjectFolder, json: options.Json = False) -> int:
     """Check an ObjectFile: hashes, graphs, shapes, finite answers, and the answers it was made with.
 
     Nothing is written, nothing outside of the folder is read, and nothing in it can run code: a graph

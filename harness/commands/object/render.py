@@ -38,7 +38,7 @@ class _Pulse:
 
 
 def render(
-    folder: Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")],
+    folder: options.ObjectFolder,
     out: Annotated[Path, typer.Option(help="The sound, 24 bits.", metavar="FILE.wav")],
     at: Annotated[
         places.Coordinates | None,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def render(
-    folder: Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")],
+    folder: options.ObjectFolder,
     out: Annotated[Path, typer.Option(help="The picture, 8 bits RGB.", metavar="FILE.png")],
     contact: Annotated[
         places.Coordinates | None,

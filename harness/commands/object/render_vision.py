@@ -33,7 +33,7 @@ _FIRST = 256
 
 
 def render(
-    folder: vision_options.Folder,
+    folder: options.ObjectFolder,
     out: Annotated[Path, typer.Option(help="The picture, before white, 8 bits sRGB.", metavar="FILE.png")],
     camera: vision_options.Camera = None,
     look_at: vision_options.LookAt = None,

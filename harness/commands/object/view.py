@@ -12,7 +12,7 @@ PORT = 8765
 
 
 def view(
-    folder: vision_options.Folder,
+    folder: options.ObjectFolder,
     port: Annotated[int, typer.Option(help="Of 127.0.0.1; 0 for any that is free.", min=0, max=65535)] = PORT,
     threads: vision_options.Threads = None,
     json: options.Json = False,

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
 
 Three = tuple[float, float, float]
 
-Folder = Annotated[Path, typer.Argument(help="The ObjectFile's folder.", metavar="OBJECT")]
 Camera = Annotated[
     Three | None,
     typer.Option(

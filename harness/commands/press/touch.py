@@ -17,7 +17,12 @@ from harness.commands.press.touch_sources import refuse
 
 def touch(
     mesh: Annotated[
-        str | None, typer.Argument(help="A mesh file, or builtin:mug; or say --height.", metavar="MESH")
+        str | None,
+        typer.Argument(
+            help="A mesh file, builtin:mug and so on, or an ObjectFile; or give --height.",
+            metavar="MESH",
+            callback=options.check_touched,
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="The picture, 8 bits RGB.", metavar="FILE.png")] = None,
     height: Annotated[

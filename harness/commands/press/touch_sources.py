@@ -127,8 +127,9 @@ def of_mesh(
 def _scene(what: str, units: str | None, gel: "Gel", objectfile: Path | None = None) -> "SceneFile":
     """A table with nothing on it but what is touched; touch does not depend on its material."""
     from harness.basics.toml_file import validate
-    from harness.bench.scene import BUILTIN, SceneFile, scene_from_options
+    from harness.bench.scene import SceneFile, scene_from_options
     from harness.bench.scene_objectfile import holds_objectfile, objectfile_folder
+    from harness.objects.builtin import BUILTIN
 
     if what.endswith(".npy"):
         tree = {"schema": 1, "object": {"mesh": what, "material": "steel"}}

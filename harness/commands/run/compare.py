@@ -9,13 +9,15 @@ from harness.commands import options
 
 
 def compare(
-    run: Annotated[Path, typer.Argument(help="A run folder, as runs/20260101-120000-...", metavar="RUN")],
+    run: options.RunFolder,
     objectfile: Annotated[
         Path | None,
         typer.Option(
             "--objectfile",
-            help="Folder of another object's ObjectFile, put in the place of the run's object.",
+            help="ObjectFile of another object to compare with instead of the run's own: its folder, or "
+            "the name of one that comes with the program.",
             metavar="FOLDER",
+            callback=options.find_objectfile_option,
         ),
     ] = None,
     reference: Annotated[

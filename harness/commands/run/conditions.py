@@ -31,7 +31,7 @@ def levels_of(
         WrongUse: a condition that the experiment does not have, or a level that is not one.
     """
     from harness.basics.errors import WrongUse
-    from harness.basics.toml_file import nearest
+    from harness.basics.files.named_file import nearest
 
     known = {condition.name: condition for condition in conditions}
     asked: dict[str, list[str]] = {name: list(levels) for name, levels in given.items() if levels}

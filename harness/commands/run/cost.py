@@ -52,6 +52,7 @@ def cost(
 
     Try: touchstone cost contact-localization --seeds 2 --only mug --contacts 6
     """
+    options.require_folders(("--out", out))
     from harness.basics.errors import DataRefused
     from harness.basics.files.lock_file import hold_briefly, hold_folder
     from harness.basics.whole_file import make_folder
@@ -116,7 +117,7 @@ def _styled(kind: Any) -> tuple[str, ...]:
 
 def _gap(name: str) -> str:
     from harness.basics.errors import WrongUse
-    from harness.basics.toml_file import nearest
+    from harness.basics.files.named_file import nearest
 
     if name not in ("default", "none"):
         raise WrongUse(f"--gap {name!r} is not known; {nearest(name, ('default', 'none'))}")
@@ -125,7 +126,7 @@ def _gap(name: str) -> str:
 
 def _scenes(only: list[str] | None, scene: Path | None) -> dict[str, Any]:
     from harness.basics.errors import WrongUse
-    from harness.basics.toml_file import nearest
+    from harness.basics.files.named_file import nearest
     from harness.bench.scene import load_scene
     from harness.experiment.subjects import objects
 

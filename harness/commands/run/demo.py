@@ -25,7 +25,10 @@ _BENCHES = {
 
 def demo(
     experiment: Annotated[
-        str, typer.Argument(help=f"What to run: {', '.join(RUNNABLE)}.", metavar="NAME")
+        str,
+        typer.Argument(
+            help=f"What to run: {', '.join(RUNNABLE)}.", metavar="NAME", callback=options.check_experiment
+        ),
     ] = DEFAULT,
     object_: Annotated[
         str, typer.Option("--object", help="An object of ours: mug, bowl, plate, pitcher, tray, wrench.")

@@ -10,7 +10,7 @@ from harness.commands.output import warn
 
 
 def replay(
-    run: Annotated[Path, typer.Argument(help="A run folder, as runs/20260101-120000-...", metavar="RUN")],
+    run: options.RunFolder,
     level: options.LevelOption = None,
     out: Annotated[
         Path | None, typer.Option(help="Where the result and the report go; beside the run if left out.")
@@ -30,6 +30,7 @@ def replay(
 
     Try: touchstone replay runs/... --level localization.method=particle
     """
+    options.require_folders(("--out", out), ("--wav", wav))
     from harness.basics.errors import RecordingDamaged
     from harness.basics.files.lock_file import hold_folder
     from harness.commands.run.answered_run import drawing, publisher, show_report

@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 import typer
 
-from harness.bench.experiments import EXPERIMENTS
+from harness.bench.experiments import experiment_names
 from harness.commands import options
 
-RUNNABLE = tuple(name for name, row in EXPERIMENTS.items() if row.value is not None)
+RUNNABLE = experiment_names()
 
 DEFAULT = "contact-localization"
 """Run where no experiment is named."""
@@ -48,7 +48,11 @@ BenchOption = Annotated[
 def run(
     experiment: Annotated[
         str | None,
-        typer.Argument(help=f"What to run: {', '.join(RUNNABLE)}; {DEFAULT} if left out.", metavar="NAME"),
+        typer.Argument(
+            help=f"What to run: {', '.join(RUNNABLE)}; {DEFAULT} if left out.",
+            metavar="NAME",
+            callback=options.check_experiment,
+        ),
     ] = None,
     station: options.StationOrOwn = None,
     scene: options.SceneOption = None,
@@ -98,7 +102,10 @@ def run(
         Path | None, typer.Option(help="The run's folder; a dated one under runs/ if left out.")
     ] = None,
     resume: Annotated[
-        Path | None, typer.Option(help="Go on with this run folder at its first missing contact.")
+        Path | None,
+        typer.Option(
+            help="Continue this run folder at its first missing contact.", callback=options.check_run
+        ),
     ] = None,
     json: options.Json = False,
 ) -> int:
@@ -109,6 +116,7 @@ def run(
 
     Try: touchstone run contact-localization --station mock --scene scenes/mug_touch.toml
     """
+    options.require_folders(("--out", out))
     from harness.commands.run.answered_run import perform_and_answer
     from harness.commands.run.planned_run import BenchOptions, new_run, resumed_run, target_of_options
     from harness.commands.scenes import SceneOptions

@@ -62,9 +62,10 @@ def tables(
 
     Try: touchstone tables contact-localization --seeds 2 --only mug
     """
+    options.require_folders(("--out", out), ("--recordings", recordings))
     from harness.basics.errors import WrongUse
     from harness.basics.files.lock_file import hold_folder
-    from harness.basics.toml_file import nearest
+    from harness.basics.files.named_file import nearest
     from harness.bench.gap import load_gap
     from harness.commands.scenes import with_assignments
     from harness.experiment.lookup import named

@@ -24,6 +24,7 @@ def modes(
         typer.Argument(
             help="A surface, or tetrahedra of four or ten nodes (.inp, .msh, .vtu, ...); or builtin:NAME.",
             metavar="MESH",
+            callback=options.check_mesh,
         ),
     ],
     material: Annotated[
@@ -111,8 +112,7 @@ def modes(
 
 def _own_material(mesh: str) -> str | None:
     """What one of our own objects is made of; None of a file."""
-    from harness.bench.scene import BUILTIN
-    from harness.objects.household import MATERIALS
+    from harness.objects.builtin import BUILTIN, MATERIALS
 
     return MATERIALS.get(mesh.removeprefix(BUILTIN)) if mesh.startswith(BUILTIN) else None
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import WrongUse
+from harness.basics.files.named_file import nearest
 from harness.basics.materials import Material
-from harness.basics.toml_file import nearest
 from harness.sim.sound.contact_pulse import DURATION, Hammer, HertzPulse, hertz_pulse
 
 HAMMERS: Mapping[str, Hammer] = MappingProxyType({

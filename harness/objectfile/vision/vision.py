@@ -6,8 +6,8 @@ import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
 from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.files.named_file import nearest
 from harness.basics.mesh import Mesh
-from harness.basics.toml_file import nearest
 from harness.objectfile.entries import NetworkEntry
 from harness.objectfile.file import ObjectFile
 from harness.objectfile.self_test import all_queries, require_answers

@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from harness.basics.errors import WrongUse
-from harness.bench.scene import BUILTIN
 from harness.objects.albedo import print_of, print_places
-from harness.objects.builtin import MATERIALS, build
+from harness.objects.builtin import BUILTIN, MATERIALS, build
 from harness.sim.light.appearance import CREASE, Appearance, smooth_normals
 from harness.sim.light.appearance_read import read_appearance
 

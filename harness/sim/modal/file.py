@@ -10,10 +10,10 @@ import numpy as np
 
 from harness.basics.arrays import BoolArray, IntArray
 from harness.basics.errors import WrongUse
+from harness.basics.files.named_file import nearest
 from harness.basics.materials import Material
 from harness.basics.store import Store
-from harness.basics.toml_file import nearest
-from harness.bench.scene import BUILTIN
+from harness.objects.builtin import BUILTIN
 from harness.sim.modal.element_edge import finely_filled
 from harness.sim.modal.modal import HEARING, curved
 from harness.sim.modal.solve import Elasticity, Solution, check_elasticity, check_limit, solve_mesh

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
-from harness.bench.scene import BUILTIN
+from harness.objects.builtin import BUILTIN
 from harness.objects.household import build
 from harness.sim.solid.intake import take_in
 from harness.sim.solid.walls import walled

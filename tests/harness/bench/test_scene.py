@@ -70,7 +70,7 @@ def test_a_mesh_path_is_relative_to_the_scene_and_absolute_once_read(tmp_path: P
 def test_an_objectfile_is_found_beside_the_scene_and_must_be_one(tmp_path: Path) -> None:
     named = scene_file(tmp_path, pose='objectfile = "own/mug"')
     (tmp_path / "own" / "mug").mkdir(parents=True)
-    with pytest.raises(WrongUse, match=r"'object\.objectfile': there is no ObjectFile .*own/mug, a folder"):
+    with pytest.raises(WrongUse, match=r"'object\.objectfile': .*own/mug is no ObjectFile"):
         load_scene(named)
     (tmp_path / "own" / "mug" / "object.json").write_text("{}")
     scene = load_scene(named)

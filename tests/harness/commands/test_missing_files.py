@@ -1,5 +1,8 @@
-"""A file or folder that is not there is wrong use, whichever command is told of it: exit code 2."""
+"""Missing input files are wrong use with exit code 2, and mistyped names are refused before heavy imports."""
 
+import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -39,6 +42,11 @@ COMMANDS = (
     ("sim", "touch", *MUG, "--markers", "absent.json"),
     ("sim", "touch", *MUG, "--objectfile", "absent"),
     ("cost", "vision", "absent.obj"),
+    ("camera", "scene", "--object", "absent.stl"),
+    ("object", "render", "queries", "absent", "--out", "q"),
+    ("object", "compare", "vision", "absent", "--out", "q.png"),
+    ("compare", "absent"),
+    ("mock-lab", "--scene", "absent"),
 )
 
 
@@ -52,3 +60,52 @@ def test_what_is_not_there_is_wrong_use(
     monkeypatch.chdir(tmp_path)
     assert invoke(list(words)) == 2
     assert "absent" in capsys.readouterr().err
+
+
+MISTYPED = (
+    ("there is no scene 'nosuch'", ("run", "--scene", "nosuch")),
+    ("did you mean 'mug_touch'?", ("run", "--scene", "mug_tuch")),
+    ("did you mean 'contact-localization'?", ("run", "contact-localizatoin")),
+    ("did you mean 'shape-reconstruction'?", ("demo", "shape-reconstructoin")),
+    ("there is no station 'mok'; did you mean 'mock'?", ("run", "--station", "mok")),
+    ("--object: there is no built-in object 'mgu'; did you mean 'mug'?", ("run", "--object", "builtin:mgu")),
+    ("there is no file", ("run", "--object", "nosuch.stl")),
+    ("--objectfile: there is no ObjectFile", ("run", "--objectfile", "mgu")),
+    ("there is no run nosuch", ("run", "--resume", "nosuch")),
+    ("there is no run nosuch", ("replay", "nosuch")),
+    ("there is no run nosuch", ("compare", "nosuch")),
+    ("there is no scene 'nosuch'", ("explain", "nosuch")),
+    ("there is no file", ("sim", "touch", "nosuch.stl", "--vertex", "1", "--out", "x.png")),
+    ("there is no file", ("sim", "modes", "nosuch.stl")),
+    ("there is no file", ("camera", "scene", "--object", "nosuch.stl")),
+    ("there is no file", ("object", "build", "nosuch.stl", "--material", "steel", "--out", "x")),
+    ("there is no ObjectFile", ("object", "info", "nosuch")),
+    ("there is no ObjectFile", ("object", "view", "nosuch")),
+    ("did you mean 'mug'?", ("object", "verify", "mgu")),
+    ("there is no ObjectFile", ("object", "render", "vision", "nosuch", "--out", "x.png")),
+    ("Did you mean 'run'?", ("runn",)),
+)
+LIGHT = frozenset(
+    {"harness", "typer", "rich", "shellingham", "annotated_doc"}
+    | {"pydantic", "pydantic_core", "annotated_types", "typing_extensions", "typing_inspection"}
+)
+"""Packages that a refused command may import: typer and those it imports itself. numpy takes 0.1 s of CPU."""
+COUNTED = """
+import json, sys
+from harness.cli import invoke
+code = invoke(sys.argv[1:])
+roots = {name.partition(".")[0] for name, module in sys.modules.items() if getattr(module, "__file__", None)}
+heavy = sorted(root for root in roots - set(sys.stdlib_module_names) if not root.startswith("_"))
+print(json.dumps([code, heavy]))
+"""
+
+
+@pytest.mark.parametrize(("message", "words"), MISTYPED, ids=[" ".join(words) for _, words in MISTYPED])
+def test_a_mistyped_name_is_refused_before_anything_heavy_is_imported(
+    message: str, words: tuple[str, ...]
+) -> None:
+    done = subprocess.run([sys.executable, "-c", COUNTED, *words], capture_output=True, text=True, check=True)
+    code, packages = json.loads(done.stdout.splitlines()[-1])
+    assert code == 2
+    assert message in done.stderr
+    assert set(packages) <= LIGHT

@@ -46,6 +46,7 @@ def import_published(
 
     Try: touchstone object import ObjectFile.pth --out objects/published_mug
     """
+    options.require_folders(("--out", out))
     from harness.authoring.published.imported import LICENCE
     from harness.authoring.published.imported import import_published as read
     from harness.basics.files.lock_file import hold_folder

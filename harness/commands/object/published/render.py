@@ -14,7 +14,7 @@ _COMPAT_SIZE = 256
 
 
 def render(
-    folder: Annotated[Path, typer.Argument(help="The object's folder, imported or built.", metavar="OBJECT")],
+    folder: options.ObjectFolder,
     out: Annotated[Path, typer.Option(help="Made, with audio, touch and vision in it.", metavar="FOLDER")],
     vision: Annotated[
         Path | None,
@@ -67,6 +67,7 @@ def render(
 
     Try: touchstone object render queries objects/published_mug --vision vision_demo.npy --out rendered
     """
+    options.require_folders(("--out", out))
     from harness.basics.errors import WrongUse
     from harness.basics.quantities import LENGTH
     from harness.objectfile.file import ObjectFile
