@@ -97,6 +97,7 @@ def taxim(
         str | None,
         typer.Option(help="Reality gap of a mocked bench; target if left out.", metavar="NAME"),
     ] = None,
+    bench: options.BenchOption = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -194,6 +195,7 @@ def taxim(
         options.positive("--ball-radius", ball_radius, LENGTH),
         seed,
         gap,
+        bench,
     )
     chosen(folder, wanted)
     source = folder if folder is not None else pressed(wanted, json)

@@ -24,10 +24,11 @@ class PressRequest:
     ball_radius: float | None
     seed: int | None
     gap: str | None
+    bench: str | None
 
     def require_none(self) -> None:
         """Refuse options that only a new run of the arm can follow."""
-        names = ("scene", "run", "presses", "depth", "seed", "gap")
+        names = ("scene", "run", "presses", "depth", "seed", "gap", "bench")
         named = [f"--{name}" for name in names if vars(self)[name] is not None]
         if named:
             raise WrongUse(
@@ -51,11 +52,12 @@ def chosen(folder: Path | None, wanted: PressRequest) -> None:
 def pressed(wanted: PressRequest, as_json: bool) -> Path | None:
     """The folder of the run that the arm made or went on with; None where Ctrl-C ended it early."""
     from calibration.taxim.arm.session import procedure
-    from harness.experiment.perform import perform_on_bench, steps_planned
+    from harness.experiment.perform import describe_bench, perform_on_bench, steps_planned
 
     recording, presses = _recording(wanted), procedure()
     total = steps_planned(presses, recording)
     if recording.committed < total:
+        CONSOLE.print(f"bench: {describe_bench(recording)}", markup=False)
         CONSOLE.print(f"recording to {recording.folder}", markup=False)
         how = f"touchstone calibrate taxim --resume {recording.folder}"
         with (
@@ -104,7 +106,13 @@ def _begun(wanted: PressRequest) -> "Recording":
     station = load_station(station_path(wanted.station or ""))
     with CONSOLE.status("planning the presses, rehearsing them in the twin"):
         begun = begin(
-            procedure(settings), ball_scene(radius, scene), station, wanted.seed, wanted.gap, wanted.run
+            procedure(settings),
+            ball_scene(radius, scene),
+            station,
+            wanted.seed,
+            wanted.gap,
+            wanted.run,
+            wanted.bench,
         )
     rehearsal = begun.plan.rehearsal
     CONSOLE.print(

@@ -4,6 +4,7 @@ Names and paths are checked as the command line is read, before a command import
 mistyped name is refused at once.
 """
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, overload
 
@@ -179,6 +180,23 @@ ObjectFolder = Annotated[
 RunFolder = Annotated[
     Path,
     typer.Argument(help="A run folder, e.g. runs/20260101-120000-...", metavar="RUN", callback=check_run),
+]
+
+
+class BenchKind(StrEnum):
+    """How a mocked bench runs."""
+
+    WIRES = "wires"
+    IN_PROCESS = "in-process"
+
+
+BenchOption = Annotated[
+    BenchKind | None,
+    typer.Option(
+        "--bench",
+        help="How a mocked station runs. in-process: the same world without cables, in simulated time; "
+        "wires: each instrument at the far end of its cable, in real time. in-process if left out.",
+    ),
 ]
 Seed = Annotated[
     int | None,

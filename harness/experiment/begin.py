@@ -12,6 +12,7 @@ from harness.effects.scene_object import KnownObject, known_object
 from harness.experiment.compare import require_sources
 from harness.experiment.experiment import Experiment, Planned, Procedure
 from harness.experiment.lookup import new_runs_folder
+from harness.experiment.perform import IN_PROCESS
 from harness.experiment.solving import TARGET, Target
 from harness.recording.recording import Recording, require_unused
 from harness.recording.run_folder import create_run, station_acquisition, station_calibration
@@ -45,7 +46,7 @@ def begin(
         seed: of all that is drawn; the scene's where None.
         gap: reality gap of a mocked bench; the experiment's or the station's where None.
         folder: of the run; a dated one under ``runs/`` where None.
-        bench: of a mocked station, ``wires`` or ``in-process``; over its wires where None.
+        bench: how a mocked station runs, ``in-process`` or ``wires``; in process if None.
         target: of the answer, beside its levels; stored with the plan.
 
     Raises:
@@ -95,5 +96,4 @@ def _mock(
             if value is not None:
                 raise WrongUse(f"{option} is for a mocked bench; this station is a real one: leave it out")
         return None
-    chosen = {} if bench is None else {"bench": bench}
-    return {"gap": lasting_name(gap or procedure.gap or station.mock.gap), **chosen}
+    return {"gap": lasting_name(gap or procedure.gap or station.mock.gap), "bench": bench or IN_PROCESS}

@@ -1,9 +1,10 @@
 """Perform what is left of a run on its bench; a step's readings are taken in once it is on the disk."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from typing import Any
 
 from harness.basics.clock import clock_offset_ns, now
 from harness.basics.errors import FitRefused, WrongUse
@@ -22,6 +23,11 @@ from harness.twin.bench_of import twin_of
 WIRES, IN_PROCESS = "wires", "in-process"
 """Mocked benches: each instrument at the far end of its cable, or the same world without cables, in simulated
 time."""
+
+_BENCHES = {
+    WIRES: "mocked, each instrument at the far end of its cable, in real time",
+    IN_PROCESS: "mocked in this process, in simulated time (a new run takes --bench wires for the cables)",
+}
 
 IN_PROCESS_BENCH = "mocks.in_process.bench:in_process_bench"
 """Import string of the latter."""
@@ -50,6 +56,17 @@ class Performed:
 def steps_planned(procedure: Procedure, recording: Recording) -> int:
     """How many steps the run was planned with."""
     return len(recording.planned(procedure.plan_key))
+
+
+def describe_bench(recording: Recording) -> str:
+    """Return the bench that a run uses, in words for the operator."""
+    mock = recording.header.mock
+    return "the real instruments" if mock is None else _BENCHES[_mocked_as(mock)]
+
+
+def _mocked_as(mock: Mapping[str, Any]) -> str:
+    """Return how a run's bench is mocked; runs older than the key used their wires."""
+    return str(mock.get("bench", WIRES))
 
 
 def perform_on_bench(
@@ -99,7 +116,7 @@ def perform_on_bench(
 def _bench_of(run: RunFiles) -> Iterator[Bench]:
     """The bench that a run was begun for, open."""
     recording = run.recording
-    if (recording.header.mock or {}).get("bench", WIRES) == IN_PROCESS:
+    if _mocked_as(recording.header.mock or {}) == IN_PROCESS:
         yield loaded(IN_PROCESS_BENCH)(run.scene, run.station, run.context)
         return
     with open_station(run.station, run.scene, run.context) as bench:

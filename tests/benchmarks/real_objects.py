@@ -90,7 +90,7 @@ class Job:
         file, units, material = OBJECTS[self.object]
         what = ["--object", str(self.data / file), "--units", units, "--material", material]
         where = ["--seed", str(self.seed), "--out", str(self.folder)]
-        return ["run", "contact-localization", "--station", "mock", *what, *where]
+        return ["run", "contact-localization", "--station", "mock", "--bench", "wires", *what, *where]
 
     def perform(self) -> Row:
         """The row kept of an earlier start, or of a run made now."""

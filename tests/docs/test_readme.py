@@ -14,10 +14,10 @@ from tests.support.whole_run import in_process_run, touch_scene
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
-OVER_WIRES = ("run ", "demo ", "check ", "calibrate taxim --station")
+ON_A_BENCH = ("run ", "demo ", "check ", "calibrate taxim --station")
 MEASURED = ("tables ", "cost ", "replay RUN")
-LONG = (*OVER_WIRES, *MEASURED)
-"""A run over every wire takes a minute, and each of these commands has quicker tests of its own."""
+LONG = (*ON_A_BENCH, *MEASURED)
+"""Commands that take up to a minute; each has quicker tests of its own."""
 
 IN_ORDER = (
     "sim touch",

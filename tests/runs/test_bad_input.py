@@ -159,8 +159,8 @@ MUG = ("run", "--object", "builtin:mug")
         ([*MUG, "--contcts", "2"], ("--contcts",)),
         (["run", "contact-localisation", "--object", "builtin:mug"], ("contact-localisation",)),
         (["run"], ("--scene", "--object")),
-        (["run", "--scene", "a.toml", "--object", "builtin:mug"], ("--scene", "--object")),
-        (["run", "--object", "mug.obj"], ("--material",)),
+        (["run", "--scene", "mug_touch", "--object", "builtin:mug"], ("--scene", "--object")),
+        (["run", "--object", "mug.obj"], ("there is no file", "mug.obj")),
         (["replay", "nowhere"], ("nowhere", "run.json")),
         (["run", "--resume", "nowhere"], ("nowhere", "run.json")),
         (["explain", "nowhere.toml"], ("nowhere.toml",)),
@@ -191,8 +191,12 @@ def test_wrong_use(refused: Refused, arguments: list[str], named: tuple[str, ...
     ],
     ids=lambda option: option[0],
 )
-def test_a_run_that_is_resumed_is_the_run_that_was_planned(refused: Refused, option: tuple[str, str]) -> None:
-    said = refused(["run", "--resume", "nowhere", *option])
+def test_a_run_that_is_resumed_is_the_run_that_was_planned(
+    refused: Refused, tmp_path: Path, option: tuple[str, str]
+) -> None:
+    (tmp_path / "run").mkdir()
+    written(tmp_path / "run", "run.json", "{}")
+    said = refused(["run", "--resume", "run", *option])
     assert said.code == 2
     assert option[0] in said.error
 

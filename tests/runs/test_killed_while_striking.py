@@ -19,6 +19,7 @@ pytestmark = [
 
 MUG = (
     *("run", "contact-localization", "--object", "builtin:mug", "--sense", "both"),
+    *("--bench", "wires"),
     *("--contacts", "2", "--spacing", "spread", "--seed", "3"),
 )
 

@@ -25,7 +25,7 @@ pytestmark = [
 
 CONTACTS = 2
 MUG = (
-    *("run", "contact-localization", "--object", "builtin:mug"),
+    *("run", "contact-localization", "--object", "builtin:mug", "--bench", "wires"),
     *("--contacts", str(CONTACTS), "--spacing", "spread", "--seed", "3"),
 )
 KILLS = int(os.environ.get("TOUCHSTONE_KILLS", "1"))

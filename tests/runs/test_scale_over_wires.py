@@ -16,7 +16,17 @@ pytestmark = [
 
 
 def test_a_run_looks_touches_and_answers_and_is_replayed_to_the_same(tmp_path: Path) -> None:
-    arguments = ["run", "scale-estimation", "--object", "builtin:mug", "--range", "6cm", "24cm"]
+    arguments = [
+        "run",
+        "scale-estimation",
+        "--object",
+        "builtin:mug",
+        "--range",
+        "6cm",
+        "24cm",
+        "--bench",
+        "wires",
+    ]
     arguments += ["--sense", "vision,touch", "--contacts", "2", "--seed", "2", "--out", str(tmp_path / "run")]
     code, result = RunProcess(arguments, tmp_path).finish(200.0)
     assert code == 0

@@ -34,7 +34,7 @@ def surfaces(result: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.slow  # the same run in process is in test_shape_run.py
 def test_a_run_looks_presses_and_answers_and_is_replayed_to_the_same(tmp_path: Path) -> None:
     arguments = ["run", "shape-reconstruction", "--object", "builtin:mug", "--presses", "2", "--seed", "0"]
-    arguments += ["--level", "shape.method=hull"]
+    arguments += ["--level", "shape.method=hull", "--bench", "wires"]
     code, result = RunProcess([*arguments, "--out", str(tmp_path / "run")], tmp_path).finish(240.0)
     assert code == 0
     assert result["mock"]

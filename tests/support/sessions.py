@@ -22,8 +22,8 @@ from harness.report.run_page import write_run_page
 def start(
     scene: SceneFile, station: Station, seed: int, gap: str | None, folder: Path | None = None
 ) -> begin.Begun:
-    """Planned, rehearsed and on the disk."""
-    return begin.begin(EXPERIMENT, scene, station, seed, gap, folder)
+    """Plan and rehearse a run over the wires, and write it to the disk."""
+    return begin.begin(EXPERIMENT, scene, station, seed, gap, folder, perform.WIRES)
 
 
 def perform_on(bench: Bench, recording: Recording, progress: Progress) -> Performed:

@@ -11,7 +11,7 @@ from harness.experiment.answer import Draw, Publish, WrittenAnswer, add_report, 
 from harness.experiment.budget import answer_as_asked, sentences
 from harness.experiment.experiment import Experiment
 from harness.experiment.front import doubts, front_for
-from harness.experiment.perform import Performed, perform_on_bench, steps_planned
+from harness.experiment.perform import Performed, describe_bench, perform_on_bench, steps_planned
 from harness.recording.run_folder import RunFiles
 from harness.report.run_page import write_run_page
 
@@ -96,6 +96,7 @@ def _performed(run: PlannedRun, as_json: bool, conclude: Callable[[Performed], N
     total = steps_planned(run.experiment, run.recording)
     if run.recording.committed == total:
         return Performed(True, {})  # nothing is left to touch: no bench is opened
+    CONSOLE.print(f"bench: {describe_bench(run.recording)}", markup=False)
     CONSOLE.print(f"recording to {run.recording.folder}", markup=False)
     accuracy: Accuracy | None = run.accuracy if run.target is None else None
     with (

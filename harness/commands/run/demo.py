@@ -7,7 +7,7 @@ import typer
 
 from harness.commands import options
 from harness.commands.output import CONSOLE
-from harness.commands.run.run import DEFAULT, RUNNABLE, BenchKind, BenchOption, Spacing, run
+from harness.commands.run.run import DEFAULT, RUNNABLE, Spacing, run
 
 _OPTIONS: dict[str, dict[str, Any]] = {
     DEFAULT: {"contacts": 4, "spacing": Spacing.SPREAD, "sense": "both"},
@@ -15,12 +15,6 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     "shape-reconstruction": {"presses": 4, "set_": ["choose=active"]},
 }
 """Of ``touchstone run``, by experiment: a short run that shows what it does."""
-
-
-_BENCHES = {
-    BenchKind.WIRES: "each at the far end of its cable",
-    BenchKind.IN_PROCESS: "in this process and in simulated time (--bench wires for the cables)",
-}
 
 
 def demo(
@@ -35,7 +29,7 @@ def demo(
     ] = "mug",
     objectfile: options.ObjectFileOption = None,
     level: options.LevelOption = None,
-    bench: BenchOption = BenchKind.IN_PROCESS,
+    bench: options.BenchOption = None,
     seed: options.Seed = 1,
     out: Annotated[Path | None, typer.Option(help="The run's folder.")] = None,
     json: options.Json = False,
@@ -53,8 +47,7 @@ def demo(
     Try: touchstone demo shape-reconstruction
     """
     CONSOLE.print(
-        f"mock bench: a UR5e, a GelSight and what else the run reads, {_BENCHES[bench or BenchKind.WIRES]}, "
-        "with a reality gap of their own"
+        "mocked bench: a UR5e, a GelSight and the other instruments that the run reads, with a reality gap"
     )
     folder = None if objectfile is not None else _objectfile(experiment, object_)
     return run(

@@ -22,27 +22,11 @@ class Spacing(StrEnum):
     SPREAD = "spread"
 
 
-class BenchKind(StrEnum):
-    """How a mocked bench is run."""
-
-    WIRES = "wires"
-    IN_PROCESS = "in-process"
-
-
 class Yaw(StrEnum):
     """Whether the estimator knows the object's yaw."""
 
     KNOWN = "known"
     UNKNOWN = "unknown"
-
-
-BenchOption = Annotated[
-    BenchKind | None,
-    typer.Option(
-        help="Of a mocked station. wires: each instrument at the far end of its cable, in real time; "
-        "in-process: the same world without cables, in simulated time. wires if left out.",
-    ),
-]
 
 
 def run(
@@ -63,7 +47,7 @@ def run(
     objectfile: options.ObjectFileOption = None,
     seed: options.Seed = None,
     gap: options.GapOption = None,
-    bench: BenchOption = None,
+    bench: options.BenchOption = None,
     set_: Annotated[
         list[str] | None,
         typer.Option(

@@ -106,7 +106,7 @@ def test_a_damaged_description_is_refused(tmp_path: Path, text: str, said: str) 
 
 def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "none").mkdir()
-    with pytest.raises(WrongUse, match="is no ObjectFile: there is no object.json in it"):
+    with pytest.raises(WrongUse, match=r"is no ObjectFile: there is no object\.json in it"):
         load_scene(written(tmp_path, 'objectfile = "none"'))
 
 

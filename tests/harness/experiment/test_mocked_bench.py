@@ -9,7 +9,7 @@ from experiments.contact_localization.experiment import EXPERIMENT
 from harness.basics.errors import WrongUse
 from harness.bench.station_file import Station, load_station, station_path
 from harness.experiment.begin import begin
-from harness.experiment.perform import IN_PROCESS, perform_on_bench
+from harness.experiment.perform import IN_PROCESS, WIRES, describe_bench, perform_on_bench
 from harness.recording.recording import Recording
 from harness.recording.session import Quiet
 from tests.support.whole_run import touch_scene
@@ -45,10 +45,16 @@ def test_a_run_in_process_opens_no_wire_and_goes_on_without_one(
     assert recording.committed == 2
 
 
-def test_a_run_takes_the_wires_where_nothing_else_is_said(
-    tmp_path: Path, station: Station, no_wires: None
-) -> None:
+def test_a_mocked_run_is_in_process_by_default(tmp_path: Path, station: Station, no_wires: None) -> None:
     recording = begin(EXPERIMENT, touch_scene(contacts=1), station, 3, None, tmp_path / "run").recording
+    assert "in this process" in describe_bench(recording)
+    assert perform_on_bench(EXPERIMENT, recording, Quiet()).complete
+
+
+def test_a_run_takes_the_wires_on_request(tmp_path: Path, station: Station, no_wires: None) -> None:
+    begun = begin(EXPERIMENT, touch_scene(contacts=1), station, 3, None, tmp_path / "run", WIRES)
+    recording = begun.recording
+    assert "at the far end of its cable" in describe_bench(recording)
     with pytest.raises(AssertionError, match="opens no wire"):
         perform_on_bench(EXPERIMENT, recording, Quiet())
 
