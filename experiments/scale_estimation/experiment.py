@@ -6,7 +6,7 @@ from typing import Any
 
 from experiments.scale_estimation.answer import ScaleAnswering
 from experiments.scale_estimation.dials import KNOBS, OF_SHAPE, OWN
-from experiments.scale_estimation.explore import performer, plan, steps_of
+from experiments.scale_estimation.explore import performer, plan, smallest_error, steps_of
 from experiments.scale_estimation.report import write
 from experiments.scale_estimation.result import lines_of, result_of
 from experiments.scale_estimation.section import Scale
@@ -93,6 +93,7 @@ EXPERIMENT = Experiment(
         "sensors": {"camera": True, "sound": True, "touch": True},
     },
     error_key="until",
+    smallest_error=smallest_error,
     budgets=plain_budgets(NAME, steps_of, *OWN),
     sizes_unknown=True,
     measured="the size and the place of the object are what this run measures",

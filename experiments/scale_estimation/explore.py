@@ -1,13 +1,16 @@
 """The steps of a scale estimation: a look, then contacts planned one by one on what is known by then."""
 
+from statistics import NormalDist
+
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.next_contact import Explorer
 from experiments.scale_estimation.section import Scale
+from experiments.scale_estimation.size import CREDIBLE, SHARED
 from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
-from harness.experiment.experiment import Helpers, Planned
+from harness.experiment.experiment import ErrorBound, Helpers, Planned
 from harness.recording.run_folder import RunFiles
 from harness.skills.exploring.exploration import Exploration, kinds
 from harness.twin.rehearsal import rehearse
@@ -18,6 +21,19 @@ def steps_of(scene: SceneFile) -> int:
     sensors = scene.sensors
     contacts = scene.section(Scale).contacts if sensors.touch or sensors.sound else 0
     return int(sensors.camera) + contacts
+
+
+def smallest_error(scene: SceneFile, mesh: Mesh) -> ErrorBound:
+    """Return the narrowest half interval that an answer can state: every sense shares ``SHARED``."""
+    nominal = float((mesh.bounds[1] - mesh.bounds[0]).max())
+    low = scene.object.sizes_of(nominal)[0] if scene.object.is_hidden else nominal
+    half = NormalDist().inv_cdf(0.5 + 0.5 * CREDIBLE)
+    return ErrorBound(
+        half * SHARED * low,
+        f"half the 90 % interval of an object {1e3 * low:.0f} mm long: all senses share an error of "
+        f"{100 * SHARED:g} % of the size, which no contact reduces",
+        "or leave it out to make every contact",
+    )
 
 
 def plan(scene: SceneFile, station: Station, mesh: Mesh, _seed: int) -> Planned:

@@ -1,5 +1,6 @@
 """The steps of a shape reconstruction: a look, then presses chosen one by one, or planned on the drawing."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from harness.basics.errors import WrongUse
 from harness.basics.mesh import Mesh
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
-from harness.experiment.experiment import Helpers, Planned
+from harness.experiment.experiment import ErrorBound, Helpers, Planned
 from harness.recording.run_folder import RunFiles
 from harness.skills.exploring.exploration import Exploration, NextContact, kinds
 from harness.skills.exploring.surroundings import nowhere
@@ -28,6 +29,18 @@ def steps_of(scene: SceneFile) -> int:
 
 def _presses(scene: SceneFile) -> int:
     return scene.section(ShapeRun).presses if scene.sensors.touch else 0
+
+
+def smallest_error(scene: SceneFile, _mesh: Mesh) -> ErrorBound:
+    """Return the mean deviation that all readings would leave if they measured one and the same point."""
+    section, count = scene.section(ShapeRun), steps_of(scene)
+    readings = f"{_presses(scene)} presses" + (" and a picture" if scene.sensors.camera else "")
+    return ErrorBound(
+        section.contact_error / math.sqrt(max(count, 1)),
+        f"the mean deviation that {readings} leave where each contact is known to "
+        f"{1e3 * section.contact_error:g} mm",
+        "or take more presses with --presses",
+    )
 
 
 def plan(scene: SceneFile, station: Station, mesh: Mesh, seed: int) -> Planned:

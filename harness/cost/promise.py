@@ -137,6 +137,13 @@ def promise_share(point: Point, name: str | None, error: float) -> float:
     return float(np.count_nonzero(doubts(point, alike) <= reach) / len(alike))
 
 
+def smallest_promise(point: Point, name: str | None) -> float:
+    """Return the smallest error in m that a setting promises to any of the runs like these, or infinity."""
+    limits, promised = promises(point)
+    groups = np.searchsorted(limits, doubts(point, like(point, name)))
+    return float(np.append(promised, np.inf)[groups].min()) if len(groups) else float("inf")
+
+
 def typical_promise(point: Point, name: str | None) -> float:
     """Metres promised to half of the runs like these, or infinity."""
     limits, promised = promises(point)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harness.basics.errors import WrongUse
+from harness.basics.mesh import Mesh
 from harness.bench.gap import lasting_name
 from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
@@ -71,6 +72,7 @@ def begin(
     if procedure.section is not None:
         section = scene.section(procedure.section)
         scene, seed = scene.with_section(section), section.seed if seed is None else seed
+        require_reachable(procedure, scene, known.mesh)
     seed = 0 if seed is None else seed
     plan = procedure.plan(scene, station, known.mesh, seed)
     described = {
@@ -85,6 +87,30 @@ def begin(
     stamp = dt.datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
     with new_runs_folder(procedure.name, scene.object.name, stamp) as own:
         return Begun(create_run(own, *run), plan, known)
+
+
+def require_reachable(procedure: Procedure, scene: SceneFile, mesh: Mesh) -> None:
+    """Refuse an ``--error`` that no run of this scene can state.
+
+    Args:
+        procedure: the experiment; nothing is refused if its ``--error`` chooses levels.
+        scene: with the experiment's table.
+        mesh: of the object, in m.
+
+    Raises:
+        WrongUse: the error is below the bound, which the message states.
+    """
+    if procedure.section is None or procedure.error_key is None or procedure.smallest_error is None:
+        return
+    wanted = vars(scene.section(procedure.section))[procedure.error_key]
+    if wanted is None:
+        return
+    bound = procedure.smallest_error(scene, mesh)
+    if wanted < bound.error:
+        raise WrongUse(
+            f"an error of {1e3 * wanted:g} mm cannot be reached: this run can state "
+            f"{1e3 * bound.error:.2g} mm at best, {bound.reason}; allow more with --error, {bound.advice}"
+        )
 
 
 def _mock(

@@ -244,6 +244,20 @@ class Measurement:
     per_object: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class ErrorBound:
+    """The smallest error that a run can state, known before anything moves."""
+
+    error: float
+    """m; every run of the scene states at least this."""
+
+    reason: str
+    """What limits it, as the end of a sentence that begins with the error."""
+
+    advice: str
+    """What lowers it, or what to do instead."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Procedure:
     """What an arm is to do at a bench, whatever is made of the readings: an experiment's or a calibration's.
@@ -260,6 +274,8 @@ class Procedure:
         assumed: tables and keys of a scene made from options, where they say nothing else.
         error_key: of its table, that ``--error`` sets: the run itself ends when that is met; None where
             ``--error`` chooses the levels of the answer.
+        smallest_error: lower bound of the error that a run states, of a scene and its mesh; needed with
+            ``error_key``.
         sizes_unknown: whether it can do with an object whose size is hidden.
     """
 
@@ -273,6 +289,7 @@ class Procedure:
     observe: tuple[str, ...] | None = None
     assumed: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     error_key: str | None = None
+    smallest_error: Callable[[SceneFile, Mesh], ErrorBound] | None = None
     sizes_unknown: bool = False
 
     @property

@@ -3,12 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from harness.basics.errors import WrongUse
 from harness.bench.scene import SceneFile
 from harness.cost.choice import for_budget, for_error, nearest_condition
 from harness.cost.curve import Curve, Point
 from harness.cost.file import curve_path, load
-from harness.cost.promise import promise_share, typical_promise
+from harness.cost.promise import promise_share, smallest_promise, typical_promise
 from harness.cost.provenance import code, machine, stale
 from harness.effects.accuracy import Level, Setting
 from harness.effects.scene_object import known_object
@@ -131,29 +133,48 @@ def foresee(experiment: Experiment, scene: SceneFile, target: Target) -> str:
         target: what is asked.
 
     Raises:
-        WrongUse: the cheapest setting measured on this machine takes longer than the budget, or no setting
-            was measured that promised the error; nothing like this run was measured, or the experiment
-            keeps no budgets.
+        WrongUse: the cheapest setting takes longer than the budget (by far, if the curve is stale); no
+            setting promises the error, or none with so few steps; nothing like this run was measured, or
+            the experiment keeps no budgets.
     """
     front = front_for(experiment, scene, budgets_of(experiment).steps(scene))
     name = object_key(scene.object.name, known_object(scene).mesh)
     if target.seconds is None:
         assert target.error is not None
         tried = for_error(front.points, target.error, name)
-        if front.vouches and promise_share(tried[-1], name, target.error) == 0.0:
+        if promise_share(tried[-1], name, target.error) == 0.0:
+            smallest = min(smallest_promise(point, name) for point in front.points)
+            least = (
+                f"the smallest error that is promised is {1e3 * smallest:.2g} mm"
+                if np.isfinite(smallest)
+                else "too few runs were measured to promise any"
+            )
             raise WrongUse(
                 f"an error of {1e3 * target.error:g} mm cannot be promised: no answer to runs like this one "
-                f"did, at any setting; half of them promised {1e3 * typical_promise(tried[-1], name):.2g} mm "
-                f"({tried[-1].name}); allow more, or take more {experiment.plural}"
+                f"did, at any setting; {least}, and half of the runs promise "
+                f"{1e3 * typical_promise(tried[-1], name):.2g} mm ({tried[-1].name}); allow more, or take "
+                f"more {experiment.plural}"
+            )
+        if not front.vouches:
+            raise WrongUse(
+                f"an error of {1e3 * target.error:g} mm cannot be promised: settings were measured with "
+                f"{front.steps} {experiment.plural} and this run has fewer; take {front.steps} "
+                f"{experiment.plural}, or measure fewer with `touchstone cost {experiment.name} --contacts N`"
             )
         return f"for an error of {1e3 * target.error:g} mm: {', then '.join(point.name for point in tried)}"
     found = for_budget(front.points, target.seconds, name, front.scale)
-    if not found.fits and front.trusted:
+    if not found.fits and (front.trusted or _SPEED * target.seconds < found.seconds):
+        where = "here" if front.trusted else f"where it was measured ({'; '.join(front.reasons)})"
         raise WrongUse(
             f"a budget of {target.seconds:g} s cannot be kept: the cheapest setting may take "
-            f"{found.seconds:.2g} s here ({found.point.name}); allow more, or take fewer {experiment.plural}"
+            f"{found.seconds:.2g} s {where} ({found.point.name}); allow more, or take fewer "
+            f"{experiment.plural}"
         )
     return f"for {target.seconds:g} s: {found.point.name}, at most {found.seconds:.2g} s"
+
+
+_SPEED = 10.0
+"""A stale curve refuses a budget only if a machine this many times as fast could not keep it either."""
 
 
 def doubts(experiment: Experiment, front: Front, target: Target) -> tuple[str, ...]:

@@ -19,7 +19,10 @@ from experiments.contact_localization.accuracy.dials import (
 from experiments.contact_localization.accuracy.solving import ESTIMATOR, PROGRAM
 from experiments.contact_localization.experiment import EXPERIMENT
 from experiments.contact_localization.posterior.dials import METHOD, SPACING
+from experiments.scale_estimation.experiment import EXPERIMENT as SCALE
+from experiments.shape_reconstruction.experiment import EXPERIMENT as SHAPE
 from harness.basics.errors import WrongUse
+from harness.bench.scene import scene_from_json, scene_from_options
 from harness.bench.station_file import Station, load_station, station_path
 from harness.cli import invoke
 from harness.commands.run.planned_run import target_of_options
@@ -27,12 +30,13 @@ from harness.cost.curve import Curve, Point, Sample
 from harness.cost.file import curve_path, load, save
 from harness.cost.provenance import code, machine
 from harness.effects.accuracy import Accuracy, Level
-from harness.experiment.begin import begin
+from harness.experiment.begin import begin, require_reachable
 from harness.experiment.budget import answer_as_asked, sentences
 from harness.experiment.costing import Work, gathered, joined, measure
 from harness.experiment.front import Front, doubts, foresee, front_for, staleness
 from harness.experiment.solving import Target, target_of
 from harness.experiment.subjects import object_key, objects
+from harness.objects.household import build
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
 from tests.support import sessions as session_of
@@ -160,6 +164,63 @@ def test_an_error_that_no_setting_promises_is_refused_before_anything_moves(
     with pytest.raises(WrongUse, match=r"0.001 mm cannot be promised: .* allow more"):
         foresee(EXPERIMENT, scene, Target(error=1e-6))
     assert "for an error of 100 mm" in foresee(EXPERIMENT, scene, Target(error=0.1))
+
+
+def test_a_stale_curve_refuses_a_budget_that_a_ten_times_faster_machine_could_not_keep(
+    done: Recording, cache: Path
+) -> None:
+    old = curve_of(done, coarse_cpu=0.2)
+    save(Curve(PROGRAM, old.points, old.machine, {**old.code, "sha256": "0"}, old.made), curve_path(PROGRAM))
+    scene = RunFiles(done).scene
+    with pytest.raises(WrongUse, match=r"the cheapest setting may take 0\.2. s .*code has changed"):
+        foresee(EXPERIMENT, scene, Target(seconds=1e-6))
+    assert "at most" in foresee(EXPERIMENT, scene, Target(seconds=0.1))
+
+
+def test_an_error_is_refused_with_the_smallest_promise_and_where_the_run_has_too_few_contacts(
+    done: Recording, cache: Path
+) -> None:
+    measured = curve_of(done)
+    save(measured, curve_path(PROGRAM))
+    scene = RunFiles(done).scene
+    with pytest.raises(WrongUse, match="the smallest error that is promised is 1 mm"):
+        foresee(EXPERIMENT, scene, Target(error=0.5e-3))
+    more = tuple(replace(point, condition={**point.condition, "contacts": 6}) for point in measured.points)
+    save(replace(measured, points=more), curve_path(PROGRAM))
+    with pytest.raises(WrongUse, match="measured with 6 contacts and this run has fewer; take 6 contacts"):
+        foresee(EXPERIMENT, scene, Target(error=0.1))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("contact-localization --budget 1us", "a budget of 1e-06 s cannot be kept: the cheapest setting"),
+        ("contact-localization --error 1um", "the smallest error that is promised is"),
+        ("scale-estimation --range 6cm 24cm --error 0.29mm", "this run can state 0.3 mm at best"),
+        ("scale-estimation --budget 1us", "was not measured on this machine; measure it with"),
+        ("shape-reconstruction --error 0.14mm", "this run can state 0.15 mm at best, the mean deviation"),
+        ("shape-reconstruction --budget 1us", "was not measured on this machine; measure it with"),
+    ],
+)
+def test_what_no_run_reaches_is_refused_before_the_arm_moves(
+    words: str, said: str, cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert invoke(["run", *words.split(), "--object", "builtin:mug", "--out", str(out), "--json"]) == 2
+    assert said in json.loads(capsys.readouterr().out)["error"]
+    assert not out.exists()
+
+
+def test_an_error_that_a_run_may_reach_is_not_refused() -> None:
+    mug = build("mug")
+    for experiment, error in ((SCALE, 0.31e-3), (SHAPE, 0.16e-3)):
+        assert experiment.section is not None
+        scene = scene_from_options("builtin:mug")
+        tree = scene.model_dump(mode="json", by_alias=True)
+        tree["object"] |= {"scale": "hidden", "sizes": ["6 cm", "24 cm"]}
+        tree["sensors"] |= {"camera": True}
+        tree[experiment.section.table] = {"until": f"{1e3 * error} mm"}
+        require_reachable(experiment, scene_from_json(tree, "the test"), mug)
 
 
 @pytest.mark.parametrize("target", [Target(seconds=2.0), Target(error=5e-3)])

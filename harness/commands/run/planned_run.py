@@ -20,6 +20,7 @@ from harness.experiment.experiment import Experiment
 from harness.experiment.front import foresee
 from harness.experiment.levels import chosen_levels
 from harness.experiment.lookup import experiment_of, named, require_of
+from harness.experiment.perform import steps_planned
 from harness.experiment.solving import Target, target_of
 from harness.recording.recording import Recording
 from harness.recording.run_folder import RunFiles
@@ -79,6 +80,8 @@ def new_run(
     station = load_station(station_path(bench.station or "mock"))
     if target is not None:
         CONSOLE.print(foresee(experiment, wanted, target), markup=False)
+    elif experiment.section is not None and experiment.error_key is not None:
+        _describe_end(experiment, vars(wanted.section(experiment.section))[experiment.error_key])
     begun = begin(experiment, wanted, station, bench.seed, bench.gap, bench.out, bench.bench, target)
     _describe(experiment, begun, accuracy)
     return PlannedRun(experiment, begun.recording, accuracy, target)
@@ -111,7 +114,10 @@ def resumed_run(
     kind = experiment_of(recording)
     if experiment is not None:
         require_of(recording, named(experiment).name, "--resume")
-    accuracy = chosen_levels(kind.knobs, levels, RunFiles(recording).network_levels)
+    files = RunFiles(recording)
+    accuracy = chosen_levels(kind.knobs, levels, files.network_levels)
+    if target is not None and recording.committed < steps_planned(kind, recording):
+        CONSOLE.print(foresee(kind, files.scene, target), markup=False)
     if target is None and not levels:
         target = target_of(recording.header.plan)
     return PlannedRun(kind, recording, accuracy, target)
@@ -145,6 +151,15 @@ def target_of_options(budget: str | None, error: str | None, levels: Sequence[st
     option, kind = ("--budget", TIME) if budget is not None else ("--error", LENGTH)
     value = positive(option, given, kind)
     return Target(seconds=value) if budget is not None else Target(error=value)
+
+
+def _describe_end(experiment: Experiment, error: float | None) -> None:
+    """State when a run ends whose own estimate is compared with ``--error``; it has no curve."""
+    if error is not None:
+        CONSOLE.print(
+            f"no curve promises an error of {experiment.name} in advance: the run ends when its own estimate "
+            f"states {1e3 * error:g} mm or less, at the latest after its last {experiment.step}"
+        )
 
 
 def _describe(experiment: Experiment, begun: Begun, accuracy: Accuracy) -> None:
