@@ -280,7 +280,8 @@ class ScaleAnswering:
         refusal = self._no_picture(self.ways)
         if refusal is not None:
             raise refusal
-        return ways_alone(self.ways, self.model.sizes, int(self.accuracy[TURNS.name]))
+        turns, same_place = int(self.accuracy[TURNS.name]), self.model.same_place
+        return ways_alone(self.ways, self.model.sizes, turns, same_place)
 
     def _no_picture(self, read: Sequence[object]) -> FitRefused | None:
         """Why touch has no answer where pictures were taken and none of them was read."""

@@ -20,6 +20,7 @@ from harness.bench.scene import SceneFile
 from harness.bench.station_file import Station
 from harness.effects.accuracy import Accuracy, Level
 from harness.experiment.object_modes import ReadFile, object_modes
+from harness.experiment.repeated_readings import PlaceTolerance
 from harness.picture.camera_errors import CameraErrors
 from harness.sim.solid.surface_samples import sample_surface
 from harness.skills.exploring.surroundings import nowhere
@@ -103,8 +104,13 @@ class ObjectModel:
         """For contacts."""
         surface = sample_surface(self.mesh, self.nominal / _SAMPLES)
         asked = self.scene.section(Scale)
-        errors = StandErrors.at(self.station.errors, asked.place_error, asked.support_error)
+        errors = StandErrors.at(self.station.errors, asked.place_error, asked.support_error, self.same_place)
         return Stand.of(surface, self.upright, self.anchor, self.place, errors)
+
+    @property
+    def same_place(self) -> PlaceTolerance:
+        """Largest differences between two contacts at one place."""
+        return PlaceTolerance.from_errors(self.station.errors, self.station.gel.sensor.gel_thickness)
 
     @property
     def errors(self) -> CameraErrors:

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from experiments.scale_estimation.touch.patch import Patch
-from harness.basics.arrays import FloatArray
-from harness.bench.bench_errors import BenchErrors
+from harness.basics.arrays import FloatArray, IntArray
+from harness.bench.bench_errors import USUAL, BenchErrors
+from harness.experiment.repeated_readings import PlaceTolerance, group_by_place, weigh_repeated
 from harness.sim.solid.surface_samples import Surface
 
 FACING = 12.0e-3
@@ -35,6 +36,12 @@ READING = 0.2e-3
 """M, by which the places of all imprints lie off the object alike, as the gel hangs around what it meets: the
 root mean square over ten runs of seeds 40, 60 and 61."""
 
+GEL_THICKNESS = 2.5e-3
+"""Thickness in m of a gel whose sensor is not stated."""
+
+USUAL_PLACE = PlaceTolerance.from_errors(USUAL, GEL_THICKNESS)
+"""Largest differences between two contacts at one place, on a bench whose errors are not stated."""
+
 UNKNOWNS = 8
 """Log of the size over the nominal one; x, y, m; yaw, rad; height, m; tilts about x and y, rad; depth, m."""
 
@@ -50,18 +57,29 @@ class StandErrors:
         support: m, of the height.
         tilt: rad, per axis, of the object's own stand.
         depth: m, along its axis, of where the gel is on the arm and how deep it reads: of all contacts alike.
+        same_place: largest differences between two contacts that count as one.
     """
 
     place: float = 0.1
     support: float = 1.0e-3
     tilt: float = float(np.radians(0.5))
     depth: float = 0.54e-3
+    same_place: PlaceTolerance = USUAL_PLACE
 
     @classmethod
-    def at(cls, bench: BenchErrors, place: float, support: float) -> "StandErrors":
-        """On a bench whose errors are stated; place and support in m, as above."""
+    def at(
+        cls, bench: BenchErrors, place: float, support: float, same_place: PlaceTolerance = USUAL_PLACE
+    ) -> "StandErrors":
+        """Derive the errors from those of the bench.
+
+        Args:
+            bench: standard deviations that the station states.
+            place: standard deviation of the object's position per axis of the plane in m.
+            support: standard deviation of the support's height in m.
+            same_place: largest differences between two contacts that count as one.
+        """
         depth = float(np.linalg.norm([bench.gel_centre, bench.gel_depth, READING]))
-        return cls(place, support, bench.tilt, depth)
+        return cls(place, support, bench.tilt, depth, same_place)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +173,39 @@ class FreeSpace:
         )
 
 
+def places_of(patches: Sequence[Patch], tolerance: PlaceTolerance) -> IntArray:
+    """Assign each contact to the place that it touched.
+
+    Args:
+        patches: contacts.
+        tolerance: largest differences between two contacts at one place.
+
+    Returns:
+        ``(n,)`` index of the place, from 0.
+    """
+    lines = np.array([patch.press_line for patch in patches]).reshape(-1, 2, 3)
+    return group_by_place(lines[:, 0], lines[:, 1], tolerance)
+
+
+def distinct_paths(paths: Sequence[FloatArray], tolerance: PlaceTolerance) -> list[FloatArray]:
+    """Keep the longest of the paths of the gel that lead along one line to one place.
+
+    Args:
+        paths: ``(n, 3)`` points in base in m each, along one straight path, its end first.
+        tolerance: largest differences between two paths to one place.
+    """
+    long = [path for path in paths if len(path) > 1]  # a single point has no direction to compare
+    if not long:
+        return list(paths)
+    ends = np.array([path[0] for path in long])
+    axes = ends - np.array([path[-1] for path in long])
+    places = group_by_place(ends, axes / np.linalg.norm(axes, axis=1, keepdims=True), tolerance)
+    longest: dict[int, FloatArray] = {}
+    for place, path in zip(places.tolist(), long, strict=True):
+        longest[place] = max(longest.get(place, path), path, key=len)
+    return [*longest.values(), *(path for path in paths if len(path) == 1)]
+
+
 class TouchProblem:
     """Least squares of contacts over ``(k, UNKNOWNS)``.
 
@@ -163,6 +214,9 @@ class TouchProblem:
         patches: of the contacts.
         points: of each patch that are used; the first are spread the widest.
         slack: by which share a sample that is taken for the nearest may be farther than it.
+
+    Attributes:
+        places: number of different places that were touched; the contacts of one place count once.
     """
 
     def __init__(self, stand: Stand, patches: Sequence[Patch], points: int, slack: float = 0.0) -> None:
@@ -171,7 +225,9 @@ class TouchProblem:
         places = [patch.points[:points] - stand.place for patch in patches]
         self._points = np.array(places).reshape(len(patches), points, 3)
         self._normals = np.array([patch.normal for patch in patches]).reshape(-1, 3)
-        self.contacts = len(patches)
+        visited = places_of(patches, stand.errors.same_place)
+        self._shares = weigh_repeated(visited)
+        self.places = len(np.unique(visited))
 
     def refined(self, unknowns: FloatArray, rounds: int, fixed_size: bool) -> tuple[FloatArray, FloatArray]:
         """Downhill from each hypothesis.
@@ -244,8 +300,8 @@ class TouchProblem:
         lateral = np.linalg.norm(along, axis=-1).mean(axis=2)
         beyond = np.maximum(lateral - scale[:, None] * 3.0e-3, 0.0) / DISTANCE_SIGMA
         cost = 0.5 * (distance**2 + np.minimum(angle, 3.0) ** 2 / 3.0 + beyond**2)
-        capped = CAP * (1.0 - np.exp(-cost / CAP))
-        weight = np.exp(-0.5 * cost / CAP)
+        capped = self._shares * CAP * (1.0 - np.exp(-cost / CAP))
+        weight = np.sqrt(self._shares) * np.exp(-0.5 * cost / CAP)
         slopes = np.empty((k, c, UNKNOWNS))
         # Slopes of the distance along the sample's normal, in the standing frame.
         slopes[..., _SIZE] = -scale[:, None] * np.einsum("kcmi,kcmi->kcm", points, faced).mean(axis=2)

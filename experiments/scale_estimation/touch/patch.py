@@ -31,10 +31,20 @@ class Patch:
     Attributes:
         points: ``(POINTS, 3)`` m in base.
         normal: ``(3,)`` unit in base, out of the object: of the plane through them.
+        base_from_gel: ``(4, 4)`` pose of the gel as the arm reported it; None where the pose is unknown, and
+            the points and the normal then tell whether two contacts are at one place.
     """
 
     points: FloatArray
     normal: FloatArray
+    base_from_gel: FloatArray | None = None
+
+    @property
+    def press_line(self) -> tuple[FloatArray, FloatArray]:
+        """``(3,)`` centre of the gel in base in m, and ``(3,)`` unit press axis, into the object."""
+        if self.base_from_gel is None:
+            return self.points.mean(axis=0), -self.normal
+        return self.base_from_gel[:3, 3], self.base_from_gel[:3, 2]
 
 
 def free_line(base_from_gel: FloatArray, length: float, touched: bool) -> FloatArray:
@@ -67,7 +77,8 @@ def patch_of(heights: FloatArray, pitch: float, base_from_gel: FloatArray) -> Pa
     in_gel = np.column_stack([across, along, -heights[rows, columns]])
     normal = _normal(in_gel)
     chosen = in_gel[_spread(in_gel[:, :2], POINTS)]
-    return Patch(read_only(apply(base_from_gel, chosen)), read_only(base_from_gel[:3, :3] @ normal))
+    points, rotation = apply(base_from_gel, chosen), base_from_gel[:3, :3]
+    return Patch(read_only(points), read_only(rotation @ normal), read_only(base_from_gel.copy()))
 
 
 def _normal(points: FloatArray) -> FloatArray:

@@ -8,7 +8,13 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from experiments.scale_estimation.size import Belief, SizeRange
-from experiments.scale_estimation.touch.fit import UNKNOWNS, FreeSpace, Stand, TouchProblem
+from experiments.scale_estimation.touch.fit import (
+    UNKNOWNS,
+    FreeSpace,
+    Stand,
+    TouchProblem,
+    distinct_paths,
+)
 from experiments.scale_estimation.touch.patch import Patch
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
@@ -82,7 +88,9 @@ def by_touch(
     refined: int = 12,
     free: Sequence[FloatArray] = (),
 ) -> Touch:
-    """The sizes at which the contacts lie on the model's surface.
+    """Compute the density of the sizes at which the contacts lie on the model's surface.
+
+    Contacts at one place count once, and so do paths to one place.
 
     Args:
         stand: the model.
@@ -99,7 +107,7 @@ def by_touch(
         raise FitRefused("the gel touched nothing yet; touch the object")
     began = time.perf_counter()
     logs = sizes.logs - np.log(nominal)
-    passed = FreeSpace(stand, free)
+    passed = FreeSpace(stand, distinct_paths(free, stand.errors.same_place))
     found, costs = TouchProblem(stand, patches, _COARSE_POINTS, _SLACK).refined(
         _starts(stand, patches, logs, refined > CHEAP), 5, fixed_size=False
     )
@@ -108,10 +116,11 @@ def by_touch(
     minima, misfits = fine.refined(likely[:refined], 8, fixed_size=False)
     least = misfits + passed.cost(minima)
     best = int(least.argmin())
-    if misfits[best] / len(patches) > MISFIT:
+    cost = float(misfits[best] / fine.places)
+    if cost > MISFIT:
         raise FitRefused(
             "the contacts are off this object's surface at any size and turn: "
-            f"{misfits[best] / len(patches):.1f} a contact (limit {MISFIT:g}); check that it is this object, "
+            f"{cost:.1f} a contact (limit {MISFIT:g}); check that it is this object, "
             "and that it stands upright where the scene says"
         )
     apart = _apart(minima, least)
@@ -121,8 +130,7 @@ def by_touch(
     for k in apart:
         scan.append(_scanned(fine, minima[k], float(least[k] - misfits[k])))
     belief = Belief.of(sizes, -_least_of(np.vstack(scan), logs))
-    cost = float(misfits[best] / len(patches))
-    belief = belief.doubted(max(CHANCE ** (len(patches) - 1), STRANGER if cost > DOUBTED else 0.0))
+    belief = belief.doubted(max(CHANCE ** (fine.places - 1), STRANGER if cost > DOUBTED else 0.0))
     return Touch(belief, minima[best], cost, time.perf_counter() - began)
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from experiments.scale_estimation.dials import TURNS
 from experiments.scale_estimation.size import Belief, SizeRange, fused
+from experiments.scale_estimation.touch.fit import USUAL_PLACE
 from experiments.scale_estimation.touch.patch import Patch
-from experiments.scale_estimation.unseen.contact_set import GelWay
+from experiments.scale_estimation.unseen.contact_set import GelWay, distinct_ways
 from experiments.scale_estimation.unseen.network import by_imprints, by_strikes, by_ways, shipped
 from experiments.scale_estimation.unseen.real_shapes import shape_sigma
 from experiments.scale_estimation.unseen.regression import by_outline, features_of
@@ -19,6 +20,7 @@ from harness.basics.errors import FitRefused
 from harness.basics.materials import Material
 from harness.bench.acquisition import Strike
 from harness.bench.station_sections import CameraSection
+from harness.experiment.repeated_readings import PlaceTolerance
 from harness.picture.outline import SeenOutline
 
 NOVEL_SIGMA = 0.35
@@ -86,20 +88,26 @@ def strikes_alone(strikes: Sequence[Strike], material: Material, sizes: SizeRang
     return ShapelessAnswer(*by_strikes(*heard, material, sizes))
 
 
-def ways_alone(ways: Sequence[GelWay], sizes: SizeRange, turns: int = TURNS.default) -> ShapelessAnswer:
-    """By the straight ways of the gel, those that met the object and those that did not.
+def ways_alone(
+    ways: Sequence[GelWay],
+    sizes: SizeRange,
+    turns: int = TURNS.default,
+    same_place: PlaceTolerance = USUAL_PLACE,
+) -> ShapelessAnswer:
+    """Estimate the size from the straight paths of the gel, those that met the object and those that did not.
 
     Args:
-        ways: of one exploration.
-        sizes: asked about.
-        turns: about the vertical, over which the network is averaged.
+        ways: paths of one exploration.
+        sizes: range of sizes that is asked about.
+        turns: number of rotations about the vertical over which the network is averaged.
+        same_place: largest differences between two paths to one place; the first of them counts.
 
     Raises:
         FitRefused: the gel touched nothing.
     """
     if all(way.normal is None for way in ways):
         raise FitRefused("the gel touched nothing yet")
-    belief, distance = by_ways(ways, sizes, turns)
+    belief, distance = by_ways(distinct_ways(ways, same_place), sizes, turns)
     # Farther off than usual, the network has given an even density its share already.
     novel = NOVEL_SIGMA * min(distance, 1.0)
     return ShapelessAnswer(belief.widened(float(np.hypot(shape_sigma("touch"), novel))), distance)

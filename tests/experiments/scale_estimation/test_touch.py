@@ -8,7 +8,14 @@ import pytest
 
 from experiments.scale_estimation.model import ObjectModel
 from experiments.scale_estimation.size import SizeRange
-from experiments.scale_estimation.touch.fit import THROUGH, UNKNOWNS, FreeSpace, Stand, StandErrors
+from experiments.scale_estimation.touch.fit import (
+    THROUGH,
+    UNKNOWNS,
+    FreeSpace,
+    Stand,
+    StandErrors,
+    distinct_paths,
+)
 from experiments.scale_estimation.touch.patch import POINTS, Patch, patch_of
 from experiments.scale_estimation.touch.touch import by_touch
 from harness.basics.arrays import FloatArray
@@ -92,6 +99,51 @@ def test_one_contact_says_hardly_anything() -> None:
     found = by_touch(stand, contacts("mug", 1.0, 1), nominal, RANGE)
     low, high = found.belief.interval
     assert high / low > 2.0
+
+
+def repeated(patch: Patch, times: int, seed: int) -> list[Patch]:
+    """The same press again, each with a fresh error of the arm and of the gel's reading."""
+    random = np.random.default_rng(seed)
+    copies = []
+    for _ in range(times):
+        moved = patch.points + 0.3e-3 * random.standard_normal(3)
+        copies.append(Patch(moved + 0.02e-3 * random.standard_normal(patch.points.shape), patch.normal))
+    return copies
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_the_same_touch_ten_times_gives_the_interval_of_one(count: int) -> None:
+    stand, nominal = stand_of("mug")
+    made = contacts("mug", 1.0, count)
+    once = by_touch(stand, made, nominal, RANGE)
+    copied = by_touch(stand, [made[0]] * 9 + made, nominal, RANGE)
+    assert copied.belief.interval == pytest.approx(once.belief.interval, rel=1e-4)
+    assert copied.cost == pytest.approx(once.cost, abs=1e-4)
+    low, high = copied.belief.interval
+    assert low < nominal < high
+
+
+def test_the_same_touch_read_ten_times_gives_nearly_the_interval_of_one() -> None:
+    stand, nominal = stand_of("mug")
+    made = contacts("mug", 1.0, 5)
+    low, high = by_touch(stand, made, nominal, RANGE).belief.interval
+    again = by_touch(stand, [*made, *repeated(made[0], 9, 1)], nominal, RANGE).belief.interval
+    assert low < nominal < high
+    assert again == pytest.approx((low, high), rel=0.01)
+    assert again[1] / again[0] > 1.0 + 0.8 * (high / low - 1.0)
+
+
+def test_a_path_to_the_same_place_again_is_no_new_evidence() -> None:
+    stand, nominal = stand_of("tray")
+    aside = PLACE + np.array([0.75 * nominal, 0.0, 0.0])
+    path = aside + np.linspace(0.001, 0.2, 140)[:, None] * UP
+    shorter, elsewhere = path[:70], path + np.array([0.02, 0.0, 0.0])
+    kept = distinct_paths([shorter, path, elsewhere, path[:1]], stand.errors.same_place)
+    assert [one.tolist() for one in kept] == [path.tolist(), elsewhere.tolist(), path[:1].tolist()]
+    assert distinct_paths([], stand.errors.same_place) == []
+    made = contacts("tray", 1.0, 3)
+    once, copied = (by_touch(stand, made, nominal, RANGE, free=[path] * times) for times in (1, 10))
+    assert copied.belief.interval == pytest.approx(once.belief.interval)
 
 
 def test_contacts_on_one_side_leave_the_size_open() -> None:

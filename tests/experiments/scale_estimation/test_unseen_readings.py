@@ -143,6 +143,13 @@ def test_the_order_of_contacts_does_not_matter() -> None:
     assert first.log_density == pytest.approx(second.log_density, abs=1e-4)
 
 
+def test_the_same_path_ten_times_gives_the_answer_of_one() -> None:
+    made = ways()
+    once, copied = ways_alone(made, RANGE), ways_alone([made[0]] * 9 + made, RANGE)
+    assert copied.belief.log_density == pytest.approx(once.belief.log_density, abs=1e-4)
+    assert copied.distance == pytest.approx(once.distance)
+
+
 def test_no_more_ways_are_looked_at_than_there_is_room_for() -> None:
     many = (ways() * 5)[: 2 * MOST]
     rows, kinds, whole = features_of_ways(many)
