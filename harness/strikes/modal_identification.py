@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 from harness.basics.arrays import AnyArray, BoolArray, FloatArray, read_only
 from harness.basics.clipping import is_clipped
 from harness.basics.errors import DataRefused, WrongUse
-from harness.strikes.moved_modes import MovedMode, moved_modes
+from harness.strikes.moved_modes import MovedMode, merge_poles
 from harness.strikes.pole_fit import ComplexArray, PoleFit, SpectralLines, fit_poles
 from harness.strikes.pole_search import PoleSearch, new_poles
 
@@ -220,7 +220,7 @@ def _identified(lines: SpectralLines, search: PoleSearch, rounding: float) -> Id
 def _searched(lines: SpectralLines, search: PoleSearch, rounding: float) -> Identified:
     fit = fit_poles(lines, np.zeros(0), np.zeros(0), search.skirt)
     most = min(search.most, len(lines.frequencies) // _LINES_A_MODE)
-    moved, full = moved_modes(lines, fit, search), False
+    moved, full = merge_poles(lines, fit, search), False
     while not full:
         new = [one for one in new_poles(lines, fit, search, rounding) if not _stands_for(moved, one[0])]
         room = most - len(fit.omegas)
@@ -230,12 +230,12 @@ def _searched(lines: SpectralLines, search: PoleSearch, rounding: float) -> Iden
         omegas = np.concatenate([fit.omegas, [omega for omega, _ in new[:room]]])
         decays = np.concatenate([fit.decays, [decay for _, decay in new[:room]]])
         fit = fit_poles(lines, omegas, decays, search.skirt)
-        moved = moved_modes(lines, fit, search)
+        moved = merge_poles(lines, fit, search)
     return _described(lines, fit, moved, full)
 
 
 def _stands_for(moved: Sequence[MovedMode], omega: float) -> bool:
-    return any(mode.holds(omega) for mode in moved)
+    return any(mode.contains(omega) for mode in moved)
 
 
 def _described(lines: SpectralLines, fit: PoleFit, moved: Sequence[MovedMode], full: bool) -> Identified:

@@ -282,6 +282,50 @@ def test_a_mode_that_moves_from_row_to_row_is_one_mode_and_that_is_stated(moved:
     assert any("changed between the rows" in note for note in identified.notes) == (moved > 0.0)
 
 
+PAIR = np.array([1681.2, 1684.2])
+
+
+def pair_response(amplitudes: list[tuple[float, float]], damping: float) -> tuple[FloatArray, ComplexArray]:
+    """Hz and accelerance of two modes, a row for each pair of amplitudes, with noise of a thousandth."""
+    random = np.random.default_rng(0)
+    frequencies = np.arange(1500.0, 1900.0, 0.5)
+    s, omegas = 2j * np.pi * frequencies, 2.0 * np.pi * PAIR[:, None]
+    values = np.array(amplitudes) @ (s**2 / (omegas**2 + 2.0 * damping * s + s**2))
+    noise = random.normal(size=values.shape) + 1j * random.normal(size=values.shape)
+    return frequencies, np.asarray(values + 1e-3 * np.abs(values).max() * noise, np.complex128)
+
+
+def test_a_moved_mode_is_one_mode_and_a_true_pair_is_two() -> None:
+    """A hammer roves along a beam whose modes move by one per cent; a pair has nodes in some rows."""
+    frequencies, values, factors = roving(1e-2)
+    identified = modes_of_response(frequencies, values, PoleSearch(low=20.0))
+    assert len(identified.modes) == 6
+    sixth = identified.modes[-1]
+    shares = free_shape(float(beam_roots("free-free", 6)[-1]), np.linspace(0.0, 1.0, len(factors))) ** 2
+    assert sixth.frequency == pytest.approx(ROVING * np.average(factors, weights=shares), abs=0.5)
+    assert sixth.damping == pytest.approx(2e-4 * 2.0 * np.pi * ROVING, abs=0.03)
+    for damping in (3.0, 10.0, 20.0):
+        for amplitudes in ([(0, 1), (1, 0), (1, 0.3), (1, 0)], [(0, 1), (1, 0), (1, 0), (0, 1)]):
+            pair = modes_of_response(*pair_response(amplitudes, damping))
+            assert found(pair)[0] == pytest.approx(PAIR, abs=0.02)
+            assert found(pair)[1] == pytest.approx([damping] * 2, abs=0.05)
+            assert pair.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "damping"),
+    [
+        ([(0, 1), (1, 0.15)], 3.0),
+        ([(0, 1), (1, 0), (1, 0.3)], 10.0),
+        ([(1, 0.5), (1, -0.5), (0.3, 1)], 20.0),
+    ],
+)
+def test_a_pair_in_few_rows_is_two_modes(amplitudes: list[tuple[float, float]], damping: float) -> None:
+    """One row shows both peaks, or fewer poles than rows explain everything."""
+    pair = modes_of_response(*pair_response(amplitudes, damping))
+    assert found(pair)[0] == pytest.approx(PAIR, abs=0.02)
+
+
 def test_a_close_pair_in_several_rows_stays_two_modes() -> None:
     """Rows that all have both, in proportions of their own: no row alone is explained by one pole."""
     random = np.random.default_rng(1)
