@@ -20,6 +20,7 @@ from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import CalibrationRefused, DataRefused
 from harness.basics.files.foreign_file import MOST_TEXT, read_bounded
 from harness.basics.resampling import resample
+from harness.basics.rest_level import fit_rest
 from harness.basics.whole_file import write_text_whole
 from harness.bench.acquisition_channels import (
     FLAG_FIELDS,
@@ -39,6 +40,13 @@ SCHEMA = 1
 _SHIPPED = Path(__file__).parent / "data"
 _TEXTS = ("model", "serial", "hammer_serial", "microphone_serial", "date", "made_from")
 _SIGNED = ("hammer_offset", "microphone_offset")
+DRIFT_SAMPLES = 256
+"""Samples before a blow from which a drift of the rest is known well enough to be removed."""
+
+DRIFT_SIGMAS, DRIFT_COUNTS = 6.0, 2.0
+"""Deviations of the slope, and counts over the time before the blow, from which the rest drifts."""
+
+_ROUNDING = 0.3
 _FULL_SCALES = (2**11 - 1, 2**15 - 1, 2**23 - 1, 2**31 - 1)
 
 
@@ -177,7 +185,8 @@ class Strike:
             shares no moment with the force.
         onset: sample at which the force reached the trigger's threshold; 0 where silent.
         start: s on the bench clock, of sample 0.
-        overload: full scale was read, or the calibrated range was left: amplitudes are not to be trusted.
+        overload: full scale was read, a channel has flat tops, or the calibrated range was left: amplitudes
+            are not to be trusted.
             Also where ``lost`` says that the sound is not.
         double_hit: the hammer touched twice.
         silent: no force reached the threshold; there is nothing to analyse.
@@ -242,13 +251,14 @@ def strike_from_readings(readings: Mapping[str, Reading], calibration: Acquisiti
     scales = calibration.full_scale_counts, calibration.microphone_full_scale_counts
     check_counts(force, scales[0])
     check_counts(pressure, scales[1])
-    flags = judge(force.counts, pressure.counts, threshold, *scales)
+    flags = judge(force.counts, pressure.counts, threshold, *scales, force.rate)
     tolerance = calibration.offset_tolerance
     before = force.counts[: max(0, flags.onset - GUARD)]
     quiet = force.counts if flags.silent else before
-    force_rest = calibration.hammer_offset
+    force_rest: FloatArray | float = calibration.hammer_offset
     if len(quiet) >= SHORTEST_REST:
-        force_rest = rest_of(FORCE, float(np.median(quiet)), calibration.hammer_offset, tolerance)
+        level, force_rest = _rest_of_force(force, quiet, flags.silent)
+        rest_of(FORCE, level, calibration.hammer_offset, tolerance)
     # Sound swings about its rest; all of it tells the rest better than the short, rumbling time before.
     tolerance *= calibration.microphone_full_scale_counts / calibration.full_scale_counts
     pressure_rest = rest_of(PRESSURE, middle(pressure.counts), calibration.microphone_offset, tolerance)
@@ -280,6 +290,28 @@ def strike_from_readings(readings: Mapping[str, Reading], calibration: Acquisiti
         0.0 if take is None else take.uncertainty,
         None if take is None else take.opened,
     )
+
+
+def _rest_of_force(force: Record, quiet: FloatArray, silent: bool) -> tuple[float, FloatArray | float]:
+    """Return the rest next to a blow in counts, and the rest of every sample: a line where it drifts.
+
+    Args:
+        force: counts of the force.
+        quiet: counts before the blow, or all where nothing was struck.
+        silent: whether nothing was struck.
+    """
+    level, first = float(np.median(quiet)), len(quiet)
+    if silent or first < DRIFT_SAMPLES:
+        return level, level
+    before = np.arange(len(force.counts)) < first
+    line = fit_rest(force.counts, before, force.rate, first, min(first + GUARD, len(force.counts) - 1))
+    if line is None:
+        return level, level
+    # The noise of whole counts is at least that of rounding.
+    sigma = max(line.noise, _ROUNDING) * float(np.sqrt(line.covariance[1, 1]))
+    if abs(line.slope) < DRIFT_SIGMAS * sigma or abs(line.slope) * first / force.rate < DRIFT_COUNTS:
+        return level, level
+    return line.level, line.at(np.arange(len(force.counts)) / force.rate)
 
 
 def of_one_stream(strikes: Sequence[Strike | None]) -> tuple[Strike | None, ...]:

@@ -5,6 +5,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.clipping import is_clipped
+from harness.basics.rest_level import coarse_rest
 from harness.bench.reading import Channel, Reading
 
 FORCE = "hammer.force"
@@ -59,7 +61,7 @@ class Flags:
 
     Attributes:
         onset: first sample of force at the threshold; 0 where silent.
-        overload: the converter read full scale on either channel: the true peak is not known.
+        overload: either channel read full scale or has flat tops below it: the true peak is not known.
         double_hit: the hammer touched twice.
         silent: the force never reached the threshold.
     """
@@ -89,7 +91,7 @@ def readings_of_capture(
             clock at which it arrived, of what the clock was fitted to.
         residuals: ``(n,)`` s by which those were later than the fit.
     """
-    flags = judge(counts[:, 0], counts[:, 1], form.threshold, form.full_scale, form.full_scale)
+    flags = judge(counts[:, 0], counts[:, 1], form.threshold, form.full_scale, form.full_scale, rate)
     onset = -1 if flags.silent else flags.onset
     said = {**asdict(flags), "onset": onset, "threshold": form.threshold}
     return (
@@ -114,7 +116,12 @@ def _blocks(name: str, counts: AnyArray, start: float, rate: float, nominal_rate
 
 
 def judge(
-    force: AnyArray, pressure: AnyArray, threshold: float, full_scale: int, microphone_full_scale: int
+    force: AnyArray,
+    pressure: AnyArray,
+    threshold: float,
+    full_scale: int,
+    microphone_full_scale: int,
+    rate: float | None = None,
 ) -> Flags:
     """Whether a strike can be used, from raw counts.
 
@@ -124,10 +131,16 @@ def judge(
         threshold: counts above rest at which a strike begins.
         full_scale: greatest count that the hammer's converter can say; ``-full_scale - 1`` is the least.
         microphone_full_scale: the same of the microphone's converter.
+        rate: samples of force per second, for a rest that drifts; None for one level.
     """
-    risen = np.asarray(force, np.float64) - np.median(force)
+    rest = np.median(force) if rate is None else coarse_rest(force, rate)
+    risen = np.asarray(force, np.float64) - rest
     reached = np.flatnonzero(risen >= threshold)
-    overload = bool(_at_full_scale(force, full_scale) or _at_full_scale(pressure, microphone_full_scale))
+    # An amplifier in front of the converter may saturate below full scale: flat tops at any level count.
+    flat = is_clipped(force, above_only=True) or is_clipped(pressure)
+    overload = bool(
+        flat or _at_full_scale(force, full_scale) or _at_full_scale(pressure, microphone_full_scale)
+    )
     if not len(reached):
         return Flags(0, overload, False, True)
     onset = int(reached[0])

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import resample
 
-from harness.basics.arrays import AnyArray, FloatArray
+from harness.basics.arrays import AnyArray, BoolArray, FloatArray
 from harness.basics.clipping import is_clipped
 from harness.basics.errors import DataRefused, WrongUse
+from harness.basics.rest_level import RestLine, coarse_rest, fit_rest
 from harness.bench.acquisition_channels import SECOND_HIT
 
 _FINE = 32
@@ -25,9 +26,11 @@ _SETTLED = 1.0e-3
 _LOUD = 0.02
 """Of the peak, or eight deviations of the noise: from there on, something touches."""
 
+_ROUNDS = 3
+"""Of finding what is loud against a rest, and the rest next to it."""
+
 _LEAST_REST = 8
 _ABOVE_NOISE = 8.0
-_SIGMA_PER_DEVIATION = 1.4826
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,8 @@ class Blow:
         width: s above half the peak.
         start: s from the first sample, where the first touch crossed the level.
         touches: how often the force rose to 5 % of its peak, having fallen to half of that before.
-        rest: N that was read with nothing touching.
+        rest: N that was read with nothing touching, next to the blow, at ``start``.
+        drift: N/s by which the rest changes there.
         noise: N, standard deviation at rest.
         clipped: whether the force stayed at one value as only a full scale makes it: peak and impulse
             are then too small, and nobody knows by how much.
@@ -60,6 +64,7 @@ class Blow:
     start: float
     touches: int
     rest: float
+    drift: float
     noise: float
     clipped: bool
 
@@ -85,13 +90,18 @@ def measure_blow(force: AnyArray, rate: float, level: float = 0.1) -> Blow:
     """
     samples = np.asarray(force, np.float64)
     _check(samples, rate, level)
-    top = int(np.argmax(samples))
-    rest, noise, quiet = _at_rest(samples, top, rate)
-    risen = samples - rest
+    line, risen = _above_rest(samples, rate)
+    noise, top = line.noise, int(np.argmax(risen))
     if not risen[top] > _ABOVE_NOISE * noise:
+        down = float(risen.min())
+        swapped = -down > max(4.0 * float(risen[top]), _ABOVE_NOISE * noise)
         raise DataRefused(
             f"no blow: the greatest force is {risen[top]:.3g} N above a rest with noise of {noise:.3g} N; "
-            "strike harder, or trigger on the right channel"
+            + (
+                f"the force falls by {-down:.3g} N: its sign is swapped, compression must be positive"
+                if swapped
+                else "strike harder, or trigger on the right channel"
+            )
         )
     first, last = _reach(risen, noise)
     if first == 0 or last == len(risen) - 1:
@@ -105,17 +115,23 @@ def measure_blow(force: AnyArray, rate: float, level: float = 0.1) -> Blow:
     touch, touch_slopes = _above(fine, level * peak)
     half, _ = _above(fine, 0.5 * peak)
     span, within = end - begin, risen[begin:end]
+    start = (begin + touch[0] / _FINE) / rate
     return Blow(
         peak=peak,
-        peak_sigma=noise,
+        peak_sigma=float(np.hypot(noise, line.sigma)),
         impulse=float(within.sum()) / rate,
-        impulse_sigma=noise / rate * float(np.sqrt(span * (1.0 + span / quiet))),
+        impulse_sigma=float(np.hypot(noise * np.sqrt(span), line.sum_sigma(np.arange(begin, end) / rate)))
+        / rate,
         duration=(touch[1] - touch[0]) / (_FINE * rate),
-        duration_sigma=noise / (_FINE * rate) * float(np.hypot(*(1.0 / touch_slopes))),
+        duration_sigma=float(
+            np.hypot(noise * np.hypot(*(1.0 / touch_slopes)), line.sigma * np.sum(1.0 / touch_slopes))
+        )
+        / (_FINE * rate),
         width=(half[1] - half[0]) / (_FINE * rate),
-        start=(begin + touch[0] / _FINE) / rate,
+        start=start,
         touches=_touches(risen, noise),
-        rest=rest,
+        rest=float(line.at(np.array(start))),
+        drift=line.slope,
         noise=noise,
         clipped=is_clipped(samples, above_only=True),
     )
@@ -134,21 +150,50 @@ def _check(samples: FloatArray, rate: float, level: float) -> None:
         raise DataRefused("the force holds values that are not finite; calibrate the channel again")
 
 
-def _at_rest(samples: FloatArray, top: int, rate: float) -> tuple[float, float, int]:
-    """Median and standard deviation of the samples far from the blow, and how many they are."""
-    middle = np.abs(samples - np.median(samples))
-    spread = _SIGMA_PER_DEVIATION * float(np.median(middle))
-    loud = np.flatnonzero(middle > max(_LOUD * middle[top], _ABOVE_NOISE * spread))
+def _above_rest(samples: FloatArray, rate: float) -> tuple[RestLine, FloatArray]:
+    """Return the rest next to the blow, and ``(t,)`` N above the rest.
+
+    Far from the blow the rest is the medians of blocks, so that a drift is no second touch.
+    """
+    rest = coarse_rest(samples, rate)
     around = round(_SETTLED * rate)
-    before = loud[0] - around if len(loud) else len(samples)
-    after = loud[-1] + around if len(loud) else len(samples)
-    quiet = np.concatenate([samples[: max(0, before)], samples[after:]])
-    if len(quiet) < _LEAST_REST:
+    line = None
+    for _ in range(_ROUNDS):
+        risen = samples - rest
+        top = int(np.argmax(risen))
+        loud = np.abs(risen) > max(_LOUD * risen[top], _ABOVE_NOISE * _spread(risen))
+        begin, end = _event(loud, top, around)
+        quiet = np.ones(len(samples), np.bool_)
+        for place in np.flatnonzero(loud):
+            quiet[max(0, place - around) : place + around + 1] = False
+        quiet[begin : end + 1] = False
+        if np.count_nonzero(quiet) >= _LEAST_REST:
+            line = fit_rest(samples, quiet, rate, begin, end)
+        if line is None:
+            break
+        near = slice(max(0, begin - around), end + around + 1)
+        rest = coarse_rest(samples, rate)
+        rest[near] = line.at(np.arange(len(samples))[near] / rate)
+    if line is None:
         raise DataRefused(
-            "the force is at rest nowhere in the record; record some milliseconds more about the blow"
+            "the force is at rest nowhere near the blow; record some milliseconds more about the blow"
         )
-    rest = float(np.median(quiet))
-    return rest, _SIGMA_PER_DEVIATION * float(np.median(np.abs(quiet - rest))), len(quiet)
+    return line, samples - rest
+
+
+def _event(loud: BoolArray, top: int, around: int) -> tuple[int, int]:
+    """Return first and last loud sample about ``top`` that no quiet stretch parts from it."""
+    places = np.flatnonzero(loud)
+    if not loud[top]:
+        return top, top
+    groups = np.split(places, np.flatnonzero(np.diff(places) > 2 * around) + 1)
+    group = next(group for group in groups if group[0] <= top <= group[-1])
+    return int(group[0]), int(group[-1])
+
+
+def _spread(risen: FloatArray) -> float:
+    """Return the standard deviation of most samples."""
+    return 1.4826 * float(np.median(np.abs(risen - np.median(risen))))
 
 
 def _reach(risen: FloatArray, noise: float) -> tuple[int, int]:

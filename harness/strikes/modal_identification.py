@@ -97,7 +97,8 @@ class Identified:
     def notes(self) -> tuple[str, ...]:
         """What a reader must know of the modes, in sentences."""
         moved = (_moved_note(mode) for mode in self.modes if mode.spread > 0.0)
-        return (*moved, *(_undamped_note(pole) for pole in self.undamped))
+        clipped = (_clipped_note(int(channel)) for channel in np.flatnonzero(self.clipped))
+        return (*clipped, *moved, *(_undamped_note(pole) for pole in self.undamped))
 
 
 def modes_of_decay(decays: AnyArray, rate: float, search: PoleSearch | None = None) -> Identified:
@@ -292,6 +293,13 @@ def _moved_pole(fit: PoleFit, mode: MovedMode) -> IdentifiedMode:
         level=float(np.sum(np.abs(lines) ** 2)),
         lines=read_only(lines),
         spread=mode.spread / (2.0 * np.pi),
+    )
+
+
+def _clipped_note(channel: int) -> str:
+    return (
+        f"row {channel + 1} of the decays is clipped: its modes, dampings and levels are not those of the "
+        "object; leave it out, and strike softer or set a wider range"
     )
 
 

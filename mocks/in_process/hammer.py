@@ -114,7 +114,9 @@ class InProcessHammer:
         return self._idle[np.arange(count) % len(self._idle)]
 
     def _readings(self, counts: AnyArray, start: float) -> tuple[Reading, ...]:
-        flags = judge(counts[:, 0], counts[:, 1], self._threshold, self._full_scale, self._full_scale)
+        flags = judge(
+            counts[:, 0], counts[:, 1], self._threshold, self._full_scale, self._full_scale, self._rate
+        )
         onset = -1 if flags.silent else flags.onset
         said = {
             "onset": onset,

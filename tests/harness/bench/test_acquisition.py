@@ -100,6 +100,37 @@ def test_full_scale_on_either_channel_is_an_overload(channel: str, width: int) -
     assert strike_of(force, pressure).overload
 
 
+@pytest.mark.parametrize("channel", ["force", "pressure"])
+@pytest.mark.parametrize("hiss", [0.0, 10.0])
+def test_flat_tops_below_full_scale_are_an_overload(channel: str, hiss: float) -> None:
+    """An amplifier that saturates at 4000 counts of 32767, in front of a converter with noise of its own."""
+    times = np.arange(SCANS) / RATE
+    tone = 15000.0 * np.exp(-30.0 * times) * np.sin(2.0 * np.pi * 700.0 * times)
+    force, pressure = half_sine(5000.0, ONSET), np.asarray(np.where(np.arange(SCANS) < ONSET, 0.0, tone))
+    assert not strike_of(force, pressure).overload
+    noise = hiss * np.random.default_rng(1).normal(size=SCANS)
+    if channel == "force":
+        force = np.minimum(half_sine(20000.0, ONSET), 4000.0) + noise
+    else:
+        pressure = np.clip(pressure, -4000.0, 4000.0) + noise
+    assert strike_of(force, pressure).overload
+
+
+@pytest.mark.parametrize("drift", [-10.0, 10.0, 40.0])
+def test_a_drift_of_the_force_is_taken_off(drift: float) -> None:
+    """N/s: the impulse is that of the blow, to half a per cent, and 50 ms after it the force is at rest."""
+    blow = half_sine(5000.0, 4000)
+    counts = drift / CALIBRATION.newtons_per_count * (np.arange(SCANS) - 4000) / RATE
+    still, drifting = strike_of(blow), strike_of(blow + counts)
+    assert not drifting.double_hit
+    impulse = [
+        float(np.sum(strike.force[strike.onset - 50 : strike.onset + 200])) / RATE
+        for strike in (still, drifting)
+    ]
+    truth = float(np.sum(blow)) * CALIBRATION.newtons_per_count / RATE
+    assert impulse == pytest.approx([truth] * 2, abs=0.01 * truth)
+
+
 def test_beyond_the_calibrated_range_is_an_overload() -> None:
     weak = replace(CALIBRATION, hammer_limit=50.0)
     peak = 60.0 / weak.newtons_per_count
