@@ -1,5 +1,6 @@
 """Files an operator writes: strict TOML, every mistake named at once, nothing guessed."""
 
+import re
 import tomllib
 import types
 from collections.abc import Sequence
@@ -10,8 +11,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from harness.basics.errors import WrongUse
-from harness.basics.files.foreign_file import MOST_TEXT, read_bounded
+from harness.basics.files.foreign_file import MOST_TEXT
 from harness.basics.files.named_file import nearest
+from harness.basics.files.text_file import read_text
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -33,25 +35,34 @@ def load_toml(path: Path, model: type[M]) -> M:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file as plain values.
+    """Read a TOML file as plain values.
 
     Raises:
-        WrongUse: the file cannot be read, is not TOML, or nests deeper or says more than any of ours.
+        WrongUse: the file cannot be read, is not TOML, or nests deeper or holds more values than ours do.
     """
+    text = read_text(path, "a TOML file", MOST_TEXT, WrongUse)
+    if _longest_key(text) > _DEEPEST:
+        raise WrongUse(f"{path} {_TOO_DEEP}")
     try:
-        tree = tomllib.loads(read_bounded(path, "a TOML file", MOST_TEXT, WrongUse).decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise WrongUse(f"{path} is not UTF-8 text ({error.reason} at byte {error.start})") from error
-    except tomllib.TOMLDecodeError as error:
-        raise WrongUse(f"{path} is not TOML: {str(error)[:1].lower()}{str(error)[1:]}") from error
+        tree = tomllib.loads(text)
+    # The library lets Python's own errors through, e.g. of a number with 5,000 digits.
+    except ValueError as error:
+        raise WrongUse(f"{path} is not TOML: {_lower(str(error).partition('; use sys.')[0])}") from error
     except RecursionError as error:
         raise WrongUse(f"{path} {_TOO_DEEP}") from error
     _require_modest(tree, path)
     return tree
 
 
+def _longest_key(text: str) -> int:
+    """Count the dots of the longest dotted key: the library takes quadratic time and memory for long ones."""
+    lines = "\n".join(line for line in text.split("\n") if not line.lstrip().startswith("#"))
+    pieces = re.split(r"[,\[\]{}=\n]", re.sub(r"\.{2,}", "", lines))
+    return max(piece.count(".") for piece in pieces)
+
+
 def _require_modest(tree: dict[str, Any], path: Path) -> None:
-    """Refuse a tree that recursion would not end in, or whose every mistake nobody would read."""
+    """Refuse a tree that is too deep for recursion or too large for a list of its mistakes."""
     values = 0
     level: list[Any] = [tree]
     for _ in range(_DEEPEST):
@@ -59,6 +70,8 @@ def _require_modest(tree: dict[str, Any], path: Path) -> None:
             item for table in level for item in (table.values() if isinstance(table, dict) else table)
         ]
         values += len(items)
+        if any(isinstance(item, int) and abs(item) >= 2**63 for item in items):
+            raise WrongUse(f"{path} holds an integer of more than 64 bits; TOML has none")
         level = [item for item in items if isinstance(item, dict | list)]
         if values > _MOST_VALUES:
             raise WrongUse(f"{path} holds more than {_MOST_VALUES:,} values, and no file of ours does")

@@ -1,7 +1,5 @@
 """A catalogue of objects: rows of a CSV or TOML file, and the rows that cannot be built, with reasons."""
 
-import csv
-import io
 import math
 import re
 from collections import Counter
@@ -9,18 +7,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from harness.authoring.catalogue.csv_rows import PUBLISHED, read_csv_rows
 from harness.authoring.catalogue.toml_rows import read_toml_rows
 from harness.basics.errors import WrongUse
 from harness.basics.files.named_file import nearest, require_file
 from harness.basics.materials import MATERIALS
 
-PUBLISHED = ("number", "name", "scale_m", "material", "source")
-"""Columns of ObjectFolder's ``objects.csv``, which has no header."""
-
-COLUMNS = (*PUBLISHED, "mesh", "units", "wall_m", "mass_kg", "licence")
-"""That the header of a CSV file may name."""
-
 _NOTHING = ("", "none", "null", "nan", "n/a")
+_COMMA = re.compile(r"(?P<whole>\+?\d*),(?P<decimals>\d+)(?:[eE][+-]?\d+)?")
+"""A number with a decimal comma; with three decimals the comma may also separate thousands."""
+
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,79}")
 
 
@@ -91,14 +87,15 @@ def read_catalogue(path: Path) -> Catalogue:
     """Read a catalogue; a row that cannot be built does not stop the others.
 
     Args:
-        path: a ``.toml`` file of ``[[object]]`` tables; else CSV, with a header of ``COLUMNS`` or as
-            ObjectFolder published it.
+        path: a ``.toml`` file of ``[[object]]`` tables; else CSV, with a header or as ObjectFolder
+            published it.
 
     Raises:
         WrongUse: no such file, a TOML file with a mistake, or a file without any object.
     """
     require_file(path, "catalogue", "say a .csv or .toml file")
-    cells = read_toml_rows(path) if path.suffix.lower() == ".toml" else _csv_rows(path)
+    is_toml = path.suffix.lower() == ".toml"
+    cells, notes = (read_toml_rows(path), ()) if is_toml else read_csv_rows(path)
     rows: list[CatalogueRow] = []
     excluded: list[ExcludedRow] = []
     for where, row in cells:
@@ -109,7 +106,7 @@ def read_catalogue(path: Path) -> Catalogue:
     if not rows and not excluded:
         raise WrongUse(f"{path} lists no object; write a row of {', '.join(PUBLISHED)} for each")
     unique, again = _unique(rows)
-    return Catalogue(path, unique, (*excluded, *again), _notes(unique))
+    return Catalogue(path, unique, (*excluded, *again), (*notes, *_notes(unique)))
 
 
 def of_materials(catalogue: Catalogue, names: Iterable[str]) -> Catalogue:
@@ -123,36 +120,6 @@ def of_materials(catalogue: Catalogue, names: Iterable[str]) -> Catalogue:
         raise WrongUse(f"no material {name!r}; {nearest(name, MATERIALS)}")
     rows = tuple(row for row in catalogue.rows if not wanted or row.material in wanted)
     return replace(catalogue, rows=rows)
-
-
-def _csv_rows(path: Path) -> list[tuple[str, dict[str, str]]]:
-    try:
-        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise WrongUse(f"{path} does not read as CSV in UTF-8: {error}; export it again") from error
-    columns = _header(lines[0], path) if lines else None
-    first = 0 if columns is None else 1
-    numbered = [
-        (f"line {index + 1}", cells) for index, cells in enumerate(lines) if any(map(str.strip, cells))
-    ]
-    return [(where, _cells(columns or PUBLISHED, cells)) for where, cells in numbered[first:]]
-
-
-def _header(cells: Sequence[str], path: Path) -> tuple[str, ...] | None:
-    names = tuple(cell.strip().lower() for cell in cells)
-    if "name" not in names:
-        return None
-    for name in names:
-        if name not in COLUMNS:
-            raise WrongUse(f"{path}: unknown column {name!r}; {nearest(name, COLUMNS)}")
-    return names
-
-
-def _cells(columns: Sequence[str], cells: Sequence[str]) -> dict[str, str]:
-    """By column; more cells than columns are joined under ``"more"``, fewer are left out."""
-    found = {name: cell.strip() for name, cell in zip(columns, cells, strict=False)}
-    more = ",".join(cells[len(columns) :])
-    return found | ({"more": more} if more.strip() else {})
 
 
 def _row(cells: dict[str, str]) -> CatalogueRow:
@@ -189,8 +156,14 @@ def _row(cells: dict[str, str]) -> CatalogueRow:
 def _positive(given: dict[str, str], column: str, unit: str) -> float | None:
     if column not in given:
         return None
+    comma = _COMMA.fullmatch(given[column])
+    if comma and len(comma["decimals"]) == 3 and comma["whole"].lstrip("+0"):
+        raise RowRefused(
+            f"{column} {given[column]!r} may be {given[column].replace(',', '.')} or "
+            f"{given[column].replace(',', '')} {unit}; write it with a decimal point"
+        )
     try:
-        value = float(given[column])
+        value = float(given[column].replace(",", ".") if comma else given[column])
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):

@@ -1,5 +1,6 @@
 """Strict files: every mistake is named with its key, its value and what was expected."""
 
+import time
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -7,7 +8,7 @@ import pytest
 
 from harness.basics.errors import WrongUse
 from harness.basics.quantities import Length, Positive
-from harness.basics.toml_file import StrictModel, load_toml, validate
+from harness.basics.toml_file import StrictModel, load_toml, read_toml, validate
 
 
 class Inner(StrictModel):
@@ -81,7 +82,7 @@ def test_toml_that_does_not_parse_says_where(tmp_path: Path) -> None:
 def test_a_file_that_is_absent_or_not_text_is_refused(tmp_path: Path) -> None:
     with pytest.raises(WrongUse, match="cannot be read: no such file"):
         load_toml(tmp_path / "none.toml", Outer)
-    (tmp_path / "b.toml").write_bytes(b"\xff\xfe")
+    (tmp_path / "b.toml").write_bytes(b"title = \xff")
     with pytest.raises(WrongUse, match="not UTF-8"):
         load_toml(tmp_path / "b.toml", Outer)
 
@@ -89,3 +90,38 @@ def test_a_file_that_is_absent_or_not_text_is_refused(tmp_path: Path) -> None:
 def test_json_written_reads_back_to_the_same_model() -> None:
     read = validate({**GOOD, "inner": {"depth": "1.7 mm"}}, Outer, "x")
     assert validate(read.model_dump(mode="json"), Outer, "x") == read
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-32"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_file_of_any_encoding_and_line_end_is_read(encoding: str, end: str, tmp_path: Path) -> None:
+    text = 'title = "t"\n[inner]\ndepth = "1 mm"\n'
+    (tmp_path / "f.toml").write_bytes(text.replace("\n", end).encode(encoding))
+    assert load_toml(tmp_path / "f.toml", Outer).inner.depth == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a." * 400_000 + "a = 1", "more than 32 deep"),
+        ('"a"."' * 200_000, "more than 32 deep"),
+        ("a = " + "[" * 500_000, "more than 32 deep"),
+        ("a = 0x" + "1" * 900_000, "integer of more than 64 bits"),
+        ("a = " + "1" * 900_000, "4300 digits"),
+        ("[[a]]\n" * 150_000, "more than 10,000 values"),
+    ],
+)
+def test_a_hostile_file_is_refused_in_a_sentence_and_at_once(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "f.toml").write_text(text)
+    begun = time.process_time()
+    with pytest.raises(WrongUse, match=said) as caught:
+        load_toml(tmp_path / "f.toml", Outer)
+    assert len(str(caught.value)) < 300
+    assert time.process_time() - begun < 5.0
+
+
+def test_dots_in_comments_and_lists_are_no_deep_key(tmp_path: Path) -> None:
+    (tmp_path / "f.toml").write_text(
+        f'# {"v1.2 " * 50}\n# {"." * 80}\ntitle = "to be continued{"." * 40}"\na = [{"0.1, " * 40}]\n'
+    )
+    assert len(read_toml(tmp_path / "f.toml")["a"]) == 40

@@ -116,3 +116,75 @@ def test_meshes_are_found_by_name_by_number_and_in_folders_of_their_own(tmp_path
     }
     assert [row.name for row in excluded] == ["two", "none"]
     assert all(str(tmp_path) in row.reason for row in excluded)
+
+
+ROWS = (
+    "name{s}material{s}scale_m{s}mass_kg\nbowl{s}ceramic{s}0{d}04{s}0{d}06\nmug{s}steel{s}0{d}04{s}0{d}19\n"
+)
+
+
+@pytest.mark.parametrize("separator", [";", "\t", "|"])
+@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize("before", ["", "sep={s}\n", "\n"])
+def test_a_spreadsheet_s_separators_are_read_and_stated(
+    separator: str, decimal: str, before: str, tmp_path: Path
+) -> None:
+    text = (before if separator in ";\t" else "") + ROWS
+    found = read_catalogue(written(tmp_path, text.format(s=separator, d=decimal)))
+    assert [(row.name, row.scale, row.mass) for row in found.rows] == [
+        ("bowl", 0.04, 0.06),
+        ("mug", 0.04, 0.19),
+    ]
+    assert not found.excluded
+    assert found.notes[0].startswith("the columns are separated by ")
+
+
+def test_the_semicolons_of_the_case_are_read() -> None:
+    found = read_catalogue(Path(__file__).parents[3] / "samples" / "text_files" / "semi.csv")
+    assert [(row.name, row.scale, row.mass) for row in found.rows] == [
+        ("bowl", 0.04, 0.06),
+        ("mug", 0.04, 0.19),
+    ]
+    assert "the columns are separated by semicolons" in found.notes
+
+
+def test_published_rows_with_semicolons_have_their_columns(tmp_path: Path) -> None:
+    found = read_catalogue(written(tmp_path, "1;mug;0,2;steel;https://a.example/x,y\n"))
+    assert (found.rows[0].name, found.rows[0].scale) == ("mug", 0.2)
+
+
+@pytest.mark.parametrize("cell", ["1,234", "12,500", "1,2,3", "0,0"])
+def test_a_comma_that_may_separate_thousands_is_refused(cell: str, tmp_path: Path) -> None:
+    found = read_catalogue(written(tmp_path, f'name,material,scale_m\nmug,steel,"{cell}"\n'))
+    assert not found.rows
+    assert found.excluded[0].reason.startswith(f"line 2: scale_m '{cell}' ")
+
+
+def test_a_decimal_comma_in_columns_of_commas_is_refused(tmp_path: Path) -> None:
+    found = read_catalogue(written(tmp_path, "name,material,scale_m\nmug,steel,0,04\n"))
+    assert "more cells than columns" in found.excluded[0].reason
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_catalogue_of_any_encoding_and_line_end_is_read(encoding: str, end: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(ROWS.format(s=",", d=".").replace("\n", end).encode(encoding))
+    assert [row.name for row in read_catalogue(tmp_path / "a.csv").rows] == ["bowl", "mug"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("name" + ",x" * 1_000_000, "line 1 has 2,000,004 characters"),
+        ("name,material\n" + "a,steel\n" * 200_000, "more than 100,000 lines"),
+        (
+            "name,material\na," + '"' + "x\n" * 90_000,
+            "line 2 does not read as CSV: field larger than field limit",
+        ),
+        ("name,material,name\na,steel,b\n", "two columns are named 'name'"),
+    ],
+)
+def test_a_hostile_catalogue_is_refused_in_a_sentence(text: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(WrongUse, match=said) as caught:
+        read_catalogue(written(tmp_path, text))
+    assert len(str(caught.value)) < 300
