@@ -66,6 +66,13 @@ class Mesh:
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
 
 
+def signed_volume(mesh: Mesh) -> float:
+    """Compute the volume inside a closed mesh in m^3; negative if its faces point inward."""
+    # Seen from a vertex: far from the origin the terms of the sum would cancel.
+    a, b, c = (mesh.corners[:, corner] - mesh.vertices[0] for corner in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
 def _divide(vectors: FloatArray, lengths: FloatArray) -> FloatArray:
     safe = np.where(lengths > 0.0, lengths, 1.0)
     quotient: FloatArray = vectors / safe[:, None]

@@ -10,14 +10,14 @@ from harness.basics.mesh import Mesh
 def hull_of(points: FloatArray) -> FloatArray:
     """``(m, d)`` those of ``(n, d)`` points that span their convex hull; all of a flat set."""
     try:
-        return points[ConvexHull(points).vertices]
+        return points[ConvexHull(points - points[0]).vertices]
     except QhullError:
         return np.unique(points, axis=0)
 
 
 def closed_hull(points: FloatArray) -> Mesh:
     """The convex hull of ``(n, 3)`` points, its faces looking outward."""
-    hull = ConvexHull(points)
+    hull = ConvexHull(points - points[0])
     used, faces = np.unique(hull.simplices, return_inverse=True)
     faces = faces.reshape(hull.simplices.shape)
     corners = points[used][faces]

@@ -7,11 +7,10 @@ import numpy as np
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import WrongUse
 from harness.basics.materials import Material
-from harness.basics.mesh import Mesh
+from harness.basics.mesh import Mesh, signed_volume
 from harness.objectfile.file import ObjectFile, file_entry
 from harness.objectfile.surface_file import ply_bytes
 from harness.objectfile.surface_search import SurfaceSearch
-from harness.objects.solid import signed_volume
 
 _SHAPE = 1e-3
 """Of the diagonal, by which two surfaces of one object may differ, and of the volume: a frequency then

@@ -10,7 +10,7 @@ from manifold3d import Manifold
 from manifold3d import Mesh as ManifoldMesh
 
 from harness.basics.arrays import FloatArray, IntArray
-from harness.basics.mesh import Mesh
+from harness.basics.mesh import Mesh, signed_volume
 
 _GOLDEN = 0.6180339887498949
 
@@ -80,12 +80,6 @@ def tube(centres: FloatArray, halves: FloatArray, edge: float) -> Mesh:
 def outward(mesh: Mesh) -> Mesh:
     """A closed mesh with its faces turned so that its volume is positive."""
     return mesh if signed_volume(mesh) > 0.0 else Mesh(mesh.vertices, mesh.faces[:, ::-1])
-
-
-def signed_volume(mesh: Mesh) -> float:
-    """Cubic metres inside a closed mesh; negative if its faces point inward."""
-    a, b, c = mesh.corners[:, 0], mesh.corners[:, 1], mesh.corners[:, 2]
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
 
 def union(meshes: list[Mesh], smallest: float = 5e-3) -> Mesh:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from harness.basics.errors import MeshRefused, WrongUse
-from harness.basics.mesh import Mesh
+from harness.basics.mesh import Mesh, signed_volume
 from harness.sim.solid.mesh_bodies import take_apart
 from harness.sim.solid.mesh_holes import fill_holes, join_bodies
 from harness.sim.solid.mesh_read import METRES, RawMesh, read_mesh
@@ -164,7 +164,7 @@ def take_in(path: Path, units: str | None, scale: float = 1.0, wall: float | Non
         watertight=watertight,
         longest_side=longest,
         area=float(mesh.face_areas.sum()),
-        volume=_volume(mesh) if watertight else None,
+        volume=signed_volume(mesh) if watertight else None,
         wall=wall,
         repairs=tuple(surface.repairs),
         warnings=(*raw.notes, *_warnings(mesh, watertight, pieces, wall)),
@@ -256,11 +256,6 @@ def _check_wall(wall: float | None, mesh: Mesh) -> None:
         )
 
 
-def _volume(mesh: Mesh) -> float:
-    a, b, c = mesh.corners[:, 0], mesh.corners[:, 1], mesh.corners[:, 2]
-    return float(np.einsum("ij,ij->i", a - mesh.vertices[0], np.cross(b - a, c - a)).sum() / 6.0)
-
-
 def _warnings(mesh: Mesh, watertight: bool, pieces: int, wall: float | None) -> tuple[str, ...]:
     said = []
     if not watertight:
@@ -279,7 +274,7 @@ def _warnings(mesh: Mesh, watertight: bool, pieces: int, wall: float | None) -> 
 def _looks_filled(mesh: Mesh) -> bool:
     """Large and filling most of its convex hull, as vessels scanned from outside do."""
     try:
-        hull = float(ConvexHull(mesh.vertices).volume)
+        hull = float(ConvexHull(mesh.vertices - mesh.vertices[0]).volume)
     except QhullError:
         return False
-    return hull > _SOLID_VOLUME and _volume(mesh) > _SOLID_FILL * hull
+    return hull > _SOLID_VOLUME and signed_volume(mesh) > _SOLID_FILL * hull

@@ -45,7 +45,9 @@ def join_bodies(surface: RepairedSurface) -> int:
     count = int(body.max()) + 1
     if count == 1 or not is_watertight(surface.faces):
         return count
-    parts = [_solid(surface.vertices, surface.faces[body == k]) for k in range(count)]
+    # Seen from a vertex: a solid's coordinates are float32.
+    centre = surface.vertices[0].copy()
+    parts = [_solid(surface.vertices - centre, surface.faces[body == k]) for k in range(count)]
     # A wall of a cavity is a body of negative volume: only whole solids can be united.
     if any(part.status() != Error.NoError or part.volume() <= 0.0 for part in parts):
         return count
@@ -54,7 +56,7 @@ def join_bodies(surface: RepairedSurface) -> int:
     if after == count and joined.num_tri() == len(surface.faces):
         return count
     raw = joined.to_mesh64()
-    surface.vertices = np.asarray(raw.vert_properties, np.float64)[:, :3]
+    surface.vertices = np.asarray(raw.vert_properties, np.float64)[:, :3] + centre
     surface.faces = np.asarray(raw.tri_verts, np.int64)
     surface.repairs.append(f"joined {count} overlapping bodies into {after}")
     return after

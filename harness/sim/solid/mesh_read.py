@@ -3,23 +3,28 @@
 import io
 import warnings
 from contextlib import redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.files.named_file import require_file
+from harness.sim.solid.coordinates import move_near
+from harness.sim.solid.formats.abaqus import read_abaqus
+from harness.sim.solid.formats.cells import CellBlock, CellFile
+from harness.sim.solid.formats.plain_file import plain_file
+from harness.sim.solid.formats.ply import read_ply
 from harness.sim.solid.plain_formats import read_obj, read_off, read_stl
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Metres in one unit of a mesh file, by the unit's name."""
 
-_PLAIN = {".obj": read_obj, ".stl": read_stl, ".stl_ascii": read_stl, ".off": read_off}
-_BY_TRIMESH = frozenset({".ply", ".glb", ".gltf", ".3mf", ".dae"})
+_PLAIN = {".obj": read_obj, ".stl": read_stl, ".stl_ascii": read_stl, ".off": read_off, ".ply": read_ply}
+_BY_TRIMESH = frozenset({".glb", ".gltf", ".3mf", ".dae"})
 _OFTEN = "OBJ, STL, PLY, OFF, glTF, 3MF, COLLADA, or tetrahedra as Gmsh, VTK, Abaqus or Nastran write them"
+_OF_ELEMENTS = {".inp": read_abaqus}
 _TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 SOLIDS = ("hexahedron", "wedge", "pyramid", "tetra")
 """How meshio's names of solid cells begin."""
@@ -39,12 +44,14 @@ class RawMesh:
         faces: ``(m, 3)`` indices.
         unit: the unit the file declares, or None.
         notes: what is odd of the file, a sentence each.
+        single: the file holds float32 coordinates.
     """
 
     vertices: FloatArray
     faces: IntArray
     unit: str | None
     notes: tuple[str, ...] = ()
+    single: bool = False
 
 
 def read_mesh(path: Path) -> RawMesh:
@@ -57,7 +64,7 @@ def read_mesh(path: Path) -> RawMesh:
     require_file(path, "mesh file")
     if path.stat().st_size == 0:
         raise MeshRefused(f"{path.name} is empty (0 bytes); export it again")
-    kind = path.suffix.lower()
+    kind = mesh_kind(path)
     read = _plain if kind in _PLAIN else _with_trimesh if kind in _BY_TRIMESH else _with_meshio
     if read is _with_meshio and not _known_to_meshio(kind):
         raise MeshRefused(f"{path.name}: {kind or 'no ending'} is not that of a mesh; give {_OFTEN}")
@@ -81,12 +88,18 @@ def read_mesh(path: Path) -> RawMesh:
             f"{path.name} has a face with vertex {most if most >= len(raw.vertices) else least}, "
             f"but {len(raw.vertices)} vertices; the file is cut short or damaged, export it again"
         )
-    return raw
+    vertices, moved = move_near(raw.vertices, raw.faces, path.name, raw.single)
+    return replace(raw, vertices=vertices, notes=(*raw.notes, *moved))
 
 
 def _plain(path: Path) -> RawMesh:
-    found = _PLAIN[path.suffix.lower()](path)
-    return RawMesh(found.vertices, found.faces, None, found.notes)
+    found = _PLAIN[mesh_kind(path)](path)
+    return RawMesh(found.vertices, found.faces, None, found.notes, found.single)
+
+
+def mesh_kind(path: Path) -> str:
+    """Return the ending that names a mesh file's format, in lower case and without a ``.gz`` after it."""
+    return Path(path.name.lower().removesuffix(".gz")).suffix
 
 
 def _with_trimesh(path: Path) -> RawMesh:
@@ -112,7 +125,7 @@ def _known_unit(declared: str | None) -> str | None:
 
 def _with_meshio(path: Path) -> RawMesh:
     mesh = read_cells(path)
-    faces = [_triangles_of(block.type, np.asarray(block.data, np.int64)) for block in mesh.cells]
+    faces = [_triangles_of(block.type, block.data) for block in mesh.cells]
     kinds = {block.type for block in mesh.cells if block.type.startswith(SOLIDS)}
     notes: tuple[str, ...] = ()
     if kinds:
@@ -121,10 +134,11 @@ def _with_meshio(path: Path) -> RawMesh:
         faces = [_outside(_tetrahedra(mesh, kinds, path.name))]
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
-    return RawMesh(points, np.vstack([np.zeros((0, 3), np.int64), *faces]), None, notes)
+    every = np.vstack([np.zeros((0, 3), np.int64), *faces])
+    return RawMesh(points, every, None, (*mesh.notes, *notes), mesh.single)
 
 
-def _tetrahedra(mesh: Any, kinds: set[str], name: str) -> IntArray:
+def _tetrahedra(mesh: CellFile, kinds: set[str], name: str) -> IntArray:
     """``(c, 4)``: the corners of all cells of a file of solids.
 
     Raises:
@@ -135,17 +149,23 @@ def _tetrahedra(mesh: Any, kinds: set[str], name: str) -> IntArray:
             f"{name} holds cells of kind {', '.join(sorted(kinds))}; export it as four-node tetrahedra only, "
             "or ten-node ones only"
         )
-    cells = [np.asarray(block.data, np.int64)[:, :4] for block in mesh.cells if block.type in kinds]
+    cells = [block.data[:, :4] for block in mesh.cells if block.type in kinds]
     return np.concatenate(cells)
 
 
-def read_cells(path: Path) -> Any:
-    """What meshio reads of a file, as it gives it; it prints to standard output, which is others'."""
+def read_cells(path: Path) -> CellFile:
+    """Read the nodes and cells of a file of finite elements."""
+    if mesh_kind(path) in _OF_ELEMENTS:
+        return _OF_ELEMENTS[mesh_kind(path)](path)
     import meshio
 
-    with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+    # The library prints to standard output, which is for answers alone.
+    with warnings.catch_warnings(), redirect_stdout(io.StringIO()), plain_file(path) as readable:
         warnings.simplefilter("ignore")
-        return meshio.read(path)
+        found = meshio.read(readable)
+    cells = tuple(CellBlock(block.type, np.asarray(block.data, np.int64)) for block in found.cells)
+    single = np.asarray(found.points).dtype == np.float32
+    return CellFile(np.asarray(found.points, np.float64), cells, found.point_sets, (), single)
 
 
 def _known_to_meshio(kind: str) -> bool:

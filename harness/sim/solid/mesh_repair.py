@@ -216,7 +216,9 @@ def _faces_room(surface: RepairedSurface, mine: BoolArray, closed: bool, others:
     if not closed:
         return openness(np.flatnonzero(mine), corners) >= 0.0
     own = corners[mine]
-    volume = float(np.einsum("ij,ij->i", own[:, 0], np.cross(own[:, 1], own[:, 2])).sum())
+    # Far from the origin the terms of the sum cancel: spokes from a corner of the patch do not.
+    spokes = own - own[0, 0]
+    volume = float(np.einsum("ij,ij->i", spokes[:, 0], np.cross(spokes[:, 1], spokes[:, 2])).sum())
     around = sum(_surrounds(corners[other], own) for other in others)
     return (volume > 0.0) == (around % 2 == 0)
 

@@ -3,23 +3,36 @@
 A file that was cut short is refused here, where it can still be told from one that is whole.
 """
 
+import io
 import re
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused
+from harness.basics.files.foreign_file import MOST_DATA, read_bounded
+from harness.basics.files.text_file import plain_bytes, read_text_bytes, unpack
 from harness.sim.solid.polygons import triangulated
+from harness.sim.solid.text_numbers import MAX_ELEMENTS, MAX_LINE, refuse_number, require_few, show
 
 _STL_HEADER = 84
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _STL_WORDS = (rb"^\s*solid\b", rb"^\s*endsolid\b", rb"\bfacet\s+normal", rb"\bendfacet\b")
 _OFF_KINDS = frozenset({b"OFF", b"COFF", b"NOFF", b"CNOFF"})
+_OBJ_SHAPES = frozenset({b"surf", b"curv", b"bzp", b"bsp", b"cdp", b"cdc", b"res", b"call", b"csh"})
+"""Statements of an OBJ that hold shape in another way than faces do: free-form surfaces, and other files."""
+
+_MAX_LINES = 3 * MAX_ELEMENTS
+"""Lines of a text file: vertices, faces, and all that is left out."""
+
+_WEIGHTED = 5
+"""Words of a vertex statement that ends with a weight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,91 +43,146 @@ class PlainMesh:
         vertices: ``(n, 3)`` in the file's unit; may not be numbers.
         faces: ``(m, 3)`` indices, from 0.
         notes: what is odd of the file, a sentence each.
+        single: the file holds float32 coordinates.
     """
 
     vertices: FloatArray
     faces: IntArray
     notes: tuple[str, ...] = ()
+    single: bool = False
 
 
 def read_obj(path: Path) -> PlainMesh:
-    """Wavefront OBJ: vertices and faces of any number of corners, numbered from either end or from 0.
+    """Read the polygons of a Wavefront OBJ, numbered from 1, from 0 or backwards.
 
     Raises:
-        MeshRefused: a face names a vertex that is not there.
-        ValueError: a number that is none.
+        MeshRefused: a face names a vertex that is not there, a word is not a number, or the file holds
+            free-form surfaces or names other files.
     """
     vertices, corners, lengths = array("d"), array("q"), array("q")
-    relative = False
-    for words in _logical_lines(path):
-        if words[0] == b"v":
-            vertices.extend(_place(words))
-        elif words[0] == b"f":
-            numbers = [int(word.split(b"/", 1)[0]) for word in words[1:]]
+    relative, name = False, path.name
+    for line, words in _logical_lines(path):
+        kind = words[0]
+        if kind == b"v":
+            vertices.extend(_place(words, name, line))
+            require_few(len(vertices) // 3, "vertices", name)
+        elif kind == b"f":
+            try:
+                numbers = [int(word.split(b"/", 1)[0]) for word in words[1:]]
+            except ValueError as error:
+                raise refuse_number(words[1:], name, line, "the numbers of vertices") from error
             relative |= min(numbers, default=1) < 0
-            corners.extend([_absolute(number, len(vertices) // 3, path.name) for number in numbers])
+            corners.extend([_absolute(number, len(vertices) // 3, name) for number in numbers])
             lengths.append(len(numbers))
+            require_few(len(corners) // 3, "faces", name)
+        elif kind in _OBJ_SHAPES:
+            raise MeshRefused(
+                f"{name}, line {line}: the statement {show(kind)!r} is not read; export polygons only"
+            )
     places, used = np.array(vertices).reshape(-1, 3), np.array(corners, dtype=np.int64)
-    first, notes = _first_number(used, len(places), relative, path.name)
+    first, notes = _first_number(used, len(places), relative, name)
     return PlainMesh(places, triangulated(places, used - first, np.array(lengths, dtype=np.int64)), notes)
 
 
 def read_stl(path: Path) -> PlainMesh:
-    """STL of either kind, any number of solids.
+    """Read an STL, text or binary, of any number of solids.
 
     Raises:
-        MeshRefused: it is cut short.
-        ValueError: a number that is none.
+        MeshRefused: it is cut short, or a word is not a number.
     """
-    data = path.read_bytes()
-    return _text_stl(data, path.name) if _is_text(data) else _binary_stl(data, path.name)
+    data = unpack(
+        read_bounded(path, "an STL", MOST_DATA, MeshRefused), path, "an STL", MOST_DATA, MeshRefused
+    )
+    if not _is_exactly_binary(data):
+        text = plain_bytes(data, path, MeshRefused)
+        if text.lstrip()[:5].lower() == b"solid" and b"\0" not in text[:_STL_HEADER]:
+            return _text_stl(text, path.name)
+    return _binary_stl(data, path.name)
 
 
 def read_off(path: Path) -> PlainMesh:
-    """OFF: faces of any number of corners; colours and normals are left aside.
+    """Read an OFF with faces of any number of corners; colours and normals are left out.
 
     Raises:
-        MeshRefused: it is cut short, or another kind of OFF.
-        ValueError: a number that is none.
+        MeshRefused: it is cut short, another kind of OFF, or a word is not a number.
     """
-    lines = [line.split(b"#", 1)[0].split() for line in path.read_bytes().splitlines()]
-    lines = [words for words in lines if words]
-    if not lines or lines[0][0] not in _OFF_KINDS:
-        raise MeshRefused(f"{path.name} does not begin with OFF; export it again as plain OFF, OBJ or STL")
-    counts, rest = (lines[0][1:], lines[1:]) if len(lines[0]) > 1 else (lines[1], lines[2:])
-    points, faces = int(counts[0]), int(counts[1])
-    if points < 0 or faces < 0 or len(rest) < points + faces:
+    name = path.name
+    lines = _logical_lines(path)
+    line, words = next(lines, (1, [b""]))
+    if words[0] not in _OFF_KINDS:
+        raise MeshRefused(f"{name} does not begin with OFF; export it again as plain OFF, OBJ or STL")
+    line, counts = (line, words[1:]) if len(words) > 1 else next(lines, (line, []))
+    try:
+        points, faces = int(counts[0]), int(counts[1])
+    except (ValueError, IndexError) as error:
+        raise refuse_number(counts, name, line, "the numbers of vertices and faces") from error
+    require_few(points, "vertices", name)
+    require_few(faces, "faces", name)
+    places, corners, lengths = array("d"), array("q"), array("q")
+    for line, words in islice(lines, max(points, 0)):
+        places.extend(_place([b"v", *words], name, line))
+    for line, words in islice(lines, max(faces, 0)):
+        polygon = _counted(words, points, name, line)
+        corners.extend(polygon)
+        lengths.append(len(polygon))
+        require_few(len(corners) // 3, "faces", name)
+    found = len(places) // 3
+    if found != points or len(lengths) != faces:
         raise MeshRefused(
-            f"{path.name} is cut short: it announces {points} vertices and {faces} faces, and {len(rest)} "
-            "lines follow; export it again"
+            f"{name} is cut short: it announces {points} vertices and {faces} faces, and {found} vertices "
+            f"and {len(lengths)} faces follow; export it again"
         )
-    places = np.array([[float(word) for word in words[:3]] for words in rest[:points]], np.float64)
-    polygons = [_counted(words, points, path.name) for words in rest[points : points + faces]]
-    corners = np.array([corner for polygon in polygons for corner in polygon], dtype=np.int64)
-    lengths = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
-    places = places.reshape(-1, 3)
-    return PlainMesh(places, triangulated(places, corners, lengths))
+    vertices = np.array(places).reshape(-1, 3)
+    faces_of = triangulated(vertices, np.array(corners, dtype=np.int64), np.array(lengths, dtype=np.int64))
+    return PlainMesh(vertices, faces_of)
 
 
-def _logical_lines(path: Path) -> Iterator[list[bytes]]:
-    """The words of each line that has any, comments left out; one that ends in a backslash goes on."""
+def _logical_lines(path: Path) -> Iterator[tuple[int, list[bytes]]]:
+    """Split a file into lines of words with the number of their last line, without comments and empty lines.
+
+    A line that ends in a backslash continues with the next.
+    """
     begun: list[bytes] = []
-    with path.open("rb") as lines:
-        for line in lines:
-            words = begun + line.split(b"#", 1)[0].split()
-            goes_on = bool(words) and words[-1].endswith(b"\\")
-            begun = [*words[:-1], words[-1][:-1]] if goes_on else []
-            if words and not goes_on:
-                yield [word for word in words if word]
+    size = number = 0
+    # Iterating the bytes makes one line at a time; splitting them takes ten times the memory of the file.
+    for number, line in enumerate(io.BytesIO(read_text_bytes(path, "a mesh", MOST_DATA, MeshRefused)), 1):
+        size += len(line)
+        if size > MAX_LINE:
+            raise MeshRefused(
+                f"{path.name}, line {number} has more than {MAX_LINE:,} characters; export it again with one "
+                "vertex or face to a line"
+            )
+        words = line.split(b"#", 1)[0].split()
+        if words and words[-1].endswith(b"\\"):
+            begun.extend([*words[:-1], words[-1][:-1]])
+            continue
+        if begun:
+            words = [word for word in (*begun, *words) if word]
+            begun = []
+        size = 0
+        if words:
+            yield number, words
+        if number > _MAX_LINES:
+            raise MeshRefused(f"{path.name} has more than {_MAX_LINES:,} lines; reduce its resolution")
+    if begun := [word for word in begun if word]:
+        yield number, begun
 
 
-def _place(words: list[bytes]) -> list[float]:
-    """Of a vertex line; colours may follow it.
+def _place(words: list[bytes], name: str, line: int) -> list[float]:
+    """Read the coordinates of a vertex statement; a colour may follow them.
 
     Raises:
-        ValueError: fewer than three numbers.
+        MeshRefused: fewer than three numbers, a word that is not a number, or a weight that is not 1.
     """
-    x, y, z = (float(word) for word in words[1:4])
+    try:
+        x, y, z = (float(word) for word in words[1:4])
+        if len(words) == _WEIGHTED and float(words[4]) != 1.0:
+            raise MeshRefused(
+                f"{name}, line {line}: the vertex has the weight {show(words[4])}; only a weight of 1 is "
+                "read, export plain polygons"
+            )
+    except ValueError as error:
+        raise refuse_number(words[1:], name, line, "3 coordinates") from error
     return [x, y, z]
 
 
@@ -151,11 +219,14 @@ def _refuse_beyond(used: IntArray, count: int, name: str) -> None:
         )
 
 
-def _counted(words: list[bytes], points: int, name: str) -> list[int]:
-    """The corners of a face line; colours may follow them."""
-    count = int(words[0])
-    corners = [int(word) for word in words[1 : count + 1]]
-    if len(corners) < count or (corners and not 0 <= min(corners) <= max(corners) < points):
+def _counted(words: list[bytes], points: int, name: str, line: int) -> list[int]:
+    """Read the corners of a face line; colours may follow them."""
+    try:
+        count = int(words[0])
+        corners = [int(word) for word in words[1 : count + 1]] if count >= 0 else []
+    except ValueError as error:
+        raise refuse_number(words, name, line, "the numbers of a face's corners") from error
+    if len(corners) != count or (corners and not 0 <= min(corners) <= max(corners) < points):
         raise MeshRefused(
             f"{name} has a face of {count} corners that names {len(corners)}, or a vertex that is none of "
             f"its {points}; the file is cut short or damaged, export it again"
@@ -163,19 +234,26 @@ def _counted(words: list[bytes], points: int, name: str) -> list[int]:
     return corners
 
 
-def _is_text(data: bytes) -> bool:
-    """Whether an STL is of words: many a binary one begins with ``solid`` too."""
-    if data.lstrip()[:5].lower() != b"solid":
-        return False
+def _is_exactly_binary(data: bytes) -> bool:
+    """Test for the length of a binary STL: many a header begins with ``solid``, as a text does."""
     announced = int.from_bytes(data[_STL_HEADER - 4 : _STL_HEADER], "little")
-    return len(data) != _STL_HEADER + announced * _STL_FACET.itemsize and b"\0" not in data[:_STL_HEADER]
+    return len(data) == _STL_HEADER + announced * _STL_FACET.itemsize
 
 
 def _text_stl(data: bytes, name: str) -> PlainMesh:
-    begun, ended, opened, closed = (len(re.findall(rb"(?mi)" + word, data)) for word in _STL_WORDS)
-    places = np.array([[float(word) for word in found] for found in _VERTEX.findall(data)], np.float64)
-    places = places.reshape(-1, 3)
-    last = data.rstrip().splitlines()[-1].lower()
+    begun, ended, opened, closed = (
+        sum(1 for _ in re.finditer(rb"(?mi)" + word, data)) for word in _STL_WORDS
+    )
+    require_few(opened, "facets", name)
+    numbers = array("d")
+    for found in _VERTEX.finditer(data):
+        try:
+            numbers.extend(map(float, found.groups()))
+        except ValueError as error:
+            line = data.count(b"\n", 0, found.start()) + 1
+            raise refuse_number(list(found.groups()), name, line, "3 coordinates") from error
+    places = np.array(numbers).reshape(-1, 3)
+    last = data.rstrip()[-MAX_LINE:].splitlines()[-1].lower()
     whole = begun == ended and opened == closed and len(places) == 3 * opened
     if not (whole and last.split()[0] == b"endsolid"):
         raise MeshRefused(
@@ -203,4 +281,4 @@ def _binary_stl(data: bytes, name: str) -> PlainMesh:
         notes = (f"{beyond} bytes after its {announced} triangles are left out",)
     facets = np.frombuffer(data, _STL_FACET, count, _STL_HEADER)
     places = facets["corners"].reshape(-1, 3).astype(np.float64)
-    return PlainMesh(places, np.arange(len(places), dtype=np.int64).reshape(-1, 3), notes)
+    return PlainMesh(places, np.arange(len(places), dtype=np.int64).reshape(-1, 3), notes, single=True)

@@ -32,12 +32,13 @@ def enclosed_volume(mesh: Mesh) -> float:
     A signed volume counts overlapping bodies twice; this counts what is there. Integrated along
     vertical lines, to about half a percent.
     """
-    low, high = mesh.bounds
+    # Seen from a vertex: far from the origin heights lose their digits.
+    low, high = mesh.bounds - mesh.vertices[0]
     sides = np.array([_LINES, _LINES])
     pitch = (high - low)[:2] / _LINES
     # Shares without a short fraction, so that no line runs along the edges of a modelled object.
     first = low[:2] + pitch * np.array([0.4142135, 0.6180339])
-    line, height, sign = column_crossings(mesh.corners, first, pitch, sides)
+    line, height, sign = column_crossings(mesh.corners - mesh.vertices[0], first, pitch, sides)
     order = np.lexsort((height, line))
     line, height, sign = line[order], height[order], sign[order]
     inside = -np.cumsum(sign)[:-1] >= 1
@@ -51,7 +52,9 @@ def wall_thickness(mesh: Mesh, points: FloatArray, normals: FloatArray) -> Float
     Infinite where nothing is behind, as behind an open surface.
     """
     lift = _LIFT * mesh.diagonal
-    return first_distances(points - lift * normals, -normals, mesh.corners) + lift
+    # Seen from a vertex: far from the origin the lift would vanish.
+    starts = points - mesh.vertices[0] - lift * normals
+    return first_distances(starts, -normals, mesh.corners - mesh.vertices[0]) + lift
 
 
 def thin_wall(mesh: Mesh, share: float = 0.02) -> float:
@@ -63,7 +66,7 @@ def thin_wall(mesh: Mesh, share: float = 0.02) -> float:
     area = mesh.face_areas
     picked = random.choice(len(area), _ASKED, p=area / area.sum())
     shares = random.dirichlet(np.ones(3), _ASKED)
-    points = np.einsum("nc,ncd->nd", shares, mesh.corners[picked])
+    points = np.einsum("nc,ncd->nd", shares, mesh.corners[picked] - mesh.vertices[0]) + mesh.vertices[0]
     return float(np.quantile(wall_thickness(mesh, points, mesh.face_normals[picked]), share))
 
 

@@ -180,11 +180,12 @@ def _filled(mesh: Mesh, edge: float, envelope: float, stop: float) -> tuple[Floa
 def _simplified(mesh: Mesh, tolerance: float) -> Mesh:
     """Fewer faces, none of them further than ``tolerance`` m away: filling takes as long as they are many."""
     try:
-        solid = to_manifold(Mesh(mesh.vertices / _MM, mesh.faces))
+        # Seen from a vertex: its coordinates become float32.
+        solid = to_manifold(Mesh((mesh.vertices - mesh.vertices[0]) / _MM, mesh.faces))
     except ValueError:
         return mesh
     fewer = from_manifold(solid.simplify(tolerance / _MM))
-    return Mesh(fewer.vertices * _MM, fewer.faces)
+    return Mesh(fewer.vertices * _MM + mesh.vertices[0], fewer.faces)
 
 
 def signed_volumes(nodes: FloatArray, cells: IntArray) -> FloatArray:

@@ -3,14 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.errors import MeshRefused, WrongUse
+from harness.sim.solid.coordinates import move_near
+from harness.sim.solid.formats.cells import CellFile
 from harness.sim.solid.intake import read_line
-from harness.sim.solid.mesh_read import METRES, SOLIDS, TETRAHEDRA, read_cells
+from harness.sim.solid.mesh_read import METRES, SOLIDS, TETRAHEDRA, mesh_kind, read_cells
 from harness.sim.solid.modal_mesh import QuadraticMesh, quadratic_mesh, six_node_faces
 from harness.sim.solid.tetrahedra import signed_volumes
 from harness.sim.solid.volume_mesh_checks import (
@@ -73,14 +74,15 @@ def read_volume(path: Path, units: str | None = None) -> VolumeMesh | None:
     """
     if units is not None and units not in METRES:
         raise WrongUse(f"unknown unit {units!r} for a mesh; say one of {', '.join(METRES)}")
-    known = path.is_file() and path.stat().st_size > 0 and path.suffix.lower() not in _SURFACES_ONLY
+    known = path.is_file() and path.stat().st_size > 0 and mesh_kind(path) not in _SURFACES_ONLY
     read = _read(path) if known else None
     kinds = sorted({block.type for block in read.cells if block.type.startswith(SOLIDS)}) if read else []
     if read is None or not kinds:
         return None
     cells = _cells(read, kinds, path.name)
-    nodes = np.asarray(read.points, dtype=np.float64)
+    nodes = read.points
     nodes, cells, number, said = _compacted(nodes, cells, path.name)
+    nodes, moved = move_near(nodes, cells, path.name, read.single)
     longest = float(np.ptp(nodes, axis=0).max())
     unit, source = _unit(units, longest, path.name)
     mesh, done, quality = _oriented(nodes * METRES[unit], cells)
@@ -89,13 +91,23 @@ def read_volume(path: Path, units: str | None = None) -> VolumeMesh | None:
     sets = {name: found[found >= 0] for name, found in named.items()}
     volume = float(signed_volumes(mesh.nodes, mesh.cells).sum())
     summary = read_line(path.name, bodies, len(mesh.faces), volume, longest * METRES[unit], unit, source)
-    return VolumeMesh(mesh, sets, cells.shape[1], unit, bodies, quality, (summary, *said, *done, *warned))
+    return VolumeMesh(
+        mesh,
+        sets,
+        cells.shape[1],
+        unit,
+        bodies,
+        quality,
+        (summary, *read.notes, *moved, *said, *done, *warned),
+    )
 
 
-def _read(path: Path) -> Any:
-    """What meshio reads."""
+def _read(path: Path) -> CellFile:
+    """Read the cells of a file, or refuse it in one sentence."""
     try:
         return read_cells(path)
+    except MeshRefused:
+        raise
     # The readers raise whatever their parsers meet, and one of them exits: there is no common class.
     except (Exception, SystemExit) as error:
         raise MeshRefused(
@@ -104,7 +116,7 @@ def _read(path: Path) -> Any:
         ) from error
 
 
-def _cells(read: Any, kinds: list[str], name: str) -> IntArray:
+def _cells(read: CellFile, kinds: list[str], name: str) -> IntArray:
     """``(c, 4)`` or ``(c, 10)``: the file's tetrahedra, in their order."""
     if not set(kinds) <= set(TETRAHEDRA) or len({TETRAHEDRA[kind] for kind in kinds}) > 1:
         raise MeshRefused(

@@ -6,8 +6,8 @@ from manifold3d import Manifold
 from harness.basics.arrays import BoolArray, FloatArray, IntArray
 from harness.basics.errors import MeshRefused
 from harness.basics.faces.mesh_rays import column_crossings
-from harness.basics.mesh import Mesh
-from harness.objects.solid import from_manifold, outward, signed_volume
+from harness.basics.mesh import Mesh, signed_volume
+from harness.objects.solid import from_manifold, outward
 from harness.sim.solid.mesh_repair import boundary_edges
 from harness.sim.solid.surface_measure import nearest_on_surface
 
@@ -35,7 +35,10 @@ def walled(mesh: Mesh, wall: float | None) -> Mesh:
         return mesh
     if len(boundary_edges(mesh.faces)):
         return _thickened(mesh, wall)
-    return _joined(mesh, _cavity(mesh, wall))
+    # Level sets have float32 coordinates: far from the origin they lose the wall.
+    centre = mesh.vertices[0]
+    cavity = _cavity(Mesh(mesh.vertices - centre, mesh.faces), wall)
+    return _joined(mesh, Mesh(cavity.vertices + centre, cavity.faces))
 
 
 def _thickened(mesh: Mesh, wall: float) -> Mesh:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import WrongUse
+from harness.basics.mesh import signed_volume
 from harness.objects.builtin import MATERIALS, build
-from harness.objects.solid import signed_volume
 from harness.objects.targets import BALL_RADIUS, ball
 
 

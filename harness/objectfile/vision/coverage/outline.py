@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from harness.basics.arrays import AnyArray, FloatArray, read_only
-from harness.basics.mesh import Mesh
+from harness.basics.mesh import Mesh, signed_volume
 from harness.objectfile.vision.coverage.contour import Contours, covered, crossed
 from harness.objectfile.vision.coverage.front import find_front, gathered, nearest_of, projected
 from harness.objectfile.vision.coverage.raster import NEAREST, draw, look_through, placed
@@ -51,8 +51,7 @@ def is_closed(mesh: Mesh) -> bool:
     # One number for a way along an edge: rows would be sorted ten times as slowly.
     forth, back = (np.sort(one * len(mesh.vertices) + other) for one, other in ((begin, end), (end, begin)))
     matched = np.array_equal(forth, back) and bool((np.diff(forth) > 0).all())
-    low, high = mesh.corners[:, 0], np.cross(mesh.corners[:, 1], mesh.corners[:, 2])
-    return bool(matched and np.einsum("nx,nx->", low, high) > 0.0)
+    return matched and signed_volume(mesh) > 0.0
 
 
 def mesh_outline(

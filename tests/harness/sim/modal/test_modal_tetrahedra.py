@@ -9,9 +9,9 @@ from manifold3d import Manifold
 
 from harness.basics.errors import MeshRefused, WrongUse
 from harness.basics.materials import MATERIALS
-from harness.basics.mesh import Mesh
+from harness.basics.mesh import Mesh, signed_volume
 from harness.basics.store import Store
-from harness.objects.solid import from_manifold, signed_volume
+from harness.objects.solid import from_manifold
 from harness.sim.modal.file import modes_of_file
 from harness.sim.modal.modal import default_edge, modes_of, solve_modes
 from harness.sim.solid.mesh_repair import boundary_edges

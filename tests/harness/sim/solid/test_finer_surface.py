@@ -5,8 +5,7 @@ import pytest
 import trimesh
 
 from harness.basics.errors import WrongUse
-from harness.basics.mesh import Mesh
-from harness.objects.solid import signed_volume
+from harness.basics.mesh import Mesh, signed_volume
 from harness.sim.solid.finer_surface import with_edges_below
 from tests.oracles.seen_shapes import cuboid
 

@@ -24,6 +24,11 @@ RIGHT = {
     "count_too_small.stl": ("mm", 1, 2.7e-5, 0.03),
     "tail.stl": ("mm", 1, 2.7e-5, 0.03),
     "channel.off": ("mm", 1, 1.248e-4, 0.08),
+    "two_instances.inp": ("mm", 2, 4.8e-5, 0.14),
+    "node_blocks.inp": ("mm", 1, 2.4e-5, 0.06),
+    "bom_pivot.obj": ("mm", 1, 2.4e-5, 0.04),
+    "bom.stl": ("mm", 1, 2.4e-5, 0.04),
+    "utm.obj": ("m", 1, 2.4e-5, 0.04),
 }
 
 
@@ -41,7 +46,7 @@ def test_a_flat_sheet_is_open_and_has_a_mass_only_with_a_wall() -> None:
     assert take_in(FILES / "sheet.obj", "mm", wall=1e-3).report.mass(7800.0) is not None
 
 
-@pytest.mark.parametrize("name", ["two_rel.obj", "block_clamp.msh"])
+@pytest.mark.parametrize("name", ["two_rel.obj", "block_clamp.msh", "two_instances.inp", "node_blocks.inp"])
 def test_every_command_says_the_same_of_a_file(name: str) -> None:
     path = FILES / name
     summary = take_in(path, "mm").report.summary
