@@ -14,6 +14,7 @@ from harness.basics.files.named_file import require_file
 from harness.sim.solid.coordinates import move_near
 from harness.sim.solid.formats.abaqus import read_abaqus
 from harness.sim.solid.formats.cells import CellBlock, CellFile
+from harness.sim.solid.formats.nastran import read_nastran
 from harness.sim.solid.formats.plain_file import plain_file
 from harness.sim.solid.formats.ply import read_ply
 from harness.sim.solid.plain_formats import read_obj, read_off, read_stl
@@ -24,7 +25,7 @@ METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.30
 _PLAIN = {".obj": read_obj, ".stl": read_stl, ".stl_ascii": read_stl, ".off": read_off, ".ply": read_ply}
 _BY_TRIMESH = frozenset({".glb", ".gltf", ".3mf", ".dae"})
 _OFTEN = "OBJ, STL, PLY, OFF, glTF, 3MF, COLLADA, or tetrahedra as Gmsh, VTK, Abaqus or Nastran write them"
-_OF_ELEMENTS = {".inp": read_abaqus}
+_OF_ELEMENTS = {".inp": read_abaqus, ".bdf": read_nastran, ".nas": read_nastran, ".fem": read_nastran}
 _TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 SOLIDS = ("hexahedron", "wedge", "pyramid", "tetra")
 """How meshio's names of solid cells begin."""

@@ -202,6 +202,10 @@ class _Reader:
         for line, text in self._data:
             if not text:
                 continue
+            if text.rstrip(b", ").count(b",") > 3 and b"." not in text:  # a normal may follow the coordinates
+                raise MeshRefused(
+                    f"{self._name}, line {line}: {show(text)!r} has decimal commas; export it with points"
+                )
             number, *place = self._floats(line, text, 4)
             place += [0.0] * (3 - len(place))
             if system == "C":
