@@ -4,12 +4,16 @@ Frame ``stand``: base, shifted to where the scene nominally puts the object on i
 support, axes as base has them. Everything here and every estimate is in it, in metres.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from harness.basics.arrays import BoolArray, FloatArray, read_only
 from harness.basics.errors import OutOfDomain
+from harness.bench.bench_errors import USUAL, BenchErrors
+from harness.experiment.repeated_readings import PlaceTolerance, group_by_place
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +107,7 @@ class ShapeEvidence:
         library: folder of known shapes, of which it may be one; None for those that come with the program.
         supposed: ``(n, 3)`` m where the surface is supposed to be, by what was learnt from other objects; no
             reading, and none unless an estimator asks for them.
+        errors: standard deviations of the bench; contacts whose poses agree within them are one reading.
     """
 
     touches: tuple[GuardedTouch, ...]
@@ -115,6 +120,7 @@ class ShapeEvidence:
     largest: float
     library: str | None = None
     supposed: FloatArray = field(default_factory=lambda: read_only(np.zeros((0, 3))))
+    errors: BenchErrors = USUAL
 
     def __post_init__(self) -> None:
         for touch in self.touches:
@@ -127,8 +133,33 @@ class ShapeEvidence:
 
     @property
     def contacts(self) -> tuple[GuardedTouch, ...]:
-        """Those touches that met the object."""
-        return tuple(touch for touch in self.touches if touch.met)
+        """The touches that met the object, the first at each place: a repeated reading is no new evidence."""
+        return tuple(alike[0] for alike in self._by_place)
+
+    @property
+    def repeated(self) -> int:
+        """How many contacts are left out because an earlier one is at the same place."""
+        return sum(len(alike) - 1 for alike in self._by_place)
+
+    def without(self, contacts: Collection[int]) -> "ShapeEvidence":
+        """The same without some contacts, and without every touch at their places.
+
+        Args:
+            contacts: indices into ``contacts``.
+        """
+        gone = {id(touch) for k in contacts for touch in self._by_place[k]}
+        return replace(self, touches=tuple(one for one in self.touches if id(one) not in gone))
+
+    @cached_property
+    def _by_place(self) -> tuple[tuple[GuardedTouch, ...], ...]:
+        met = [touch for touch in self.touches if touch.met]
+        poses = np.array([touch.stand_from_gel for touch in met]).reshape(-1, 4, 4)
+        tolerance = PlaceTolerance.from_errors(self.errors, self.gel_thickness)
+        places = group_by_place(poses[:, :3, 3], poses[:, :3, 2], tolerance)
+        return tuple(
+            tuple(met[k] for k in np.flatnonzero(places == place))
+            for place in range(int(places.max(initial=-1)) + 1)
+        )
 
     @property
     def ended_by_housing(self) -> tuple[GuardedTouch, ...]:

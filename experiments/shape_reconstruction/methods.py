@@ -8,10 +8,10 @@ from experiments.shape_reconstruction.estimators.ellipsoid import by_ellipsoid
 from experiments.shape_reconstruction.estimators.hermite import by_hermite
 from experiments.shape_reconstruction.estimators.plain_bodies import by_box, by_hull, by_visual_hull
 from experiments.shape_reconstruction.estimators.point_answer import PointEstimate, by_raw_points
+from experiments.shape_reconstruction.estimators.stated_space import require_stated_size, require_stated_space
 from experiments.shape_reconstruction.evidence import ShapeEvidence
-from experiments.shape_reconstruction.family.settings import LEVELS
-from experiments.shape_reconstruction.family_or_smooth import by_family
-from experiments.shape_reconstruction.glance_or_family import by_glance_or_family
+from experiments.shape_reconstruction.family.settings import LEVELS, FamilySettings
+from experiments.shape_reconstruction.fusion.reconstruct import reconstruct, reconstruct_with_prior
 from experiments.shape_reconstruction.pcn.completed_surface import by_completed_surface
 from experiments.shape_reconstruction.pcn.glance import by_glance
 from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
@@ -28,10 +28,10 @@ METHODS: Mapping[str, Callable[[ShapeEvidence], ShapeEstimate]] = {
     "glance": by_glanced_surface,
     "rbf": by_hermite,
     "pcn": by_completed_surface,
-    "family-coarse": partial(by_family, settings=LEVELS["coarse"]),
+    "family-coarse": partial(reconstruct_with_prior, settings=LEVELS["coarse"]),
     "retrieval": by_known_shapes,
-    "family": by_glance_or_family,
-    "family-fine": partial(by_glance_or_family, settings=LEVELS["fine"]),
+    "family": reconstruct_with_prior,
+    "family-fine": partial(reconstruct_with_prior, settings=LEVELS["fine"]),
 }
 """From cheap to dear: a box takes 10 ms, the family some seconds."""
 
@@ -55,15 +55,39 @@ def estimated(method: str, evidence: ShapeEvidence) -> ShapeEstimate:
 
     Raises:
         WrongUse: the folder of known shapes is not there, or holds none.
-        FitRefused: the readings say too little for it, or contradict each other.
+        FitRefused: the readings say too little for it, contradict each other, or contradict the size and the
+            place that the scene states.
     """
     if evidence.look is None and not evidence.contacts:
         raise FitRefused(
             f"the object was not seen, and {len(evidence.touches)} ways of the gel met nothing; check where "
             "it stands and where the camera looks, or press again"
         )
+    require_stated_space(evidence)
     with _refusing():
-        return METHODS[method](evidence)
+        found = METHODS[method](evidence)
+    require_stated_size(found.mesh, evidence, method)
+    return found
+
+
+def continued(
+    evidence: ShapeEvidence, settings: FamilySettings, previous: ShapeEstimate | None
+) -> ShapeEstimate:
+    """Reconstruct the shape between two presses, from the hypotheses before the last one.
+
+    Args:
+        evidence: of a run so far.
+        settings: how much of the family is searched beside those hypotheses.
+        previous: the estimate before the last press; None at the first.
+
+    Raises:
+        FitRefused: as ``estimated``.
+    """
+    require_stated_space(evidence)
+    with _refusing():
+        found = reconstruct(evidence, settings, previous)
+    require_stated_size(found.mesh, evidence, "family")
+    return found
 
 
 def pointed(method: str, evidence: ShapeEvidence) -> PointEstimate:

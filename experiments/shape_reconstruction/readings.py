@@ -68,6 +68,7 @@ class ShapeReadings:
             support_error=settings.support_error,
             largest=settings.largest,
             library=settings.library,
+            errors=self.run.station.errors,
         )
 
 

@@ -56,6 +56,7 @@ def result_of(scored: Scored) -> dict[str, Any]:
         "choose": scored.run.scene.section(ShapeRun).choose,
         "presses": len(answer.evidence.touches),
         "contacts": len(answer.evidence.contacts),
+        "repeated": answer.evidence.repeated,
         "ended_by_housing": len(answer.evidence.ended_by_housing),
         "estimates": estimates,
         "seconds": sum(answer.seconds[sense] for sense in answer.by_sense),
@@ -117,6 +118,11 @@ def _warnings(scored: Scored, answer: ShapeAnswer) -> list[str]:
         f"step {index} is {1e3 * off:.1f} mm off what all others say: it may have slipped"
         for index, off in fused.doubtful.items()
     ]
+    if answer.evidence.repeated:
+        said.append(
+            f"{answer.evidence.repeated} presses repeat an earlier one within the bench's errors; each place "
+            "counts once"
+        )
     if left_out:
         said.append(f"{len(left_out)} presses were left out; of the last: {left_out[-1]}")
     if scored.run.scene.section(ShapeRun).choose == "planned":

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.family.settings import CONTINUED
-from experiments.shape_reconstruction.family_or_smooth import by_family
-from experiments.shape_reconstruction.methods import estimated
+from experiments.shape_reconstruction.methods import continued, estimated
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from harness.basics.errors import FitRefused, OutOfDomain
+from harness.basics.errors import FitRefused
 
 INFORMATIVE = "family, continued"
 """While the arm waits for a press that goes by which shapes are likely."""
@@ -48,6 +47,6 @@ class RunningShape:
             if self._method != INFORMATIVE:
                 return estimated(self._method, evidence)
             settings = replace(CONTINUED, seed=len(evidence.touches))
-            return by_family(evidence, settings, self._found)
-        except (FitRefused, OutOfDomain):
+            return continued(evidence, settings, self._found)
+        except FitRefused:
             return None

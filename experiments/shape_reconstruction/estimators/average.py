@@ -39,7 +39,7 @@ def by_average(evidence: ShapeEvidence) -> ShapeEstimate:
     level = float(np.quantile(mean, 1.0 - max(float(mean.mean()), _SMALL_SHARE)))
     field = (level - mean).reshape(grid.shape) * grid.pitch
     field[:, :, 0] = np.maximum(field[:, :, 0], 0.0)  # closed at the support, not below it
-    mesh = grid.surface(field)
+    mesh = grid.surface(field).mesh
     count = len(mesh.vertices)
     spread = max(evidence.largest - size, size) / np.sqrt(12.0)
     return ShapeEstimate(

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from experiments.shape_reconstruction.estimators.one_body import BodySurface, extract_body
 from harness.basics.arrays import FloatArray
-from harness.basics.faces.isosurface import isosurface
-from harness.basics.mesh import Mesh
 
 MOST_CORNERS = 200_000
 """Of a grid: beyond it the cells are made larger."""
@@ -65,10 +64,15 @@ class Grid:
         values[band] = field(self.points[band])
         return values
 
-    def surface(self, field: FloatArray) -> Mesh:
-        """The closed surface around where ``(n,)`` m of the corners are below zero.
+    def surface(self, field: FloatArray, contacts: FloatArray | None = None) -> BodySurface:
+        """Extract the closed surface of the one body where a field is below zero.
+
+        Args:
+            field: ``(n,)`` signed distance at the corners, m.
+            contacts: ``(n, 3)`` points of the surface that were touched, m; they decide which piece is the
+                body.
 
         Raises:
             OutOfDomain: as ``isosurface``.
         """
-        return isosurface(field.reshape(self.shape), self.origin, self.pitch)
+        return extract_body(field.reshape(self.shape), self.origin, self.pitch, contacts)

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
@@ -17,7 +17,7 @@ from experiments.shape_reconstruction.estimators.knowledge import (
     limited_sides,
     not_bounded,
 )
-from experiments.shape_reconstruction.estimators.leave_out import doubtful_touches
+from experiments.shape_reconstruction.estimators.leave_out import LeftOut, predict_by_field
 from experiments.shape_reconstruction.estimators.picture import silhouette_of
 from experiments.shape_reconstruction.estimators.revolution import Revolution, find_revolution
 from experiments.shape_reconstruction.estimators.silhouette_rim import rim_data
@@ -104,7 +104,7 @@ def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate
     data = _contact_data(samples)
     low, high = _box(data.points, evidence.largest)
     by_contacts = field = fitted(data, low, high)
-    doubtful = doubtful_touches(evidence, by_contacts)
+    left_out = predict_by_field(evidence, by_contacts)
     if axis is not None:
         data = data.joined(_copies(axis, samples, evidence, silhouette))
         low, high = _box(data.points, evidence.largest)
@@ -115,8 +115,9 @@ def by_hermite(evidence: ShapeEvidence, symmetric: bool = True) -> ShapeEstimate
         rim = rim_data(silhouette, _cut(field, bounds), data.points, low, high)
         field = fitted(data.joined(rim), low, high, by_contacts.amplitude)
     grid = Grid.over(low, high, PITCH)
-    mesh = grid.surface(grid.near_zero(_cut(field, bounds)))
-    return _finished(_Fit(evidence, whole, silhouette, field, axis, doubtful), mesh, start)
+    body = grid.surface(grid.near_zero(_cut(field, bounds)), samples.points)
+    found = _finished(_Fit(evidence, whole, silhouette, field, axis, left_out), body.mesh, start)
+    return replace(found, flags=(*found.flags, *body.notes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +129,7 @@ class _Fit:
     silhouette: Silhouette | None
     field: ThinPlateField
     axis: Revolution | None
-    doubtful: dict[int, float]
+    left_out: LeftOut
 
 
 def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
@@ -145,13 +146,14 @@ def _finished(fit: _Fit, mesh: Mesh, start: float) -> ShapeEstimate:
         deviation=np.sqrt(_deviations(fit.field, mesh) ** 2 + READING**2 + beyond**2 + hollow**2),
         known_by=known,
         not_bounded=not_bounded(sides),
-        doubtful=fit.doubtful,
+        doubtful=fit.left_out.outliers,
         flags=tuple(flag for flag in (round_, open_) if flag),
         seconds=time.perf_counter() - start,
         details={
             "estimator": "rbf",
             "contacts": len(fit.evidence.contacts),
             "amplitude": fit.field.amplitude,
+            "left_out_m": fit.left_out.errors.tolist(),
             "axis_m": None if fit.axis is None else [float(value) for value in fit.axis.centre],
         },
     )

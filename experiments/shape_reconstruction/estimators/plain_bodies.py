@@ -1,6 +1,7 @@
 """The plainest bodies that hold what was touched or seen: a box, a hull, what lies within the silhouette."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import QhullError
@@ -85,7 +86,7 @@ def by_hull(evidence: ShapeEvidence) -> ShapeEstimate:
             f"{len(evidence.contacts)} contacts span a body less than {1e3 * PITCH:g} mm thick, the pitch of "
             "the hull's grid; touch another side"
         )
-    return plain_answer(evidence, samples, None, grid.surface(beyond), "hull", start)
+    return plain_answer(evidence, samples, None, grid.surface(beyond).mesh, "hull", start)
 
 
 def by_visual_hull(evidence: ShapeEvidence) -> ShapeEstimate:
@@ -114,8 +115,10 @@ def by_visual_hull(evidence: ShapeEvidence) -> ShapeEstimate:
         )
     low, high = left.min(axis=0) - _COARSE, left.max(axis=0) + _COARSE
     fine = Grid.over(np.maximum(low, [-np.inf, -np.inf, 0.0]), high, PITCH)
-    mesh = fine.surface(_beyond(evidence, silhouette, fine.points, within))
-    return plain_answer(evidence, samples, silhouette, mesh, "visual hull", start)
+    touched = None if samples is None else samples.points
+    body = fine.surface(_beyond(evidence, silhouette, fine.points, within), touched)
+    found = plain_answer(evidence, samples, silhouette, body.mesh, "visual hull", start)
+    return replace(found, flags=body.notes)
 
 
 def _slab(silhouette: Silhouette, points: FloatArray) -> tuple[FloatArray, float, float]:

@@ -9,12 +9,14 @@ import numpy as np
 from experiments.shape_reconstruction.estimators.knowledge import beyond_deviation, limited_sides
 from experiments.shape_reconstruction.estimators.knowledge import not_bounded as open_axes
 from experiments.shape_reconstruction.estimators.picture import silhouette_of
+from experiments.shape_reconstruction.estimators.stated_space import TOO_LONG, longest_side, max_offset
 from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.family import layout
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.contacts.fit import ContactFit, contact_fit, moved_points
 from experiments.shape_reconstruction.family.contacts.tilts import turned_contacts
 from experiments.shape_reconstruction.family.distance import distances
-from experiments.shape_reconstruction.family.field import median_surface
+from experiments.shape_reconstruction.family.field import corners_of, median_surface
 from experiments.shape_reconstruction.family.known import beyond_contacts, known_by, not_bounded
 from experiments.shape_reconstruction.family.posterior import Mixture, mixture_of
 from experiments.shape_reconstruction.family.search import FamilySearch, Hypothesis
@@ -23,7 +25,7 @@ from experiments.shape_reconstruction.family.strain import Strain
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.surface import ShapeEstimate
 from harness.basics.arrays import BoolArray, FloatArray
-from harness.basics.errors import OutOfDomain
+from harness.basics.errors import FitRefused, OutOfDomain
 from harness.basics.mesh import Mesh
 
 NOISE = 0.6e-3
@@ -54,9 +56,9 @@ OUTSIDE = 6.0
 LOOSE = 8.0
 """The same above which the class does not limit what no reading does."""
 
-FOREIGN, SURE = 20.0, 6.0
-"""A contact's typical sum of squares above which no class fits at all, were contacts without number; of so
-many contacts it is twice that."""
+POINT_SIGMA = 1.6e-3
+"""One standard deviation of each of the eight points of a contact that a surface is moved to, m: they err
+together, and each counts as a part of it."""
 
 SLIPPING = 0.15
 """Share of contacts that may have slipped."""
@@ -94,15 +96,19 @@ def family_estimate(
         )
     search = FamilySearch(evidence, settings)
     seeds = [seed for estimate in previous for seed in _seeds_of(search, estimate)]
-    mixture = mixture_of(search.found(seeds), evidence.sighted, bool(evidence.contacts), settings.seed)
+    hypotheses = _at_stated_place(search.found(seeds), evidence)
+    mixture = mixture_of(hypotheses, evidence.sighted, bool(evidence.contacts), settings.seed)
     turned = turned_contacts(mixture.best.shape, evidence)
     fit, strain = contact_fit(mixture.best.shape, search.full), search.strain(mixture.best.shape)
     fit = replace(fit, doubtful=fit.doubtful | (turned > 0.0))
-    plain = median_surface(mixture, settings.pitch)
+    rejected = _outliers(fit)
+    touched = np.concatenate([np.empty((0, 3)), *(touch.points for touch in evidence.contacts)])
+    body = median_surface(mixture, settings.pitch, touched)
+    plain = body.mesh
     mesh = _warped(plain, mixture.best.shape, evidence, fit)
     doubtful = {
         touch.index: float(off)
-        for touch, off, bad in zip(evidence.contacts, fit.off, fit.doubtful, strict=True)
+        for touch, off, bad in zip(evidence.contacts, fit.off, rejected, strict=True)
         if bad
     }
     found = ShapeEstimate(
@@ -112,22 +118,45 @@ def family_estimate(
         not_bounded=not_bounded(evidence, mesh, fit.typical > LOOSE or strain.beyond_belief),
         doubtful=doubtful,
         flags=(
-            *_flags(mixture, fit, strain, doubtful, settings.draws < LEVELS["fine"].draws),
+            *_flags(mixture, fit, strain),
+            *_contact_flags(evidence, fit, rejected, settings.draws < LEVELS["fine"].draws),
             *_turned_flags(evidence, turned),
+            *body.notes,
         ),
         seconds=time.perf_counter() - began,
         details={
             **_details(mixture, fit),
-            "foreign": _is_foreign(fit),
             "strain": strain.cost,
+            "strained": strain.beyond_belief,
+            "sighted": evidence.sighted,
             "beyond_m": _beyond(mesh, evidence),
         },
     )
     return found if evidence.contacts else _by_picture_alone(found, evidence)
 
 
-def _is_foreign(fit: ContactFit) -> bool:
-    return bool(len(fit.sums)) and fit.typical > FOREIGN * (1.0 + SURE / len(fit.sums))
+def _at_stated_place(hypotheses: list[Hypothesis], evidence: ShapeEvidence) -> list[Hypothesis]:
+    """Those no larger than the scene allows and no farther from the stated place.
+
+    Raises:
+        FitRefused: there is none.
+    """
+    limit = TOO_LONG * evidence.largest
+    kept = [
+        one
+        for one in hypotheses
+        if longest_side(corners_of(one.shape)) <= limit
+        and float(np.hypot(*one.shape.theta[: layout.Y + 1])) <= max_offset(evidence)
+    ]
+    if not kept:
+        best = hypotheses[0].shape
+        off = float(np.hypot(*best.theta[: layout.Y + 1]))
+        raise FitRefused(
+            f"the readings fit a household shape {longest_side(corners_of(best)):.2f} m long, {off:.2f} m "
+            f"from the stated place; [shape] largest is {evidence.largest:g} m and the place is known to "
+            f"{evidence.place_error * 1e3:g} mm; correct object.pose.position or these two"
+        )
+    return kept
 
 
 def _beyond(mesh: Mesh, evidence: ShapeEvidence) -> float:
@@ -157,19 +186,22 @@ def _seeds_of(search: FamilySearch, estimate: ShapeEstimate) -> Iterator[Hypothe
 
 
 def _warped(mesh: Mesh, shape: FamilyShape, evidence: ShapeEvidence, fit: ContactFit) -> Mesh:
-    places, offsets = moved_points(shape, evidence, _believed(fit))
-    # Points of one contact err together: each counts as a part of it.
-    sigma = np.full(len(places), 1.6e-3)
+    places, offsets = moved_points(shape, evidence, ~_outliers(fit))
+    sigma = np.full(len(places), POINT_SIGMA)
     far = float(np.sqrt(np.mean(np.sum(offsets**2, axis=1)))) if fit.typical > OUTSIDE else 0.0
     moved = mesh.vertices + displacement(places - offsets, offsets, sigma, mesh.vertices, far)
     return Mesh(moved, mesh.faces)
 
 
-def _believed(fit: ContactFit) -> BoolArray:
-    """Contacts that the surface is moved to: those that slipped are not, unless so many cannot have."""
+def _outliers(fit: ContactFit) -> BoolArray:
+    """``(contacts,)`` whether each is rejected: it fits none of the rest, and few are so.
+
+    Where more than ``SLIPPING`` of them do not fit, the shape is wrong, and the surface is moved to all of
+    them.
+    """
     if len(fit.doubtful) and fit.doubtful.mean() > SLIPPING:
-        return np.ones_like(fit.doubtful)
-    return ~fit.doubtful
+        return np.zeros_like(fit.doubtful)
+    return fit.doubtful
 
 
 def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh, fit: ContactFit, sighted: bool) -> FloatArray:
@@ -186,9 +218,7 @@ def _deviation(plain: Mesh, mixture: Mixture, mesh: Mesh, fit: ContactFit, sight
     return np.asarray(np.sqrt(known + UNDERSIDE**2 * under) * (1.0 if sighted else BLIND))
 
 
-def _flags(
-    mixture: Mixture, fit: ContactFit, strain: Strain, doubtful: dict[int, float], may_be_finer: bool
-) -> tuple[str, ...]:
+def _flags(mixture: Mixture, fit: ContactFit, strain: Strain) -> tuple[str, ...]:
     flags = []
     classes = mixture.by_class()
     rivals = [name for name, weight in classes.items() if weight >= RIVAL]
@@ -200,10 +230,26 @@ def _flags(
         )
     if strain.beyond_belief:
         flags.append(f"outside the family: such a shape fits with {strain.most}")
-    if doubtful:
-        said = f"contacts that do not fit the rest: {', '.join(str(index) for index in doubtful)}"
-        flags.append(f"{said}; {FINER}" if may_be_finer and len(doubtful) > 1 else said)
     return tuple(flags)
+
+
+def _contact_flags(
+    evidence: ShapeEvidence, fit: ContactFit, rejected: BoolArray, may_be_finer: bool
+) -> list[str]:
+    """Name the contacts that do not fit, with the reason, and say whether the surface passes through them."""
+    if not fit.doubtful.any():
+        return []
+    named = ", ".join(
+        f"{touch.index} ({1e3 * off:.1f} mm)"
+        for touch, off, bad in zip(evidence.contacts, fit.off, fit.doubtful, strict=True)
+        if bad
+    )
+    rest = 1e3 * float(np.median(fit.off[~fit.doubtful])) if not fit.doubtful.all() else np.inf
+    finer = f"; {FINER}" if may_be_finer and fit.doubtful.sum() > 1 else ""
+    if not rejected.any():
+        off = f"contacts off the household shape: {named}; they are too many to have slipped and all count"
+        return [off + finer]
+    return [f"contacts rejected as outliers: {named}, where the others fit to {rest:.1f} mm{finer}"]
 
 
 def _turned_flags(evidence: ShapeEvidence, turned: FloatArray) -> list[str]:

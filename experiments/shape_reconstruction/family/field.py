@@ -2,14 +2,13 @@
 
 import numpy as np
 
+from experiments.shape_reconstruction.estimators.one_body import BodySurface, extract_body
 from experiments.shape_reconstruction.family.classes import FamilyShape
 from experiments.shape_reconstruction.family.distance import BOX, PREPARED, distance, prepare
 from experiments.shape_reconstruction.family.layout import FLOOR, HOLLOW, KIND, TURNED, WALL
 from experiments.shape_reconstruction.family.posterior import Mixture
 from harness.basics.arrays import FloatArray, IntArray
 from harness.basics.compiled import compiled
-from harness.basics.faces.isosurface import isosurface
-from harness.basics.mesh import Mesh
 
 BLOCK = 4
 """Cells a side that are filled at once where no surface is near."""
@@ -37,13 +36,14 @@ _WEIGHT = 0.03
 """Below it a hypothesis does not move the median."""
 
 
-def median_surface(mixture: Mixture, pitch: float) -> Mesh:
-    """The surface that half of the belief is inside of.
+def median_surface(mixture: Mixture, pitch: float, contacts: FloatArray | None = None) -> BodySurface:
+    """Extract the median surface of the hypotheses as one body: half of the weight lies inside it.
 
     Args:
         mixture: of shapes in ``stand``.
         pitch: m of the grid; finer where a wall is thin, coarser where the body is larger than 160 cells. A
             wall too thin for the grid that is left is drawn as thick as it shows, on its inner side.
+        contacts: ``(n, 3)`` points of the surface that were touched, m; they decide which piece is the body.
     """
     pairs = zip(mixture.hypotheses, mixture.weights, strict=True)
     shapes = [(one.shape, float(weight)) for one, weight in pairs if weight >= _WEIGHT]
@@ -61,7 +61,8 @@ def median_surface(mixture: Mixture, pitch: float) -> Mesh:
     else:
         # A plate thinner than any cell: drawn as thick as it shows.
         inside = inside - (inside.min() + _SLIVER * finer * cell)
-    return isosurface(_above_support(inside, low[2], finer * cell), low, finer * cell)
+    above = _above_support(inside, low[2], finer * cell)
+    return extract_body(above, low, finer * cell, contacts)
 
 
 def _above_support(inside: FloatArray, low: float, cell: float) -> FloatArray:

@@ -68,7 +68,7 @@ def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str
         outside: whether its contacts do not fit any class.
     """
     if evidence.look is not None and _limits(evidence.look):
-        return _open_without_class(evidence, mesh) if outside else ()
+        return open_without_class(evidence, mesh) if outside else ()
     normals = np.array([touch.mean_normal for touch in evidence.contacts]).reshape(-1, 3)
     supposed = beyond_contacts(mesh.vertices, evidence).max(axis=0)
     free = []
@@ -80,9 +80,16 @@ def not_bounded(evidence: ShapeEvidence, mesh: Mesh, outside: bool) -> tuple[str
     return tuple(free)
 
 
-def _open_without_class(evidence: ShapeEvidence, mesh: Mesh) -> tuple[str, ...]:
-    samples = all_samples(evidence)
-    return open_axes(limited_sides(mesh, samples, silhouette_of(evidence, samples.points)))
+def open_without_class(evidence: ShapeEvidence, mesh: Mesh) -> tuple[str, ...]:
+    """List the axes along which neither the silhouette nor contacts limit the object, whatever its class.
+
+    Args:
+        evidence: one contact or a silhouette at least.
+        mesh: the answer.
+    """
+    samples = all_samples(evidence) if evidence.contacts else None
+    touched = np.zeros((0, 3)) if samples is None else samples.points
+    return open_axes(limited_sides(mesh, samples, silhouette_of(evidence, touched)))
 
 
 def beyond_contacts(vertices: FloatArray, evidence: ShapeEvidence) -> FloatArray:

@@ -1,6 +1,7 @@
 """A closed surface around the points that the network completes: what a gap between them could not let in."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
@@ -14,6 +15,7 @@ from experiments.shape_reconstruction.estimators.knowledge import (
     limited_sides,
     not_bounded,
 )
+from experiments.shape_reconstruction.estimators.one_body import BodySurface
 from experiments.shape_reconstruction.evidence import ShapeEvidence
 from experiments.shape_reconstruction.pcn.network import shipped
 from experiments.shape_reconstruction.surface import ShapeEstimate
@@ -42,7 +44,8 @@ def by_completed_surface(evidence: ShapeEvidence) -> ShapeEstimate:
     start = time.perf_counter()
     samples = all_samples(evidence)
     points = shipped().completed(samples.points)
-    mesh = closed_around(points)
+    body = closed_around(points)
+    mesh = body.mesh
     known, sides = known_by(mesh, samples, None), limited_sides(mesh, samples, None)
     beyond = beyond_deviation(mesh, known, sides, evidence.largest)
     return ShapeEstimate(
@@ -51,30 +54,48 @@ def by_completed_surface(evidence: ShapeEvidence) -> ShapeEstimate:
         known_by=known,
         not_bounded=not_bounded(sides),
         doubtful={},
-        flags=(),
+        flags=body.notes,
         seconds=time.perf_counter() - start,
         details={"estimator": "pcn", "points": len(points)},
     )
 
 
-def closed_around(points: FloatArray, gap: float = GAP, blur: float = 0.0) -> Mesh:
-    """The morphological closing of ``(n, 3)`` m of points, a pitch outside of them and above the support.
+def closed_around(points: FloatArray, gap: float = GAP, blur: float = 0.0) -> BodySurface:
+    """Extract the morphological closing of points, a pitch outside of them and above the support.
 
     Args:
-        points: all over a body.
+        points: ``(n, 3)`` places all over a body, m.
         gap: median distances between neighbouring points that the closing ball does not pass.
         blur: pitches over which the surface is smoothed.
 
     Raises:
         OutOfDomain: as ``isosurface``.
     """
+    grid, outside = closing_field(points, gap, blur)
+    body = grid.surface(outside)
+    above = np.maximum(body.mesh.vertices, [-np.inf, -np.inf, 0.0])
+    return replace(body, mesh=Mesh(above, body.mesh.faces))
+
+
+def closing_field(
+    points: FloatArray, gap: float = GAP, blur: float = 0.0, margin: float = 3.0 * PITCH
+) -> tuple[Grid, FloatArray]:
+    """Compute the field whose zero is the morphological closing of points, on a grid around them.
+
+    Args:
+        points: ``(n, 3)`` places all over a body, m.
+        gap: median distances between neighbouring points that the closing ball does not pass.
+        blur: pitches over which the field is smoothed.
+        margin: distance from the closing ball to the border of the grid, m.
+
+    Returns:
+        The grid, and ``(corners,)`` m, negative inside; outside it grows no farther than the ball's radius.
+    """
     apart = float(np.median(cKDTree(points).query(points, k=[2])[0]))
     radius = max(gap * apart, 2.0 * PITCH)
-    margin = radius + 3.0 * PITCH
-    grid = Grid.over(points.min(axis=0) - margin, points.max(axis=0) + margin, PITCH)
+    reach = radius + margin
+    grid = Grid.over(points.min(axis=0) - reach, points.max(axis=0) + reach, PITCH)
     near = (np.asarray(cKDTree(points).query(grid.points)[0]) <= radius).reshape(grid.shape)
     around = ndimage.binary_fill_holes(near)
     depth = grid.pitch * np.asarray(ndimage.distance_transform_edt(around))
-    outside = ndimage.gaussian_filter(radius - grid.pitch - depth, blur)
-    mesh = grid.surface(outside.ravel())
-    return Mesh(np.maximum(mesh.vertices, [-np.inf, -np.inf, 0.0]), mesh.faces)
+    return grid, np.asarray(ndimage.gaussian_filter(radius - grid.pitch - depth, blur)).ravel()

@@ -30,8 +30,8 @@ def by_glanced_surface(evidence: ShapeEvidence) -> ShapeEstimate:
     start = time.perf_counter()
     seen = silhouette_to_glance_at(evidence)
     points = shipped().points(seen.look)
-    mesh = closed_around(points, GAP, BLUR)
-    deviation = np.hypot(SPREAD * shipped().held_out, 2.0 * _outside(seen, points))
+    body = closed_around(points, GAP, BLUR)
+    mesh, deviation = body.mesh, prior_deviation(seen, points)
     return ShapeEstimate(
         mesh=mesh,
         deviation=np.full(len(mesh.vertices), deviation),
@@ -41,10 +41,21 @@ def by_glanced_surface(evidence: ShapeEvidence) -> ShapeEstimate:
         flags=(
             "by the picture alone: its class is not told, and what is behind is supposed, as household "
             "shapes are",
+            *body.notes,
         ),
         seconds=time.perf_counter() - start,
         details={"estimator": "glance", "points": len(points)},
     )
+
+
+def prior_deviation(seen: Silhouette, points: FloatArray) -> float:
+    """Compute one standard deviation of the single-view prior's surface, m.
+
+    Args:
+        seen: the silhouette.
+        points: ``(n, 3)`` places that the network predicts, m.
+    """
+    return float(np.hypot(SPREAD * shipped().held_out, 2.0 * _outside(seen, points)))
 
 
 def _outside(seen: Silhouette, points: FloatArray) -> float:

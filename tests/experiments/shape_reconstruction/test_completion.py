@@ -104,7 +104,7 @@ def test_closing_fills_a_ball_and_leaves_a_bowl_open() -> None:
     ball *= 0.06 / np.linalg.norm(ball, axis=1)[:, None]
     ball[:, 2] += 0.06
     middle = np.array([[0.0, 0.0, 0.045]])
-    solid, bowl = closed_around(ball), closed_around(ball[ball[:, 2] < 0.05])
+    solid, bowl = closed_around(ball).mesh, closed_around(ball[ball[:, 2] < 0.05]).mesh
     assert is_inside(middle, solid.corners)[0]
     assert np.ptp(solid.bounds, axis=0) == pytest.approx(
         0.12 + 2.0 * PITCH, abs=PITCH

@@ -64,12 +64,12 @@ def test_what_goes_on_from_press_to_press_is_the_same_where_a_run_is_taken_up_ag
 def test_each_estimate_is_given_that_of_a_press_less(monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[object] = []
 
-    def by_family(
+    def continued(
         evidence: ShapeEvidence, _settings: FamilySettings, previous: ShapeEstimate | None
     ) -> ShapeEstimate:
         given.append(previous and previous.details["presses"])
         return replace(by_box(evidence_of(TOUCHES)), details={"presses": len(evidence.touches)})
 
-    monkeypatch.setattr(running, "by_family", by_family)
+    monkeypatch.setattr(running, "continued", continued)
     RunningShape(INFORMATIVE).after(evidence_of(TOUCHES[:3]))
     assert given == [None, 0, 1, 2]

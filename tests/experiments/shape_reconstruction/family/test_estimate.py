@@ -1,5 +1,6 @@
 """The estimate's promises: finite, closed, convergent, and honest where nothing limits the object."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -14,13 +15,12 @@ from experiments.shape_reconstruction.family.estimate import (
     BLIND,
     LOOSE,
     NOISE,
-    _believed,
-    _flags,
+    _contact_flags,
+    _outliers,
     family_estimate,
 )
-from experiments.shape_reconstruction.family.posterior import Mixture
 from experiments.shape_reconstruction.family.settings import LEVELS
-from experiments.shape_reconstruction.family.strain import STRAINED, Strain
+from experiments.shape_reconstruction.family.strain import STRAINED
 from experiments.shape_reconstruction.family.warp import displacement
 from experiments.shape_reconstruction.metric import shape_error
 from experiments.shape_reconstruction.surface import SEEN, SUPPOSED, TOUCHED, ShapeEstimate
@@ -229,22 +229,32 @@ def test_a_body_that_is_off_alike_is_moved_between_its_contacts_too() -> None:
     assert both > 1.4e-3
 
 
-@pytest.mark.parametrize(("count", "doubtful", "believed"), [(8, 1, 7), (8, 3, 8), (32, 4, 28), (0, 0, 0)])
-def test_contacts_that_slipped_do_not_move_the_surface_and_too_many_have_not(
-    count: int, doubtful: int, believed: int
+@pytest.mark.parametrize(
+    ("count", "doubtful", "rejected"), [(8, 1, 1), (8, 3, 0), (32, 4, 4), (6, 1, 0), (0, 0, 0)]
+)
+def test_few_contacts_that_do_not_fit_are_outliers_and_many_are_not(
+    count: int, doubtful: int, rejected: int
 ) -> None:
     fit = ContactFit(np.ones(count), np.zeros(count), np.arange(count) < doubtful, 0.0)
-    assert _believed(fit).sum() == believed
+    assert _outliers(fit).sum() == rejected
 
 
 @pytest.mark.parametrize(
-    ("doubtful", "finer", "said"), [(1, True, False), (3, True, True), (3, False, False)]
+    ("doubtful", "finer", "reason", "hint"),
+    [
+        (0, True, "", False),
+        (1, True, r"rejected as outliers: 0 \(4.0 mm\), where the others fit to 0.3 mm", False),
+        (3, True, r"0 \(4.0 mm\), 1 \(4.0 mm\), 2 \(4.0 mm\); they are too many to have slipped", True),
+        (3, False, "too many to have slipped and all count", False),
+    ],
 )
-def test_several_contacts_that_do_not_fit_name_the_finer_search(
-    doubtful: int, finer: bool, said: bool
+def test_a_contact_that_does_not_fit_is_named_with_the_reason(
+    doubtful: int, finer: bool, reason: str, hint: bool
 ) -> None:
-    mixture = cast(Mixture, SimpleNamespace(by_class=lambda: {"can": 1.0}))
-    fit = ContactFit(np.ones(8), np.zeros(8), np.arange(8) < doubtful, 0.0)
-    flags = _flags(mixture, fit, Strain(0.0, ""), dict.fromkeys(range(doubtful), 2e-3), finer)
-    assert len(flags) == 1
-    assert ("shape.method=family-fine" in flags[0]) == said
+    bad = np.arange(8) < doubtful
+    fit = ContactFit(np.ones(8), np.where(bad, 4e-3, 0.3e-3), bad, 0.0)
+    evidence = cast(ShapeEvidence, SimpleNamespace(contacts=[SimpleNamespace(index=k) for k in range(8)]))
+    flags = " ".join(_contact_flags(evidence, fit, _outliers(fit), finer))
+    assert re.search(reason, flags)
+    assert bool(flags) == (doubtful > 0)
+    assert ("shape.method=family-fine" in flags) == hint

@@ -19,7 +19,7 @@ def cup_with(wall: float) -> FamilyShape:
 
 
 def surface_of(shape: FamilyShape, pitch: float) -> Mesh:
-    return median_surface(mixture_of_all(shape), pitch)
+    return median_surface(mixture_of_all(shape), pitch).mesh
 
 
 def mixture_of_all(*shapes: FamilyShape) -> Mixture:
@@ -68,7 +68,7 @@ def volume(mesh: Mesh) -> float:
 @pytest.mark.timeout(300)
 def test_bodies_that_lie_apart_are_answered_by_the_likeliest() -> None:
     apart = [board_at(x, 6e-3) for x in (0.0, 0.05, 0.1)]
-    mesh = median_surface(mixture_of_all(*apart), 2.5e-3)
+    mesh = median_surface(mixture_of_all(*apart), 2.5e-3).mesh
     assert holes_and_pieces(mesh) == 2
     assert mesh.bounds[0, 0] < 0.0
 

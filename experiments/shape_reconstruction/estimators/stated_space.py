@@ -1,0 +1,119 @@
+"""Check readings and answers against where the scene says that the object is, and how large it may be."""
+
+import numpy as np
+
+from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
+from harness.basics.arrays import FloatArray
+from harness.basics.errors import FitRefused
+from harness.basics.mesh import Mesh
+
+PLACE_ERRORS = 3.0
+"""Standard deviations of the stated place that the object's middle is off by, at most."""
+
+OFF_MIDDLE = 0.25
+"""Distance between an object's middle and what it stands on, relative to ``largest``, at most: a head heavier
+than its handle."""
+
+TOO_LONG = 1.1
+"""An answer's longest side over ``largest`` from which on the readings contradict it: the surface's own
+error."""
+
+_YAWS = 45
+_HORIZON = 1.0e-3
+_FAR = 100.0
+
+
+def max_offset(evidence: ShapeEvidence) -> float:
+    """Greatest distance between the stated place and the support under the object, m."""
+    return PLACE_ERRORS * evidence.place_error + OFF_MIDDLE * evidence.largest
+
+
+def require_stated_space(evidence: ShapeEvidence) -> None:
+    """Refuse readings that no object of the stated size at the stated place can cause.
+
+    Args:
+        evidence: contacts and silhouette.
+
+    Raises:
+        FitRefused: the silhouette, or a contact, is too far from the stated place, or two contacts are
+            farther apart than the stated size allows.
+    """
+    if evidence.look is not None and evidence.look.mask.any():
+        _require_outline(evidence, evidence.look)
+    if evidence.contacts:
+        _require_contacts(evidence, np.concatenate([touch.points for touch in evidence.contacts]))
+
+
+def require_stated_size(mesh: Mesh, evidence: ShapeEvidence, method: str) -> None:
+    """Refuse an answer that is larger than the scene allows.
+
+    Args:
+        mesh: the answer, m in ``stand``.
+        evidence: states ``largest``.
+        method: name of the estimator, for the message.
+
+    Raises:
+        FitRefused: its longest side is more than ``TOO_LONG`` times ``largest``.
+    """
+    longest = longest_side(mesh.vertices)
+    if longest > TOO_LONG * evidence.largest:
+        raise FitRefused(
+            f"the readings fit a body {longest:.2f} m long (method {method}), and [shape] largest is "
+            f"{evidence.largest:g} m; check the camera's pose and where the object stands, or raise largest"
+        )
+
+
+def longest_side(points: FloatArray) -> float:
+    """Longest side of the upright box around points whose longest side is least, m.
+
+    Args:
+        points: ``(n, 3)`` m.
+    """
+    yaws = np.arange(_YAWS) * 0.5 * np.pi / _YAWS
+    turned = points[:, :2] @ np.array([np.cos(yaws), np.sin(yaws)])
+    across = points[:, :2] @ np.array([-np.sin(yaws), np.cos(yaws)])
+    level = np.maximum(np.ptp(turned, axis=0), np.ptp(across, axis=0)).min()
+    return float(max(level, np.ptp(points[:, 2])))
+
+
+def _require_outline(evidence: ShapeEvidence, look: SeenMask) -> None:
+    """Compare the place where the filled silhouette meets the support with the stated place."""
+    off, limit = _outline_offset(look), max_offset(evidence)
+    if off > limit:
+        seen = "above the horizon" if off >= _FAR else f"{off:.2f} m from the stated place at the nearest"
+        raise FitRefused(
+            f"in the picture the object stands {seen}; with [shape] place_error "
+            f"{evidence.place_error * 1e3:g} mm and largest {evidence.largest:g} m it must be within "
+            f"{limit:.2f} m; correct object.pose.position or these two, or check the camera's pose"
+        )
+
+
+def _outline_offset(look: SeenMask) -> float:
+    """Least distance from the stated place to where rays of the silhouette meet the support, m."""
+    rows, columns = np.nonzero(look.mask)
+    height, width = look.mask.shape
+    pixels = np.column_stack([columns + 0.5 - 0.5 * width, rows + 0.5 - 0.5 * height]) / look.focal_length
+    rays = np.column_stack([pixels, np.ones(len(pixels))]) @ look.stand_from_camera[:3, :3].T
+    eye = look.stand_from_camera[:3, 3]
+    down = rays[:, 2] < -_HORIZON
+    if eye[2] <= 0.0 or not down.any():
+        return _FAR
+    feet = eye[:2] - (eye[2] / rays[down, 2])[:, None] * rays[down, :2]
+    return min(float(np.linalg.norm(feet, axis=1).min()), _FAR)
+
+
+def _require_contacts(evidence: ShapeEvidence, points: FloatArray) -> None:
+    reach = evidence.largest / np.sqrt(2.0) + PLACE_ERRORS * evidence.place_error
+    off = float(np.linalg.norm(points[:, :2], axis=1).max())
+    longest = longest_side(points)
+    if off > reach:
+        raise FitRefused(
+            f"a press met something {off:.2f} m from the stated place; with [shape] place_error "
+            f"{evidence.place_error * 1e3:g} mm and largest {evidence.largest:g} m the object ends within "
+            f"{reach:.2f} m; correct object.pose.position or these two"
+        )
+    if longest > TOO_LONG * evidence.largest:
+        raise FitRefused(
+            f"contacts are {longest:.2f} m apart, and [shape] largest is {evidence.largest:g} m; raise "
+            "largest, or check whether the presses met one object"
+        )

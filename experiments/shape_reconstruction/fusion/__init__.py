@@ -1,0 +1,1 @@
+"""One answer from the shape family, the smooth surface and the single-view prior."""

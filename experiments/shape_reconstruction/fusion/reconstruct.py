@@ -1,0 +1,195 @@
+"""Reconstruct a shape from contacts, silhouette and the single-view prior."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from experiments.shape_reconstruction.estimators.hermite import by_hermite
+from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.family.estimate import LEFT, LOOSE, RIVAL, family_estimate
+from experiments.shape_reconstruction.family.known import open_without_class
+from experiments.shape_reconstruction.family.settings import ANEW, FamilySettings
+from experiments.shape_reconstruction.family.strain import STRAINED
+from experiments.shape_reconstruction.fusion.acceptance import (
+    MAX_OUTLINE_ERROR,
+    MIN_CONTACTS,
+    Candidate,
+    choose,
+    rejection_reason,
+)
+from experiments.shape_reconstruction.fusion.bent_prior import bend_prior
+from experiments.shape_reconstruction.fusion.predictions import outline_error, predict_left_out
+from experiments.shape_reconstruction.pcn.glance import with_supposed
+from experiments.shape_reconstruction.pcn.glanced_surface import by_glanced_surface
+from experiments.shape_reconstruction.surface import ShapeEstimate
+from harness.basics.errors import FitRefused, OutOfDomain
+
+SEARCHES, BLIND_SEARCHES = 3, 2
+"""Searches of a shape that no search fits well; of one without a picture, at least."""
+
+UNEASY = 4.0
+"""Nuisance-parameter cost of an answer by few contacts above which one more search is made
+(docs/results/shape.md)."""
+
+
+def reconstruct_with_prior(evidence: ShapeEvidence, settings: FamilySettings | None = None) -> ShapeEstimate:
+    """Reconstruct the shape from contacts, silhouette and the single-view prior.
+
+    Args:
+        evidence: one contact or a silhouette at least.
+        settings: how much of the family is searched; the default level where not given.
+
+    Raises:
+        FitRefused: no shape of the family is at the stated place, and there is no contact.
+        OutOfDomain: nothing was touched or seen.
+    """
+    if not evidence.contacts:
+        prior = _prior(evidence)
+        if prior is not None:
+            return choose(None, None, prior)
+    return reconstruct(evidence, settings)
+
+
+def reconstruct(
+    evidence: ShapeEvidence, settings: FamilySettings | None = None, previous: ShapeEstimate | None = None
+) -> ShapeEstimate:
+    """Reconstruct the shape by the family or the smooth surface; by the family where nothing was touched.
+
+    Args:
+        evidence: one contact or a silhouette at least.
+        settings: how much of the family is searched; the default level where not given.
+        previous: answer of this function from fewer readings of the same object; the search begins at its
+            hypotheses too.
+
+    Raises:
+        FitRefused: no shape of the family is at the stated place, and there is no contact.
+        OutOfDomain: nothing was touched or seen.
+    """
+    settings = settings or FamilySettings()
+    evidence = evidence if len(evidence.contacts) >= MIN_CONTACTS else with_supposed(evidence)
+    smooth = _smooth(evidence)
+    try:
+        fit = (
+            _search(evidence, settings, smooth)
+            if previous is None
+            else _continue(evidence, settings, previous, smooth)
+        )
+    except FitRefused:
+        if smooth is None:
+            raise
+        return choose(None, smooth, None)
+    found = choose(fit, smooth, None)
+    seconds = fit.estimate.seconds + (0.0 if smooth is None else smooth.estimate.seconds)
+    if smooth is None or found.mesh is not smooth.estimate.mesh:
+        return replace(found, seconds=seconds)
+    details = {**found.details, LEFT: fit.estimate.details["hypotheses"]}
+    return replace(found, seconds=seconds, details=details)
+
+
+def _prior(evidence: ShapeEvidence) -> ShapeEstimate | None:
+    """The single-view prior; None where it does not apply."""
+    try:
+        return by_glanced_surface(evidence)
+    except FitRefused:
+        return None
+
+
+def _smooth(evidence: ShapeEvidence) -> Candidate | None:
+    """The smooth surface that predicts left-out contacts best; None where there is none."""
+    found: list[Candidate] = []
+    if not evidence.contacts:
+        return None
+    if evidence.sighted:
+        # The prior may not apply: its window is too small, or free space leaves nothing of it.
+        with suppress(FitRefused, OutOfDomain):
+            found.append(bend_prior(evidence))
+    if not found or len(evidence.contacts) >= MIN_CONTACTS:
+        with suppress(OutOfDomain):  # contacts and free space may contradict each other
+            surface = by_hermite(evidence, symmetric=False)  # every class of round bodies is in the family
+            found.append(Candidate(surface, np.array(surface.details["left_out_m"])))
+    shown = [replace(one, outline_error=outline_error(one.estimate.mesh, evidence.look)) for one in found]
+    best = min((one.outline_error for one in shown), default=0.0)
+    alike = [one for one in shown if one.outline_error <= best + MAX_OUTLINE_ERROR]
+    return min(alike, key=lambda one: one.misfit, default=None)
+
+
+def _search(evidence: ShapeEvidence, settings: FamilySettings, smooth: Candidate | None) -> Candidate:
+    """The family's best candidate of one to three searches, each by draws of its own.
+
+    More searches are made of what fits poorly, of several classes that fit alike, and without a picture,
+    where the cost has more local minima. Of good fits the least cost is taken, of poor ones the least contact
+    residual.
+    """
+    best = _candidate(family_estimate(evidence, settings), evidence)
+    seconds = best.estimate.seconds
+    many = len(evidence.contacts) >= MIN_CONTACTS
+    least = 1 if evidence.sighted or not many else BLIND_SEARCHES
+    for more in range(1, SEARCHES):
+        unsure = _is_undecided(best) if many else _strain_of(best) > UNEASY
+        again = _is_poor(best) or (more == least and unsure)
+        if more >= least and not again:
+            break
+        found = _candidate(family_estimate(evidence, replace(settings, seed=settings.seed + more)), evidence)
+        seconds += found.estimate.seconds
+        best = min(best, found, key=_rank)
+    return _with_predictions(best, evidence, smooth, seconds)
+
+
+def _continue(
+    evidence: ShapeEvidence, settings: FamilySettings, previous: ShapeEstimate, smooth: Candidate | None
+) -> Candidate:
+    """The family's candidate from another's hypotheses; of a poor fit by a new search beside them."""
+    found = _candidate(family_estimate(evidence, settings, (previous,)), evidence)
+    found = _with_predictions(found, evidence, smooth, found.estimate.seconds)
+    if not _is_poor(found) and rejection_reason(found, smooth) is None:
+        return found
+    again = family_estimate(evidence, replace(ANEW, seed=settings.seed), (found.estimate,))
+    seconds = found.estimate.seconds + again.seconds
+    return _with_predictions(_candidate(again, evidence), evidence, smooth, seconds)
+
+
+def _candidate(found: ShapeEstimate, evidence: ShapeEvidence) -> Candidate:
+    """A family's estimate with its outline compared; left-out contacts are predicted for the best alone."""
+    nothing = np.zeros(len(evidence.contacts))
+    return Candidate(
+        found, nothing, outline_error(found.mesh, evidence.look), open_without_class(evidence, found.mesh)
+    )
+
+
+def _with_predictions(
+    found: Candidate, evidence: ShapeEvidence, smooth: Candidate | None, seconds: float
+) -> Candidate:
+    estimate = replace(found.estimate, seconds=seconds)
+    if smooth is None or rejection_reason(found, None) is not None:
+        return replace(found, estimate=estimate)
+    return replace(found, estimate=estimate, left_out=predict_left_out(estimate, evidence))
+
+
+def _is_poor(found: Candidate) -> bool:
+    """Whether the shape fits contacts or outline poorly, or only on a bench that is off."""
+    typical = found.estimate.details["contact_cost"]
+    assert isinstance(typical, float)
+    return typical > LOOSE or _strain_of(found) > STRAINED or found.outline_error > MAX_OUTLINE_ERROR
+
+
+def _is_undecided(found: Candidate) -> bool:
+    """Whether the readings fit two classes alike."""
+    classes = found.estimate.details["classes"]
+    assert isinstance(classes, Mapping)
+    return bool(sum(weight >= RIVAL for weight in classes.values()) > 1)
+
+
+def _strain_of(found: Candidate) -> float:
+    strain = found.estimate.details["strain"]
+    assert isinstance(strain, float)
+    return strain
+
+
+def _rank(found: Candidate) -> tuple[bool, float]:
+    """Good fits go before poor ones, by their cost; poor ones by their contact residual."""
+    poor = _is_poor(found)
+    cost = found.estimate.details["contact_cost" if poor else "cost"]
+    assert isinstance(cost, float)
+    return poor, cost
