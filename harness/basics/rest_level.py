@@ -93,8 +93,8 @@ def fit_rest(samples: AnyArray, quiet: BoolArray, rate: float, first: int, last:
 
     Returns:
         The line, at the event's first sample. Of a record whose level changes by less than 0.2 % of the
-        event's height, the median of all quiet samples. Where fewer than 64 samples before the event are quiet,
-        the line goes through those on both sides. None where no sample is quiet.
+        event's height, the median of all quiet samples. Where fewer than 64 samples before the event are
+        quiet, the line goes through those on both sides. None where no sample is quiet.
     """
     values = np.asarray(samples, np.float64)
     window = round(_WINDOW * rate)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from harness.basics.errors import WrongUse
 from harness.basics.files.foreign_file import MOST_JSON
+from harness.basics.files.named_file import nearest
 from harness.basics.files.text_file import read_text
-from harness.basics.toml_file import nearest
 
 PUBLISHED = ("number", "name", "scale_m", "material", "source")
 """Columns of ObjectFolder's ``objects.csv``, which has no header."""

@@ -84,8 +84,8 @@ def test_an_answer_longer_than_stated_is_refused(monkeypatch: pytest.MonkeyPatch
     for factor, refused in ((0.99, False), (1.01, True)):
         size = factor * TOO_LONG * TOUCHED.largest / longest_side(long.mesh.vertices)
         grown = replace(long, mesh=Mesh(size * long.mesh.vertices, long.mesh.faces))
-        monkeypatch.setattr(methods, "METHODS", {"box": lambda _: grown})
-        monkeypatch.setattr(methods, "reconstruct", lambda *_: grown)
+        monkeypatch.setattr(methods, "METHODS", {"box": lambda _, grown=grown: grown})
+        monkeypatch.setattr(methods, "reconstruct", lambda *_, grown=grown: grown)
         if refused:
             with pytest.raises(FitRefused, match=r"a body 0.33 m long \(method box\), .* largest is 0.3 m"):
                 estimated("box", TOUCHED)

@@ -305,7 +305,10 @@ def test_a_moved_mode_is_one_mode_and_a_true_pair_is_two() -> None:
     assert sixth.frequency == pytest.approx(ROVING * np.average(factors, weights=shares), abs=0.5)
     assert sixth.damping == pytest.approx(2e-4 * 2.0 * np.pi * ROVING, abs=0.03)
     for damping in (3.0, 10.0, 20.0):
-        for amplitudes in ([(0, 1), (1, 0), (1, 0.3), (1, 0)], [(0, 1), (1, 0), (1, 0), (0, 1)]):
+        for amplitudes in (
+            [(0.0, 1.0), (1.0, 0.0), (1.0, 0.3), (1.0, 0.0)],
+            [(0.0, 1.0), (1.0, 0.0), (1.0, 0.0), (0.0, 1.0)],
+        ):
             pair = modes_of_response(*pair_response(amplitudes, damping))
             assert found(pair)[0] == pytest.approx(PAIR, abs=0.02)
             assert found(pair)[1] == pytest.approx([damping] * 2, abs=0.05)
