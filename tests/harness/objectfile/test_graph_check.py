@@ -2,6 +2,7 @@
 
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -10,8 +11,12 @@ from onnx import ModelProto, NodeProto, TensorProto, helper, numpy_helper
 
 from harness.basics.arrays import AnyArray
 from harness.basics.errors import DataRefused
+from harness.objectfile import graph_cost
 from harness.objectfile.audio.graph import audio_graph
+from harness.objectfile.entries import Domain, Input, Tensor
 from harness.objectfile.graph_check import checked_graph, declared
+from harness.objectfile.graph_cost import GraphCost, query_cost
+from harness.objectfile.runtime import Network
 from tests.samples.object_bench import ENCODING, MODES, egg, normaliser, perceptron, scales
 
 
@@ -150,3 +155,120 @@ def test_a_file_cut_short_is_refused(share: float) -> None:
 def test_a_graph_whose_operations_do_not_fit_together_is_refused() -> None:
     node = helper.make_node("MatMul", ["x", "w"], ["y"])
     assert "not a valid graph" in refused(tiny([node], {"w": np.zeros((4, 2), np.float32)}))
+
+
+def of_a_query(shape: list[int]) -> tuple[list[NodeProto], dict[str, AnyArray]]:
+    """Nodes that make ``big`` of a shape from the first number of a query."""
+    nodes = [
+        helper.make_node("Slice", ["x", "zero", "one", "one"], ["first"]),
+        helper.make_node("Unsqueeze", ["first", "one"], ["column"]),
+        helper.make_node("Expand", ["column", "shape"], ["big"]),
+    ]
+    return nodes, {"zero": np.array([0]), "one": np.array([1]), "shape": np.array(shape)}
+
+
+def test_many_values_at_the_same_time_are_refused_though_each_is_small_enough() -> None:
+    """As 6 KB of a file take 6.4 GB: 24 values of 2^22 numbers, and a sum of all."""
+    nodes, constants = of_a_query([1, 2**11, 2**11])
+    nodes += [helper.make_node("Sin", ["big"], [f"s{k}"]) for k in range(24)]
+    nodes += [helper.make_node("Concat", [f"s{k}" for k in range(24)], ["all"], axis=0)]
+    nodes += [helper.make_node("ReduceMax", ["all"], ["y"], axes=[1, 2], keepdims=0)]
+    said = refused(tiny(nodes, constants, axes=1))
+    assert "one query" in said
+
+
+def test_values_one_after_the_other_are_no_sum() -> None:
+    nodes, constants = of_a_query([1, 2**10, 2**10])
+    nodes += [helper.make_node("Sin", ["big" if k == 0 else f"s{k - 1}"], [f"s{k}"]) for k in range(100)]
+    nodes += [helper.make_node("ReduceMax", ["s99"], ["y"], axes=[2], keepdims=0)]
+    data = tiny(nodes, constants).SerializeToString()
+    cost = query_cost(checked_graph(data, "x.onnx"), "x.onnx")
+    assert cost.live_bytes == pytest.approx(2 * 4 * 2**20, rel=0.01)
+    assert cost.work == pytest.approx(102 * 4 * 2**20, rel=0.01)
+
+
+def test_sums_of_constants_are_refused_before_onnxruntime_folds_them() -> None:
+    """Each is dead after the next operation, and onnxruntime would keep or compute all of them at start."""
+    constants = {"one": np.ones((1, 1), np.float32), "shape": np.array([2**11, 2**11])}
+    nodes = [helper.make_node("Expand", ["one", "shape"], ["big"])]
+    nodes += [helper.make_node("Sin", ["big" if k == 0 else f"s{k - 1}"], [f"s{k}"]) for k in range(60)]
+    nodes += [
+        helper.make_node("ReduceMax", ["s59"], ["least"], keepdims=0),
+        helper.make_node("Add", ["x", "least"], ["y"]),
+    ]
+    assert "its constants alone take 1.02e+09 bytes" in refused(tiny(nodes, constants))
+
+
+def test_products_of_constants_are_refused_before_onnxruntime_folds_them() -> None:
+    constants = {"one": np.ones((1, 1), np.float32), "shape": np.array([2**11, 2**11])}
+    nodes = [helper.make_node("Expand", ["one", "shape"], ["p0"])]
+    nodes += [helper.make_node("MatMul", [f"p{k}", "p0"], [f"p{k + 1}"]) for k in range(5)]
+    nodes += [
+        helper.make_node("ReduceMax", ["p5"], ["least"], keepdims=0),
+        helper.make_node("Add", ["x", "least"], ["y"]),
+    ]
+    assert "its constants alone take 4.3e+10 operations" in refused(tiny(nodes, constants))
+
+
+def test_products_of_a_query_are_refused() -> None:
+    nodes, constants = of_a_query([1, 2**11, 2**11])
+    nodes += [
+        helper.make_node("MatMul", ["big" if k == 0 else f"p{k - 1}", "big"], [f"p{k}"]) for k in range(5)
+    ]
+    nodes += [helper.make_node("ReduceMax", ["p4"], ["y"], axes=[2], keepdims=0)]
+    assert "one query takes 4.3e+10 operations" in refused(tiny(nodes, constants))
+
+
+def test_values_that_grow_with_the_square_of_the_queries_are_refused() -> None:
+    nodes = [
+        helper.make_node("Transpose", ["x"], ["t"], perm=[1, 0]),
+        helper.make_node("MatMul", ["x", "t"], ["y"]),
+    ]
+    assert "'y' has 1 numbers for one query and 16 for 4" in refused(tiny(nodes))
+
+
+@pytest.mark.parametrize("kept", [4, 900])
+def test_values_that_grow_late_are_refused(kept: int) -> None:
+    """The square of the queries beyond some number, one number before."""
+    nodes = [
+        helper.make_node("Slice", ["x", "kept", "end", "zero"], ["late"]),
+        helper.make_node("Slice", ["late", "zero", "one", "one"], ["column"]),
+        helper.make_node("Transpose", ["column"], ["row"], perm=[1, 0]),
+        helper.make_node("MatMul", ["column", "row"], ["y"]),
+    ]
+    constants = {
+        "kept": np.array([kept]),
+        "end": np.array([2**40]),
+        "zero": np.array([0]),
+        "one": np.array([1]),
+    }
+    assert "grow no faster" in refused(tiny(nodes, constants))
+
+
+def test_a_size_beyond_the_number_of_queries_must_be_stated() -> None:
+    model = tiny([helper.make_node("Relu", ["x"], ["y"])])
+    model.graph.input[0].type.tensor_type.shape.dim[1].dim_param = "m"
+    assert "free in other sizes than the first" in refused(model)
+
+
+def test_calls_of_too_many_queries_are_refused() -> None:
+    cost = GraphCost(live_bytes=2**20, work=2**24)
+    cost.require_call(512, "x.onnx")
+    with pytest.raises(
+        DataRefused, match=r"x\.onnx: 513 queries at once need 513 MiB, at most 512 MiB may be"
+    ):
+        cost.require_call(513, "x.onnx")
+    with pytest.raises(DataRefused, match=r"x\.onnx: 4 queries at once take 5\.5e\+11 operations"):
+        GraphCost(live_bytes=1, work=2**37).require_call(4, "x.onnx")
+
+
+def test_a_network_refuses_a_call_of_too_many_queries(monkeypatch: pytest.MonkeyPatch) -> None:
+    entries: dict[str, Any] = {"dtype": "float32", "shape": ("n", 3), "unit": "m", "meaning": "of the test"}
+    model = tiny([helper.make_node("Relu", ["x"], ["y"])])
+    model.graph.output[0].type.CopyFrom(model.graph.input[0].type)
+    inputs = (Input(name="x", domain=Domain(near_surface_m=1.0), normaliser="in the graph", **entries),)
+    network = Network(model.SerializeToString(), "x.onnx", inputs, (Tensor(name="y", **entries),))
+    monkeypatch.setattr(graph_cost, "MAX_CALL_BYTES", 12 * 7)
+    assert len(network({"x": np.zeros((7, 3), np.float32)})["y"]) == 7
+    with pytest.raises(DataRefused, match="8 queries at once"):
+        network({"x": np.zeros((8, 3), np.float32)})
