@@ -208,7 +208,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def invoke(arguments: list[str]) -> int:
-    """Run the command line; the exit code instead of an exit."""
+    """Run the command line and return the exit code; the program and its groups alone print their help."""
+    if (not arguments and not _completed()) or " ".join(arguments) in GROUPS:
+        arguments = [*arguments, "--help"]
     as_json = "--json" in arguments
     with answers_alone() if as_json else nullcontext():
         return _ended(arguments, as_json)
@@ -254,12 +256,11 @@ def _app(chosen: str | None) -> typer.Typer:
         name=PROGRAM,
         help="Touch an object, compare it with its model, estimate, replay.",
         epilog=EPILOG,
-        no_args_is_help=True,
         rich_markup_mode="rich",
         pretty_exceptions_enable=False,
     )
     app.callback()(_root)
-    groups = {name: typer.Typer(help=text, no_args_is_help=True) for name, text in GROUPS.items()}
+    groups = {name: typer.Typer(help=text) for name, text in GROUPS.items()}
     for name, command in commands().items():
         group, _, last = name.rpartition(" ")
         parent = groups[group] if group else app

@@ -59,7 +59,7 @@ def rendering(
     senses, counts = _senses(sense), RenderingCounts(views, strikes, presses)
     opened = [_opened(name) for name in object_ or ["mug"]]
     rows = quoted_rows()
-    with share_progress() as report:
+    with share_progress(quiet=json) as report:
         work = RenderingWork(Store(out / "cells"), report)
         for of in opened:
             rows += measured_rows(of, senses, counts, work)

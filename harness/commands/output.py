@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -34,6 +35,9 @@ WIDE = 132
 CONSOLE = Console(stderr=True, highlight=False, soft_wrap=True, width=None if sys.stderr.isatty() else WIDE)
 A_MINUTE = 60.0
 """s after which a work that has no bar says how far it is."""
+
+_REPEAT = 1.0
+"""s between checks whether a stage has been silent for a minute."""
 
 _DIGITS = re.compile(r"[\d.]+")
 """What changes in what is being done without another stage beginning."""
@@ -176,25 +180,64 @@ def run_progress(total: int) -> Iterator[Callable[[], None]]:
 
 
 @contextmanager
-def share_progress() -> Iterator[Callable[[str, float], None]]:
-    """A progress bar for the length of a work; its report takes what is being done and the share done.
+def share_progress(quiet: bool = False) -> Iterator[Callable[[str, float], None]]:
+    """Show the stages of a computation on standard error: a bar on a terminal, else lines.
 
-    Where there is no terminal a line is printed as each stage begins, and one a minute.
+    The yielded function takes the name of the stage and the fraction of it that is done, 0 where that is not
+    known. A line is printed as each stage begins and once a minute, with the time since the start.
+
+    Args:
+        quiet: whether nothing is shown, as with ``--json``.
     """
+    if quiet:
+        yield lambda _doing, _share: None
+        return
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    pace = Pace()
-    with Progress(*columns, console=CONSOLE, transient=True) as bar:
+    lines = _StageLines()
+    with Progress(*columns, console=CONSOLE, transient=True) as bar, lines.repeated():
         task = bar.add_task("", total=1.0)
 
         def report(doing: str, share: float) -> None:
-            bar.update(task, description=doing, completed=share)
-            _print_line(pace, doing, share)
+            bar.update(task, description=doing, completed=share, total=1.0 if share > 0.0 else None)
+            lines.report(doing, share)
 
         yield report
 
 
-def _print_line(pace: Pace, doing: str, share: float) -> None:
+class _StageLines:
+    """Lines about the stages of a computation where there is no terminal."""
+
+    def __init__(self) -> None:
+        self._pace, self._began = Pace(), time.monotonic()
+        self._now = ("", 0.0)
+
+    def report(self, doing: str, share: float) -> None:
+        """Print a line if the stage is a new one, or a minute after the last line."""
+        self._now = (doing, share)
+        if not CONSOLE.is_terminal and doing:
+            elapsed = time.monotonic() - self._began
+            _print_line(self._pace, doing, share, f" ({duration(elapsed)} elapsed)" if elapsed >= 1.0 else "")
+
+    @contextmanager
+    def repeated(self) -> Iterator[None]:
+        """Repeat the stage's line once a minute, also while a long stage reports nothing."""
+        ended = threading.Event()
+
+        def repeat() -> None:
+            while not ended.wait(_REPEAT):
+                self.report(*self._now)
+
+        thread = threading.Thread(target=repeat, name="progress", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            thread.join()
+
+
+def _print_line(pace: Pace, doing: str, share: float, suffix: str = "") -> None:
     if not CONSOLE.is_terminal:
         line = pace.line(doing, share)
         if line is not None:
-            CONSOLE.print(line, markup=False)
+            CONSOLE.print(f"{line}{suffix}", markup=False)

@@ -13,7 +13,7 @@ import pytest
 from drivers.dataq.link import LinkCut
 from harness.basics.answers import answers_alone, write_answer
 from harness.basics.errors import TouchstoneError, WrongUse
-from harness.cli import COMMANDS, SYSTEM, UNFORESEEN, Interrupted, invoke, load
+from harness.cli import COMMANDS, GROUPS, SYSTEM, UNFORESEEN, Interrupted, invoke, load
 
 FORBIDDEN_AT_START = ("torch", "mujoco", "numba", "scipy", "cv2", "matplotlib", "pydantic")
 
@@ -81,6 +81,17 @@ def test_a_shell_completes_commands_and_their_options(
     with pytest.raises(SystemExit):
         invoke([])
     assert completed in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", ["", *GROUPS])
+def test_the_program_and_its_groups_alone_print_their_help(
+    words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert invoke(words.split()) == 0
+    captured = capsys.readouterr()
+    assert "Usage" in captured.out
+    assert "Commands" in captured.out
+    assert captured.err == ""
 
 
 def test_wrong_use_exits_with_2() -> None:

@@ -21,7 +21,7 @@ from harness.objectfile.verify.verify import verify
 from harness.sim.modal.file import modes_of_file
 from harness.sim.modal.modal import HEARING, default_edge, solved_once
 from harness.sim.modal.modes import Modes, dampings
-from harness.sim.modal.stage_seconds import CPU, cpu, renamed, timed, wall
+from harness.sim.modal.stage_seconds import CPU, Begin, cpu, renamed, timed, wall
 from harness.sim.solid.surface_source import surface_of
 from harness.sim.solid.volume_mesh import read_volume
 
@@ -94,9 +94,9 @@ def build_audio(
             written does not read back.
     """
     chosen = profile(wanted.profile)
-    report("modes", 0.0)
+    report("reading the mesh", 0.0)
     seconds: dict[str, float] = {}
-    mesh, found, source, said = _modes(wanted, store, seconds)
+    mesh, found, source, said = _modes(wanted, store, seconds, lambda stage: report(stage, 0.0))
     with timed(seconds, "order"):
         modes = _lowest(canonical(found), wanted.most)
     rates = dampings(modes.frequencies, wanted.material)
@@ -117,6 +117,7 @@ def build_audio(
     with timed(seconds, "export"):
         made = with_audio(created, part)
     (out / CHECKPOINT).unlink(missing_ok=True)
+    report("verifying what was written", 0.0)
     with timed(seconds, "verify"):
         _check(made)
     ordered = {before + stage: seconds[before + stage] for before in ("", CPU) for stage in STAGES}
@@ -146,36 +147,38 @@ def _with_seconds(made: ObjectFile, seconds: Mapping[str, float]) -> ObjectFile:
 
 
 def _modes(
-    wanted: AudioRequest, store: Store | None, seconds: dict[str, float]
+    wanted: AudioRequest, store: Store | None, seconds: dict[str, float], begin: Begin
 ) -> tuple[Mesh, Modes, Source, tuple[str, ...]]:
     whole: dict[str, float] = {}
     with timed(whole, "intake"):
         source = source_of(wanted.mesh, wanted.licence)
         volume = source.sha256 is not None and read_volume(Path(wanted.mesh), wanted.units) is not None
     if volume:
-        mesh, modes, said = _of_volume(wanted)
+        mesh, modes, said = _of_volume(wanted, begin)
     else:
         with timed(whole, "intake"):
             taken = surface_of(wanted.mesh, wanted.units, wanted.wall)
-        modes, kept = _solved(wanted, taken.mesh, store)
+        modes, kept = _solved(wanted, taken.mesh, store, begin)
         mesh, said = taken.mesh, (*taken.said, *((_KEPT,) if kept else ()))
     none = dict.fromkeys([before + stage for before in ("", CPU) for stage in _SOLVED.values()], 0.0)
     seconds |= whole | none | renamed(modes.seconds, _SOLVED)
     return mesh, modes, source, said
 
 
-def _of_volume(wanted: AudioRequest) -> tuple[Mesh, Modes, tuple[str, ...]]:
+def _of_volume(wanted: AudioRequest, begin: Begin) -> tuple[Mesh, Modes, tuple[str, ...]]:
     path = Path(wanted.mesh)
-    solved = modes_of_file(path, wanted.material, wanted.units, wanted.wall, wanted.limit, edge=wanted.edge)
+    solved = modes_of_file(
+        path, wanted.material, wanted.units, wanted.wall, wanted.limit, edge=wanted.edge, begin=begin
+    )
     modes = solved.solution.modes
     return Mesh(modes.points, modes.faces), modes, solved.said
 
 
-def _solved(wanted: AudioRequest, mesh: Mesh, store: Store | None) -> tuple[Modes, bool]:
+def _solved(wanted: AudioRequest, mesh: Mesh, store: Store | None, begin: Begin) -> tuple[Modes, bool]:
     edge = wanted.edge
     if edge is None:
         edge = default_edge(mesh, wanted.material, wanted.limit, wanted.most)
-    return solved_once(mesh, wanted.material, wanted.limit, edge, wanted.most, store)
+    return solved_once(mesh, wanted.material, wanted.limit, edge, wanted.most, store, begin)
 
 
 def _lowest(modes: Modes, most: int) -> Modes:

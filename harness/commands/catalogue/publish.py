@@ -33,7 +33,7 @@ def publish(
     from harness.authoring.catalogue.publish import ObjectStore, publish
 
     store = ObjectStore(to)
-    with share_progress() as report:
+    with share_progress(quiet=json) as report:
         found = publish(BuildFolder(folder), store, report)
     counts = Counter(each.outcome for each in found)
     sent = sum(each.sent for each in found)

@@ -31,7 +31,7 @@ def build_and_say(
         show: the answer for people.
         json: whether the answer is for scripts.
     """
-    with share_progress() as report:
+    with share_progress(quiet=json) as report:
         built = builder(report)
     for sentence in built.said:
         warn(sentence)

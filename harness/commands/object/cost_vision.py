@@ -70,7 +70,7 @@ def vision(
     look = appearance_of(mesh, surface_of(mesh, units, None).units)
     studio = Studio(LitObject(look), held_out_pictures(look.mesh, views, size, size, seed), threads)
     out.mkdir(parents=True, exist_ok=True)
-    with share_progress() as report:
+    with share_progress(quiet=json) as report:
         wanted = tuple(dict.fromkeys(way.networks for way in chosen))
         for number, networks in enumerate(wanted, start=1):
             studio.train(networks, seed, out, _after(f"networks {number} of {len(wanted)}", report))

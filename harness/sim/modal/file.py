@@ -17,6 +17,7 @@ from harness.objects.builtin import BUILTIN
 from harness.sim.modal.element_edge import finely_filled
 from harness.sim.modal.modal import HEARING, curved
 from harness.sim.modal.solve import Elasticity, Solution, check_elasticity, check_limit, solve_mesh
+from harness.sim.modal.stage_seconds import Begin, ignore_stage
 from harness.sim.solid.filled import filled
 from harness.sim.solid.modal_mesh import QuadraticMesh
 from harness.sim.solid.surface_source import surface_of
@@ -96,6 +97,7 @@ def modes_of_file(
     fixed: Sequence[str] = (),
     store: Store | None = None,
     envelope: float | None = None,
+    begin: Begin = ignore_stage,
 ) -> FileModes:
     """The modes of an object given by a file, or of one of our own.
 
@@ -112,6 +114,7 @@ def modes_of_file(
         store: where the tetrahedra of a surface are kept; None to fill it.
         envelope: m, how far cells may leave the surface; None for ``tetrahedralize``'s own; not for
             tetrahedra.
+        begin: called as each stage begins.
 
     Raises:
         WrongUse: options that cannot be, or that do not go together.
@@ -128,7 +131,7 @@ def modes_of_file(
         taken = _surface(asked, seconds, store)
     held = _held(taken, fixed)
     below = np.inf if limit is None and count is not None else highest
-    solution = solve_mesh(taken.mesh, material, below, least=count, held=held)
+    solution = solve_mesh(taken.mesh, material, below, least=count, held=held, begin=begin)
     spent = solution.modes.seconds
     return FileModes(
         solution=solution,

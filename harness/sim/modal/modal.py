@@ -14,7 +14,7 @@ from harness.basics.store import Store, digest
 from harness.sim.modal.modes import Modes
 from harness.sim.modal.snap import snapped, straightened
 from harness.sim.modal.solve import Elasticity, check_limit, solve_mesh
-from harness.sim.modal.stage_seconds import CPU, timed
+from harness.sim.modal.stage_seconds import CPU, Begin, ignore_stage, timed
 from harness.sim.solid.filled import FillingSeconds, filled
 from harness.sim.solid.modal_kernels import MASS_POINTS, MASS_WEIGHTS, determinants, shape_slopes
 from harness.sim.solid.modal_mesh import QuadraticMesh, least_determinant, middles_of, quadratic_mesh
@@ -60,9 +60,15 @@ def modes_of(
 
 
 def solved_once(
-    mesh: Mesh, material: Material, limit: float, edge: float | None, most: int | None, store: Store | None
+    mesh: Mesh,
+    material: Material,
+    limit: float,
+    edge: float | None,
+    most: int | None,
+    store: Store | None,
+    begin: Begin = ignore_stage,
 ) -> tuple[Modes, bool]:
-    """``modes_of``, and whether the modes were in the store; their seconds are then of that time."""
+    """Return ``modes_of``, and whether the modes were in the store; their seconds are then of that time."""
     edge = default_edge(mesh, material, limit, most) if edge is None else edge
     # Damping moves no undamped mode: a material of other alpha and beta has the same ones.
     elastic = [material.density, material.young, material.poisson]
@@ -71,9 +77,10 @@ def solved_once(
     if isinstance(kept, Mapping):
         return from_arrays(kept), True
     took = FillingSeconds()
+    begin("filling the mesh with tetrahedra")
     inside, _ = filled(mesh, edge, store, spent=took)
     spent = {"tetrahedra": took.wall, f"{CPU}tetrahedra": took.cpu}
-    solved = solve_modes(inside, material, limit, mesh, most=most, spent=spent)
+    solved = solve_modes(inside, material, limit, mesh, most=most, spent=spent, begin=begin)
     if store is not None:
         store.put(key, to_arrays(solved))
     return solved, False
@@ -123,6 +130,7 @@ def solve_modes(
     most: int | None = None,
     spent: Mapping[str, float] | None = None,
     undeformed: Tetrahedra | None = None,
+    begin: Begin = ignore_stage,
 ) -> Modes:
     """The modes of a volume mesh.
 
@@ -135,6 +143,7 @@ def solve_modes(
         spent: s that earlier stages took (``stage_seconds.timed``), to be listed.
         undeformed: the same cells where ``surface`` belongs to them, if ``tetrahedra`` were moved
             away from it since; None if they were not.
+        begin: called as each stage begins.
 
     Raises:
         WrongUse: a limit or a count that cannot be, or elasticity that is not one.
@@ -146,7 +155,7 @@ def solve_modes(
         seconds = {"tetrahedra": 0.0, **(spent or {})}
         with timed(seconds, "assembly"):
             mesh = curved(tetrahedra, surface, undeformed or tetrahedra)
-        return solve_mesh(mesh, elasticity, limit, most, spent=seconds).modes
+        return solve_mesh(mesh, elasticity, limit, most, spent=seconds, begin=begin).modes
 
 
 def curved(tetrahedra: Tetrahedra, surface: Mesh | None, undeformed: Tetrahedra) -> QuadraticMesh:

@@ -12,7 +12,7 @@ from harness.basics.materials import Material
 from harness.basics.mesh import Mesh
 from harness.sim.modal.lanczos import DENSE, EigenPairs, modes_below
 from harness.sim.modal.modes import Modes
-from harness.sim.modal.stage_seconds import timed
+from harness.sim.modal.stage_seconds import Begin, ignore_stage, timed
 from harness.sim.modal.system import MassRule, ModalSystem, modal_system
 from harness.sim.solid.modal_mesh import QuadraticMesh
 
@@ -75,6 +75,7 @@ def solve_mesh(
     held: BoolArray | None = None,
     rule: MassRule = "consistent",
     spent: Mapping[str, float] | None = None,
+    begin: Begin = ignore_stage,
 ) -> Solution:
     """The modes of ten-node tetrahedra, on their own nodes.
 
@@ -88,6 +89,7 @@ def solve_mesh(
         rule: how mass is integrated.
         spent: s that earlier stages took (``stage_seconds.timed``), to be listed; more is added to
             ``"assembly"`` and ``"solve"``.
+        begin: called as each stage begins.
 
     Raises:
         WrongUse: a limit or a count that cannot be, elasticity that is not one, or nothing left free.
@@ -99,10 +101,12 @@ def solve_mesh(
     check_elasticity(elasticity, len(mesh.cells))
     seconds = dict(spent or {})
     with threadpool_limits(limits=1, user_api="blas"):
+        begin("assembling stiffness and mass")
         with timed(seconds, "assembly"):
             system = modal_system(mesh, elasticity.lame, elasticity.density, rule)
             if held is not None and held.any():
                 system = _held(system, held, len(mesh.nodes))
+        begin(f"solving for the modes of {system.stiffness.shape[0]} unknowns")
         with timed(seconds, "solve"):
             pairs, reached = _found(system, limit, most, least)
     modes = _modes(mesh, system, pairs, reached, seconds)

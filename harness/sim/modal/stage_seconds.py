@@ -1,11 +1,18 @@
 """What each stage of a computation took: on the clock, and of the processor."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 CPU = "cpu."
 """Before a stage's name where its seconds are those of the processor, all threads together."""
+
+Begin = Callable[[str], None]
+"""Called with the name of a stage, in words, as it begins."""
+
+
+def ignore_stage(_stage: str) -> None:
+    """Report no stage."""
 
 
 @contextmanager

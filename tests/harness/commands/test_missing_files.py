@@ -109,3 +109,60 @@ def test_a_mistyped_name_is_refused_before_anything_heavy_is_imported(
     assert code == 2
     assert message in done.stderr
     assert set(packages) <= LIGHT
+
+
+OUTPUTS = (
+    "sim touch builtin:mug --vertex 1 --out absent/x.png",
+    "sim touch builtin:mug --vertex 1 --out x.png --picture absent/x.png",
+    "sim touch builtin:mug --vertex 1 --out x.png --height-out absent/x.npy",
+    "sim touch builtin:mug --vertex 1 --out x.png --force --pressure-out absent/x.npy",
+    "object render audio mug --vertex 1 --out absent/x.wav",
+    "object render audio mug --vertex 1 --out x.wav --picture absent/x.png",
+    "object render touch mug --vertex 1 --out absent/x.png",
+    "object render touch mug --vertex 1 --out x.png --height-out absent/x.npy",
+    "object render vision mug --out absent/x.png",
+    "object render vision mug --out x.png --depth-out absent/x.npy",
+    "object render vision mug --out x.png --alpha-out absent/x.npy",
+    "object compare vision mug --live x.png --out absent/x.png",
+    "camera gel --out absent/x.png",
+    "catalogue page built --out absent/x.html",
+    "calibrate markers x.png --out absent/x.json",
+    "calibrate taxim presses --ball-radius 2mm --out absent/x.npz",
+    "calibrate taxim presses --ball-radius 2mm --polycalib absent/x.npz",
+    "calibrate taxim presses --ball-radius 2mm --shadow-table absent/x.npz",
+)
+FOLDERS = (
+    "run --object builtin:mug --out file/run",
+    "object build builtin:mug --material ceramic --out file",
+    "object render queries mug --out file/q",
+    "object import x.pth --out file/q",
+    "catalogue build x.csv --out file/q",
+    "cost vision builtin:mug --out file/q",
+    "cost contact-localization --out file/q",
+    "tables contact-localization --out file/q",
+    "tables contact-localization --recordings file/q",
+    "tables rendering --out file/q",
+    "calibrate markers x.png --report file/q",
+    "calibrate taxim --station mock --run file/q",
+)
+
+
+@pytest.mark.parametrize("words", OUTPUTS)
+def test_a_missing_output_folder_is_named_before_anything_is_computed(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert invoke(words.split()) == 2
+    assert "there is no folder absent; make it with `mkdir -p absent`" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("words", FOLDERS)
+def test_a_file_in_the_way_of_an_output_folder_is_named_before_anything_is_computed(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("")
+    assert invoke(words.split()) == 2
+    assert "file is a file; name a folder" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -1,7 +1,10 @@
 """How far a work is, in lines where there is no terminal: at every stage, and once a minute."""
 
+import threading
+
 import pytest
 
+from harness.commands import output
 from harness.commands.output import A_MINUTE, Pace, duration
 
 
@@ -59,3 +62,23 @@ def test_nothing_is_said_of_a_pace_that_there_is_not(clock: Clock) -> None:
 )
 def test_a_duration_is_in_the_unit_that_people_use(seconds: float, words: str) -> None:
     assert duration(seconds) == words
+
+
+def test_a_stage_that_reports_nothing_is_repeated_with_the_time_since_the_start(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = Clock()
+    monkeypatch.setattr(output, "_REPEAT", 0.01)
+    monkeypatch.setattr(output.time, "monotonic", now)
+    monkeypatch.setattr(output, "Pace", lambda: Pace(now))
+    with output.share_progress() as report:
+        report("filling the mesh", 0.0)
+        report("solving", 0.0)
+        assert capsys.readouterr().err.splitlines() == ["filling the mesh", "solving"]
+        now.now = 75.0
+        for _ in range(200):
+            threading.Event().wait(0.01)
+            written = capsys.readouterr().err
+            if "elapsed" in written:
+                break
+    assert written.strip() == "solving (75 s elapsed)"

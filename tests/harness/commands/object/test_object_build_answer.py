@@ -35,3 +35,9 @@ def test_notes_go_beside_the_answer_and_the_answer_is_one(
         assert json.loads(out) == {"said": ["holes were closed", "its [wall] is thin"]}
     else:
         assert out == "for people: 2\n"
+
+
+def test_progress_is_shown_to_people_and_not_to_scripts(capsys: pytest.CaptureFixture[str]) -> None:
+    for script in (False, True):
+        build_and_say(of_steel, lambda _: {}, shown, script)
+        assert ("casting: 50 %" in capsys.readouterr().err) is not script
