@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from harness.basics.errors import DataRefused, TouchstoneError
+from harness.basics.files.lock_file import FOLDER_LOCK
 from harness.objectfile.audio.audio import open_audio
 from harness.objectfile.entries import FileEntry, NetworkEntry
 from harness.objectfile.file import ObjectFile
@@ -103,7 +104,7 @@ def _bytes(of: ObjectFile | PublishedObject, entry: FileEntry) -> str:
 
 
 def _no_others(of: ObjectFile | PublishedObject) -> str:
-    known = {DESCRIPTION, *(entry.file for entry in of.description.files)}
+    known = {DESCRIPTION, FOLDER_LOCK, *(entry.file for entry in of.description.files)}
     others = sorted(path.name for path in of.folder.iterdir() if path.name not in known)
     stopped = [name for name in others if name.startswith(".") and name.endswith("_training.npz")]
     if stopped:

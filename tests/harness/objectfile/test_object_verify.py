@@ -8,6 +8,7 @@ import pytest
 from onnx import TensorProto, helper, load_model_from_string, numpy_helper
 
 from harness.basics.errors import DataRefused
+from harness.basics.files.lock_file import hold_folder
 from harness.basics.mesh import Mesh
 from harness.objectfile.audio.audio import open_audio
 from harness.objectfile.audio.graph import OutputScales, audio_graph
@@ -64,6 +65,11 @@ def test_a_missing_network_fails_where_it_is_used(spoiled: Path) -> None:
 def test_a_file_that_nothing_names_is_pointed_at(spoiled: Path) -> None:
     (spoiled / "audio.onnx.data").write_bytes(b"weights")
     assert "audio.onnx.data" in failures(ObjectFile.open(spoiled))["folder: nothing else"]
+
+
+def test_the_lock_of_a_build_is_not_a_foreign_file(spoiled: Path) -> None:
+    with hold_folder(spoiled):
+        assert not failures(ObjectFile.open(spoiled))
 
 
 def test_another_network_of_the_same_shape_fails_the_self_test(spoiled: Path) -> None:
