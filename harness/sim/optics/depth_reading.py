@@ -6,14 +6,21 @@ from time import process_time
 import numpy as np
 
 from harness.basics.arrays import BoolArray, ByteArray, FloatArray, read_only
-from harness.basics.errors import DataRefused
+from harness.basics.errors import DataRefused, PictureRefused
 from harness.basics.geometry import apply
 from harness.picture.square_pixels import aspect_stated, made_square
 from harness.sim.optics.check.picture_check import checked_picture, require_within_gel
-from harness.sim.optics.contact_depth import Depth, read_depth
-from harness.sim.optics.inverse import Detection, mean_picture
+from harness.sim.optics.contact_depth import TOUCHED, Depth, read_depth
+from harness.sim.optics.inverse import DRIFTING, Detection, Inversion, mean_picture
 from harness.sim.optics.inverse_error import USUAL, height_errors
 from harness.sim.optics.tactile_calibration import TactileCalibration, with_background
+
+_THICKEST = 5e-3
+"""Metres of a gel whose thickness is not known: the thickest of the sensors that come with the program."""
+
+_SURROUNDINGS = 0.25
+"""Share of the depth, one standard deviation, that surroundings of another colour may add. Real balls of
+known radius read 2.0 to 2.6 mm deep where the radius of their contact gives 1.0 to 1.6 mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +113,18 @@ def read_press(
     began = process_time()
     checked = checked_picture(mean, calibration, rest)
     by = with_background(calibration, checked.background)
-    depth = read_depth(checked.image[None], by, detection)
+    depth = read_depth(checked.image[None], by, detection if checked.agrees else DRIFTING)
+    if not (checked.agrees or background is None or depth.read.imprint.any()):
+        raise PictureRefused(
+            "the whole picture differs from the resting picture and no contact stands out: the light "
+            "changed, or a face covers the whole view; take a resting picture just before the press, and leave "
+            "some of the gel free"
+        )
     read_in = process_time() - began
-    assumed = replace(USUAL, camera=USUAL.camera / float(checked.gain.min()))
+    least = float(checked.gain.min())
+    assumed = replace(USUAL, camera=USUAL.camera / least, light=checked.light_error / least)
     sigma = height_errors(checked.image[None], depth, assumed)[0].sigma
+    sigma = np.hypot(sigma, _level_error(depth.read, checked.agrees, thickness))
     if thickness is not None:
         require_within_gel(depth.read.height[0], sigma, thickness)
     stated_in = process_time() - began - read_in
@@ -123,6 +138,23 @@ def read_press(
         (read_in, stated_in),
         checked.notes,
     )
+
+
+def _level_error(read: Inversion, agrees: bool, thickness: float | None) -> FloatArray:
+    """Return ``(rows, columns)`` metres, one standard deviation of the level from which heights are counted.
+
+    Without gel at rest in view the least height may be pressed in too, by anything up to what remains of the
+    gel. Where the surroundings of the contact do not agree with the resting picture, colours that a contact
+    spreads around itself are read as slopes that lead up to it.
+    """
+    height = read.height[0]
+    deepest = float(height.max())
+    if not read.anchored[0]:
+        remaining = max(0.0, (_THICKEST if thickness is None else thickness) - deepest)
+        return np.full(height.shape, remaining / np.sqrt(3.0))
+    if agrees or deepest == 0.0:
+        return np.zeros(height.shape)
+    return np.asarray(_SURROUNDINGS * deepest * np.minimum(1.0, height / (TOUCHED * deepest)))
 
 
 def _check(frames: ByteArray, background: ByteArray | None, calibration: TactileCalibration) -> None:

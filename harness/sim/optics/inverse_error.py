@@ -55,6 +55,8 @@ class ColourError:
             state what held-out presses showed.
         dimming: share by which a contact may be darker or brighter than the calibration's were.
         draws: how many; the spread of 32 is known to an eighth.
+        light: grey levels rms by which the light of the picture differs from that of its resting picture,
+            alike over the picture or growing from one side of it to the other.
     """
 
     camera: float = 1.5
@@ -62,6 +64,7 @@ class ColourError:
     share: float = 0.4
     dimming: float = 0.3
     draws: int = 32
+    light: float = 0.0
 
 
 USUAL = ColourError()
@@ -161,6 +164,9 @@ class _Slopes:
         place = np.minimum(np.argwhere(~still) * block + block // 2, (rows - 1, columns - 1))
         misfit = header.misfit or ColourMisfit(assumed.share * noise, assumed.alike)
         self._where, self._camera, self._alike = ~still, assumed.camera / block, misfit.alike
+        across = 2.0 * place / (rows, columns) - 1.0
+        # Of unit variance over the picture: one third of it for each direction, and the rest alike.
+        self._light = assumed.light * np.sqrt(0.6) * np.column_stack([np.ones(len(place)), across])
         self._dimming = assumed.dimming * dimming[place[:, 0], place[:, 1]].T
         self._normal = normal[place[:, 0], place[:, 1]]
         shade, slope = np.empty((len(place), 3)), np.empty((len(place), 3, 2))
@@ -186,6 +192,8 @@ class _Slopes:
         fields = _functions_of_normal(rng, self._normal, self._alike)
         colour = self._misfit * fields[:3] + rng.normal(0.0, self._camera, (3, len(self._flat)))
         colour += rng.normal() * self._dimming
+        if self._light.any():
+            colour += rng.normal(size=(3, 3)) @ self._light.T
         by_colour = np.einsum("pac,cp->ap", self._gain, colour)
         normal = self._normal.T
         moved = by_colour + normal * (self._beyond * fields[3])

@@ -1,16 +1,18 @@
-"""A tactile picture compared with its calibration before it is read: corrected, or refused with the reason.
+"""Compare a tactile picture with its resting picture and its calibration; correct or refuse it.
 
-The resting gel of a calibration has a structure of its own: the lights fall on it unevenly. By it a picture's
-channel order, orientation, gain and lost parts are known. What a press changed is then compared with the
-calibration's shading (``harness.sim.optics.check.slopes``).
+A press is compared with a picture of the untouched gel, its own or the calibration's, and its own resting
+picture with the calibration's. The gel's resting pattern gives the change of the light, the channel order and
+the orientation of each pair (``harness.sim.optics.check.light``). The change of colour that the press made is
+then compared with the calibration's shading (``harness.sim.optics.check.slopes``).
 """
 
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.ndimage import uniform_filter
 
-from harness.basics.arrays import ByteArray, FloatArray, block_means, read_only
+from harness.basics.arrays import BoolArray, ByteArray, FloatArray, block_means, read_only
 from harness.basics.errors import DataRefused, PictureRefused
 from harness.sim.optics.check.faults import (
     require_light,
@@ -19,24 +21,48 @@ from harness.sim.optics.check.faults import (
     require_unclipped,
     require_whole,
 )
-from harness.sim.optics.check.light import LightMatch, fit_light, orientation, same
-from harness.sim.optics.check.light_under_contact import light_under_contact, multiplies
-from harness.sim.optics.check.slopes import SlopeFit, slope_fit, surface_residual
+from harness.sim.optics.check.light import MIN_EXPLAINED, LightMatch, match_light, matching_variant
+from harness.sim.optics.check.slopes import SlopeFit, linear_shading, slope_fit, surface_residual
 from harness.sim.optics.check.turned import better_turned, without_drift
+from harness.sim.optics.poisson import free_heights
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
 _BLOCKS = 40
 """Along the longer side."""
 
 _GAINS = (0.4, 2.0)
-"""Of a light that is corrected: beyond, grey levels are too coarse or clipped."""
+"""Of a light that is corrected: outside, grey levels are too coarse or clipped."""
 
-_SAME_GAIN = 0.04
-_SAME_GAIN_PRESSED = 0.08
-"""Gains this near to 1 are the fit's own error; beside a contact they are known less well."""
+_MAX_OFFSET = 60.0
+"""Grey levels of an offset that is corrected; a gamma of 1.5 is like 55."""
 
-_LEAST_ALIKE, _SURE = 0.6, 0.75
-"""Shares of a resting picture, and of a reference in another orientation, explained by the light alone."""
+_CLOSE_AT_REST = 6.0
+"""Grey levels within which a resting picture of another day agrees with the calibration's."""
+
+_MIN_EXPLAINED_AT_REST = 0.4
+"""Weight of the blocks of a resting picture that have to agree with the calibration's in some light."""
+
+_CLEAR = 0.25
+"""Weight of the blocks from which the light is compared closely."""
+
+_SIMPLE = 3
+"""Models of the light, without those that would follow what a contact does to its surroundings."""
+
+_LEAST_TOUCHED = 0.03
+"""Of the blocks, that show a contact of their own beside a change of the light."""
+
+_MIN_TILT_CHANGE = 0.7
+"""Grey levels, length over the channels: a face that changes less is 0.1 mm from side to side."""
+
+_MAX_UNEXPLAINED, _MAX_RELIEF = 0.1, 3.5e-3
+"""Share of a change (grey levels squared) that slopes leave, and m between its highest and lowest point: a
+contact within these changes the colours in the same way."""
+
+_MAX_CLIPPED = 0.1
+"""Of the contact's values; real presses have up to 0.04. At 0.18 a depth of 0.6 mm is 0.04 mm too small."""
+
+_VARIANT_BETTER = 0.15
+"""Weight of the blocks that another channel order or orientation has to explain more, to be reported."""
 
 _LEAST_EXPLAINED, _LEAST_SURFACE = 0.45, 0.4
 """Of a press, by slopes small enough for linear shading: steep contacts that fill the window have 0.6."""
@@ -44,11 +70,14 @@ _LEAST_EXPLAINED, _LEAST_SURFACE = 0.45, 0.4
 _FOREIGN = 15.0
 """Grey levels rms that no surface of the gel explains: steep contacts that fill the window leave up to 13."""
 
-_MOSTLY = 0.7
-"""Share of a picture in one light, from which no contact can have made it look so."""
+_UNKNOWN_LIGHT = 3.0
+"""Grey levels by which the light may differ where no gel at rest is in view: 2 %, as exposures vary."""
 
-_PATTERN = 4.0
-"""Grey levels of standard deviation of a resting gel, from which a light is told from a contact by it."""
+_SURROUNDINGS = 8.0
+"""Grey levels, length over the channels, from which a block is the contact's and not its surroundings'."""
+
+_SMOOTH = 5
+"""Blocks over which the light is smooth, and the camera's noise is not."""
 
 _PULLED = -0.5
 _DEEPEST = 0.85
@@ -59,30 +88,31 @@ _TAKE = "take both pictures as the calibration's presses were taken, or calibrat
 
 @dataclass(frozen=True, eq=False)
 class CheckedPicture:
-    """A picture that may be read with its calibration.
-
-    Attributes:
-        image: ``(rows, columns, 3)`` RGB as the calibration's light would have shown it.
-        background: ``(rows, columns, 3)`` RGB, the untouched gel in that light.
-        gain: ``(3,)`` by which the picture's light was divided, 1 where it was not.
-        notes: sentences for people about what was corrected.
-    """
+    """A picture that may be read with its calibration."""
 
     image: ByteArray
+    """``(rows, columns, 3)`` RGB as the calibration's light would have shown it."""
     background: ByteArray
+    """``(rows, columns, 3)`` RGB, the untouched gel in that light."""
     gain: FloatArray
+    """``(3,)``: mean gain by which the change of colour was divided, 1 where it was not."""
+    light_error: float
+    """Grey levels rms by which the light around the contact still differs from the resting picture's."""
+    agrees: bool
+    """Whether the surroundings of the contact agree with the resting picture to a grey level."""
     notes: tuple[str, ...] = ()
+    """Sentences for the operator about the corrections."""
 
 
 def checked_picture(
     image: ByteArray, calibration: TactileCalibration, background: ByteArray | None = None
 ) -> CheckedPicture:
-    """Compare a picture with its calibration.
+    """Compare a picture with its resting picture and its calibration.
 
     Args:
         image: ``(rows, columns, 3)`` RGB of a press, of the calibration's shape.
         calibration: of the gel.
-        background: ``(rows, columns, 3)`` RGB of the untouched gel in the same light; None for the
+        background: ``(rows, columns, 3)`` RGB of the untouched gel just before the press; None for the
             calibration's.
 
     Raises:
@@ -99,21 +129,78 @@ def checked_picture(
     block = max(1, max(image.shape) // _BLOCKS)
     known = _rest(calibration, block)
     seen = block_means(image, block)
-    require_light(seen, known)
-    require_unclipped(image, calibration.background)
-    require_whole(image, calibration.background)
-    rest = known if background is None else block_means(background, block)
-    light = None if background is None else _light_of_rest(rest, known)
+    untouched = calibration.background if background is None else background
+    rest = block_means(untouched, block)
+    for levels, picture in ((seen, image), (rest, untouched)):
+        require_light(levels, known)
+        require_unclipped(picture, calibration.background)
+        require_whole(picture, calibration.background)
+    rest_light = match_light(known, known) if background is None else _light_of_rest(rest, known)
+    light, agrees = _light_of_press(seen, rest)
+    gain = light.gain(*image.shape[:2]) * rest_light.gain(*image.shape[:2])
+    _require_gain(gain, light.offset + rest_light.offset)
+    shown = np.clip(light.apply(rest), 0.0, 255.0)
+    require_lit(seen, shown)
+    require_quiet(image, untouched)
+    _require_colours(image, untouched, np.linalg.norm(seen - shown, axis=2) > _SURROUNDINGS, block)
+    light_error = _light_error(light, _SURROUNDINGS if agrees else 3.0 * _CLOSE_AT_REST)
     if len(calibration.smooth):
-        _require_own_orientation(seen, rest, calibration, block)
-    if background is None:
-        light = _light_of_press(seen, known, calibration, block)
-        rest = known if light is None else light.shown(known)
-    gain = _gain(light, _SAME_GAIN_PRESSED if background is None else _SAME_GAIN)
-    require_lit(seen, rest)
-    require_quiet(image, calibration.background if background is None else background)
-    _require_press(without_drift(seen - rest) / gain, calibration, block)
-    return _corrected(image, calibration, background, light, gain)
+        _require_own_orientation(seen, shown, calibration, block)
+        change = light.apply(rest) - rest if agrees else seen - rest
+        size, relief = _tilt_like_change(change, rest, calibration, block)
+        stands_out = _stands_out(seen - shown)
+        if (size > 0.0 and (agrees or not stands_out)) or not (agrees or stands_out or background is None):
+            whole = max(size, float(np.linalg.norm(seen - rest, axis=2).mean()))
+            face = f" ({1e3 * relief:.1f} mm from its highest to its lowest point)" if relief > 0.0 else ""
+            raise PictureRefused(
+                f"the whole picture differs from the resting picture by {whole:.1f} grey levels, as "
+                f"another white balance or a face over the whole view{face} does: fix the white balance, "
+                "take a resting picture just before the press, and leave some of the gel free"
+            )
+        light_error = max(light_error, size / np.sqrt(3.0))
+        coarse = light.gain(*rest.shape[:2]) * rest_light.gain(*rest.shape[:2])
+        _require_press(without_drift(seen - shown) / coarse, calibration, block)
+    notes = _notes(light, rest_light, background is not None)
+    if light.name == rest_light.name == "same":
+        return CheckedPicture(image, untouched, read_only(np.ones(3)), light_error, agrees, notes)
+    # The change is divided, over the calibration's own background: its noise is none of this picture's.
+    moved = (
+        calibration.background
+        + (image - np.clip(light.apply(untouched.astype(np.float64)), 0.0, 255.0)) / gain
+    )
+    corrected = np.clip(np.rint(moved), 0.0, 255.0).astype(np.uint8)
+    return CheckedPicture(
+        read_only(corrected),
+        calibration.background,
+        read_only(gain.mean(axis=(0, 1))),
+        light_error,
+        agrees,
+        notes,
+    )
+
+
+def _require_colours(image: ByteArray, untouched: ByteArray, touched: BoolArray, block: int) -> None:
+    """Refuse a press of which the contact's own colours are clipped where the resting picture's are not."""
+    clipped = ((image == 0) | (image == 255)) & (untouched > 0) & (untouched < 255)
+    share = block_means(clipped.astype(np.float64), block)[touched]
+    if len(share) and share.mean() > _MAX_CLIPPED:
+        raise PictureRefused(
+            f"{share.mean():.0%} of the contact's colours are at 0 or 255 (at most {_MAX_CLIPPED:.0%}): its "
+            "slopes cannot be read; set exposure and gain as they were at the calibration"
+        )
+
+
+def _require_own_orientation(
+    seen: FloatArray, shown: FloatArray, calibration: TactileCalibration, block: int
+) -> None:
+    """Refuse a press that another channel order or orientation makes a far better surface of the gel."""
+    found = better_turned(seen, shown, calibration, block)
+    if found is not None:
+        words, turned, as_it_is = found
+        raise PictureRefused(
+            f"the press fits its resting gel only with {words}: a surface of the gel then leaves "
+            f"{turned:.0f} grey levels of it unexplained, and {as_it_is:.0f} as it is; {_TAKE}"
+        )
 
 
 def require_within_gel(height: FloatArray, sigma: FloatArray, thickness: float) -> None:
@@ -143,64 +230,140 @@ def _rest(calibration: TactileCalibration, block: int) -> FloatArray:
 
 
 def _light_of_rest(rest: FloatArray, known: FloatArray) -> LightMatch:
-    light = fit_light(rest, known)
-    if light.alike < _LEAST_ALIKE:
-        words, other = orientation(rest, known)
-        if not same(words) and other.alike > _SURE:
-            raise PictureRefused(
-                f"the resting picture is the calibration's with {words}: give pictures in the camera's own "
-                "channel order and orientation, as the calibration's presses were"
-            )
+    """Return the light of a resting picture in terms of the calibration's."""
+    light = match_light(rest, known)
+    if light.explained < _MIN_EXPLAINED_AT_REST:
+        light = match_light(rest, known, _CLOSE_AT_REST)
+    if light.explained >= _MIN_EXPLAINED_AT_REST:
+        return light
+    words, other = matching_variant(rest, known, _CLOSE_AT_REST)
+    if words and other.explained > light.explained + _VARIANT_BETTER:
         raise PictureRefused(
-            f"the resting picture differs from the calibration's in {1.0 - light.alike:.0%} of its area (at "
-            f"most {1.0 - _LEAST_ALIKE:.0%}) by more than one gain and offset a channel: of another gel, "
-            f"part of it is dark, or something touched it; {_TAKE}"
+            f"the resting picture is the calibration's with {words}: give pictures in the camera's own "
+            "channel order and orientation, as the calibration's presses were"
         )
-    return light
+    raise PictureRefused(
+        f"the resting picture differs from the calibration's in {1.0 - light.explained:.0%} of its area (at "
+        f"most {1.0 - _MIN_EXPLAINED_AT_REST:.0%}) by more than one gain and offset per channel: it is of "
+        f"another gel, part of it is dark, or something touched it; {_TAKE}"
+    )
 
 
-def _light_of_press(
-    seen: FloatArray, known: FloatArray, calibration: TactileCalibration, block: int
-) -> LightMatch | None:
-    """The light that a press was made in; None where that is the calibration's, or not known.
+def _light_of_press(seen: FloatArray, rest: FloatArray) -> tuple[LightMatch, bool]:
+    """Return the light of a press in terms of its resting picture's, and whether it agrees closely."""
+    light = match_light(seen, rest)
+    if light.explained >= _CLEAR:
+        return light, True
+    # Real gels change their colour around a contact, and a resting picture of another day differs by more.
+    light = match_light(seen, rest, models=2)
+    loose = match_light(seen, rest, _CLOSE_AT_REST, _SIMPLE)
+    if loose.explained < (_MIN_EXPLAINED_AT_REST if light.is_known else _CLEAR):
+        return light, light.is_known
+    change = np.linalg.norm(loose.apply(rest) - rest, axis=2).mean()
+    return (loose if change > _CLOSE_AT_REST else match_light(seen, rest, _CLOSE_AT_REST, 1)), False
 
-    A tilted face that fills the window changes its colour as another light does: only beside a contact is
-    the light the picture's own. Under one it is found across the slopes, by the resting gel's pattern.
+
+def _stands_out(change: FloatArray) -> bool:
+    """Return whether a contact stands out from its surroundings, inside the picture more than at its edge."""
+    touched = np.linalg.norm(change, axis=2) > _SURROUNDINGS
+    edge = np.concatenate([touched[0], touched[-1], touched[:, 0], touched[:, -1]])
+    return bool(touched.mean() > max(_LEAST_TOUCHED, edge.mean()))
+
+
+def _tilt_like_change(
+    change: FloatArray, rest: FloatArray, calibration: TactileCalibration, block: int
+) -> tuple[float, float]:
+    """Return how much of a change of the picture a face pressed over the whole view could have made.
+
+    Slopes cannot change all three colours by one gain or offset, as an exposure does. What remains of the
+    change without that is compared with the slopes of a surface as deep as a gel is thick.
+
+    Args:
+        change: ``(rows, columns, 3)`` grey levels, means over blocks.
+        rest: the same, of the resting picture.
+        calibration: with a smooth model.
+        block: pixels per side of a block.
+
+    Returns:
+        Grey levels, length over the channels, and m between the highest and the lowest point of the face;
+        zeros where no such face explains the change.
     """
-    beside = fit_light(seen, known)
-    if beside.sure and (np.abs(beside.gain - 1.0) <= _SAME_GAIN_PRESSED).all():
-        return None
-    patterned = len(calibration.smooth) > 0 and float(known.std(axis=(0, 1)).min()) > _PATTERN
-    if not patterned:
-        return beside if beside.sure else None
-    if beside.tight > _MOSTLY:
-        return beside if multiplies(beside, seen, known, calibration, block) else None
-    return light_under_contact(seen, known, calibration, block)
+    shading, inverse = linear_shading(calibration, block)
+    across = np.cross(shading[..., 0, :], shading[..., 1, :])
+    across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)
+    exposure = np.stack([(across * rest).sum(axis=2).ravel(), across.sum(axis=2).ravel()], axis=1)
+    by_exposure = np.linalg.lstsq(exposure, (across * change).sum(axis=2).ravel(), rcond=None)[0]
+    change = change - by_exposure[0] * rest - by_exposure[1]
+    unexplained = (across * change).sum(axis=2)
+    size = float(np.sqrt((change**2).sum(axis=2).mean()))
+    if size < _MIN_TILT_CHANGE or (unexplained**2).mean() > _MAX_UNEXPLAINED * size**2:
+        return 0.0, 0.0
+    normal = np.einsum("ijac,ijc->ija", inverse, change)
+    heights = free_heights(-normal[..., 1], -normal[..., 0])
+    relief = float(np.ptp(heights)) * block * calibration.header.pitch
+    return (size, relief) if relief < _MAX_RELIEF else (0.0, 0.0)
 
 
-def _require_own_orientation(
-    seen: FloatArray, rest: FloatArray, calibration: TactileCalibration, block: int
-) -> None:
-    found = better_turned(seen, rest, calibration, block)
-    if found is not None:
-        words, turned, as_it_is = found
+def _require_gain(gain: FloatArray, offset: FloatArray) -> None:
+    if np.abs(offset).max() > _MAX_OFFSET:
+        shown = ", ".join(f"{value:+.0f}" for value in offset)
         raise PictureRefused(
-            f"the press fits its resting gel only with {words}: a surface of the gel then leaves "
-            f"{turned:.0f} grey levels of it unexplained, and {as_it_is:.0f} as it is; {_TAKE}"
+            f"the light differs from the calibration's by {shown} grey levels (red, green, blue; at most "
+            f"{_MAX_OFFSET:g}): set exposure, gamma and black level as they were at the calibration"
         )
-
-
-def _gain(light: LightMatch | None, deadband: float) -> FloatArray:
-    if light is None:
-        return np.ones(3)
     low, high = _GAINS
-    if (light.gain < low).any() or (light.gain > high).any():
-        shown = ", ".join(f"{value:.2f}" for value in light.gain)
+    if gain.min() < low or gain.max() > high:
+        shown = ", ".join(f"{value:.2f}" for value in gain.mean(axis=(0, 1)))
         raise PictureRefused(
             f"the light is {shown} times the calibration's (red, green, blue); {low:g} to {high:g} can be "
             "corrected: set exposure and white balance as they were at the calibration"
         )
-    return np.where(np.abs(light.gain - 1.0) <= deadband, 1.0, light.gain)
+
+
+def _notes(light: LightMatch, rest_light: LightMatch, has_own_rest: bool) -> tuple[str, ...]:
+    notes = []
+    if rest_light.name != "same":
+        notes.append(
+            f"the light of the resting picture is that of the calibration by {_in_words(rest_light)}; the "
+            "change was divided by the gain"
+        )
+    if light.name != "same":
+        notes.append(
+            f"the light changed between the resting picture and the press by {_in_words(light)}; the change "
+            "was divided by the gain"
+        )
+    if not light.is_known:
+        notes.append(
+            f"{light.explained:.0%} of the press agrees with the resting picture in any light (at least "
+            f"{MIN_EXPLAINED:.0%} is needed to compare their light): the contact fills the view or the light "
+            "is uneven; the same light is assumed"
+        )
+    if not has_own_rest:
+        notes.append(
+            "no resting picture was given: the press is compared with the calibration's; one taken just "
+            "before the press (--background) is more accurate"
+        )
+    return tuple(notes)
+
+
+def _in_words(light: LightMatch) -> str:
+    gains = ", ".join(f"{value:.3f}" for value in light.slope[0])
+    offsets = ", ".join(f"{value:+.1f}" for value in light.offset)
+    if light.name == "offset":
+        return f"{offsets} grey levels (red, green, blue)"
+    if light.name == "gain and offset":
+        return f"a gain of {gains} and {offsets} grey levels (red, green, blue)"
+    uneven = " at the centre, uneven over the picture" if light.name == "uneven gain" else ""
+    return f"a gain of {gains} (red, green, blue){uneven}"
+
+
+def _light_error(light: LightMatch, most: float) -> float:
+    """Return the grey levels rms by which the surroundings of the contact differ smoothly from the light."""
+    if not light.is_known:
+        return _UNKNOWN_LIGHT
+    smooth = uniform_filter(light.residual, size=(_SMOOTH, _SMOOTH, 1), mode="nearest")
+    around = np.linalg.norm(light.residual, axis=2) < most
+    return float(np.sqrt((smooth[around] ** 2).mean())) if around.any() else _UNKNOWN_LIGHT
 
 
 def _require_press(change: FloatArray, calibration: TactileCalibration, block: int) -> None:
@@ -228,23 +391,3 @@ def _require_pressed(fit: SlopeFit) -> None:
             "by its colours the gel was pulled out, not pressed in: press and resting picture are exchanged, "
             f"or both are upside down; {_TAKE}"
         )
-
-
-def _corrected(
-    image: ByteArray,
-    calibration: TactileCalibration,
-    background: ByteArray | None,
-    light: LightMatch | None,
-    gain: FloatArray,
-) -> CheckedPicture:
-    rest = calibration.background if background is None else background
-    if light is None or (gain == 1.0).all():
-        return CheckedPicture(image, rest, read_only(np.ones(3)))
-    # The change is divided, over the calibration's own background: its noise is none of this picture's.
-    known = calibration.background.astype(np.float64)
-    shown = light.shown(known) if background is None else background
-    moved = known + (image - shown) / gain
-    words = ", ".join(f"{value:.2f}" for value in gain)
-    note = f"the light is {words} times the calibration's (red, green, blue); the change was divided by it"
-    corrected = np.clip(np.rint(moved), 0.0, 255.0).astype(np.uint8)
-    return CheckedPicture(read_only(corrected), calibration.background, read_only(gain), (note,))

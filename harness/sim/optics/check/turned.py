@@ -8,7 +8,7 @@ steeper than the linear shading, are explained badly as they are, and worse in e
 import numpy as np
 
 from harness.basics.arrays import FloatArray, block_means
-from harness.sim.optics.check.light import UNCHANGED, both_in_words, channel_orders, turns
+from harness.sim.optics.check.light import channel_orders, in_words, turns
 from harness.sim.optics.check.slopes import surface_residual
 from harness.sim.optics.tactile_calibration import TactileCalibration
 
@@ -27,6 +27,9 @@ _AS_GOOD = 1.1
 _NO_MORE = 1.1
 """Times a press's change: a way in which the press differs by more from the rest than this is none."""
 
+_UNCHANGED = 4.0
+"""Grey levels within which a block is at rest."""
+
 _STILL = 0.25
 """Share of a picture that is taken to be at rest."""
 
@@ -41,7 +44,7 @@ def without_drift(change: FloatArray) -> FloatArray:
         change: ``(rows, columns, 3)`` grey levels, means over blocks.
     """
     size = np.abs(change).max(axis=2)
-    if (size < UNCHANGED).mean() > _STILL:
+    if (size < _UNCHANGED).mean() > _STILL:
         return change
     still = size <= np.percentile(size, 100.0 * _STILL)
     return np.asarray(change - np.median(change[still], axis=0))
@@ -90,7 +93,7 @@ def _nearer(picture: FloatArray, rest: FloatArray, limit: float) -> list[tuple[s
     apart = np.vdot(picture, picture) + np.vdot(rest, rest) - 2.0 * products[:, taken, _OWN].sum(axis=2)
     near = apart / count - (moved**2).sum(axis=1) < limit**2  # (orientations, orders)
     return [
-        (both_in_words(exchanged, words), one[..., channels])
+        (in_words(exchanged, words), one[..., channels])
         for k, (exchanged, channels) in enumerate(orders)
         for t, (words, one) in enumerate(every.items())
         if near[t, k] and (exchanged or words)
