@@ -23,7 +23,7 @@ from harness.effects.force_effects import FORCE_EFFECT
 from harness.effects.sound_effects import SOUND_EFFECTS
 from harness.effects.touch_drawing import optics, reached
 from harness.effects.touch_file_effects import FILE_EFFECTS, SHAPES, gel_from
-from harness.sim.gel.gel import deform, over_range
+from harness.sim.gel.gel import deform, require_within_gel
 from harness.sim.gel.height_map import RasterMesh
 from harness.sim.gel.markers import draw_markers, marker_displacements
 from harness.sim.optics.noise import with_camera_noise
@@ -48,14 +48,10 @@ def _height_map(given: Given, levels: Levels) -> FloatArray:
     return reached(given["object.raster"], poses, given["sensor"], rays)
 
 
-def _over_range(given: Given, _levels: Levels) -> FloatArray:
-    return over_range(given["touch.height_map"], given["sensor"])[1]
-
-
 def _gel(given: Given, levels: Levels) -> FloatArray:
-    held, _ = over_range(given["touch.height_map"], given["sensor"])
+    pressed = require_within_gel(given["touch.height_map"], given["sensor"])
     skirt = given["sensor.calibration"].header.skirt
-    return deform(held, skirt, "fast" if levels[GEL.name] == "fast" else "exact")
+    return deform(pressed, skirt, "fast" if levels[GEL.name] == "fast" else "exact")
 
 
 def _colour(given: Given, levels: Levels) -> ByteArray:
@@ -84,8 +80,8 @@ def _shadow_out_of_table(given: Given, _levels: Levels) -> FloatArray:
 
 
 def _marker_motion(given: Given, levels: Levels) -> FloatArray:
-    held, _ = over_range(given["touch.height_map"], given["sensor"])
-    return marker_displacements(held, given["sensor"], float(levels[MARKER_NODES.name]))
+    pressed = require_within_gel(given["touch.height_map"], given["sensor"])
+    return marker_displacements(pressed, given["sensor"], float(levels[MARKER_NODES.name]))
 
 
 def _markers(given: Given, _levels: Levels) -> ByteArray:
@@ -129,7 +125,6 @@ EFFECTS = (
         _height_map,
         knobs=(SUPERSAMPLING,),
     ),
-    Effect("touch.over_range", ("touch.height_map", "sensor"), _over_range),
     FORCE_EFFECT,
     *FILE_EFFECTS,
     Effect(

@@ -17,7 +17,8 @@ from harness.effects.force_effects import pressed_of_gel
 from harness.effects.plan import Plan, default_accuracy, plan
 from harness.effects.touch_effects import DOTS, REST, contact_of, press_effects
 from harness.sim.gel.contact_force import ContactForce
-from harness.sim.gel.height_file import Heights, require_clear
+from harness.sim.gel.gel import require_within_gel
+from harness.sim.gel.height_file import Heights
 from harness.sim.optics.pressed_gel import Gel
 
 
@@ -61,16 +62,6 @@ class Press:
     def deepest(self) -> float:
         """Metres that the object reaches into the undeformed gel; 0 without contact."""
         return max(0.0, float(self.heights.max()))
-
-    @property
-    def over_range(self) -> float | None:
-        """Metres by which the press is deeper than the gel is thick; it was held there.
-
-        None where an ObjectFile's network gave the gel's surface: it holds it, and does not say by how much.
-        """
-        if "touch.height_map" not in self.evaluation.values:
-            return None
-        return max(0.0, self.deepest - self.gel.sensor.gel_thickness)
 
     @property
     def touches_border(self) -> bool:
@@ -150,7 +141,7 @@ def press_heights(
     Raises:
         WrongUse: an unknown knob or level; shadows or dots of a gel of which nobody says what pressed it.
         CalibrationRefused: a level that the calibration does not have.
-        OutOfDomain: a force of an object that reaches the gel's plate, or beyond the table of forces.
+        OutOfDomain: heights deeper than the gel is thick, or beyond the table of forces.
     """
     if of == "object":
         sources = {"touch.height_map": np.maximum(heights, 0.0)[None]}
@@ -195,12 +186,9 @@ def press_mesh(
         WrongUse: an unknown knob or level; no ObjectFile where one is asked, or one of another object or gel.
         DataRefused: an ObjectFile without the touch that is asked for, or a damaged one.
         CalibrationRefused: a level that the calibration does not have.
-        OutOfDomain: a part of the object is where the sensor would be; or, where a force is asked for, it
-            reaches the gel's plate, or beyond the table of forces.
+        OutOfDomain: the object reaches deeper than the gel is thick, or beyond the table of forces.
     """
-    press = _pressed(sources, "object", gel, scene, levels, force)
-    require_clear(press.deepest, gel.sensor.gel_thickness)
-    return press
+    return _pressed(sources, "object", gel, scene, levels, force)
 
 
 def press_knobs() -> Accuracy:
@@ -231,6 +219,9 @@ def _pressed(
         "sensor.elastic": gel.elastic,
         "sensor.forces": gel.forces,
     }
+    for name in ("touch.height_map", "touch.gel"):
+        if name in given:
+            require_within_gel(given[name], gel.sensor)
     sources |= {"object.wall": scene.object.wall, **_file(made, scene)}
     done = evaluate(made, {**sources, **given})
     values = replace(done, values={**given, **done.values})

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from harness.basics.arrays import FloatArray
+from harness.basics.errors import OutOfDomain
 from harness.basics.geometry import rotation_about
 from harness.basics.mesh import Mesh
 from harness.bench.scene import scene_from_options
@@ -81,14 +82,15 @@ def test_what_a_ray_misses_is_the_gel_whatever_number_says_so() -> None:
     assert np.array_equal(drawn(missed).image, drawn(post(1e-3)).image)
 
 
-def test_deeper_than_gel_and_shadow_table_is_held_and_said() -> None:
-    press = drawn(post(4e-3))
-    assert press.over_range == pytest.approx(1.5e-3)
+def test_deeper_than_the_shadow_table_is_held_and_said_and_deeper_than_the_gel_is_refused() -> None:
+    press = drawn(post(2.4e-3))
     assert press.shadow_out_of_table is not None
     assert press.shadow_out_of_table > 0.1
-    bare = drawn(post(4e-3), PLAIN)
+    bare = drawn(post(2.4e-3), PLAIN)
     # The published program throws no shadow at all from there.
     assert (press.image.astype(int) < bare.image).sum() > 300
+    with pytest.raises(OutOfDomain, match="into the gel"):
+        drawn(post(4e-3))
 
 
 def test_a_sheer_step_is_drawn_as_the_steepest_slope_known_and_counted() -> None:

@@ -79,12 +79,6 @@ class Touched:
             )
         if self.fills_window:
             said.append("the contact fills the window: a flat face then looks like the untouched gel")
-        over_range = press.over_range or 0.0
-        if over_range > 0.0:
-            said.append(
-                f"the press is {over_range * 1e3:.3g} mm deeper than the gel is thick "
-                f"({press.gel.sensor.gel_thickness * 1e3:g} mm) and was held there"
-            )
         if press.touches_border:
             said.append("the contact reaches the edge of the window; there is more of it than is seen")
         if (press.out_of_domain or 0.0) > 0.0:
@@ -128,7 +122,6 @@ def as_json(touched: Touched, out: Path, picture: Path | None, height_out: Path 
         **force_json(press),
         "flags": {
             "no_contact": not press.contact.any(),
-            "over_range_m": press.over_range,
             "touches_border": press.touches_border,
             "fills_window": touched.fills_window,
             "missing_heights": touched.missing,

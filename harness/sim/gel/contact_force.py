@@ -16,7 +16,6 @@ from harness.basics.arrays import BoolArray, FloatArray, IntArray, block_means, 
 from harness.basics.errors import OutOfDomain
 from harness.sim.gel.contact_pressure import SETTLED, Pressure, contact_pressure, spring_pressure
 from harness.sim.gel.elastic import GelElastic
-from harness.sim.gel.height_file import require_clear
 from harness.sim.gel.layer_compliance import disc_stiffness
 
 ForceLevel = Literal["winkler", "layer"]
@@ -124,7 +123,6 @@ def require_depths(depth: FloatArray, thickness: float) -> None:
             "not reach"
         )
     deepest = float(depth.max(initial=0.0))
-    require_clear(deepest, thickness)
     if deepest > thickness:
         raise OutOfDomain(
             f"the press is {deepest * 1e3:.3g} mm deep and the gel {thickness * 1e3:g} mm thick; no force is "

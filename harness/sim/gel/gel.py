@@ -41,6 +41,9 @@ TAXIM_SKIRT = GelSkirt(kernels=(201, 101, 51, 21, 11, 5), final=5, core=0.4)
 R15_SKIRT = GelSkirt(kernels=(11, 5), final=5, core=0.2)
 """For pixels of 0.1245 mm and images of 120 x 160 (ObjectFolder 2.0)."""
 
+_ROUNDING = 1e-9
+"""Metres by which a press as deep as the gel may differ from it."""
+
 _COARSE_FROM = 41
 """Width in pixels from which the fast level blurs on a coarser grid."""
 
@@ -80,6 +83,26 @@ def deform(penetration: FloatArray, skirt: GelSkirt, level: GelLevel = "exact") 
         if surface[n].any():
             _hang(surface[n], skirt, level)
     return read_only(surface)
+
+
+def require_within_gel(penetration: FloatArray, sensor: TactileSensor) -> FloatArray:
+    """Return presses that are nowhere deeper than the gel is thick.
+
+    Args:
+        penetration: ``(n, rows, columns)`` metres that the object reaches into the undeformed gel.
+        sensor: gives the thickness.
+
+    Raises:
+        OutOfDomain: some pixel is deeper.
+    """
+    deepest = float(penetration.max(initial=0.0))
+    if deepest > sensor.gel_thickness + _ROUNDING:
+        raise OutOfDomain(
+            f"the object reaches {1e3 * deepest:.3g} mm into the gel of {sensor.name}, which is "
+            f"{1e3 * sensor.gel_thickness:g} mm thick: press less deep; where another part of the object is "
+            "in the sensor's way, move, turn or tilt the contact"
+        )
+    return penetration
 
 
 def over_range(penetration: FloatArray, sensor: TactileSensor) -> tuple[FloatArray, FloatArray]:

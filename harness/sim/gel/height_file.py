@@ -18,8 +18,7 @@ Heights = Literal["object", "gel"]
 """What a map is of: how deep the object reaches, or the surface of the gel around it."""
 
 MOST_BEYOND = 4.0
-"""Thicknesses of the gel; a map that claims more is in another unit than metres, and a mesh that reaches
-farther has another part in the sensor's way."""
+"""Thicknesses of the gel; a map that claims more is in another unit than metres."""
 
 _UNITS = (("millimetres", 1e-3), ("micrometres", 1e-6))
 
@@ -149,22 +148,3 @@ def _check_unit(heights: FloatArray, sensor: TactileSensor, of: Heights, name: s
 def _fits(most: float, span: float, scale: float, thick: float) -> bool:
     """Whether a map would be one in another unit, if only against a level of its own."""
     return 0.01 * thick <= span * scale <= thick and (most * scale <= thick or span < 0.5 * most)
-
-
-def require_clear(deepest: float, thickness: float) -> None:
-    """Refuse a press in which the object would be where the sensor is.
-
-    Args:
-        deepest: m that it reaches past the untouched gel's face.
-        thickness: m of the gel.
-
-    Raises:
-        OutOfDomain: it is farther than ``MOST_BEYOND`` thicknesses.
-    """
-    most = MOST_BEYOND * thickness
-    if deepest > most:
-        raise OutOfDomain(
-            f"the object reaches {deepest * 1e3:.3g} mm past the gel's face; the limit is "
-            f"{most * 1e3:g} mm. Another part of it is in the sensor's way, or the press is too deep: turn, "
-            "tilt or move the contact, or press less"
-        )

@@ -16,6 +16,7 @@ from harness.effects.explain import scene_plan
 from harness.effects.touch_press import press_heights, press_mesh
 from harness.objects.household import build
 from harness.sim.gel.gel import deform
+from harness.sim.gel.height_file import Heights
 from harness.sim.optics.known_gel import known_gel
 from harness.sim.optics.pressed_gel import Gel
 from harness.sim.optics.shadow import ShadowTable
@@ -91,7 +92,7 @@ def test_no_contact_is_the_background_to_the_bit(level: str, of: Any, dome: bool
     press = press_heights(nothing, of, gel, SCENE, [f"touch.optics={level}"], reached)
     assert np.array_equal(press.image, BENCH.calibration.background)
     assert not press.contact.any()
-    assert (press.deepest, press.over_range, press.saturated, press.touches_border) == (0.0, 0.0, 0, False)
+    assert (press.deepest, press.saturated, press.touches_border) == (0.0, 0, False)
     assert press.shadow_out_of_table == 0.0
 
 
@@ -124,12 +125,16 @@ def test_shadows_over_a_measured_dome_fall_downhill_of_the_dome_too() -> None:
         assert dark[:, lower].sum() > 0.55 * dark.sum() > 300
 
 
-def test_beyond_the_gel_is_held_and_said() -> None:
-    press = press_heights(bump(4e-3), "object", BENCH, SCENE)
-    assert press.over_range == pytest.approx(1.5e-3)
-    assert press.deepest == 4e-3
-    held = press_heights(np.minimum(bump(4e-3), 2.5e-3), "object", BENCH, SCENE)
-    assert np.array_equal(press.image, held.image)
+@pytest.mark.parametrize("of", ["object", "gel"])
+def test_heights_deeper_than_the_gel_are_refused(of: Heights) -> None:
+    with pytest.raises(OutOfDomain, match=r"4 mm into the gel .* 2\.5 mm thick"):
+        press_heights(bump(4e-3), of, BENCH, SCENE)
+    press_heights(bump(GELSIGHT_R15.gel_thickness), of, BENCH, SCENE)
+
+
+def test_what_reached_deeper_than_the_gel_is_refused() -> None:
+    with pytest.raises(OutOfDomain, match="into the gel"):
+        press_heights(bump(1e-3), "gel", BENCH, SCENE, reached=bump(4e-3))
 
 
 def test_a_part_that_is_where_the_sensor_would_be_is_refused() -> None:

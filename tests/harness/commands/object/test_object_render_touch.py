@@ -118,7 +118,6 @@ def test_sim_touch_draws_the_same_press_from_the_same_codes(
     answered(capsys, tmp_path, *alone)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "c.png").read_bytes()
     assert answer["levels"]["touch.shapes"] == "network"
-    assert answer["flags"]["over_range_m"] is None
     assert answer["error_estimate"]["maps_measured"] == {"psnr_db": 50.0}
     ran = {step["effect"] for step in answer["effects"]["ran"]}
     assert "object.touch_codes" in ran
