@@ -89,7 +89,7 @@ def tactile_image(
     scene = scene_from_options(str(mesh), material, units)
     gel, known = known_gel(sensor, calibration), known_object(scene)
     place = contact_place(known.mesh, np.asarray(contact, dtype=np.float64))
-    pose = gel_from_object(place, depth, tilt, 0.0, 0.0)
+    pose = gel_from_object(place, depth, tilt, 0.0, 0.0, gel.sensor.gel_thickness)
     return press_mesh({"object.mesh": known.mesh, "contact.gel_from_object": pose[None]}, gel, scene)
 
 

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from calibration.taxim.arm.record import ArmPresses
     from calibration.taxim.mark_free import Identity
     from calibration.taxim.pictures import Channels, Pictures
+    from harness.bench.sensor import TactileSensor
+
+_SAME_SHAPE = 0.02
+"""Relative difference of the reductions along both sides, by rounding to whole pixels."""
 
 
 def taxim(
@@ -48,7 +52,7 @@ def taxim(
         str | None,
         typer.Option(
             help="Length of gel that a pixel shows, as 0.0295mm. Presses cannot tell it, the arm can: "
-            "what it measured if left out, or that of the GelSight R1.5 of pictures.",
+            "what it measured if left out. Of pictures that of --sensor, else of the GelSight R1.5.",
             metavar="LENGTH",
         ),
     ] = None,
@@ -150,7 +154,12 @@ def taxim(
         bool, typer.Option("--marks", help="Start from the circles that came with a data pack.")
     ] = False,
     sensor: Annotated[
-        str | None, typer.Option(help="Make of the sensor; a run of the arm knows it.", metavar="NAME")
+        str | None,
+        typer.Option(
+            help="Sensor: a shipped name or a sensor file, whose pitch and name are used, or any other name. "
+            "A run of the arm knows it.",
+            metavar="NAME",
+        ),
     ] = None,
     serial: Annotated[str, typer.Option(help="Of the very sensor.", metavar="NAME")] = "unknown",
     licence: Annotated[str, typer.Option(help="Of the pictures.", metavar="NAME")] = "not stated",
@@ -203,7 +212,7 @@ def taxim(
         return 130
     arm, scale, taken = _read(source, background, channels)
     pictures = squared(taken, aspect if aspect is not None else 1.0 if scale is None else scale.aspect_taken)
-    who = _identity(sensor, serial, licence, pitch, wanted.ball_radius, arm, scale)
+    who = _identity(sensor, serial, licence, pitch, wanted.ball_radius, arm, scale, pictures)
     known = None if like is None else read_calibration(like)
     made = calibrate(pictures, who, use_marks=marks, like=known)
     artefact = out if out is not None else _place(source, arm is not None)
@@ -261,12 +270,12 @@ def _identity(
     ball_radius: float | None,
     arm: "ArmPresses | None",
     scale: "ArmScale | None",
+    pictures: "Pictures",
 ) -> "Identity":
-    """Who the sensor is, and its pitch: as given, else by the arm, else the paper's sensor's."""
+    """Return the sensor's identity with its pitch: as given, else by the arm, else of the sensor's file."""
     from calibration.taxim.mark_free import Identity
     from harness.basics.errors import WrongUse
     from harness.basics.quantities import LENGTH
-    from harness.bench.sensor import GELSIGHT_R15
 
     recorded = None if arm is None else arm.ball_radius
     if ball_radius is None and recorded is None:
@@ -276,16 +285,54 @@ def _identity(
             f"--ball-radius {1e3 * ball_radius:g} mm: this run was made with a ball of {1e3 * recorded:g} "
             "mm; leave it out"
         )
-    known = GELSIGHT_R15.pitch if scale is None else scale.pitch.value
     stated = options.positive("--pitch", pitch, LENGTH)
+    described = _described(sensor)
+    if stated is not None:
+        known = stated
+    elif scale is not None:
+        known = scale.pitch.value
+    else:
+        known = _pitch_of_pictures(described, pictures)
+    name = sensor if described is None else described.name
     return Identity(
-        sensor=sensor or ("GelSight" if arm is None else arm.sensor),
+        sensor=name or ("GelSight" if arm is None else arm.sensor),
         serial=serial if arm is None or serial != "unknown" else arm.serial or serial,
         licence=licence,
         date=datetime.now(UTC).date().isoformat(),
-        pitch=known if stated is None else stated,
+        pitch=known,
         ball_radius=recorded if recorded is not None else ball_radius or 0.0,
     )
+
+
+def _described(sensor: str | None) -> "TactileSensor | None":
+    """Return the sensor of a shipped name or of a sensor file; None for any other name."""
+    from harness.bench.sensor import described_sensor, shipped_sensors
+
+    is_known = sensor is not None and (
+        sensor in shipped_sensors() or Path(sensor).suffix == ".toml" or Path(sensor).is_file()
+    )
+    return described_sensor(sensor).sensor if sensor is not None and is_known else None
+
+
+def _pitch_of_pictures(sensor: "TactileSensor | None", pictures: "Pictures") -> float:
+    """Return m per pixel of pictures that may be a reduced version of the sensor's own.
+
+    Raises:
+        WrongUse: the pictures are cropped, or another sensor's.
+    """
+    from harness.basics.errors import WrongUse
+    from harness.bench.sensor import GELSIGHT_R15
+
+    if sensor is None:
+        return GELSIGHT_R15.pitch
+    rows, columns = pictures.background.shape[:2]
+    down, right = sensor.rows / rows, sensor.columns / columns
+    if abs(down / right - 1.0) > _SAME_SHAPE:
+        raise WrongUse(
+            f"the pictures are {columns} x {rows} pixels and {sensor.name} has {sensor.columns} x "
+            f"{sensor.rows}: they are not its whole picture; give --pitch, or the sensor that took them"
+        )
+    return sensor.pitch * (down * right) ** 0.5
 
 
 def _channels(text: str | None) -> "Channels | None":

@@ -12,6 +12,7 @@ from harness.commands.press import depth_force
 
 if TYPE_CHECKING:
     from harness.basics.arrays import ByteArray, FloatArray
+    from harness.bench.sensor import TactileSensor
     from harness.bench.station_file import Station
     from harness.sim.optics.depth_reading import DepthReading
     from harness.sim.optics.inverse import Detection
@@ -29,12 +30,13 @@ def depth(
         ),
     ],
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(
-            help="Arrays without pickles: height, sigma (metres), contact, trusted, points, points_sigma.",
+            help="Arrays without pickles: height, sigma (metres), contact, trusted, points, points_sigma. "
+            "Without it the figures are only printed.",
             metavar="FILE.npz",
         ),
-    ],
+    ] = None,
     calibration: Annotated[
         str | None,
         typer.Option(
@@ -45,9 +47,17 @@ def depth(
     background: Annotated[
         Path | None,
         typer.Option(
-            help="Picture of the untouched gel, taken just before; the calibration's, with the light of the "
-            "moment taken out, if left out.",
+            help="Picture of the untouched gel, taken just before the press. The calibration's if left out, "
+            "with a note.",
             metavar="IMAGE",
+        ),
+    ] = None,
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            help="Sensor whose gel is pressed: a shipped name or a sensor file. Its thickness bounds the "
+            "depth. If left out, that of --station, or the shipped one that the calibration names.",
+            metavar="NAME",
         ),
     ] = None,
     station: Annotated[
@@ -70,7 +80,7 @@ def depth(
     thickness: Annotated[
         str | None,
         typer.Option(
-            help="Of the gel, for --force; that of --station's sensor if left out.", metavar="LENGTH"
+            help="Thickness of the gel, for --force; that of the sensor if left out.", metavar="LENGTH"
         ),
     ] = None,
     gel_modulus: forces.Modulus = None,
@@ -83,7 +93,7 @@ def depth(
     Every pixel has its height and one standard deviation of it: by the camera's noise, the calibration's own
     misfit, slopes steeper than it knows, and what a contact itself does to the colour.
 
-    Try: touchstone depth press.png --background rest.png --calibration r15.npz --out d.npz --picture d.png
+    Try: touchstone depth press.png --background rest.png --calibration gelsight_r15_bench --picture d.png
     """
     from harness.basics.files.named_file import refusals_name
     from harness.bench.station_file import load_station, station_path
@@ -94,10 +104,12 @@ def depth(
         ("--out", out, ".npz"), ("--picture", picture, ".png"), ("--height-out", height_out, ".npy")
     )
     bench = None if station is None else load_station(station_path(station))
-    wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, bench)
+    gel = _sensor(sensor, bench)
+    wanted = depth_force.asked(force, thickness, gel_modulus, gel_modulus_error, gel_poisson, gel)
     known = _calibration(calibration, bench)
+    gel = gel or _sensor_named_by(known)
     rest = None if background is None else read_image(background)
-    frames, thickness_known = _frames(images), _thickness(known, bench)
+    frames, thickness_known = _frames(images), None if gel is None else gel.gel_thickness
     with refusals_name(*images, *([] if background is None else [background])):
         found = read_press(frames, known, _detection(rest), rest, thickness_known)
     frame_from_gel = None if bench is None else bench.flange_from_gel
@@ -107,6 +119,12 @@ def depth(
     if picture is not None:
         _draw(found, picture)
     answer = _answer(found, known, points, "gel" if bench is None else "flange")
+    answer["sensor"] = None if gel is None else {"name": gel.name, "gel_thickness_m": gel.gel_thickness}
+    if gel is None:
+        answer["notes"].append(
+            "the thickness of the gel is not known, and the depth is not compared with it: the calibration "
+            f"is of {known.header.sensor!r}; give --sensor"
+        )
     files = {"out": out, "picture": picture, "height_out": height_out}
     answer |= {name: None if path is None else str(path) for name, path in files.items()}
     answer["images"] = [str(path) for path in images]
@@ -134,11 +152,24 @@ def _calibration(named: str | None, bench: "Station | None") -> "TactileCalibrat
     return named_calibration(named)
 
 
-def _thickness(known: "TactileCalibration", bench: "Station | None") -> float | None:
-    from harness.sim.optics.known_gel import sensor_like
+def _sensor(named: str | None, bench: "Station | None") -> "TactileSensor | None":
+    """Return the sensor of ``--sensor``, else of the station; None where neither is given."""
+    from harness.bench.sensor import described_sensor
 
-    sensor = sensor_like(known) if bench is None else bench.gel.sensor
-    return None if sensor is None else sensor.gel_thickness
+    if named is not None:
+        return described_sensor(named).sensor
+    return None if bench is None else bench.gel.sensor
+
+
+def _sensor_named_by(known: "TactileCalibration") -> "TactileSensor | None":
+    """Return the shipped sensor that a calibration names as its own; None where there is none.
+
+    Number and size of the pixels do not identify a sensor: gels of 2 to 5 mm share them.
+    """
+    from harness.bench.sensor import described_sensor, shipped_sensors
+
+    sensors = [described_sensor(name).sensor for name in shipped_sensors()]
+    return next((sensor for sensor in sensors if sensor.name == known.header.sensor), None)
 
 
 def _frames(images: list[Path]) -> "ByteArray":
@@ -164,7 +195,7 @@ def _detection(rest: "ByteArray | None") -> "Detection":
     return DRIFTING if rest is None else STEADY
 
 
-def _write(found: "DepthReading", points: "FloatArray", out: Path, height_out: Path | None) -> None:
+def _write(found: "DepthReading", points: "FloatArray", out: Path | None, height_out: Path | None) -> None:
     from harness.basics.npz_file import write_array, write_arrays
 
     arrays = {
@@ -175,7 +206,8 @@ def _write(found: "DepthReading", points: "FloatArray", out: Path, height_out: P
         "points": points,
         "points_sigma": found.sigma[found.contact],
     }
-    write_arrays(out if out.suffix == ".npz" else out.with_name(f"{out.name}.npz"), arrays, compressed=True)
+    if out is not None:
+        write_arrays(out, arrays, compressed=True)
     if height_out is not None:
         write_array(height_out, found.height)
 

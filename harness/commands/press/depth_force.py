@@ -8,7 +8,7 @@ from harness.commands import options
 from harness.commands.force_options import described, noted, require_force, sentence, stiffness
 
 if TYPE_CHECKING:
-    from harness.bench.station_file import Station
+    from harness.bench.sensor import TactileSensor
     from harness.sim.gel.elastic import GelElastic
     from harness.sim.optics.depth_reading import DepthReading
 
@@ -32,7 +32,7 @@ def asked(
     modulus: str | None,
     share: str | None,
     poisson: float | None,
-    bench: "Station | None",
+    sensor: "TactileSensor | None",
 ) -> ForceAsked | None:
     """What the options ask for; None where they ask for no force.
 
@@ -47,9 +47,11 @@ def asked(
         return None
     found = options.positive("--thickness", thickness, LENGTH)
     if found is None:
-        if bench is None:
-            raise WrongUse("a force needs to know how thick the gel is: --thickness 2.5mm, or a --station")
-        found = bench.gel.sensor.gel_thickness
+        if sensor is None:
+            raise WrongUse(
+                "a force needs to know how thick the gel is: --thickness 2.5mm, a --sensor or a --station"
+            )
+        found = sensor.gel_thickness
     return ForceAsked(found, stiffness(modulus, share, poisson))
 
 

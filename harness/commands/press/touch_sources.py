@@ -112,7 +112,7 @@ def of_mesh(
     scene = _scene(mesh, units, gel, objectfile)
     known = known_object(scene)
     place = places.pressed_place(known.mesh, contact, vertex)
-    at = gel_from_object(place, depth, tilt, azimuth, yaw)
+    at = gel_from_object(place, depth, tilt, azimuth, yaw, gel.sensor.gel_thickness)
     read = time.perf_counter() - begun
     sources = {
         "object.mesh": known.mesh,

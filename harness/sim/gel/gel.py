@@ -85,23 +85,26 @@ def deform(penetration: FloatArray, skirt: GelSkirt, level: GelLevel = "exact") 
     return read_only(surface)
 
 
-def require_within_gel(penetration: FloatArray, sensor: TactileSensor) -> FloatArray:
-    """Return presses that are nowhere deeper than the gel is thick.
+def require_depth(deepest: float, thickness: float) -> None:
+    """Refuse a press that is deeper than its gel is thick.
 
     Args:
-        penetration: ``(n, rows, columns)`` metres that the object reaches into the undeformed gel.
-        sensor: gives the thickness.
+        deepest: metres that the object reaches, or is to be pressed, into the undeformed gel.
+        thickness: metres of the gel.
 
     Raises:
-        OutOfDomain: some pixel is deeper.
+        OutOfDomain: it is deeper.
     """
-    deepest = float(penetration.max(initial=0.0))
-    if deepest > sensor.gel_thickness + _ROUNDING:
+    if deepest > thickness + _ROUNDING:
         raise OutOfDomain(
-            f"the object reaches {1e3 * deepest:.3g} mm into the gel of {sensor.name}, which is "
-            f"{1e3 * sensor.gel_thickness:g} mm thick: press less deep; where another part of the object is "
-            "in the sensor's way, move, turn or tilt the contact"
+            f"pressed {1e3 * deepest:.3g} mm deep; this gel is {1e3 * thickness:g} mm thick: press less "
+            "deep; where another part of the object is in the sensor's way, move, turn or tilt the contact"
         )
+
+
+def require_within_gel(penetration: FloatArray, sensor: TactileSensor) -> FloatArray:
+    """Return presses ``(n, rows, columns)`` in metres; ``OutOfDomain`` where one is deeper than the gel."""
+    require_depth(float(penetration.max(initial=0.0)), sensor.gel_thickness)
     return penetration
 
 

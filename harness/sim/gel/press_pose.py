@@ -14,6 +14,7 @@ from harness.basics.errors import OutOfDomain, WrongUse
 from harness.basics.faces.nearest import plane_shares
 from harness.basics.geometry import frame_facing, inverse, rotation_about, transform
 from harness.basics.mesh import Mesh
+from harness.sim.gel.gel import require_depth
 from harness.sim.solid.surface_measure import nearest_on_surface
 
 MOST_MOVED = 2e-3
@@ -96,8 +97,15 @@ def contact_vertex(mesh: Mesh, vertex: int) -> ContactPlace:
     return contact_place(mesh, mesh.vertices[vertex])
 
 
-def gel_from_object(place: ContactPlace, depth: float, tilt: float, azimuth: float, yaw: float) -> FloatArray:
-    """``(4, 4)``: the object in the frame of a gel that is pressed onto a place.
+def gel_from_object(
+    place: ContactPlace,
+    depth: float,
+    tilt: float,
+    azimuth: float,
+    yaw: float,
+    thickness: float = np.inf,
+) -> FloatArray:
+    """Return ``(4, 4)``, the object in the frame of a gel that is pressed onto a place.
 
     The untilted gel looks straight into the surface, its x axis where ``geometry.frame_facing`` puts
     it. The gel's own z axis is then leant by ``tilt`` towards the tangent direction at ``azimuth`` from
@@ -109,9 +117,11 @@ def gel_from_object(place: ContactPlace, depth: float, tilt: float, azimuth: flo
         tilt: rad between the gel's z axis and the inward normal, 0 to ``MOST_TILT``.
         azimuth: rad, the direction the gel's z axis leans to.
         yaw: rad.
+        thickness: metres of the gel. A deeper press may pass the object, and its picture shows no contact.
 
     Raises:
         WrongUse: a number that is not finite, or a tilt out of its range.
+        OutOfDomain: a press deeper than the gel is thick.
     """
     if not np.isfinite([depth, tilt, azimuth, yaw]).all():
         raise WrongUse(f"depth {depth}, tilt {tilt}, azimuth {azimuth}, yaw {yaw}: give finite numbers")
@@ -120,6 +130,7 @@ def gel_from_object(place: ContactPlace, depth: float, tilt: float, azimuth: flo
             f"a tilt of {np.degrees(tilt):g} deg; give 0 to {np.degrees(MOST_TILT):g} deg, and the side with "
             "--azimuth"
         )
+    require_depth(depth, thickness)
     upright = frame_facing(-place.normal, 0.0)
     across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     turned = upright @ rotation_about(across, tilt) @ rotation_about(_Z, yaw)

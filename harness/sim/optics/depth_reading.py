@@ -116,9 +116,9 @@ def read_press(
     depth = read_depth(checked.image[None], by, detection if checked.agrees else DRIFTING)
     if not (checked.agrees or background is None or depth.read.imprint.any()):
         raise PictureRefused(
-            "the whole picture differs from the resting picture and no contact stands out: the light changed, "
-            "or a face covers the whole view; take a resting picture just before the press, and leave some of "
-            "the gel free"
+            "the whole picture differs from the resting picture and no contact stands out: the light "
+            "changed, or a face covers the whole view; take a resting picture just before the press, and "
+            "leave some of the gel free"
         )
     read_in = process_time() - began
     least = float(checked.gain.min())

@@ -75,6 +75,19 @@ def test_one_damaged_press_is_refused_with_its_reason(damage: object, kind: str)
     assert _kinds(press_set(images, REST)) == {"0004.png": kind}
 
 
+@pytest.mark.parametrize(("clipped", "refused"), [(0.3, False), (0.49, False), (0.51, True), (0.7, True)])
+def test_a_press_of_which_more_than_half_is_clipped_is_refused(clipped: float, refused: bool) -> None:
+    """Published sets have up to 0.3 of the changed pixels clipped and stay usable."""
+    pictures, _ = drawn_set(16)
+    seen = sightings(pictures, BALL)
+    seen[4] = replace(seen[4], clipped=clipped)
+    verdict = refusals(pictures, seen, BALL)[4]
+    assert (verdict is not None) == refused
+    if verdict is not None:
+        assert verdict.kind == "saturated"
+        assert f"{clipped:.0%} of what changed" in verdict.reason
+
+
 def test_the_same_press_twice_is_kept_once() -> None:
     """The very file, and another frame of the same press with noise of its own."""
     pictures, centres = drawn_set(16)

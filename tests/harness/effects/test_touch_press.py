@@ -127,13 +127,13 @@ def test_shadows_over_a_measured_dome_fall_downhill_of_the_dome_too() -> None:
 
 @pytest.mark.parametrize("of", ["object", "gel"])
 def test_heights_deeper_than_the_gel_are_refused(of: Heights) -> None:
-    with pytest.raises(OutOfDomain, match=r"4 mm into the gel .* 2\.5 mm thick"):
+    with pytest.raises(OutOfDomain, match=r"pressed 4 mm deep; this gel is 2\.5 mm"):
         press_heights(bump(4e-3), of, BENCH, SCENE)
     press_heights(bump(GELSIGHT_R15.gel_thickness), of, BENCH, SCENE)
 
 
 def test_what_reached_deeper_than_the_gel_is_refused() -> None:
-    with pytest.raises(OutOfDomain, match="into the gel"):
+    with pytest.raises(OutOfDomain, match="this gel is"):
         press_heights(bump(1e-3), "gel", BENCH, SCENE, reached=bump(4e-3))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.geometry import inverse
-from harness.bench.sensor import GELSIGHT_R15
+from harness.bench.sensor import GELSIGHT_R15, sensor_path
 from harness.bench.station_file import load_station, station_path
 from harness.cli import invoke
 from harness.picture.image_file import write_png
@@ -99,6 +99,69 @@ def test_the_command_writes_arrays_and_a_picture_and_answers(
     assert (tmp_path / "d.png").stat().st_size > 1000
 
 
+LIGHT = Path(__file__).parents[3] / "samples/tactile_light"
+
+
+@pytest.mark.parametrize("light", ["", "_dim", "_tv", "_ae2"])
+def test_figures_are_answered_without_a_file_and_right_in_every_light(
+    capsys: pytest.CaptureFixture[str], light: str
+) -> None:
+    press, rest = (LIGHT / f"{name}{light}.png" for name in ("press", "rest"))
+    answer = _answered(capsys, press, "--background", rest, "--calibration", NAME)
+    assert answer["deepest_m"] == pytest.approx(0.599e-3, abs=0.05e-3)
+    assert answer["deepest_sigma_m"] < 0.05e-3
+    assert answer["out"] is None
+    assert answer["sensor"]["gel_thickness_m"] == GELSIGHT_R15.gel_thickness
+    assert invoke(["depth", str(press), "--background", str(rest), "--calibration", NAME]) == 0
+    assert "mm at the deepest" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("press", "rest", "reason"),
+    [
+        ("press_bgr", "rest_bgr", "channels blue, green, red"),
+        ("press_bgr", "rest", "channels blue, green, red"),
+        ("press_half", "rest", "part of the frame was lost"),
+        ("black", "rest", "lights are off"),
+        ("press", "black", "lights are off"),
+    ],
+)
+def test_pictures_in_no_light_or_another_channel_order_are_refused(
+    capsys: pytest.CaptureFixture[str], press: str, rest: str, reason: str
+) -> None:
+    words = (LIGHT / f"{press}.png", "--background", LIGHT / f"{rest}.png", "--calibration", NAME)
+    assert reason in _answered(capsys, *words, code=1)["error"]
+
+
+def test_a_press_without_its_own_resting_picture_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    answer = _answered(capsys, LIGHT / "press_ae2.png", "--calibration", NAME)
+    assert answer["deepest_m"] == pytest.approx(0.599e-3, abs=0.05e-3)
+    assert any("no resting picture was given" in note for note in answer["notes"])
+
+
+def test_the_thickness_is_that_of_the_sensor_and_not_of_one_with_the_same_pixels(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, known: TactileCalibration
+) -> None:
+    words = (LIGHT / "press.png", "--background", LIGHT / "rest.png", "--calibration", tmp_path / "c.npz")
+    save_calibration(replace(known, header=replace(known.header, sensor="of my own")), tmp_path / "c.npz")
+    answer = _answered(capsys, *words)
+    assert answer["sensor"] is None
+    assert any("give --sensor" in note for note in answer["notes"])
+    text = sensor_path("gelsight-r1.5").read_text()
+    thin = tmp_path / "thin.toml"
+    thin.write_text(text.replace('"2.5 mm"', '"0.6 mm"'))
+    assert "in a gel of 0.60 mm" in _answered(capsys, *words, "--sensor", thin, code=1)["error"]
+    assert _answered(capsys, *words, "--sensor", "gelsight-mini")["sensor"]["name"] == "GelSight Mini"
+
+
+def test_a_missing_output_folder_is_named_before_the_pictures_are_read(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for option, name in (("--out", "d.npz"), ("--picture", "d.png"), ("--height-out", "h.npy")):
+        words = (tmp_path / "nosuch.png", "--calibration", NAME, option, tmp_path / "none" / name)
+        assert str(tmp_path / "none") in _answered(capsys, *words, code=2)["error"]
+
+
 def test_the_untouched_gel_is_no_contact(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, known: TactileCalibration
 ) -> None:
@@ -134,6 +197,7 @@ def test_pictures_of_high_pixels_are_made_square_as_the_presses_were(
         (("--out", "d.txt", "--calibration", NAME), "end in .npz"),
         (("--out", "d.npz"), "--calibration FILE"),
         (("--out", "d.npz", "--calibration", "no_such"), "no shipped calibration"),
+        (("--sensor", "no_such", "--calibration", NAME), "no sensor 'no_such'"),
     ],
 )
 def test_what_is_missing_is_said(

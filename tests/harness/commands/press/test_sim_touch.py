@@ -234,6 +234,14 @@ def test_a_contact_that_fills_the_window_is_said(tmp_path: Path, capsys: pytest.
         (("--height", "h.npy", "--noise", "inf"), "finite", 2),
         (("--height", "h.npy", "--height-out", "h.txt"), "let its name end in .npy", 2),
         (("--height", "mm.npy"), "look like millimetres", 1),
+        (("--height", "deep.npy"), "this gel is 2.5 mm thick", 1),
+        (
+            ("--height", "h.npy", "--heights-of", "gel", "--reached", "deep.npy"),
+            "this gel is 2.5 mm thick",
+            1,
+        ),
+        (("builtin:mug", "--vertex", "3000", "--depth", "80mm"), "80 mm deep; this gel is 2.5 mm thick", 1),
+        (("builtin:mug", "--vertex", "3000", "--depth", "2.6mm"), "2.6 mm deep; this gel is 2.5 mm thick", 1),
         (("--height", "pixels.npy"), "look like pixels of 0.1245 mm", 1),
         (("--height", "nan.npy"), "none of its 19200 heights", 1),
         (("--height", "turned.npy"), "transpose it", 1),
@@ -248,7 +256,13 @@ def test_errors_say_what_to_do(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    maps = {"h": bump(1e-3), "mm": bump(1.0), "pixels": bump(8.0), "turned": bump(1e-3).T}
+    maps = {
+        "h": bump(1e-3),
+        "mm": bump(1.0),
+        "pixels": bump(8.0),
+        "deep": bump(2.6e-3),
+        "turned": bump(1e-3).T,
+    }
     for name, heights in {**maps, "nan": np.full((120, 160), np.nan)}.items():
         saved(tmp_path, heights, f"{name}.npy")
     write_png(tmp_path / "small.png", np.zeros((60, 80, 3), np.uint8))
