@@ -265,6 +265,7 @@ def test_errors_say_what_to_do(
     }
     for name, heights in {**maps, "nan": np.full((120, 160), np.nan)}.items():
         saved(tmp_path, heights, f"{name}.npy")
+    saved(tmp_path, bump(2.6e-3), "deep.npy")
     write_png(tmp_path / "small.png", np.zeros((60, 80, 3), np.uint8))
     answer = answered(capsys, tmp_path, *words, code=code)
     assert reason in answer["error"]
