@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import RecordingDamaged
+from harness.recording.checksums import SUM
 from harness.recording.recording import Recording, RunHeader, header_of
 from harness.recording.step_file import StepRecord, step_of
 from tests.samples.recorded_step import OFFSET_NS, OLD_RUN, sample_header, sample_step
@@ -207,3 +208,16 @@ def test_a_plan_that_is_not_there_is_refused(run: Recording) -> None:
     assert run.planned("contacts") == [{"depth_m": 1e-3}]
     with pytest.raises(RecordingDamaged, match=r"run\.json"):
         run.planned("looks")
+
+
+def test_a_value_of_run_json_that_was_changed_does_not_agree_with_its_checksum(run: Recording) -> None:
+    """Another seed is a header like any other; only the checksum shows that it is not the run's."""
+    path = run.folder / "run.json"
+    fields = json.loads(path.read_text())
+    for changed in ({**fields, "seed": fields["seed"] + 1}, {k: v for k, v in fields.items() if k != SUM}):
+        path.write_text(json.dumps(changed))
+        with pytest.raises(RecordingDamaged, match="do not agree with its checksum"):
+            Recording(run.folder)
+    path.write_text(json.dumps(fields))
+    assert Recording(run.folder).header == run.header
+    assert Recording(OLD_RUN).header.schema == 1

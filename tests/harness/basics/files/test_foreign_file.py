@@ -1,13 +1,15 @@
 """Files that somebody else wrote are read within bounds, or refused in a sentence that names them."""
 
 import tracemalloc
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from harness.basics.errors import CalibrationRefused, DataRefused, WrongUse
-from harness.basics.files.foreign_file import read_bounded, refused_as
+from harness.basics.files import foreign_file
+from harness.basics.files.foreign_file import read_bounded, refused_as, require_unpackable
 from harness.basics.npz_file import read_array, read_arrays, write_array, write_arrays
 from harness.basics.toml_file import read_toml
 from harness.picture.image_file import read_image
@@ -102,3 +104,20 @@ def test_our_own_refusals_go_through() -> None:
         raise WrongUse("ours")
     with pytest.raises(DataRefused, match="theirs"), refused_as(DataRefused, "theirs"):
         raise RecursionError
+
+
+@pytest.mark.parametrize(("sizes", "fits"), [([400, 400], True), ([400, 400, 400], False), ([1100], False)])
+def test_the_members_of_an_archive_are_counted_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sizes: list[int], fits: bool
+) -> None:
+    """Each member below the limit, all of them above it."""
+    monkeypatch.setattr(foreign_file, "MOST_DATA", 1000)
+    path = tmp_path / "some.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for number, size in enumerate(sizes):
+            archive.writestr(f"{number}.bin", bytes(size))
+    if fits:
+        require_unpackable(path, "an archive")
+    else:
+        with pytest.raises(DataRefused, match=r"some\.zip unpacks to"):
+            require_unpackable(path, "an archive")
