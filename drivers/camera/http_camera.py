@@ -22,7 +22,8 @@ class HttpCamera:
         """Connect and wait for the first frame.
 
         Raises:
-            BenchFault: nothing answers, no frame comes, or frames have another size.
+            BenchFault: nothing answers, no frame comes, frames have another size or no colour, or all frames
+                are one picture.
         """
         self._stream.open()
 
@@ -37,7 +38,7 @@ class HttpCamera:
             ``(count, rows, columns, 3)`` uint8, RGB, with the JPEG bytes.
 
         Raises:
-            BenchFault: after ``timeout`` s without them.
+            BenchFault: after ``timeout`` s without them, or where the stream is frozen.
         """
         return self._stream.read(count, timeout)
 
@@ -64,7 +65,7 @@ def gelsight(
     """
     shape = (sensor.rows, sensor.columns, 3)
     channel = Channel("gel.image", "count", shape, "uint8", "gel", nominal_rate)
-    return HttpCamera(MjpegStream(name, url, channel), f"{sensor.name} {serial}".strip())
+    return HttpCamera(MjpegStream(name, url, channel, colour=True), f"{sensor.name} {serial}".strip())
 
 
 def scene_camera(

@@ -17,6 +17,7 @@ import numpy as np
 from harness.basics.arrays import ByteArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
+from harness.basics.starvation import LATE, WATCH, name_cause
 from harness.bench.reading import Channel, Reading
 from harness.picture.jpeg import decode_jpeg
 
@@ -26,20 +27,38 @@ OPEN_TIMEOUT = 2.0
 READ_TIMEOUT = 0.5
 """s without a byte after which the stream counts as stalled and is opened again."""
 
+_PATIENCE = 4.0
+"""Times a timeout that is waited where this computer was late itself."""
+
+_CHECK_CAMERA = "check the camera's power and cable"
 _RETRY_PERIOD = 0.1
 _KEPT_FRAMES = 64
 _RHYTHM_FRAMES = 8
-_RHYTHM_GAIN = 0.1
 _SHORTEST = 0.12
 """s of frames that show a rhythm: fewer may be one group."""
 
-_EVEN = 0.5
-"""Share of the gaps between frames that are alike where a stream has a rhythm."""
+_EVEN, _ALIKE = 0.6, 0.25
+"""Fraction of the gaps that are within a quarter of their median where a stream has a rhythm."""
 
 _MOST_OF_TIME = 0.25
 """Share of the time that as many usual gaps fill where a stream has a rhythm: the rest may be stalls."""
 
-_END_OF_IMAGE = b"\xff\xd9"
+_VARIABLE = 1.5
+"""Times the median gap: where a quarter of the gaps are longer, the rate varies and no frame is due."""
+
+FROZEN_AFTER = 1.5
+"""s of one picture after which a stream is frozen: a real sensor's noise changes every picture."""
+
+FROZEN_FRAMES = 5
+"""Pictures that are the same, at least."""
+
+_FIRST_CHANGE = 3.0
+"""s that opening waits for a second picture, unlike the first."""
+
+_MIN_CONTRAST = 8
+"""Grey levels: a picture with less shows nothing whose colour could be judged."""
+
+_END_OF_IMAGE, _START_OF_SCAN = b"\xff\xd9", b"\xff\xda"
 
 
 @dataclass(frozen=True)
@@ -57,9 +76,10 @@ class MjpegStream:
         name: of the instrument, as messages call it.
         url: for example ``http://127.1.2.3:8080/?action=stream``.
         channel: names the readings; its shape is (rows, columns, 3).
+        colour: whether pictures without colour are refused.
     """
 
-    def __init__(self, name: str, url: str, channel: Channel) -> None:
+    def __init__(self, name: str, url: str, channel: Channel, colour: bool = False) -> None:
         self.name = name
         self.url = url
         self.channel = channel
@@ -67,22 +87,31 @@ class MjpegStream:
         self._arrived = threading.Condition()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
+        self._colour = colour
+        self._grey = False
         self._damaged = 0
         self._missed = 0
+        self._newly_missed: deque[int] = deque(maxlen=_KEPT_FRAMES)
+        self._scan = b""
+        self._same_since = 0.0
+        self._same_frames = 0
+        self._same_until = 0.0
+        self._changes = 0
         self._reopened = 0
-        self._due = 0.0
         self._opened = 0.0
         self._stalled = False
         self._whole = 0.0
 
     def open(self) -> None:
-        """Connect and wait for the first whole frame; does nothing if already open.
+        """Connect and wait for two whole frames that differ; does nothing if already open.
 
         Raises:
-            BenchFault: nothing answers, no frame comes, or frames have another size.
+            BenchFault: nothing answers, no frame comes, frames have another size or no colour, or all frames
+                are one picture.
         """
         if self._thread is not None:
             return
+        WATCH.start()
         capture = _capture(self.url)
         if capture is None:
             raise BenchFault(
@@ -91,10 +120,14 @@ class MjpegStream:
             )
         self._closing.clear()
         self._stalled, self._whole = False, now()
+        self._scan, self._same_frames, self._changes = b"", 0, 0
         self._thread = threading.Thread(target=self._drain, args=(capture,), name=self.name, daemon=True)
         self._thread.start()
         try:
             self.read(1, OPEN_TIMEOUT)
+            with self._arrived:
+                self._arrived.wait_for(lambda: self._changes > 1 or bool(self._frozen), _FIRST_CHANGE)
+            self._require_new()
         except BenchFault:
             self.close()
             raise
@@ -111,26 +144,32 @@ class MjpegStream:
         """The next ``count`` frames that arrive from now on, decoded to RGB.
 
         Raises:
-            BenchFault: after ``timeout`` s without them, or for frames of another size. Frames of which bytes
-                were lost are none.
+            BenchFault: after ``timeout`` s without them, for frames of another size, without colour, or of a
+                frozen stream. Frames of which bytes were lost are none.
         """
         if self._thread is None:
             raise BenchFault(f"{self.name} was read before it was opened; open the bench first")
         if not 1 <= count <= _KEPT_FRAMES:
             raise ValueError(f"{count} frames asked for; between 1 and {_KEPT_FRAMES} can be kept")
         after, damaged = now(), self._damaged
-        until = after + timeout
+        began, until = after, after + timeout
         read: list[tuple[Frame, ByteArray]] = []
         while len(read) < count:
             frames = self._next_frames(count - len(read), after, until)
             read += [(frame, image) for frame in frames if (image := self._decode(frame.jpeg)) is not None]
             if now() >= until and len(read) < count:
+                delay = WATCH.delay_since(began)
+                if delay >= LATE and now() < began + _PATIENCE * timeout:
+                    until = now() + timeout
+                    after = frames[-1].time if frames else after
+                    continue
                 lost = f", {self._damaged - damaged} damaged ones beside" if self._damaged > damaged else ""
                 raise BenchFault(
                     f"{self.name} sent {len(read)} of {count} frames in {timeout:g} s{lost}; "
-                    f"the stream at {self.url} has stalled: check the camera's power and cable"
+                    f"the stream at {self.url} has stalled: {name_cause(_CHECK_CAMERA, began)}"
                 )
             after = frames[-1].time if frames else after
+        self._require_new()
         times = np.array([frame.time for frame, _ in read])
         images = np.stack([image for _, image in read])
         return Reading(self.channel, times, images, tuple(frame.jpeg for frame, _ in read))
@@ -148,17 +187,34 @@ class MjpegStream:
 
     @property
     def detail(self) -> str:
-        """What happened to the stream since opening, in words."""
-        return f"stalled and opened again {self._reopened} times" if self._reopened else ""
+        """Faults of the stream since opening, in words."""
+        reopened = f"stalled and opened again {self._reopened} times" if self._reopened else ""
+        grey = "pictures without colour (red, green and blue are equal)" if self._grey else ""
+        return "; ".join(each for each in (reopened, grey) if each)
 
     @property
     def failure(self) -> str:
-        """Why no frame comes at present, in words; empty while frames come."""
+        """Why no new picture comes at present, in words; empty while pictures come."""
         if not self._stalled:
-            return ""
+            return self._frozen
         return (
             f"{self.name} sent no whole frame for {now() - self._whole:.1f} s (limit {READ_TIMEOUT:g} s); "
-            f"the stream at {self.url} has stalled: check the camera's power and cable"
+            f"the stream at {self.url} has stalled: {name_cause(_CHECK_CAMERA, self._whole)}"
+        )
+
+    def _require_new(self) -> None:
+        if self._frozen:
+            raise BenchFault(self._frozen)
+
+    @property
+    def _frozen(self) -> str:
+        """Why the stream's pictures are not new, in words; empty while they change."""
+        lasted = self._same_until - self._same_since
+        if self._same_frames < FROZEN_FRAMES or lasted < FROZEN_AFTER:
+            return ""
+        return (
+            f"{self.name} is frozen: {self._same_frames} frames in {lasted:.1f} s are one and the same "
+            f"picture; restart the camera or the program that serves {self.url}"
         )
 
     def _recent_times(self) -> list[float]:
@@ -197,7 +253,14 @@ class MjpegStream:
         except ValueError:
             self._damaged += 1
             return None
-        return decode_jpeg(jpeg)
+        image = decode_jpeg(jpeg)
+        self._grey = _is_grey(image)
+        if self._grey and self._colour:
+            raise BenchFault(
+                f"{self.name}: {self.url} sends pictures without colour (red, green and blue are equal), and "
+                "this camera is read by its colours; switch the camera to colour"
+            )
+        return image
 
     def _drain(self, capture: Any) -> None:
         while not self._closing.is_set():
@@ -231,22 +294,31 @@ class MjpegStream:
         # Cameras pad their frames after the end of the image.
         frame = Frame(time, packet[: end + len(_END_OF_IMAGE)])
         self._whole = frame.time
+        # Equal scans are equal pictures, whatever the heads around them say (time stamps, comments).
+        scan = frame.jpeg[frame.jpeg.rfind(_START_OF_SCAN) :]
         with self._arrived:
-            self._missed += self._missing_before(frame)
+            if scan != self._scan:
+                self._scan, self._same_since, self._same_frames = scan, time, 0
+                self._changes += 1
+            self._same_frames += 1
+            self._same_until = time
+            missing = self._missing_before(frame)
+            self._missed += missing
+            self._newly_missed.append(missing)
             self._frames.append(frame)
             self._stalled = False
             self._arrived.notify_all()
 
     def _missing_before(self, frame: Frame) -> int:
         """Frames due before this one by the stream's rhythm; negative where late ones catch up."""
-        period = _rhythm([kept.time for kept in self._frames])
+        times = [kept.time for kept in self._frames]
+        period = _rhythm(times)
         if period is None:
-            self._due = frame.time
+            if _varies(times):  # what was counted lately was the stream's own change of rate
+                self._missed -= sum(self._newly_missed)
+                self._newly_missed.clear()
             return 0
-        late = frame.time - (self._due + period)
-        missing = round(late / period)
-        self._due += (1 + missing) * period + _RHYTHM_GAIN * (late - missing * period)
-        return missing
+        return round((frame.time - times[-1] - period) / period)
 
 
 def _rhythm(times: Sequence[float]) -> float | None:
@@ -255,9 +327,25 @@ def _rhythm(times: Sequence[float]) -> float | None:
         return None
     gaps = np.diff(times)
     period = float(np.median(gaps))
-    even = float(np.mean(np.abs(gaps - period) <= 0.5 * period))
+    even = float(np.mean(np.abs(gaps - period) <= _ALIKE * period))
     steady = even >= _EVEN and period * len(gaps) >= _MOST_OF_TIME * float(gaps.sum())
-    return period if steady and period > 0.0 else None
+    return period if steady and period > 0.0 and not _varies(times) else None
+
+
+def _varies(times: Sequence[float]) -> bool:
+    """Return whether long gaps are as common as in a stream whose frame rate follows the light."""
+    if len(times) < _RHYTHM_FRAMES:
+        return False
+    gaps = np.diff(times)
+    return bool(np.quantile(gaps, 0.75) > _VARIABLE * np.median(gaps))
+
+
+def _is_grey(image: ByteArray) -> bool:
+    """Return whether a picture with contrast has no colour at all, as a monochrome camera's."""
+    if int(np.ptp(image)) < _MIN_CONTRAST:
+        return False
+    red, green, blue = (image[..., k].astype(np.int16) for k in range(3))
+    return bool(np.abs(red - green).max() <= 1 and np.abs(green - blue).max() <= 1)
 
 
 def _capture(url: str) -> Any:

@@ -14,6 +14,7 @@ from drivers.dataq.protocol import MODEL, START, STOP, BoxModel, counts, without
 from harness.basics.arrays import AnyArray, BoolArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
+from harness.basics.starvation import LATE, WATCH, name_cause
 from harness.bench.clock_fit import ClockFit
 
 STALL = 2.0
@@ -113,14 +114,18 @@ class ScanStream:
         def settled() -> bool:
             return bool(self._dead) or self._monitor.settled
 
+        WATCH.start()
+        began = now()
         with self._changed:
             done = self._changed.wait_for(settled, _SETTLE_TIMEOUT)
+            if not done and WATCH.delay_since(began) >= LATE:
+                done = self._changed.wait_for(settled, _SETTLE_TIMEOUT)
             if self._dead:
                 raise BenchFault(self._dead)
             if not done:
                 raise BenchFault(
                     f"{self._link.name}: the box sent no steady stream within {_SETTLE_TIMEOUT:g} s; "
-                    + (self.losses[-1] if self.losses else "check its USB cable")
+                    + (self.losses[-1] if self.losses else name_cause("check its USB cable", began))
                 )
             return Position(self._stretch, self._total)
 

@@ -21,6 +21,7 @@ from drivers.microphone.readings import (
 from drivers.microphone.trigger import Trigger
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
+from harness.basics.starvation import WATCH, name_cause
 from harness.bench.device import Health
 from harness.bench.microphone_take import OTHER_STATUS, SAMPLES_LOST, SILENCE_INSERTED, UNTRIGGERED
 from harness.bench.reading import Reading
@@ -104,6 +105,7 @@ class PortAudioMicrophone:
         """
         if self._stream is not None:
             return
+        WATCH.start()
         library = portaudio.acquire()
         try:
             self._stream = self._begin(library)
@@ -288,8 +290,12 @@ class PortAudioMicrophone:
 
     def _gone(self, seconds: float) -> BenchFault:
         return BenchFault(
-            f"{self.name}: {self._device!r} has sent nothing for {seconds:g} s: the device is gone or "
-            "its sound server has stopped; check its cable, then open the bench again"
+            f"{self.name}: {self._device!r} has sent nothing for {seconds:g} s: "
+            + name_cause(
+                "the device is gone or its sound server has stopped; check its cable, then open the bench "
+                "again",
+                now() - seconds,
+            )
         )
 
     def _baseline(self, end: int) -> float:

@@ -23,6 +23,7 @@ from drivers.ur.stream import Stream
 from drivers.ur.watchdog import Watchdog
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault, ProtectiveStop, SafetyStop, TouchstoneError
+from harness.basics.starvation import name_cause
 
 TICK: Final = 0.002  # s between looks at a motion
 REST_TICK: Final = 0.01
@@ -159,7 +160,8 @@ class Child:
         if not self._stream.becomes_younger(STALE * self._patience, LOST_MOVING * self._patience):
             raise BenchFault(
                 f"the arm was asked to {what}, but its state is {1e3 * self._stream.age:.0f} ms old "
-                f"(limit {1e3 * STALE * self._patience:.0f} ms); check this computer's load and the network"
+                f"(limit {1e3 * STALE * self._patience:.0f} ms); "
+                + name_cause("check this computer's load and the network", self._stream.changed)
             )
 
     def _comes_to_rest(self, seconds: float) -> bool:

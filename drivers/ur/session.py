@@ -16,6 +16,7 @@ from drivers.ur.safety import require_loopback, require_mock
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault, ProtectiveStop, TouchstoneError
+from harness.basics.starvation import WATCH, name_cause
 
 PORTS: Final = {30004: "RTDE", 29999: "dashboard", 30003: "script", 30011: "message"}
 OPEN_WITHIN: Final = 20.0  # s
@@ -23,6 +24,9 @@ FIRST_PACKET_WITHIN: Final = 2.0  # s
 CLOSE_WITHIN: Final = 3.0  # s
 ACKNOWLEDGE_WITHIN: Final = 0.15  # s for the child to brake
 REST_WITHIN: Final = 1.0  # s from braking to rest
+_CHECK_BOTH: Final = "check this computer's load and the network cable of the control box"
+_CHECK_BOX: Final = "check the network cable of the control box, and restart the controller if this stays"
+_RECENT: Final = 5.0  # s in which a delay of this computer explains a stale state
 STALE: Final = 5.0  # of the watchdog's patience
 
 
@@ -83,7 +87,11 @@ class UrSession:
             why = self.process.lost or "its stream stalled"
             fault = BenchFault(
                 f"the state of the arm at {self.address} is {age:.2f} s old (limit {self._stale:g} s): "
-                f"{why}; check this computer's load and the network cable of the control box"
+                f"{why}; "
+                + name_cause(
+                    _CHECK_BOTH,
+                    now() - min(age, _RECENT),
+                )
             )
             self.latched = self.latched or fault
             raise fault
@@ -169,20 +177,26 @@ class UrSession:
         raise fault
 
     def _ready(self, process: ChildProcess) -> list[str]:
+        WATCH.start()
+        began = now()
         try:
             controller: list[str] = process.ready(OPEN_WITHIN)
         except (DeadlineMissed, ChildLost) as error:
             self._kill_and_stop(process)
             raise BenchFault(
-                f"the arm at {self.address} did not open: {error}; check the network cable of the control "
-                "box, and restart the controller if this stays"
+                f"the arm at {self.address} did not open: {error}; "
+                + name_cause(
+                    _CHECK_BOX,
+                    began,
+                )
             ) from error
         end = now() + FIRST_PACKET_WITHIN
         while process.newest() is None:
             if now() > end or process.lost:
                 raise BenchFault(
                     f"the arm at {self.address} opened but sent no state within {FIRST_PACKET_WITHIN:g} s "
-                    f"({process.lost or 'stream silent'}); check the network cable of the control box"
+                    f"({process.lost or 'stream silent'}); "
+                    + name_cause("check the network cable of the control box", began)
                 )
             time.sleep(0.005)
         return controller

@@ -13,6 +13,7 @@ from drivers.ur import words as ur_words
 from harness.basics.arrays import FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
+from harness.basics.starvation import WATCH, name_cause
 
 AT_REST: Final = 1e-3  # rad/s of the fastest joint
 LOOK_PERIOD: Final = 0.002  # s
@@ -78,6 +79,7 @@ class Stream:
 
     def start(self) -> None:
         """Begin to read."""
+        WATCH.start()
         self._thread.start()
 
     def close(self) -> None:
@@ -104,7 +106,7 @@ class Stream:
         if self.age > age:
             raise BenchFault(
                 f"no state arrived from the arm for {self.age:.1f} s (limit {age:g} s); "
-                "check the network cable of the control box"
+                + name_cause("check the network cable of the control box", self.changed)
             )
 
     @property

@@ -57,10 +57,11 @@ def camera(
     rows, columns = frame.shape[:2]
     if json:
         size = {"rows": rows, "columns": columns, "rate_hz": health.rate, "drops": health.drops}
+        size["detail"] = health.detail
         emit({"schema": 1, "camera": name, "identity": health.identity, **size, "picture": str(out)})
     else:
         ANSWERS.print(
             f"{health.identity}: {columns} x {rows} pixels, {health.rate:.1f} Hz, {health.drops} frames "
-            f"dropped; {out}"
+            f"dropped{f'; {health.detail}' if health.detail else ''}; {out}"
         )
     return 0

@@ -3,17 +3,20 @@
 import socket
 import struct
 import threading
+import time
 import tracemalloc
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from drivers.camera.http_camera import HttpCamera, gelsight, scene_camera
 from drivers.camera.mjpeg import MjpegStream
-from harness.basics.arrays import ByteArray
+from harness.basics.arrays import ByteArray, FloatArray
 from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 from harness.bench.reading import Channel
@@ -153,14 +156,78 @@ def test_a_dropped_connection_is_made_again(bench: Bench, gel: HttpCamera) -> No
     assert "opened again" in gel.health().detail
 
 
-def test_a_frozen_stream_goes_on_with_the_old_picture(bench: Bench, gel: HttpCamera) -> None:
-    before = gel.read(1, 2.0).encoded[0]
+def test_a_frozen_stream_is_named_and_heals(bench: Bench, gel: HttpCamera) -> None:
+    """A moment of one picture is no fault; three seconds of it are."""
     bench.server.fault.set(Fault("gel", "freeze"))
     bench.view.colour = (0, 0, 0)
-    assert gel.read(5, 2.0).encoded == (before,) * 5
-    bench.server.fault.set(Fault("gel", "none"))
     gel.read(2, 2.0)
-    assert gel.read(1, 2.0).encoded[0] != before
+    assert len(set(gel.read(5, 2.0).encoded)) == 1
+    assert gel.health().failure == ""
+    time.sleep(3.0)
+    assert "gel is frozen" in gel.health().failure
+    with pytest.raises(BenchFault, match=r"gel is frozen: \d+ frames in [23]\.\d s are one"):
+        gel.read(1, 2.0)
+    bench.server.fault.set(Fault("gel", "none"))
+    time.sleep(0.2)
+    assert gel.read(1, 2.0).values[0, 0, 0, 2] < 10
+    assert gel.health().failure == ""
+
+
+def test_a_frozen_stream_does_not_open(bench: Bench) -> None:
+    with gelsight_open(bench):
+        bench.server.fault.set(Fault("gel", "freeze"))
+    camera = scene_camera(bench.url, rows=12, columns=16)
+    with pytest.raises(BenchFault, match="camera is frozen"):
+        camera.open()
+
+
+@contextmanager
+def gelsight_open(bench: Bench) -> Iterator[HttpCamera]:
+    camera = gelsight(bench.url, SMALL)
+    camera.open()
+    try:
+        yield camera
+    finally:
+        camera.close()
+
+
+def test_frames_with_other_heads_and_one_scan_are_one_picture() -> None:
+    camera, whole = stream(), lit()
+    for k in range(60):
+        stamp = f"{k:08d}".encode()
+        camera._keep(0.05 * k, whole[:2] + b"\xff\xfe\x00\x0a" + stamp + whole[2:])
+    assert "is frozen" in camera.failure
+
+
+def test_pictures_of_a_grey_camera_are_refused_of_a_gel_and_named_of_a_scene() -> None:
+    """One channel, or three equal ones."""
+    grey = np.linspace(20, 220, 120 * 160).reshape(120, 160).astype(np.uint8)
+    done, single = cv2.imencode(".jpg", grey)
+    assert done
+    for jpeg in (single.tobytes(), encode(np.repeat(grey[..., None], 3, axis=2))):
+        scene = stream()
+        assert scene._decode(jpeg) is not None
+        assert "without colour" in scene.detail
+        gel = MjpegStream("gel", "http://127.0.0.1:1", scene.channel, colour=True)
+        with pytest.raises(BenchFault, match=r"gel: .* without colour"):
+            gel._decode(jpeg)
+        gel._decode(lit())
+
+
+@pytest.mark.parametrize(
+    "gaps",
+    [
+        np.where(np.arange(400) % 200 < 100, 0.04, 0.08),
+        np.where(np.arange(400) % 3 == 0, 0.08, 0.04),
+        np.linspace(0.03, 0.12, 400),
+        np.random.default_rng(5).uniform(0.03, 0.1, 400),
+    ],
+)
+def test_a_rate_that_varies_drops_no_frames(gaps: FloatArray) -> None:
+    """Exposure that follows the light: in steps, alternating, slowly, at random. At most two steps count."""
+    camera = stream()
+    frames_at(camera, np.cumsum(gaps))
+    assert camera.drops <= 2
 
 
 def test_a_count_that_cannot_be_kept_is_a_programming_error(gel: HttpCamera) -> None:
@@ -185,8 +252,8 @@ def stream() -> MjpegStream:
 
 
 def frames_at(camera: MjpegStream, times: Iterable[float], jpeg: bytes = b"\xff\xd8\xff\xd9") -> None:
-    for time in times:
-        camera._keep(time, jpeg)
+    for at in times:
+        camera._keep(at, jpeg)
 
 
 def lit(rows: int = 120, columns: int = 160) -> bytes:
@@ -223,7 +290,7 @@ def test_frames_that_a_steady_stream_loses_are_counted(jitter: float) -> None:
     camera, random = stream(), np.random.default_rng(3)
     lost = set(random.choice(np.arange(40, 200), 20, replace=False))
     times = 0.04 * np.arange(201) + random.uniform(-jitter, jitter, 201)
-    frames_at(camera, [time for k, time in enumerate(times) if k not in lost])
+    frames_at(camera, [at for k, at in enumerate(times) if k not in lost])
     assert abs(camera.drops - 20) <= 1
 
 
