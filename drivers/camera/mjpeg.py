@@ -19,6 +19,7 @@ from harness.basics.clock import now
 from harness.basics.errors import BenchFault
 from harness.basics.starvation import LATE, WATCH, name_cause
 from harness.bench.reading import Channel, Reading
+from harness.bench.station_sections import USB_CAMERA
 from harness.picture.jpeg import decode_jpeg
 
 OPEN_TIMEOUT = 2.0
@@ -54,6 +55,10 @@ FROZEN_FRAMES = 5
 
 _FIRST_CHANGE = 3.0
 """s that opening waits for a second picture, unlike the first."""
+
+_BLACK, _MIN_TONED = 15, 0.01
+"""Grey levels from black and from white that have no colour, and the fraction of the other pixels that a
+judgement needs."""
 
 _MIN_CONTRAST = 8
 """Grey levels: a picture with less shows nothing whose colour could be judged."""
@@ -116,7 +121,7 @@ class MjpegStream:
         if capture is None:
             raise BenchFault(
                 f"{self.name}: no video stream at {self.url}; check that the camera is on, "
-                "its cable, and the address and port in the station"
+                f"its cable, and the address and port in the station; {USB_CAMERA}"
             )
         self._closing.clear()
         self._stalled, self._whole = False, now()
@@ -341,10 +346,15 @@ def _varies(times: Sequence[float]) -> bool:
 
 
 def _is_grey(image: ByteArray) -> bool:
-    """Return whether a picture with contrast has no colour at all, as a monochrome camera's."""
-    if int(np.ptp(image)) < _MIN_CONTRAST:
+    """Return whether a picture with contrast has no colour at all, as a monochrome camera's.
+
+    Black and white have no colour in any picture and do not count.
+    """
+    dark, bright = image.min(axis=2), image.max(axis=2)
+    toned = image[(dark > _BLACK) & (bright < 255 - _BLACK)]
+    if len(toned) < _MIN_TONED * dark.size or int(np.ptp(toned)) < _MIN_CONTRAST:
         return False
-    red, green, blue = (image[..., k].astype(np.int16) for k in range(3))
+    red, green, blue = (toned[:, k].astype(np.int16) for k in range(3))
     return bool(np.abs(red - green).max() <= 1 and np.abs(green - blue).max() <= 1)
 
 

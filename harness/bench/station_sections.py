@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from harness.basics.arrays import FloatArray, read_only
 from harness.basics.errors import WrongUse
@@ -35,6 +35,30 @@ from harness.bench.sensor import (
 )
 
 _TURN = 2 * np.pi
+
+USB_CAMERA = (
+    "a USB camera is served as MJPEG over HTTP by a program such as ustreamer (ustreamer "
+    "--device=/dev/video0 --format=MJPEG --host=127.0.0.1 --port=8080 serves http://127.0.0.1:8080/stream)"
+)
+"""What an operator of a USB camera does, because no driver reads one."""
+
+
+def _require_http(url: str | None) -> str | None:
+    """Return the address of a stream, or refuse one that no HTTP camera has."""
+    if url is not None and not url.startswith(("http://", "https://")):
+        raise ValueError(f"{url!r} is not the address of a stream (http://...); {USB_CAMERA}")
+    return url
+
+
+def _require_http_kind(kind: object) -> object:
+    """Refuse a kind of camera without a driver, saying how to use a USB camera."""
+    if kind not in ("gelsight-http", "camera-http"):
+        raise ValueError(f"no driver reads a camera of the kind {kind!r}; {USB_CAMERA}")
+    return kind
+
+
+_KIND = BeforeValidator(_require_http_kind)
+HttpAddress = Annotated[str | None, AfterValidator(_require_http)]
 
 Three = tuple[Length, Length, Length]
 SixAngles = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
@@ -150,8 +174,8 @@ class GelSection(StrictModel):
         rate: Hz, as its maker states it.
     """
 
-    kind: Literal["gelsight-http"] = "gelsight-http"
-    url: str | None = None
+    kind: Annotated[Literal["gelsight-http"], _KIND] = "gelsight-http"
+    url: HttpAddress = None
     make: str = DEFAULT_MAKE
     serial: str = ""
     calibration: str
@@ -280,8 +304,8 @@ class CameraSection(StrictModel):
         base_from_camera: where it looks from (OpenCV: x right, y down, z forward).
     """
 
-    kind: Literal["camera-http"] = "camera-http"
-    url: str | None = None
+    kind: Annotated[Literal["camera-http"], _KIND] = "camera-http"
+    url: HttpAddress = None
     serial: str = ""
     rows: int = Field(default=480, gt=0)
     columns: int = Field(default=640, gt=0)

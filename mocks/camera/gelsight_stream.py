@@ -30,9 +30,9 @@ _HEAD = (
 _NOT_FOUND = b"HTTP/1.0 404 Not Found\r\nConnection: close\r\nServer: MJPG-Streamer/0.2\r\n\r\n"
 _REQUEST_TIMEOUT = 5.0
 
-_NOISE_PERIODS = 5
-"""Frames of one state after which its picture is encoded again with other noise: no real sensor sends one
-picture for ever, and a driver reports one that does as frozen."""
+_NOISE_PERIOD = 6
+"""Frames of one picture, of which the last has noise: no real sensor sends one picture for ever, and a driver
+reports a stream that does as frozen."""
 
 _NOISE_SIZE = 8
 """Pixels: side of the corner that the noise is in."""
@@ -90,7 +90,8 @@ class MjpegServer:
         self._encoded = b""
         self._picture: ByteArray = np.zeros((0, 0, 3), np.uint8)
         self._repeated = 0
-        self._noisy = False
+        self._clean = b""
+        self._noisy = b""
         self._stopped = False
         self._clients: set[socket.socket] = set()
 
@@ -129,17 +130,21 @@ class MjpegServer:
 
     def _render(self) -> None:
         state = self._view.state()
-        self._repeated += 1
         if state != self._state:
-            self._picture = self._view.picture()
-            self._encoded = encode(self._picture)
-            self._state, self._repeated, self._noisy = state, 0, False
-        elif self._repeated >= _NOISE_PERIODS:
-            self._noisy, self._repeated = not self._noisy, 0
+            picture = self._view.picture()
+            self._state = state
+            if not np.array_equal(picture, self._picture):
+                self._picture, self._clean, self._noisy = picture, encode(picture), b""
+                self._repeated = 0
+        self._repeated += 1
+        if self._repeated % _NOISE_PERIOD:
+            self._encoded = self._clean
+            return
+        if not self._noisy:
             picture = self._picture.copy()
-            if self._noisy:
-                picture[:_NOISE_SIZE, :_NOISE_SIZE] ^= 1
-            self._encoded = encode(picture)
+            picture[:_NOISE_SIZE, :_NOISE_SIZE] ^= 1
+            self._noisy = encode(picture)
+        self._encoded = self._noisy
 
     def _hang_up(self) -> None:
         """Reset every connection: a zero linger sends RST in place of FIN."""
