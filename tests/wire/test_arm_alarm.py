@@ -1,6 +1,7 @@
 """A gel camera that dies while the arm moves: the motion ends then, and not at the next picture."""
 
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -93,3 +94,17 @@ def test_a_camera_that_comes_back_lets_the_arm_search(
     while gel.health().failure:
         pass
     assert not arm.move_until_contact(DOWN, 0.02, 3.0, 0.004)
+
+
+def test_a_frozen_gel_camera_lets_no_search_begin(
+    arm: UrArm, gel: HttpCamera, far_end: FarEnd, server: MjpegServer
+) -> None:
+    """A picture that never changes would hide a contact: named within three seconds, and no search begins."""
+    server.fault.set(Fault("gel", "freeze"))
+    end = time.monotonic() + 3.0
+    while not gel.health().failure and time.monotonic() < end:
+        time.sleep(0.02)
+    resting = far_end.joints()
+    with pytest.raises(MotionEnded, match="was not begun: gel is frozen"):
+        arm.move_until_contact(DOWN, 0.01, 3.0, 0.01)
+    assert np.array_equal(far_end.joints(), resting)
