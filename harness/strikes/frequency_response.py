@@ -264,7 +264,7 @@ def _windowed(force: FloatArray, blow: Blow, rate: float) -> FloatArray:
     """The force about its contact, above its rest."""
     times = np.arange(len(force)) / rate
     touching = (times >= blow.start - _AROUND) & (times <= blow.start + blow.duration + _AROUND)
-    return np.where(touching, force - blow.rest - blow.drift * (times - blow.start), 0.0)
+    return np.where(touching, force - blow.rest, 0.0)
 
 
 def _ratio(above: AnyArray, below: AnyArray) -> ComplexArray:
