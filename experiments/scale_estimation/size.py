@@ -33,6 +33,13 @@ longest side is longer than its drawing's, which neither an outline nor contacts
 recordings sight and touch were each 0.4 % too small on average, and with this 91 % of fused intervals held,
 without it 88 %."""
 
+UNEVEN_EXCESS = 0.15e-3
+"""Mean in m by which a made object's longest side exceeds that of its CAD model at the same scale: the side
+ends at the highest points of an uneven surface (docs/results/scale.md)."""
+
+UNEVEN_SIGMA = 0.35e-3
+"""Standard deviation in m of that excess: a quarter of a millimetre at each end."""
+
 STRANGE = 0.05
 """How much less likely a size beyond the range is than one within, before anything is read."""
 
@@ -184,6 +191,19 @@ class Belief:
         spread = np.convolve(np.pad(density, reach, mode="edge"), kernel / kernel.sum(), mode="valid")
         with np.errstate(divide="ignore"):
             return Belief.of(self.range, np.log(spread))
+
+
+def add_unevenness(belief: Belief) -> Belief:
+    """Convert a density of the CAD model's size to one of the made object's longest side.
+
+    Args:
+        belief: density of the size at which the CAD model fits the readings.
+    """
+    excess = UNEVEN_EXCESS / belief.size
+    logs, density = belief.range.logs, np.exp(belief.log_density)
+    with np.errstate(divide="ignore"):
+        shifted = np.log(np.interp(logs - excess, logs, density))
+    return Belief.of(belief.range, shifted).widened(UNEVEN_SIGMA / belief.size)
 
 
 def fused(beliefs: Sequence[Belief]) -> Belief:

@@ -109,10 +109,15 @@ def _around(silhouette: BoolArray) -> tuple[slice, slice]:
 
 
 def _meeting(mask: BoolArray, silhouette: BoolArray) -> BoolArray:
-    """The parts of a mask that are no noise and meet the silhouette."""
-    clean = ndimage.binary_opening(mask, np.ones((_SMALL, _SMALL), bool))
-    parts, _ = ndimage.label(clean)
-    met = np.unique(parts[silhouette])
+    """Keep the connected parts of a mask that are larger than noise and meet the silhouette.
+
+    A part is kept whole (opening by reconstruction): an opening alone also cuts off every tip and every thin
+    part of the object, so that it looks smaller than it is.
+    """
+    square = np.ones((_SMALL, _SMALL), bool)
+    parts, _ = ndimage.label(mask, square)
+    large = np.unique(parts[ndimage.binary_opening(mask, square)])
+    met = np.intersect1d(np.unique(parts[silhouette]), large)
     return read_only(np.isin(parts, met[met > 0]))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from experiments.scale_estimation.size import Belief, SizeRange
+from experiments.scale_estimation.size import Belief, SizeRange, add_unevenness
 from experiments.scale_estimation.touch.fit import (
     UNKNOWNS,
     FreeSpace,
@@ -129,7 +129,7 @@ def by_touch(
     scan = [_profile(rough, passed, found, costs, minima[apart[:followed]], logs, followed)]
     for k in apart:
         scan.append(_scanned(fine, minima[k], float(least[k] - misfits[k])))
-    belief = Belief.of(sizes, -_least_of(np.vstack(scan), logs))
+    belief = add_unevenness(Belief.of(sizes, -_least_of(np.vstack(scan), logs)))
     belief = belief.doubted(max(CHANCE ** (fine.places - 1), STRANGER if cost > DOUBTED else 0.0))
     return Touch(belief, minima[best], cost, time.perf_counter() - began)
 

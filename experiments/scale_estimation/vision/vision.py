@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from experiments.scale_estimation.size import Belief, SizeRange
+from experiments.scale_estimation.size import Belief, SizeRange, add_unevenness
 from experiments.scale_estimation.vision.fit import (
     ALIKE,
     PIXEL_SIGMA,
@@ -79,7 +79,7 @@ def by_sight(view: View, outline: SeenOutline, nominal: float, sizes: SizeRange,
     density = np.full(len(sizes.logs), -np.inf)
     for fit in _apart(fits, best.cost):
         density = np.logaddexp(density, _scanned(problem, fit, sizes.logs - log_nominal))
-    return Sight(Belief.of(sizes, density), best, time.perf_counter() - began)
+    return Sight(add_unevenness(Belief.of(sizes, density)), best, time.perf_counter() - began)
 
 
 def _require_same(view: View, best: OutlineFit) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.scale_estimation.size import ENDS, SHARED, STEP, Belief, SizeRange, fused
+from experiments.scale_estimation.size import ENDS, SHARED, STEP, Belief, SizeRange, add_unevenness, fused
 from harness.basics.errors import OutOfDomain
 
 RANGE = SizeRange(0.05, 0.4)
@@ -56,6 +56,19 @@ def test_order_does_not_matter_and_one_alone_is_itself() -> None:
 def test_an_error_on_top_adds_in_squares() -> None:
     assert normal(0.15, 0.03).widened(0.04).spread == pytest.approx(0.05, rel=0.02)
     assert normal(0.15, 0.03).widened(0.0).spread == pytest.approx(0.03, rel=0.02)
+
+
+@pytest.mark.parametrize("size", [0.06, 0.15, 0.35])
+def test_an_uneven_object_is_longer_than_its_model_and_its_size_less_certain(size: float) -> None:
+    made = add_unevenness(normal(size, 0.005))
+    assert made.size - size == pytest.approx(0.15e-3, abs=0.02e-3)
+    assert made.spread * size == pytest.approx(np.hypot(0.005 * size, 0.35e-3), rel=0.03)
+
+
+def test_unevenness_leaves_open_what_was_open() -> None:
+    before, after = (Belief.ignorant(RANGE), add_unevenness(Belief.ignorant(RANGE)))
+    assert np.ptp(np.log(after.interval)) == pytest.approx(np.ptp(np.log(before.interval)), abs=0.02)
+    assert after.spread == pytest.approx(before.spread, rel=0.01)
 
 
 def test_a_size_beyond_the_range_is_seen_there() -> None:
