@@ -132,39 +132,50 @@ class ShapeEvidence:
                 )
 
     @property
-    def contacts(self) -> tuple[GuardedTouch, ...]:
-        """The touches that met the object, the first at each place: a repeated reading is no new evidence."""
+    def distinct(self) -> tuple[GuardedTouch, ...]:
+        """The touches without repetitions: of those at one place that ended alike, the first."""
         return tuple(alike[0] for alike in self._by_place)
 
     @property
     def repeated(self) -> int:
-        """How many contacts are left out because an earlier one is at the same place."""
-        return sum(len(alike) - 1 for alike in self._by_place)
+        """How many touches repeat an earlier one at its place: a repeated reading is no new evidence."""
+        return len(self.touches) - len(self._by_place)
+
+    @property
+    def contacts(self) -> tuple[GuardedTouch, ...]:
+        """Those distinct touches that met the object."""
+        return tuple(touch for touch in self.distinct if touch.met)
 
     def without(self, contacts: Collection[int]) -> "ShapeEvidence":
-        """The same without some contacts, and without every touch at their places.
+        """Leave out some contacts, and every touch that repeats them.
 
         Args:
             contacts: indices into ``contacts``.
         """
-        gone = {id(touch) for k in contacts for touch in self._by_place[k]}
+        met = [alike for alike in self._by_place if alike[0].met]
+        gone = {id(touch) for k in contacts for touch in met[k]}
         return replace(self, touches=tuple(one for one in self.touches if id(one) not in gone))
 
     @cached_property
     def _by_place(self) -> tuple[tuple[GuardedTouch, ...], ...]:
-        met = [touch for touch in self.touches if touch.met]
-        poses = np.array([touch.stand_from_gel for touch in met]).reshape(-1, 4, 4)
+        """The touches at each place that ended alike, in order of the first of each."""
         tolerance = PlaceTolerance.from_errors(self.errors, self.gel_thickness)
-        places = group_by_place(poses[:, :3, 3], poses[:, :3, 2], tolerance)
-        return tuple(
-            tuple(met[k] for k in np.flatnonzero(places == place))
-            for place in range(int(places.max(initial=-1)) + 1)
-        )
+        found: list[tuple[GuardedTouch, ...]] = []
+        for met, housing in ((True, False), (False, True), (False, False)):
+            alike = [one for one in self.touches if (one.met, one.by_housing) == (met, housing)]
+            poses = np.array([touch.stand_from_gel for touch in alike]).reshape(-1, 4, 4)
+            places = group_by_place(poses[:, :3, 3], poses[:, :3, 2], tolerance)
+            groups: dict[int, list[GuardedTouch]] = {}
+            for place, touch in zip(places, alike, strict=True):
+                groups.setdefault(int(place), []).append(touch)
+            found += [tuple(group) for group in groups.values()]
+        order = {id(touch): k for k, touch in enumerate(self.touches)}
+        return tuple(sorted(found, key=lambda group: order[id(group[0])]))
 
     @property
     def ended_by_housing(self) -> tuple[GuardedTouch, ...]:
-        """Those touches that the sensor's housing ended, with nothing in the gel."""
-        return tuple(touch for touch in self.touches if touch.by_housing)
+        """Those distinct touches that the sensor's housing ended, with nothing in the gel."""
+        return tuple(touch for touch in self.distinct if touch.by_housing)
 
     @property
     def sighted(self) -> bool:

@@ -65,7 +65,7 @@ def _surface(scored: Scored, answer: ShapeAnswer, album: Album) -> PageSection:
 def _readings(evidence: ShapeEvidence) -> str:
     ended, met = len(evidence.ended_by_housing), len(evidence.contacts)
     contacts, ways = f"contact{'' if met == 1 else 's'}", f"way{'' if ended == 1 else 's'}"
-    nothing = len(evidence.touches) - met - ended
+    nothing = len(evidence.distinct) - met - ended
     return (
         f"{met} {contacts} (white); dotted, {ended} {ways} that the sensor's housing ended, and "
         f"{nothing} that met nothing"

@@ -63,7 +63,7 @@ SHAPE = {
     "choose": "what chose where the presses led",
     "presses": "how many guarded ways the gel has followed, those that met nothing too",
     "contacts": "how many of them the gel read, each place counted once",
-    "repeated": "how many more the gel read at a place that an earlier press had read; they count as one",
+    "repeated": "how many presses repeat an earlier one at its place; each place counts once",
     "ended_by_housing": "how many ended as the sensor's housing met it, with nothing in the gel",
     "estimates": "by sense (`vision`, `touch`, `fused`): an estimate, or `refused` with the reason",
     "seconds": "s that the answers took, the reading of the pictures included",

@@ -1,5 +1,6 @@
 """The answer as JSON: what a script reads, and what ``result.json`` holds."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,12 @@ from experiments.contact_localization.posterior.posterior import Mode
 from experiments.contact_localization.sound.consistency import doubts_of_sound
 from harness.basics.arrays import FloatArray
 from harness.basics.errors import FitRefused
+from harness.basics.mesh import Mesh
+from harness.basics.symmetry import SymmetryGroup
 from harness.experiment.experiment import Scored
+
+SAME_PLACE = 3.0e-3
+"""Distance of two places modulo the object's symmetry below which they are one, m."""
 
 _NO_SOUND = "the object's sound is not compared, and touch alone answers"
 _LEFT_OUT = "its picture is left out"
@@ -43,7 +49,7 @@ def result_of(scored: Scored) -> dict[str, Any]:
         "geometry_baseline_m": _distance(by_translations(found, len(found.observations)), last_true),
         "symmetry": scored.answering.symmetry.name,
         "seconds": found.seconds,
-        "warnings": list(_doubts(found)),
+        "warnings": list(_doubts(found, scored.answering.symmetry)),
     }
 
 
@@ -53,7 +59,7 @@ def by_translations(found: Answer, count: int) -> FloatArray:
     return without_images(poses, found.model, found.prior, SPACING.default)
 
 
-def _doubts(found: Answer) -> tuple[str, ...]:
+def _doubts(found: Answer, symmetry: SymmetryGroup) -> tuple[str, ...]:
     refusal = found.model.sound_refusal
     of_sound = (f"{_NO_SOUND}: {refusal}",) if refusal else doubts_of_sound(found.observations)
     pictures = found.refused_pictures.items()
@@ -67,8 +73,30 @@ def _doubts(found: Answer) -> tuple[str, ...]:
     return (
         *of_sound,
         f"the answer is ambiguous: {len(found.last.modes)} places stay likely ({shares}); "
-        "one more contact elsewhere on the object would tell them apart",
+        f"{further_contact([mode.position for mode in found.last.modes], symmetry, found.model.mesh)}",
     )
+
+
+def further_contact(places: Sequence[FloatArray], symmetry: SymmetryGroup, mesh: Mesh) -> str:
+    """State whether another contact can distinguish the places that stay likely.
+
+    Args:
+        places: ``(3,)`` positions on the object, the likeliest first, m.
+        symmetry: rotations that leave the object unchanged.
+        mesh: the object.
+    """
+    distances = [symmetry.distance(places[0], place) for place in places[1:]]
+    if _is_ball(mesh, symmetry.tolerance) or max(distances) < SAME_PLACE:
+        return (
+            "the object is the same at all of them by its symmetry, and no further contact distinguishes them"
+        )
+    return "one more contact elsewhere on the object can distinguish them"
+
+
+def _is_ball(mesh: Mesh, tolerance: float) -> bool:
+    """Whether every rotation about its centre leaves the surface unchanged."""
+    radii = np.linalg.norm(mesh.vertices - 0.5 * mesh.bounds.sum(axis=0), axis=1)
+    return bool(np.ptp(radii) < 2.0 * tolerance)
 
 
 def estimate_of(scored: Scored, last: Estimate) -> dict[str, Any]:

@@ -23,14 +23,14 @@ _CONTACT_BEYOND = 0.7
 def sensor_depth(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
     """``(n,)`` m that ``(n, 3)`` points are deep in what the sensor's housing passed; below 0 beside it."""
     deepest = np.full(len(points), -np.inf)
-    for touch in evidence.touches:
+    for touch in evidence.distinct:
         np.maximum(deepest, _depth_in_housing(evidence, touch, points), out=deepest)
     return deepest
 
 
 def depth_of_touches(evidence: ShapeEvidence, points: FloatArray) -> FloatArray:
     """``(touches,)`` m that the deepest of ``(n, 3)`` points is in what each housing passed; 0 at least."""
-    deepest = [float(_depth_in_housing(evidence, touch, points).max()) for touch in evidence.touches]
+    deepest = [float(_depth_in_housing(evidence, touch, points).max()) for touch in evidence.distinct]
     return np.asarray(np.maximum(deepest, 0.0))
 
 

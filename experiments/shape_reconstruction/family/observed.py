@@ -183,7 +183,7 @@ def _numbered(parts: list[FloatArray]) -> IntArray:
 
 def _free_places(evidence: ShapeEvidence, coarse: bool) -> FloatArray:
     """``(k, 3)`` m inside the housing and, of a miss, before the gel, above the support."""
-    places = [_of_touch(evidence, touch, coarse) for touch in evidence.touches]
+    places = [_of_touch(evidence, touch, coarse) for touch in evidence.distinct]
     free = _stacked(places, 3)
     return np.ascontiguousarray(free[free[:, 2] > 0.0])
 
