@@ -39,8 +39,13 @@ MORE_OBJECTS = {
     "coffeemug": ("meshes/contactdb_objects/coffeemug.stl", "m", "ceramic"),
     "banana": ("meshes/ycb_isaac/011_banana/textured.obj", "cm", "plastic"),
     "drill": ("meshes/ycb_sim/035_power_drill/035_power_drill.obj", "m", "plastic"),
+    "hammer": ("meshes/contactdb_objects/hammer.stl", "m", "steel"),
+    "lightbulb": ("meshes/contactdb_objects/lightbulb.stl", "m", "glass"),
+    "fryingpan": ("meshes/contactdb_objects/fryingpan.stl", "m", "steel"),
+    "scissors": ("meshes/ycb_ocrtoc/scissors/textured.obj", "m", "steel"),
 }
-"""Real meshes beside those of every experiment; of no family are the last two."""
+"""Real meshes besides those of every experiment; banana, drill, hammer and scissors are of no class of the
+family."""
 
 COLUMNS = (
     MeasuredColumn("chamfer_points_m", "published", "mm"),

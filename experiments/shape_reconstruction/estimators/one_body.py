@@ -113,8 +113,8 @@ def _join(
 def _bridge(cells: FloatArray, body: BoolArray, piece: BoolArray) -> BoolArray:
     """Corners of a bar three cells thick between two pieces, where the field is lowest between them."""
     costs = MCP_Geometric(_STEP + np.maximum(cells, 0.0))
-    total, _ = costs.find_costs(np.argwhere(body), find_all_ends=True)
     ends = np.argwhere(piece)
+    total, _ = costs.find_costs(np.argwhere(body), ends, find_all_ends=False)
     end = ends[int(np.argmin(total[tuple(ends.T)]))]
     path = np.zeros(cells.shape, bool)
     path[tuple(np.array(costs.traceback(tuple(int(k) for k in end))).T)] = True

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy import ndimage
@@ -12,13 +13,13 @@ from experiments.shape_reconstruction.estimators.contact_samples import ContactS
 from experiments.shape_reconstruction.estimators.free_space import CLEARANCE, Silhouette, sensor_depth
 from experiments.shape_reconstruction.estimators.grid import Grid
 from experiments.shape_reconstruction.estimators.knowledge import known_by, limited_sides, not_bounded
-from experiments.shape_reconstruction.evidence import ShapeEvidence
+from experiments.shape_reconstruction.evidence import SeenMask, ShapeEvidence
 from experiments.shape_reconstruction.fusion.acceptance import Candidate, folds_of
 from experiments.shape_reconstruction.pcn.completed_surface import closing_field
 from experiments.shape_reconstruction.pcn.glance import shipped, silhouette_to_glance_at
 from experiments.shape_reconstruction.pcn.glanced_surface import BLUR, GAP, prior_deviation
 from experiments.shape_reconstruction.surface import ShapeEstimate
-from harness.basics.arrays import FloatArray, IntArray
+from harness.basics.arrays import FloatArray, IntArray, read_only
 
 AMPLITUDE, LENGTH = 6.0e-3, 20.0e-3
 """Standard deviation and correlation length of the prior's error, m: chosen among five pairs on 14
@@ -35,7 +36,6 @@ READING = 0.7e-3
 
 _POINT, _OFFSET = 1.0e-3, 1.5e-3
 _SILHOUETTE = 1.0e-3
-_CHUNK = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,23 +72,24 @@ def bend_prior(evidence: ShapeEvidence) -> Candidate:
     start = time.perf_counter()
     whole = all_samples(evidence)
     unshifted = silhouette_to_glance_at(evidence)
-    predicted = shipped().points(unshifted.look)
     silhouette = Silhouette.of(unshifted.look, whole.points)
     samples = thinned(whole)
-    grid, field = _prior_distance(predicted)
+    grid, field, prior_error = _prior_distance(unshifted.look)
     data = _contact_data(samples, grid, field)
     precision = cho_factor(_covariance(data.points, data.points) + np.diag(data.sigmas**2))
     weights = cho_solve(precision, data.residuals)
-    places = grid.points
-    bent = field + np.concatenate(
-        [_covariance(places[k : k + _CHUNK], data.points) @ weights for k in range(0, len(places), _CHUNK)]
-    )
-    body = grid.surface(np.maximum(bent, _outside(evidence, silhouette, places)), whole.points)
+    values, places = field.copy(), grid.points
+    near = np.flatnonzero(field < MARGIN)  # farther out contacts bend nothing into the body
+    values[near] = np.maximum(field[near], _outside(evidence, silhouette, places[near]))
+    near = near[(values[near] < 2.0 * grid.pitch) & (field[near] > -MARGIN)]
+    bent = field[near] + _covariance(places[near], data.points) @ weights
+    values[near] = np.maximum(bent, _outside(evidence, silhouette, places[near]))
+    body = grid.surface(values, whole.points)
     left_out = _left_out(data, len(evidence.contacts))
     known, sides = known_by(body.mesh, whole, silhouette), limited_sides(body.mesh, whole, silhouette)
     between = _covariance(body.mesh.vertices, data.points)
     explained = np.einsum("ij,ji->i", between, cho_solve(precision, between.T)) / AMPLITUDE**2
-    unsure = max(prior_deviation(unshifted, predicted), float(np.sqrt(np.mean(left_out**2))))
+    unsure = max(prior_error, float(np.sqrt(np.mean(left_out**2))))
     estimate = ShapeEstimate(
         mesh=body.mesh,
         deviation=np.hypot(unsure * np.sqrt(np.clip(1.0 - explained, 0.0, 1.0)), READING),
@@ -102,13 +103,19 @@ def bend_prior(evidence: ShapeEvidence) -> Candidate:
     return Candidate(estimate, left_out)
 
 
-def _prior_distance(points: FloatArray) -> tuple[Grid, FloatArray]:
-    """A grid around the prior, and ``(corners,)`` m: signed distance of the prior's surface."""
+@lru_cache(maxsize=4)
+def _prior_distance(look: SeenMask) -> tuple[Grid, FloatArray, float]:
+    """A grid around the prior, ``(corners,)`` m its signed distance, and m, its standard deviation.
+
+    The estimates of a run share one picture: its prior is kept.
+    """
+    points = shipped().points(look)
     grid, closing = closing_field(points, GAP, BLUR, MARGIN)
     inside = closing.reshape(grid.shape) < 0.0
     apart = ndimage.distance_transform_edt(~inside) - ndimage.distance_transform_edt(inside)
     signed = grid.pitch * (apart - 0.5 * np.sign(apart))
-    return grid, np.asarray(ndimage.gaussian_filter(signed, BLUR)).ravel()
+    field = read_only(np.asarray(ndimage.gaussian_filter(signed, BLUR)).ravel())
+    return grid, field, prior_deviation(Silhouette.of(look, np.zeros((0, 3))), points)
 
 
 def _contact_data(samples: ContactSamples, grid: Grid, field: FloatArray) -> _Data:
