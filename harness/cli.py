@@ -16,12 +16,13 @@ from inspect import cleandoc, signature
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
+from rich.markup import escape
 from typer.exceptions import TyperException
 
 from harness.basics.answers import answers_alone, write_answer
 from harness.basics.errors import TouchstoneError, WrongUse
 from harness.bench.experiments import EXPERIMENTS
+from harness.commands.terminal import SafeConsole, escape_controls, escape_message
 
 
 class Interrupted(TouchstoneError):
@@ -235,7 +236,7 @@ def _ended(arguments: list[str], as_json: bool) -> int:
         # Ours name what is not there; a library's do not.
         if isinstance(error, NotImplementedError) and error.args:
             return _report(str(error), WrongUse.kind(), WrongUse.exit_code, as_json)
-        traceback.print_exc()
+        sys.stderr.write(escape_controls(traceback.format_exc()))
         return _report(_unforeseen(error), UNFORESEEN, 1, as_json)
     return result if isinstance(result, int) else 0
 
@@ -326,7 +327,7 @@ def _stub() -> None:
 
 
 def _report(message: str, kind: str, code: int, as_json: bool) -> int:
-    Console(stderr=True, highlight=False, soft_wrap=True).print(f"[bold red]error:[/] {_escape(message)}")
+    SafeConsole(stderr=True).print(f"[bold red]error:[/] {escape(escape_message(message))}")
     if as_json:
         write_answer(json.dumps({"schema": 1, "error": message, "kind": kind, "exit_code": code}))
     return code
@@ -343,7 +344,3 @@ def _unforeseen(error: Exception) -> str:
         f"Touchstone failed in a way that nobody foresaw ({type(error).__name__}); report the lines above "
         "this one, with the command and its files"
     )
-
-
-def _escape(message: str) -> str:
-    return message.replace("[", r"\[")

@@ -45,7 +45,8 @@ class Dimension:
         Raises:
             ValueError: no number, no unit, a unit of something else, or a number too large.
         """
-        match = _TEXT.fullmatch(text) if isinstance(text, str) else None
+        # Keyboards write the prefix micro as a Greek mu too.
+        match = _TEXT.fullmatch(text.replace("\u03bc", "\u00b5")) if isinstance(text, str) else None
         bare = isinstance(text, int | float) and not isinstance(text, bool)
         if bare or (match is not None and match.group(2) is None):
             raise ValueError(f"{text!r} has no unit; write {self.name} as {self._write()}")

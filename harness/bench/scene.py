@@ -42,6 +42,9 @@ UNITS = ("m", "cm", "mm", "in")
 _REACHED = (0.05, 0.45)
 """M: objects that an arm at this bench can reach around."""
 
+_SIZES = (1e-3, 10.0)
+"""Longest sides that may be requested, in m; the squares and cubes of smaller and larger ones lose digits."""
+
 _Z = np.array([0.0, 0.0, 1.0])
 _UPRIGHT = {
     "z": np.eye(3),
@@ -141,6 +144,18 @@ class SceneObject(StrictModel):
             raise ValueError(f"there is no built-in object {name!r}; {nearest(name, BUILTIN_MATERIALS)}")
         material = data.get("material")
         return data if material is not None else {**data, "material": BUILTIN_MATERIALS[name]}
+
+    @field_validator("sizes", mode="after")
+    @classmethod
+    def _require_a_range(cls, sizes: tuple[float, float] | None) -> tuple[float, float] | None:
+        """Refuse sizes that no robot can press: their squares and cubes leave the range of numbers."""
+        low, high = _SIZES
+        if sizes is not None and not low <= sizes[0] < sizes[1] <= high:
+            raise ValueError(
+                f"the longest side of an object lies between {low * 1e3:g} mm and {high:g} m; give a smaller "
+                "and a larger size within that"
+            )
+        return sizes
 
     @model_validator(mode="after")
     def _sizes_are_of_a_hidden_one(self) -> "SceneObject":

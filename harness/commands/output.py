@@ -11,7 +11,6 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import (
     BarColumn,
@@ -25,6 +24,7 @@ from rich.progress import (
 
 from harness.basics.answers import write_answer
 from harness.basics.errors import TouchstoneError
+from harness.commands.terminal import SafeConsole, escape_message
 
 if TYPE_CHECKING:
     from harness.recording.step_file import Step
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 WIDE = 132
 """Columns of a table where what it is written to is no terminal."""
 
-CONSOLE = Console(stderr=True, highlight=False, soft_wrap=True, width=None if sys.stderr.isatty() else WIDE)
+CONSOLE = SafeConsole(stderr=True, width=None if sys.stderr.isatty() else WIDE)
 A_MINUTE = 60.0
 """s after which a work that has no bar says how far it is."""
 
@@ -42,7 +42,7 @@ _REPEAT = 1.0
 _DIGITS = re.compile(r"[\d.]+")
 """What changes in what is being done without another stage beginning."""
 
-ANSWERS = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else WIDE)
+ANSWERS = SafeConsole(width=None if sys.stdout.isatty() else WIDE)
 
 
 def emit(result: Mapping[str, Any]) -> None:
@@ -52,7 +52,7 @@ def emit(result: Mapping[str, Any]) -> None:
 
 def warn(sentence: str) -> None:
     """Something the operator should know."""
-    CONSOLE.print(f"[yellow]note:[/] {escape(sentence)}")
+    CONSOLE.print(f"[yellow]note:[/] {escape(escape_message(sentence))}")
 
 
 @contextmanager

@@ -140,7 +140,7 @@ def _plain(text: str) -> Any:
     """A value as TOML has it; words without quotes are text."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):
         return text
 
 

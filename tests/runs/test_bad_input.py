@@ -207,3 +207,13 @@ def test_a_run_whose_header_is_damaged(refused: Refused, tmp_path: Path) -> None
     said = refused(["run", "--resume", str(tmp_path / "run")])
     assert said.code == 1
     assert "run.json" in said.error
+
+
+@pytest.mark.parametrize(
+    "sizes", [("1e-320m", "1m"), ("5cm", "1e300m"), ("5cm", "5cm"), ("0.1mm", "1m"), ("1m", "11m")]
+)
+def test_a_range_of_sizes_that_no_object_has(refused: Refused, sizes: tuple[str, str]) -> None:
+    said = refused(["run", "scale-estimation", "--object", "builtin:mug", "--range", *sizes])
+    assert said.code == 2
+    assert "'object.sizes'" in said.error
+    assert "between 1 mm and 10 m" in said.error

@@ -102,7 +102,9 @@ def read_catalogue(path: Path) -> Catalogue:
         try:
             rows.append(_row(row))
         except RowRefused as refused:
-            excluded.append(ExcludedRow(row.get("name", "").strip() or where, f"{where}: {refused}"))
+            name = row.get("name", "").strip() or where
+            # Lines of a report begin with it.
+            excluded.append(ExcludedRow(" ".join(name.splitlines()), f"{where}: {refused}"))
     if not rows and not excluded:
         raise WrongUse(f"{path} lists no object; write a row of {', '.join(PUBLISHED)} for each")
     unique, again = _unique(rows)

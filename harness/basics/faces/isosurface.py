@@ -28,12 +28,17 @@ def isosurface(field: FloatArray, origin: FloatArray, pitch: float) -> Mesh:
         Watertight and outward; it leaves the grid by at most a cell where the inside reaches its border.
 
     Raises:
-        OutOfDomain: a field that is not finite, or is nowhere below zero.
+        OutOfDomain: a field that is empty, not finite, or is nowhere below zero.
     """
-    if field.ndim != 3 or not np.isfinite(field).all() or not (np.isfinite(pitch) and pitch > 0.0):
+    if (
+        field.ndim != 3
+        or field.size == 0
+        or not np.isfinite(field).all()
+        or not (np.isfinite(pitch) and pitch > 0.0)
+    ):
         raise OutOfDomain(
             f"a field of shape {field.shape} with {np.count_nonzero(~np.isfinite(field))} numbers not "
-            f"finite, at a pitch of {pitch:g} m, has no surface; give three finite axes and a pitch above 0"
+            f"finite, at a pitch of {pitch:g} m, has no surface; give three axes of numbers and a pitch above 0"
         )
     if not (field < 0.0).any():
         raise OutOfDomain(

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.basics import quantities
-from harness.basics.quantities import ANGLE, FORCE, LENGTH, RATIO, SPEED, Dimension
+from harness.basics.quantities import ANGLE, FORCE, LENGTH, RATIO, SPEED, TIME, Dimension
 
 DIMENSIONS = [value for value in vars(quantities).values() if isinstance(value, Dimension)]
 
@@ -104,3 +104,9 @@ def test_what_is_not_a_number_is_refused(text: object) -> None:
 def test_a_number_beyond_floating_point_is_refused() -> None:
     with pytest.raises(ValueError, match="too large"):
         LENGTH.parse("1e999 m")
+
+
+@pytest.mark.parametrize("mu", ["\u00b5", "\u03bc", "u"])
+def test_micro_is_written_with_any_mu(mu: str) -> None:
+    assert LENGTH.parse(f"12 {mu}m") == 12e-6
+    assert TIME.parse(f"3{mu}s") == 3e-6

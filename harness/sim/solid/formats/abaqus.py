@@ -232,10 +232,11 @@ class _Reader:
                 f"{len(numbers)} numbers are no whole number of elements of {width - 1} nodes; the file is "
                 "cut short or damaged, export it again",
             )
+        if not numbers:
+            self._refuse(keyword, "no element follows; the file is cut short or damaged, export it again")
         require_few(len(numbers) // width, "elements", self._name)
-        if numbers:
-            rows = np.array(numbers, dtype=np.int64).reshape(-1, width)[:, 1:]
-            self._scope.elements.append((kind, rows, keyword.line))
+        rows = np.array(numbers, dtype=np.int64).reshape(-1, width)[:, 1:]
+        self._scope.elements.append((kind, rows, keyword.line))
 
     def _read_set(self, keyword: _Keyword) -> None:
         """Read a set of nodes; those of which the members cannot be named are left out."""

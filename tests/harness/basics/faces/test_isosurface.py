@@ -62,6 +62,7 @@ def test_single_precision_gives_the_same_surface() -> None:
     [
         (np.full((3, 3, 3), np.nan), "27 numbers not finite"),
         (np.ones((3, 3)), r"shape \(3, 3\)"),
+        (np.ones((0, 3, 3)), r"shape \(0, 3, 3\)"),
         (np.ones((3, 3, 3)), "no corner of a grid"),
     ],
 )
