@@ -38,7 +38,7 @@ def isosurface(field: FloatArray, origin: FloatArray, pitch: float) -> Mesh:
     ):
         raise OutOfDomain(
             f"a field of shape {field.shape} with {np.count_nonzero(~np.isfinite(field))} numbers not "
-            f"finite, at a pitch of {pitch:g} m, has no surface; give three axes of numbers and a pitch above 0"
+            f"finite, at a pitch of {pitch:g} m, has no surface; give three axes and a larger pitch"
         )
     if not (field < 0.0).any():
         raise OutOfDomain(
