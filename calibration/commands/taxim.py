@@ -332,7 +332,7 @@ def _pitch_of_pictures(sensor: "TactileSensor | None", pictures: "Pictures") -> 
             f"the pictures are {columns} x {rows} pixels and {sensor.name} has {sensor.columns} x "
             f"{sensor.rows}: they are not its whole picture; give --pitch, or the sensor that took them"
         )
-    return sensor.pitch * (down * right) ** 0.5
+    return float(sensor.pitch * (down * right) ** 0.5)
 
 
 def _channels(text: str | None) -> "Channels | None":

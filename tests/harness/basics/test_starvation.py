@@ -72,7 +72,7 @@ def test_a_busy_computer_is_named_before_the_hardware(monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize(("load", "busy"), [(0.5, False), (50000.0, True)])
 def test_the_load_tells_a_busy_computer(load: float, busy: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(starvation.os, "getloadavg", lambda: (load, load, load))
+    monkeypatch.setattr("os.getloadavg", lambda: (load, load, load))
     monkeypatch.setattr(starvation, "BUSY_PRESSURE", 1e9)
     assert starvation.is_busy() == busy
 

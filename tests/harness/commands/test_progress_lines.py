@@ -69,7 +69,7 @@ def test_a_stage_that_reports_nothing_is_repeated_with_the_time_since_the_start(
 ) -> None:
     now = Clock()
     monkeypatch.setattr(output, "_REPEAT", 0.01)
-    monkeypatch.setattr(output.time, "monotonic", now)
+    monkeypatch.setattr("time.monotonic", now)
     monkeypatch.setattr(output, "Pace", lambda: Pace(now))
     with output.share_progress() as report:
         report("filling the mesh", 0.0)

@@ -23,11 +23,11 @@ def seen(mask: BoolArray, noise: float) -> BoolArray:
     """Read the mask back from a picture of the object and one of the bench, both noisy."""
     random, bare = np.random.default_rng(0), np.full((ROWS, COLUMNS, 3), 90.0)
     live = np.where(mask[..., None], 160.0, bare)
-    pictures = (
+    picture, background = (
         np.clip(one + noise * random.standard_normal(one.shape), 0, 255).astype(np.uint8)
         for one in (live, bare)
     )
-    return mask_by_background(*pictures)
+    return mask_by_background(picture, background)
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.15, -0.3])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from harness.basics.errors import RecordingDamaged
-from harness.recording.checksums import SUM
+from harness.basics.files.json_file import CHECKSUM
 from harness.recording.recording import Recording, RunHeader, header_of
 from harness.recording.step_file import StepRecord, step_of
 from tests.samples.recorded_step import OFFSET_NS, OLD_RUN, sample_header, sample_step
@@ -214,7 +214,10 @@ def test_a_value_of_run_json_that_was_changed_does_not_agree_with_its_checksum(r
     """Another seed is a header like any other; only the checksum shows that it is not the run's."""
     path = run.folder / "run.json"
     fields = json.loads(path.read_text())
-    for changed in ({**fields, "seed": fields["seed"] + 1}, {k: v for k, v in fields.items() if k != SUM}):
+    for changed in (
+        {**fields, "seed": fields["seed"] + 1},
+        {k: v for k, v in fields.items() if k != CHECKSUM},
+    ):
         path.write_text(json.dumps(changed))
         with pytest.raises(RecordingDamaged, match="do not agree with its checksum"):
             Recording(run.folder)
