@@ -71,7 +71,9 @@ def resolve(
 def _chosen(options: SceneOptions, assumed: Mapping[str, Mapping[str, Any]]) -> SceneFile:
     """The scene of the file, or that of the object."""
     if (options.scene is None) == (options.object is None):
-        raise WrongUse("say what is on the table: either --scene FILE or --object FILE --material M")
+        raise WrongUse(
+            "name the object on the table: either --scene NAME or --object NAME, e.g. --object mug"
+        )
     if options.object is not None:
         return _with(scene_from_options(options.object, *options.of_object), assumed)
     if any(option is not None for option in options.of_object):
