@@ -45,6 +45,9 @@ _MIN_EXPLAINED_AT_REST = 0.4
 _CLEAR = 0.25
 """Weight of the blocks from which the light is compared closely."""
 
+_FAR_BETTER = 2.0
+"""Times the blocks that agree in the same light, from which another one is used beside a wide contact."""
+
 _SIMPLE = 3
 """Models of the light, without those that would follow what a contact does to its surroundings."""
 
@@ -255,7 +258,9 @@ def _light_of_press(seen: FloatArray, rest: FloatArray) -> tuple[LightMatch, boo
     if light.explained >= _CLEAR:
         return light, True
     # Real gels change their colour around a contact, and a resting picture of another day differs by more.
-    light = match_light(seen, rest, models=2)
+    # Where a contact fills most of the view, some of its own colours agree with some gain as well.
+    light, same = (match_light(seen, rest, models=models) for models in (2, 1))
+    light = light if light.explained > _FAR_BETTER * same.explained else same
     loose = match_light(seen, rest, _CLOSE_AT_REST, _SIMPLE)
     if loose.explained < (_MIN_EXPLAINED_AT_REST if light.is_known else _CLEAR):
         return light, light.is_known
