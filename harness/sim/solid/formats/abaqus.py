@@ -52,6 +52,8 @@ _CORNERS = {"triangle": 3, "quad": 4, "triangle6": 6, "quad8": 8, "quad9": 9, "t
 }
 
 _MOST_INSTANCES = 10_000
+_MAX_KEYWORD = 4096
+"""Characters of a keyword line with its continuations."""
 
 
 @dataclass
@@ -156,6 +158,10 @@ class _Reader:
         following = next(self._lines, None)
         while text.endswith(b",") and following is not None and not following[1].startswith(b"*"):
             text += following[1]
+            if len(text) > _MAX_KEYWORD:
+                raise MeshRefused(
+                    f"{self._name}, line {line}: a keyword has over {_MAX_KEYWORD:,} characters"
+                )
             following = next(self._lines, None)
         first, *options = text[1:].decode("utf-8", "replace").split(",")
         pairs = (option.partition("=") for option in options if option.strip())
